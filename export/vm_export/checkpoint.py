@@ -1,0 +1,64 @@
+"""Checkpoints: a network's description, its manifest and its weights in one .pt file of plain values."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import torch
+
+from vm_embedded.errors import InputError, ModelError
+from vm_embedded.manifest import Manifest
+
+from .network import Network, NetworkShape
+
+_FORMAT = "vm-embedded checkpoint 1"
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """A trained network and what its model file will say about it. The manifest has no self-test yet."""
+
+    network: Network
+    manifest: Manifest
+
+    def __post_init__(self) -> None:
+        shape, manifest = self.network.shape, self.manifest
+        if shape.classes != len(manifest.classes):
+            raise ModelError(f"the network has {shape.classes} outputs, the manifest {len(manifest.classes)} classes")
+        if shape.neighbors != manifest.neighbors:
+            raise ModelError(f"the network has {shape.neighbors} neighbors, mesh {manifest.mesh} {manifest.neighbors}")
+
+    def save(self, path: str | Path) -> None:
+        """Write the checkpoint, beside and then renamed."""
+        path = Path(path)
+        beside = path.with_name(path.name + ".part")
+        content = {
+            "format": _FORMAT,
+            "network": self.network.shape.as_dict(),
+            "manifest": json.loads(replace(self.manifest, self_test=None).as_json()),
+            "state": self.network.state_dict(),
+        }
+        torch.save(content, beside)
+        os.replace(beside, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Checkpoint:
+        """Read a checkpoint; nothing in it is executed. Raises InputError or ModelError."""
+        try:
+            content = torch.load(path, map_location="cpu", weights_only=True)
+        except OSError as error:
+            raise InputError(f"can't read {path}: {error.strerror or error}") from error
+        except (pickle.UnpicklingError, RuntimeError, EOFError, ValueError, KeyError) as error:
+            raise InputError(f"{path} is no checkpoint: {str(error).splitlines()[0]}") from error
+        if not isinstance(content, dict) or content.get("format") != _FORMAT:
+            raise InputError(f"{path} is no checkpoint of this format ({_FORMAT!r})")
+        network = Network(NetworkShape.from_dict(content["network"]))
+        try:
+            network.load_state_dict(content["state"])
+        except (RuntimeError, KeyError) as error:
+            raise InputError(f"{path}: weights do not fit the network: {str(error).splitlines()[0]}") from error
+        return cls(network.eval(), Manifest.from_json(json.dumps(content["manifest"])))

@@ -1,0 +1,34 @@
+"""The Visual Mesh detector for robots: numpy, ONNX Runtime and OpenCV, nothing else."""
+
+from importlib.metadata import version
+
+from .detections import ClassPoints, Detection, Detections
+from .detector import Detector
+from .errors import GeometryError, InputError, ModelError, VisualMeshError
+from .lens import Equidistant, Equisolid, Lens, Rectilinear
+from .lens_file import read_lens_file
+from .lens_opencv import BrownLens, FisheyeLens
+from .orientation import Orientation
+from .settings import Settings
+
+__all__ = [
+    "BrownLens",
+    "ClassPoints",
+    "Detection",
+    "Detections",
+    "Detector",
+    "Equidistant",
+    "Equisolid",
+    "FisheyeLens",
+    "GeometryError",
+    "InputError",
+    "Lens",
+    "ModelError",
+    "Orientation",
+    "Rectilinear",
+    "Settings",
+    "VisualMeshError",
+    "read_lens_file",
+]
+
+__version__ = version("vm-embedded")

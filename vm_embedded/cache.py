@@ -1,0 +1,114 @@
+"""Prepared work: which part of which mesh can be on screen, for a bucket of similar orientations.
+
+A bucket never changes an answer. It holds every point that any orientation in it can bring on screen, and each frame
+is projected with its own orientation; only the mesh itself depends on the bucket's height, by the tolerance that the
+user sets.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Floats
+from .lens import Lens, Size
+from .manifest import Manifest
+from .mesh import Mesh, ring_mesh
+from .orientation import Orientation, rotation_z
+from .projection import may_be_on_screen
+from .settings import Settings
+
+_ROUNDING = 2e-3
+"""Slack [rad] for rotations that are not quite rotations, as far as Orientation lets them pass."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What a frame is projected with.
+
+    mesh: the points that may be on screen. mesh_height: the camera height that it was built for [m]. rotation (3, 3):
+    camera to mesh frame. heading (3, 3): mesh frame to the frame's observation plane, a turn around the vertical.
+    """
+
+    mesh: Mesh
+    mesh_height: float
+    rotation: Floats
+    heading: Floats
+
+
+class MeshCache:
+    """Least recently used meshes and parts of meshes, up to a limit of memory.
+
+    `hits`, `misses` and `nbytes` [bytes] may be read at any time.
+    """
+
+    def __init__(self, manifest: Manifest, settings: Settings) -> None:
+        self.manifest = manifest
+        self.settings = settings
+        self.shape = manifest.mesh_shape
+        self.hits = 0
+        self.misses = 0
+        self.nbytes = 0
+        self._limit = settings.cache_mib * 2**20
+        self._meshes: OrderedDict[Hashable, Mesh] = OrderedDict()
+
+    @property
+    def hit_rate(self) -> float:
+        """Share of look-ups that needed no preparation; 0 before the first."""
+        return self.hits / max(self.hits + self.misses, 1)
+
+    def view(self, orientation: Orientation, lens: Lens, size: Size) -> View:
+        """The view for a frame. Raises GeometryError if the camera is too low for the mesh's shape."""
+        height = self.mesh_height(orientation.height)
+        if self.settings.height_tolerance == 0.0:
+            mesh = self._look_up(height, lambda: self._build(height))
+            return View(mesh, height, orientation.rotation, np.eye(3))
+        pitch = round(orientation.pitch / self.settings.pitch_step)
+        roll = round(orientation.roll / self.settings.roll_step)
+        mesh = self._look_up(
+            (height, pitch, roll, lens, size), lambda: self._prepare(height, pitch, roll, lens, size)
+        )
+        return View(mesh, height, orientation.level, rotation_z(orientation.yaw))
+
+    def mesh_height(self, height: float) -> float:
+        """Height [m] of the mesh that serves a camera height [m].
+
+        The number of rings across an object is proportional to the shape's spacing, so heights whose spacings form a
+        geometric series with ratio (1 + t / k)^2 leave no height farther than t rings from its mesh.
+        """
+        tolerance, k = self.settings.height_tolerance, self.manifest.intersections
+        spacing = float(self.shape.spacing(height))
+        if tolerance == 0.0:
+            return height
+        step = 2.0 * math.log1p(tolerance / k)
+        return self.shape.height_of(math.exp(step * round(math.log(spacing) / step)))
+
+    def _build(self, height: float) -> Mesh:
+        manifest = self.manifest
+        return ring_mesh(self.shape, height, manifest.intersections, manifest.max_distance, manifest.mesh)
+
+    def _prepare(self, height: float, pitch: int, roll: int, lens: Lens, size: Size) -> Mesh:
+        """The part of the mesh that orientations of this bucket can bring on screen."""
+        mesh = self._look_up(height, lambda: self._build(height), counted=False)
+        pitch_step, roll_step = self.settings.pitch_step, self.settings.roll_step
+        middle = Orientation.from_roll_pitch(height, roll * roll_step, pitch * pitch_step)
+        # Turns around two axes add up to at most the sum of their angles.
+        slack = 0.5 * (pitch_step + roll_step) + _ROUNDING
+        return mesh.part(np.flatnonzero(may_be_on_screen(mesh, middle.rotation, lens, size, slack)))
+
+    def _look_up(self, key: Hashable, make: Callable[[], Mesh], counted: bool = True) -> Mesh:
+        mesh = self._meshes.get(key)
+        if counted:
+            self.hits += mesh is not None
+            self.misses += mesh is None
+        if mesh is None:
+            mesh = self._meshes[key] = make()
+            self.nbytes += mesh.nbytes
+        self._meshes.move_to_end(key)
+        while self.nbytes > self._limit and self._meshes:
+            self.nbytes -= self._meshes.popitem(last=False)[1].nbytes
+        return mesh

@@ -1,0 +1,193 @@
+"""vm-detect: from frames to JSON lines."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from .configuration import Configuration, angle, length, read_configuration
+from .detector import Detector
+from .errors import InputError, VisualMeshError
+from .lens import Lens
+from .lens_file import read_lens_file
+from .orientation import Orientation
+from .settings import Settings
+from .sinks import json_line, make_folder, save_overlay, save_points
+from .sources import Frame, open_source
+
+EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line of vm-detect; its settings are the fields of Settings."""
+    parser = argparse.ArgumentParser(
+        prog="vm-detect",
+        description="Find objects in frames: one line of JSON for each frame on standard output.",
+        epilog="Exit status: 0 at least one frame was processed (bad ones are named on standard error), 1 none was, "
+        "2 wrong usage, 130 interrupted. Angles are radians, or degrees with a suffix as in 20deg.",
+    )
+    parser.add_argument(
+        "--camera",
+        required=True,
+        metavar="SOURCE",
+        help="an image, a directory or quoted glob of images, a video file, or a camera's number or device",
+    )
+    parser.add_argument("--model", type=Path, metavar="FILE", help="network that vm-export wrote (.onnx)")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="vm.toml; options on the command line override it")
+    pose = parser.add_argument_group(
+        "lens and orientation", "for frames imageNAME.* without a lensNAME.yaml beside them, which goes first"
+    )
+    pose.add_argument("--lens", type=Path, metavar="FILE", help="lens file: reference or calibration YAML, or TOML")
+    pose.add_argument("--height", metavar="M", help="height of the camera over the plane [m]")
+    pose.add_argument("--pitch", metavar="ANGLE", help="angle of the optical axis below the horizon; default 0")
+    pose.add_argument("--roll", metavar="ANGLE", help="lean of the camera to the right; default 0")
+    output = parser.add_argument_group("output")
+    output.add_argument("--save-overlay", type=Path, metavar="DIR", help="write pictures with what was found")
+    output.add_argument("--save-points", type=Path, metavar="DIR", help="write NAME.npz: pixels, rays, probabilities")
+    output.add_argument("--emit-points", metavar="CLASS,...", help="list the points of these classes in the JSON")
+    output.add_argument("--explain", action="store_true", help="list rejected clusters in the JSON, with reasons")
+    settings = parser.add_argument_group("settings")
+    for each in fields(Settings):
+        unit, limits = each.metadata["unit"], each.metadata.get("range")
+        default = "the model's" if each.default is None else each.default
+        help = f"{each.metadata['help']}{f' [{unit}]' if unit else ''}; default {default}"
+        option = "--" + each.name.replace("_", "-")
+        if "allowed" in each.metadata:
+            settings.add_argument(option, choices=each.metadata["allowed"], help=help)
+        elif limits is None:
+            settings.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=help)
+        else:
+            kind = int if isinstance(each.default, int) else float
+            settings.add_argument(option, type=kind, metavar="N" if kind is int else "X", help=help)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run vm-detect and return its exit status."""
+    options = parser().parse_args(arguments)
+    try:
+        return _run(options)
+    except VisualMeshError as error:
+        _complain(str(error))
+        return EXIT_FAILED
+    except BrokenPipeError:
+        # Whoever read the lines has seen enough; keep the interpreter from complaining when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_OK
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+
+
+@dataclass(frozen=True)
+class _Pose:
+    """Lens and orientation for frames that bring none; None where the user gave none."""
+
+    lens: Lens | None
+    orientation: Orientation | None
+
+    def of(self, frame: Frame) -> tuple[Lens, Orientation]:
+        """Lens and orientation of a frame. Raises InputError saying what is missing."""
+        lens, orientation = self.lens, self.orientation
+        beside = _lens_beside(frame.path)
+        if beside is not None:
+            file = read_lens_file(beside)
+            lens, orientation = file.lens, file.orientation or orientation
+        if lens is None:
+            raise InputError("no lens: give --lens, or put lensNAME.yaml beside imageNAME")
+        if orientation is None:
+            raise InputError("no orientation: give --height (and --pitch, --roll), or Hoc in lensNAME.yaml")
+        return lens, orientation
+
+
+def _lens_beside(path: Path | None) -> Path | None:
+    """lensNAME.yaml beside imageNAME.jpg, if it is there."""
+    if path is None or not path.stem.startswith("image"):
+        return None
+    beside = path.with_name("lens" + path.stem.removeprefix("image") + ".yaml")
+    return beside if beside.exists() else None
+
+
+def _run(options: argparse.Namespace) -> int:
+    configured = read_configuration(options.config) if options.config else Configuration()
+    model = options.model or configured.model
+    if model is None:
+        raise InputError("no model: give --model FILE, a network that vm-export wrote")
+    given = {each.name: getattr(options, each.name) for each in fields(Settings)}
+    settings = Settings(**{**configured.settings, **{name: value for name, value in given.items() if value is not None}})
+    pose = _Pose(read_lens_file(options.lens).lens if options.lens else configured.lens, _fixed(options, configured))
+    detector = Detector.from_file(model, settings)
+    emit = [name.strip() for name in options.emit_points.split(",")] if options.emit_points else []
+    for name in emit:
+        detector.manifest.column(name)
+    source = open_source(options.camera, raw=settings.format != "bgr")
+    for folder in (options.save_overlay, options.save_points):
+        if folder is not None:
+            make_folder(folder)
+
+    processed = 0
+    progress = _Progress(source.count)
+    for frame in source.frames:
+        try:
+            line = _process(frame, detector, pose, options, emit)
+        except VisualMeshError as error:
+            progress.clear()
+            _complain(f"{frame.source}: {error}")
+            continue
+        progress.clear()
+        print(line, flush=True)
+        processed += 1
+        progress.show(frame.index + 1)
+    progress.clear()
+    return EXIT_OK if processed else EXIT_FAILED
+
+
+def _process(frame: Frame, detector: Detector, pose: _Pose, options: argparse.Namespace, emit: Sequence[str]) -> str:
+    image = frame.read()
+    lens, orientation = pose.of(frame)
+    detections = detector.detect(image, orientation, lens, explain=options.explain)
+    if options.save_points is not None:
+        save_points(options.save_points, frame, detections)
+    if options.save_overlay is not None:
+        save_overlay(options.save_overlay, frame, image, detections)
+    return json_line(frame, detections, emit, options.explain)
+
+
+def _fixed(options: argparse.Namespace, configured: Configuration) -> Orientation | None:
+    """The orientation of the command line and the configuration, or None without a height."""
+    height = length(options.height) if options.height is not None else configured.height
+    pitch = angle(options.pitch) if options.pitch is not None else configured.pitch
+    roll = angle(options.roll) if options.roll is not None else configured.roll
+    if height is None:
+        if pitch is not None or roll is not None:
+            raise InputError("pitch and roll need a height: give --height")
+        return None
+    return Orientation.from_roll_pitch(height, roll or 0.0, pitch or 0.0)
+
+
+def _complain(message: str) -> None:
+    print(f"vm-detect: {' '.join(message.split())}", file=sys.stderr)
+
+
+class _Progress:
+    """A bar on standard error, if that is a terminal and the number of frames is known."""
+
+    def __init__(self, count: int | None) -> None:
+        self._count = count if count and count > 1 and sys.stderr.isatty() else None
+
+    def show(self, done: int) -> None:
+        if self._count:
+            filled = 30 * done // self._count
+            bar = "#" * filled + "." * (30 - filled)
+            print(f"\r[{bar}] {done}/{self._count}", end="", file=sys.stderr, flush=True)
+
+    def clear(self) -> None:
+        if self._count:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,73 @@
+"""Connected parts of the mesh, and how wide they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from .arrays import Indices, Mask
+
+Members = npt.NDArray[np.intp]
+"""Positions of points in a mesh, ascending."""
+
+_Edges = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
+
+
+def clusters(neighbors: Indices, positive: Mask) -> list[Members]:
+    """The connected components of the points that are `positive` (n,), largest first.
+
+    Two points are connected if either is a neighbor (n + 1, N) of the other. Labels spread along all links at once,
+    the smaller one winning, and jump to the label of their label, so the rounds needed grow with the logarithm of a
+    component's width, and nothing loops over points.
+    """
+    members = np.flatnonzero(positive)
+    a, b = _edges(neighbors, members)
+    label = np.arange(len(members))
+    while True:
+        smaller = np.minimum(label[a], label[b])
+        spread = label.copy()
+        np.minimum.at(spread, label[a], smaller)
+        np.minimum.at(spread, label[b], smaller)
+        spread = spread[spread]
+        if np.array_equal(spread, label):
+            break
+        label = spread
+    order = np.argsort(label, kind="stable")
+    starts = np.flatnonzero(np.diff(label[order], prepend=-1))
+    parts = np.split(members[order], starts[1:]) if len(members) else []
+    return sorted(parts, key=len, reverse=True)
+
+
+def graph_diameter(neighbors: Indices, members: Members, limit: int) -> int:
+    """Steps between the two members farthest apart, going through members only.
+
+    Found by two breadth-first sweeps, the second from the end of the first: exact for chains, at most a step or two
+    short for round clusters. Counting stops at limit + 1.
+    """
+    edges = _edges(neighbors, members)
+    far = int(np.argmax(_steps(edges, len(members), 0, limit)))
+    return int(_steps(edges, len(members), far, limit).max())
+
+
+def _edges(neighbors: Indices, members: Members) -> _Edges:
+    """Links between members, as positions in `members`, each in the direction that the mesh gives."""
+    position = np.full(len(neighbors), -1)
+    position[members] = np.arange(len(members))
+    ends = position[neighbors[members]]
+    starts = np.repeat(np.arange(len(members)), neighbors.shape[1])
+    inside = ends.ravel() >= 0
+    return starts[inside], ends.ravel()[inside]
+
+
+def _steps(edges: _Edges, count: int, start: int, limit: int) -> npt.NDArray[np.intp]:
+    """Steps (count,) from `start`, at most limit + 1; -1 where there is no way within them."""
+    a, b = edges
+    steps = np.full(count, -1)
+    steps[start] = 0
+    for step in range(1, limit + 2):
+        reached = np.concatenate([b[steps[a] == step - 1], a[steps[b] == step - 1]])
+        fresh = reached[steps[reached] < 0]
+        if len(fresh) == 0:
+            break
+        steps[fresh] = step
+    return steps

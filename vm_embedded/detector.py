@@ -1,0 +1,127 @@
+"""The straight line from a frame and an orientation to detections."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from .arrays import Image, Singles
+from .cache import MeshCache, View
+from .detections import Detection, Detections
+from .lens import Lens, Size
+from .objects import Scene, find_objects
+from .onnx_file import ModelFile, read_model
+from .orientation import Orientation
+from .projection import ProjectedMesh, project
+from .sampling import checked_image, sample
+from .session import Session
+from .settings import Settings
+from .shapes import shape_named
+
+
+class Detector:
+    """A network, its meshes and its settings.
+
+        detector = Detector.from_file("model.onnx")
+        for ball in detector.detect(image, orientation, lens):
+            print(ball.class_name, ball.distance, ball.position)
+
+    Not for several threads at once: they share its cache.
+    """
+
+    def __init__(self, model: ModelFile, settings: Settings | None = None) -> None:
+        self.settings = settings or Settings()
+        self.manifest = model.manifest
+        self.session = Session(model, self.settings)
+        self.cache = MeshCache(self.manifest, self.settings)
+        self.shape = shape_named(self.manifest.shape, self.settings.object_radius or self.manifest.object_radius)
+
+    @classmethod
+    def from_file(cls, path: str | Path, settings: Settings | None = None) -> Detector:
+        """From a file that vm-export wrote. Raises ModelError if it is not to be trusted or does not run."""
+        return cls(read_model(path), settings)
+
+    def detect(self, image: Image, orientation: Orientation, lens: Lens, explain: bool = False) -> Detections:
+        """What the image shows.
+
+        image: uint8 (height, width[, channels]) in the settings' pixel format. orientation: of the camera when it was
+        taken. explain: also return the rejected clusters. A camera that sees no part of the plane gives no points and
+        no detections.
+
+        Raises InputError for an image or lens that doesn't fit, GeometryError for a camera too low for the object.
+        """
+        timing: dict[str, float] = {}
+        started = perf_counter()
+        image = checked_image(image, self.settings.format)
+        size = image.shape[1], image.shape[0]
+        lens = lens.for_image(size)
+        with _timed(timing, "mesh"):
+            view = self.cache.view(orientation, lens, size)
+            rings = self._rings(orientation.height, view.mesh_height)
+        with _timed(timing, "project"):
+            projected = project(view.mesh, view.rotation, lens, size)
+        with _timed(timing, "sample"):
+            points = np.full((len(projected) + 1, 3), -1.0, dtype=np.float32)  # the last one is the off-screen point
+            sample(image, projected.pixels, self.settings.format, self.settings.sampling, out=points[:-1])
+        with _timed(timing, "infer"):
+            probabilities = self.session.run(points, projected.mesh.neighbors)
+        with _timed(timing, "cluster"):
+            found, rejected = self._objects(
+                projected, probabilities, view, orientation.height, rings, lens, size, explain
+            )
+        timing["total"] = 1e3 * (perf_counter() - started)
+        return Detections(
+            objects=tuple(sorted(found, key=lambda each: -each.confidence)),
+            rejected=tuple(rejected),
+            manifest=self.manifest,
+            mesh=projected,
+            heading=view.heading,
+            probabilities=probabilities,
+            threshold=self.settings.threshold,
+            timing_ms=timing,
+        )
+
+    def _rings(self, height: float, mesh_height: float) -> float:
+        """Mesh rings that cross an object, seen from `height` [m] through a mesh made for `mesh_height` [m]."""
+        return self.manifest.intersections * float(
+            self.shape.spacing(height) / self.cache.shape.spacing(mesh_height)
+        )
+
+    def _objects(
+        self,
+        projected: ProjectedMesh,
+        probabilities: Singles,
+        view: View,
+        height: float,
+        rings: float,
+        lens: Lens,
+        size: Size,
+        explain: bool,
+    ) -> tuple[list[Detection], list[Detection]]:
+        """Objects and rejected clusters of every object class, in the frame's own observation plane."""
+        scene = Scene(self.shape, height, view.rotation, lens, size, projected, rings)
+        found: list[Detection] = []
+        rejected: list[Detection] = []
+        for column, each in enumerate(self.manifest.classes):
+            if each.kind == "object":
+                good, bad = find_objects(scene, each.name, probabilities[:, column], self.settings, explain)
+                found += good
+                rejected += bad
+        turn = view.heading
+        return tuple(
+            [replace(each, bearing=turn @ each.bearing, position=turn @ each.position) for each in some]
+            for some in (found, rejected)
+        )  # type: ignore[return-value]
+
+
+@contextmanager
+def _timed(timing: dict[str, float], stage: str) -> Iterator[None]:
+    """Add a stage's milliseconds to `timing`."""
+    started = perf_counter()
+    yield
+    timing[stage] = 1e3 * (perf_counter() - started)

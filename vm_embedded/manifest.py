@@ -1,0 +1,178 @@
+"""What a model file says about itself: one schema, written by the exporter and read by the runtime.
+
+It travels as JSON in the .onnx file's metadata under the key `visual_mesh`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from .arrays import Indices, Singles
+from .errors import InputError, ModelError, unknown
+from .mesh import RING_NEIGHBORS
+from .shapes import SHAPES, Shape, shape_named
+
+METADATA_KEY = "visual_mesh"
+FORMAT_VERSION = 1
+
+KINDS = ("object", "upright", "area", "background")
+"""What a class is. object: has the mesh's shape and is located. upright, area: points with bearings. background."""
+
+EDGES = ("hard", "same")
+"""Where a missing neighbor leads. hard: to the off-screen point, whose input is -1. same: to the point itself."""
+
+
+@dataclass(frozen=True)
+class ObjectClass:
+    """One output of the network: its name and its kind, one of KINDS."""
+
+    name: str
+    kind: str
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ModelError(unknown(f"kind of class {self.name!r}", self.kind, KINDS))
+
+
+@dataclass(frozen=True, eq=False)
+class SelfTest:
+    """A small graph and its answer: points (n + 1, 3), neighbors (n + 1, N), probabilities (n + 1, C)."""
+
+    points: Singles
+    neighbors: Indices
+    probabilities: Singles
+
+    def as_dict(self) -> dict[str, Any]:
+        """Nested lists, with as many digits as the check needs."""
+        return {
+            "points": np.round(self.points.astype(float), 4).tolist(),
+            "neighbors": self.neighbors.tolist(),
+            "probabilities": np.round(self.probabilities.astype(float), 6).tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> SelfTest:
+        """Inverse of `as_dict`. Raises ModelError."""
+        try:
+            test = cls(
+                np.array(data["points"], dtype=np.float32),
+                np.array(data["neighbors"], dtype=np.int32),
+                np.array(data["probabilities"], dtype=np.float32),
+            )
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise ModelError(f"self-test in the model file can't be read: {error}") from error
+        rows = len(test.points) if test.points.ndim == 2 else 0
+        if rows < 1 or test.points.shape != (rows, 3) or test.neighbors.ndim != 2 or test.probabilities.ndim != 2:
+            raise ModelError("self-test in the model file has arrays of the wrong shape")
+        if len(test.neighbors) != rows or len(test.probabilities) != rows:
+            raise ModelError("self-test in the model file has arrays of different lengths")
+        if test.neighbors.size and not 0 <= test.neighbors.min() <= test.neighbors.max() < rows:
+            raise ModelError("self-test in the model file has neighbors that are no points")
+        return test
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manifest:
+    """What the runtime must know to build the mesh and read the answers of a network.
+
+    shape: circle or sphere. radius: the object's radius that the mesh is made for [m]. object_radius: that of the
+    real object [m]. intersections: rings across an object of `radius`. mesh: ring4, ring6 or ring8. max_distance of
+    the mesh [m]. edge: one of EDGES. classes: in the order of the network's outputs. channels, scale: a point's input
+    is its color in this order, times scale. sampling: the rule at pixels, "bilinear". provenance: who made it from
+    what. Raises ModelError for values that this runtime does not know.
+    """
+
+    shape: str
+    radius: float
+    object_radius: float
+    intersections: float
+    mesh: str
+    max_distance: float
+    edge: str
+    classes: tuple[ObjectClass, ...]
+    self_test: SelfTest | None = None
+    channels: str = "rgb"
+    scale: float = 1.0 / 255.0
+    sampling: str = "bilinear"
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        choices = {
+            "shape": tuple(SHAPES),
+            "mesh": tuple(RING_NEIGHBORS),
+            "edge": EDGES,
+            "channels": ("rgb",),
+            "sampling": ("bilinear",),
+        }
+        for name, allowed in choices.items():
+            if getattr(self, name) not in allowed:
+                raise ModelError(unknown(f"{name} in the model's manifest", getattr(self, name), allowed))
+        for name in ("radius", "object_radius", "intersections", "max_distance", "scale"):
+            value = getattr(self, name)
+            if not isinstance(value, int | float) or not (math.isfinite(value) and value > 0):
+                raise ModelError(f"{name} in the model's manifest must be a number above 0, not {value!r}")
+        if abs(self.scale * 255.0 - 1.0) > 1e-6:
+            raise ModelError(f"scale in the model's manifest must be 1/255, not {self.scale!r}")
+        names = [each.name for each in self.classes]
+        if not names or len(set(names)) != len(names):
+            raise ModelError(f"classes in the model's manifest must be one or more different names, not {names}")
+
+    def column(self, class_name: str) -> int:
+        """Position of a class among the outputs. Raises InputError for an unknown one."""
+        names = [each.name for each in self.classes]
+        if class_name not in names:
+            raise InputError(unknown("class", class_name, names))
+        return names.index(class_name)
+
+    @property
+    def neighbors(self) -> int:
+        """Neighbors of each point, N."""
+        return RING_NEIGHBORS[self.mesh]
+
+    @property
+    def mesh_shape(self) -> Shape:
+        """The shape that the mesh is made for."""
+        return shape_named(self.shape, self.radius)
+
+    def as_json(self) -> str:
+        """The manifest as it stands in the model file."""
+        data = asdict(self) | {"format_version": FORMAT_VERSION}
+        data["self_test"] = self.self_test.as_dict() if self.self_test else None
+        return json.dumps(data, sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> Manifest:
+        """The manifest of a model file. Raises ModelError naming what is missing, unknown or of another version."""
+        try:
+            data = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise ModelError(f"the model's manifest is not JSON: {error}") from error
+        if not isinstance(data, dict):
+            raise ModelError("the model's manifest is not a table")
+        version = data.pop("format_version", None)
+        if version != FORMAT_VERSION:
+            raise ModelError(
+                f"the model's manifest has format version {version!r}, this runtime reads {FORMAT_VERSION}: "
+                "export the model again with the vm-export of this release"
+            )
+        known = [each.name for each in fields(cls)]
+        for key in data:
+            if key not in known:
+                raise ModelError(unknown("entry in the model's manifest", key, known))
+        missing = [name for name in known if name not in data]
+        if missing:
+            raise ModelError(f"the model's manifest lacks {', '.join(missing)}")
+        try:
+            data["classes"] = tuple(ObjectClass(each["name"], each["kind"]) for each in data["classes"])
+            data["provenance"] = {str(key): str(value) for key, value in data["provenance"].items()}
+        except (TypeError, KeyError, AttributeError) as error:
+            raise ModelError(f"the model's manifest has malformed classes or provenance: {error}") from error
+        if data["self_test"] is not None:
+            data["self_test"] = SelfTest.from_dict(data["self_test"])
+        return cls(**data)

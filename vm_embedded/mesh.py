@@ -1,0 +1,128 @@
+"""The Visual Mesh: a graph of rays that puts the same number of points on an object at every distance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .arrays import Floats, Indices, frozen
+from .errors import GeometryError, InputError, unknown
+from .shapes import Shape
+
+RING_NEIGHBORS = {"ring4": 4, "ring6": 6, "ring8": 8}
+"""Neighbors of a point in each mesh model."""
+
+# Float noise must not change the size of a ring; no real count comes this close to a whole number from above.
+_CEIL_EPSILON = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """n points and their neighbors, or any part of such a mesh.
+
+    rays: (n, 3) unit vectors in the observation-plane frame, from the camera, column by column in memory.
+    neighbors: (n + 1, N) positions in the mesh. Row n is the one off-screen point, which stands for every missing
+        neighbor and is linked to itself.
+    """
+
+    rays: Floats
+    neighbors: Indices
+
+    def __len__(self) -> int:
+        return len(self.rays)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it holds [bytes]."""
+        return self.rays.nbytes + self.neighbors.nbytes
+
+    def part(self, kept: npt.NDArray[np.intp]) -> Mesh:
+        """The mesh of the points `kept`, in that order; links to all others lead to the off-screen point."""
+        position = np.full(len(self) + 1, len(kept), dtype=np.int32)
+        position[kept] = np.arange(len(kept), dtype=np.int32)
+        rows = np.append(kept, len(self))
+        rays = np.empty((len(kept), 3), order="F")
+        np.take(self.rays.T, kept, axis=1, out=rays.T)
+        return Mesh(frozen(rays), frozen(np.take(position, np.take(self.neighbors, rows, axis=0))))
+
+
+def ring_mesh(shape: Shape, height: float, intersections: float, max_distance: float, model: str = "ring6") -> Mesh:
+    """Concentric rings around the point below the camera, out to `max_distance` [m] on the plane.
+
+    Ring i lies at phi(i / k) and has ceil(2 pi k / theta) points; `intersections` k is the number of rings that
+    cross an object. Ring 0 is the nadir. The order of the neighbors fixes the meaning of a network's weights:
+    ring4 left, top, right, bottom; ring6 left, top-left, top-right, right, bottom-right, bottom-left; ring8 left,
+    top-left, top, top-right, right, bottom-right, bottom, bottom-left, where top is the next ring outwards.
+
+    Raises GeometryError for a height, intersections or distance that have no mesh, InputError for an unknown model.
+    """
+    if model not in RING_NEIGHBORS:
+        raise InputError(unknown("mesh model", model, RING_NEIGHBORS))
+    if not (math.isfinite(intersections) and intersections > 0):
+        raise GeometryError(f"intersections must be above 0, not {intersections}")
+    if not (math.isfinite(max_distance) and max_distance > 0):
+        raise GeometryError(f"maximum distance must be above 0 m, not {max_distance}")
+
+    last = float(shape.n(math.atan(max_distance / height), height)) * intersections
+    # One ring more than the closed form gives, since its last digit may fall short; the rule itself decides.
+    i = np.arange(1, math.floor(last) + 2)
+    phi = shape.phi(i / intersections, height)
+    phi = phi[height * np.tan(phi) < max_distance]
+    theta = shape.theta(i[: len(phi)] / intersections, height)
+    counts = np.ceil(2.0 * np.pi * intersections / theta - _CEIL_EPSILON).astype(np.int64)
+    counts = np.concatenate([[1], counts])
+    phi = np.concatenate([[0.0], phi])
+
+    ring = np.repeat(np.arange(len(counts)), counts)
+    start = np.concatenate([[0], np.cumsum(counts)])
+    j = np.arange(start[-1]) - start[ring]
+    angle = 2.0 * np.pi * j / counts[ring]
+    rays = np.empty((len(ring), 3), order="F")
+    rays[:, 0] = np.cos(angle) * np.sin(phi)[ring]
+    rays[:, 1] = np.sin(angle) * np.sin(phi)[ring]
+    rays[:, 2] = -np.cos(phi)[ring]
+    return Mesh(frozen(rays), frozen(_ring_neighbors(counts, start, ring, j, RING_NEIGHBORS[model])))
+
+
+def _ring_neighbors(
+    counts: npt.NDArray[np.int64],
+    start: npt.NDArray[np.int64],
+    ring: npt.NDArray[np.int64],
+    j: npt.NDArray[np.int64],
+    width: int,
+) -> Indices:
+    """Neighbor table (n + 1, width) of rings with `counts` points that begin at `start`."""
+    missing = int(start[-1])
+    count = counts[ring]
+    fraction = j / count  # double precision and not whole numbers, because that is what the reference rounds
+
+    def in_ring(other: npt.NDArray[np.int64], index: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        exists = (other >= 0) & (other < len(counts))
+        safe = np.clip(other, 0, len(counts) - 1)
+        return np.where(exists, start[safe] + index % counts[safe], missing)
+
+    outer, inner = ring + 1, ring - 1
+    out_position = fraction * np.append(counts, 1)[outer]
+    in_position = fraction * counts[inner]
+    left, right = in_ring(ring, j - 1), in_ring(ring, j + 1)
+    out_floor, in_floor = out_position.astype(np.int64), in_position.astype(np.int64)
+    top_left, top_right = in_ring(outer, out_floor), in_ring(outer, out_floor + 1)
+    bottom_left, bottom_right = in_ring(inner, in_floor), in_ring(inner, in_floor + 1)
+    # Halves are rounded upwards, as C's round does for these positive numbers.
+    top = in_ring(outer, np.floor(out_position + 0.5).astype(np.int64))
+    bottom = in_ring(inner, np.floor(in_position + 0.5).astype(np.int64))
+    columns = {
+        4: (left, top, right, bottom),
+        6: (left, top_left, top_right, right, bottom_right, bottom_left),
+        8: (left, top_left, top, top_right, right, bottom_right, bottom, bottom_left),
+    }[width]
+
+    neighbors = np.empty((missing + 1, width), dtype=np.int32)
+    neighbors[:missing] = np.stack(columns, axis=1)
+    # The nadir's neighbors are spread evenly over ring 1.
+    neighbors[0] = 1 + (np.arange(width) * counts[1]) // width if len(counts) > 1 else missing
+    neighbors[missing] = missing
+    return neighbors

@@ -1,0 +1,203 @@
+"""From the points of a class to objects on the plane, by the paper's two suggestions.
+
+An object leaves a known trace in the mesh: the subgraph inside its outline, as wide as its intersections. So a cluster
+that is much wider (its graph diameter) is no object, and for every other one the object is sought whose subgraph fits
+best; it must be filled, and the band around it empty.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import Floats, Singles
+from .clustering import Members, clusters, graph_diameter
+from .detections import Detection
+from .lens import Lens, Size
+from .projection import ProjectedMesh, to_camera
+from .settings import Settings
+from .shapes import Shape
+
+_CERTAIN = 4.0
+"""Log-odds beyond which a point counts no more: one point must not outvote its neighbors."""
+
+_DIRECTIONS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [0.7, 0.7], [0.7, -0.7], [-0.7, 0.7], [-0.7, -0.7]])
+"""Where the search looks next; staying comes first, so that it wins a draw."""
+
+_SCALES = np.geomspace(0.6, 1.8, 25)
+"""Apparent sizes that are tried, as shares of the expected one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Where objects are sought: the shape, the camera's height [m] and rotation (3, 3) to the mesh frame, the lens,
+    the image size, the points on screen, and `rings`, the number of mesh rings that cross an object here."""
+
+    shape: Shape
+    height: float
+    rotation: Floats
+    lens: Lens
+    size: Size
+    projected: ProjectedMesh
+    rings: float
+
+    @property
+    def spacing(self) -> float:
+        """Distance between rings, in units of the outline that `Shape.offset` counts in."""
+        return 2.0 / self.rings
+
+    def pixels(self, rays: Floats) -> Floats:
+        """Pixels (n, 2) of rays (n, 3)."""
+        return self.lens.project(to_camera(rays, self.rotation), self.size)
+
+
+def find_objects(
+    scene: Scene, class_name: str, probability: Singles, settings: Settings, explain: bool = False
+) -> tuple[list[Detection], list[Detection]]:
+    """Objects of one class, and with `explain` the clusters that were rejected, from the points' probabilities (n,).
+
+    Bearings and positions are in the mesh frame.
+    """
+    mesh = scene.projected.mesh
+    p = probability.astype(np.float64)
+    log_odds = np.clip(np.log(np.maximum(p, 1e-12) / np.maximum(1.0 - p, 1e-12)), -_CERTAIN, _CERTAIN)
+    widest = math.ceil(settings.max_widths * scene.rings)
+    found: list[Detection] = []
+    rejected: list[Detection] = []
+    for members in clusters(mesh.neighbors, probability > settings.threshold):
+        near = _near(scene, members)
+        if graph_diameter(mesh.neighbors, members, widest) > widest:
+            center = _middle(scene, members)
+            reason: str | None = f"wider than {widest} steps in the mesh, where an object is {scene.rings:.1f} wide"
+        else:
+            center = _best_center(scene, members, near, log_odds[near])
+            reason = _misfit(scene, center, near, p[near], settings) or _repeats(scene, center, found)
+        if reason is None:
+            found.append(_describe(scene, class_name, center, near, p[near], log_odds[near], None))
+        elif explain:
+            rejected.append(_describe(scene, class_name, center, near, p[near], log_odds[near], reason))
+    return found, rejected
+
+
+def _middle(scene: Scene, members: Members) -> Floats:
+    """Center (3,) [m] of an object in the direction of a cluster's mean ray."""
+    axis = scene.projected.mesh.rays[members].mean(axis=0, keepdims=True)
+    return scene.shape.center_along(axis / np.linalg.norm(axis), scene.height)[0]
+
+
+def _near(scene: Scene, members: Members) -> Members:
+    """The points of a cluster and those up to three object radii around it."""
+    rays = scene.projected.mesh.rays
+    center = _middle(scene, members)
+    distance = float(np.linalg.norm(center))
+    axis = center / distance
+    chord = math.sqrt(2.0 * max(1.0 - float((rays[members] @ axis).min()), 0.0)) + 3.0 * scene.shape.radius / distance
+    return np.flatnonzero(rays @ axis > 1.0 - 0.5 * min(chord, 2.0) ** 2)
+
+
+def _best_center(scene: Scene, members: Members, near: Members, log_odds: Floats) -> Floats:
+    """Center (3,) [m] of the object whose subgraph fits best around a cluster.
+
+    The likeliest object has the largest sum of log-odds inside its outline. The sum is climbed from the middle of the
+    cluster, over directions around the best one so far, in steps that halve when none is better. The outline is half
+    a ring spacing soft, so that the sum has no plateaus between points. What is off screen adds nothing, so an object
+    that the border cuts gets its center where it belongs.
+    """
+    rays = np.ascontiguousarray(scene.projected.mesh.rays[near])
+    center = _middle(scene, members)
+    step = 0.5
+    for _ in range(24):
+        distance = np.linalg.norm(center)
+        axis = center / distance
+        aside = np.cross(axis, (0.0, 0.0, 1.0) if abs(axis[2]) < 0.9 else (1.0, 0.0, 0.0))
+        aside /= np.linalg.norm(aside)
+        reach = step * scene.shape.radius / distance
+        tried = axis + reach * (_DIRECTIONS @ np.stack([aside, np.cross(axis, aside)]))
+        centers = scene.shape.center_along(tried, scene.height)
+        best = int(np.argmax(_soft(scene.shape.offset(rays, centers, scene.height), scene) @ log_odds))
+        if best:
+            center = centers[best]
+        elif step < 0.05:
+            break
+        else:
+            step *= 0.5
+    return center
+
+
+def _soft(offset: Floats, scene: Scene) -> Floats:
+    """How far points are inside of the outline: 1 inside, 0 outside, over half a ring spacing."""
+    return np.clip(0.5 + (1.0 - offset) / (0.5 * scene.spacing), 0.0, 1.0)
+
+
+def _misfit(scene: Scene, center: Floats, near: Members, p: Floats, settings: Settings) -> str | None:
+    """Why the points do not look like an object at `center`, or None.
+
+    Points within a ring spacing of the outline say little: their pixels show both sides, and networks color them
+    either way, rather outwards, because a ring that grazes the object shows some of it. So the inside ends a quarter
+    of a spacing before the outline, the band around begins three quarters beyond it, and is 1.5 spacings wide.
+    """
+    if center[2] >= 0.0 or np.linalg.norm(center) > 1e5 * scene.height:
+        return "on the horizon or above it"
+    offset = scene.shape.offset(scene.projected.mesh.rays[near], center[None], scene.height)[0]
+    whole = math.pi / 4.0 * scene.rings**2
+    visible = int((offset < 1.0).sum())
+    if visible < settings.min_visible * whole:
+        return f"{visible} points of it on screen, where a whole object has about {whole:.0f}"
+    inside = p[offset < 1.0 - 0.25 * scene.spacing]
+    if len(inside) == 0 or inside.mean() < settings.min_inside:
+        share = inside.mean() if len(inside) else 0.0
+        return f"mean probability inside its outline is {share:.2f}, below {settings.min_inside:g}"
+    around = p[(offset > 1.0 + 0.75 * scene.spacing) & (offset < 1.0 + 2.25 * scene.spacing)]
+    if len(around) and around.mean() > settings.max_around:
+        return f"mean probability around its outline is {around.mean():.2f}, above {settings.max_around:g}"
+    return None
+
+
+def _repeats(scene: Scene, center: Floats, found: list[Detection]) -> str | None:
+    """Why an object at `center` is one that was found already, or None."""
+    ray = (center / np.linalg.norm(center))[None]
+    for other in found:
+        if scene.shape.offset(ray, (other.bearing * other.distance)[None], scene.height)[0, 0] < 1.0:
+            return f"the same object as the one at {other.distance:.2f} m"
+    return None
+
+
+def _describe(
+    scene: Scene, class_name: str, center: Floats, near: Members, p: Floats, log_odds: Floats, reason: str | None
+) -> Detection:
+    offset = scene.shape.offset(scene.projected.mesh.rays[near], center[None], scene.height)[0]
+    inside = p[offset < 1.0]
+    distance = float(np.linalg.norm(center))
+    # The size that fits best at this bearing, not knowing how far away the plane puts it.
+    sums = _soft(offset / _SCALES[:, None], scene) @ log_odds
+    scale = float(_SCALES[int(np.argmax(sums))])
+    outline = scene.pixels(scene.shape.outline(center, scene.height))
+    middle, radius = _disk(outline)
+    return Detection(
+        class_name=class_name,
+        confidence=float(inside.mean()) if len(inside) else 0.0,
+        center=middle,
+        radius=radius,
+        outline=outline,
+        bearing=center / distance,
+        position=center + (0.0, 0.0, scene.height),
+        distance=distance,
+        distance_by_angle=distance / scale,
+        distances_agree=abs(scale - 1.0) <= scene.spacing,
+        points=len(inside),
+        reason=reason,
+    )
+
+
+def _disk(outline: Floats) -> tuple[Floats, float]:
+    """Centroid (2,) and equal-area radius [px] of a polygon (m, 2)."""
+    origin = outline.mean(axis=0)
+    a = outline - origin
+    b = np.roll(a, -1, axis=0)
+    cross = a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]
+    area = float(cross.sum()) / 2.0
+    if abs(area) < 1e-9:
+        return origin, 0.0
+    return origin + ((a + b) * cross[:, None]).sum(axis=0) / (6.0 * area), math.sqrt(abs(area) / math.pi)

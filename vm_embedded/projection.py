@@ -1,0 +1,108 @@
+"""From the mesh to the picture: which points are on screen, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from .arrays import Floats, Mask
+from .lens import Lens, Size
+from .mesh import Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectedMesh:
+    """The n points of a mesh that are on screen: their graph, and their pixels (n, 2)."""
+
+    mesh: Mesh
+    pixels: Floats
+
+    def __len__(self) -> int:
+        return len(self.mesh)
+
+
+def to_camera(rays: Floats, rotation: Floats) -> Floats:
+    """Rays (n, 3) in the camera frame, R^T ray, column by column in memory.
+
+    Written out instead of as a matrix product, so that a ray's digits don't depend on how many others there are.
+    """
+    camera = np.empty(rays.shape, order="F")
+    for column in range(3):
+        r = rotation[:, column]
+        camera[:, column] = rays[:, 0] * r[0] + rays[:, 1] * r[1] + rays[:, 2] * r[2]
+    return camera
+
+
+def project(mesh: Mesh, rotation: Floats, lens: Lens, size: Size) -> ProjectedMesh:
+    """The points of the mesh that are on screen.
+
+    rotation (3, 3) maps camera to mesh coordinates. On screen means: seen by the lens, and with all four pixels
+    around the point in the picture, 0 <= x and x + 1 < width, the same for y.
+    """
+    camera = to_camera(mesh.rays, rotation)
+    pixels = lens.project(camera, size)
+    kept = np.flatnonzero(lens.sees(camera) & _inside(pixels, size, 0.0))
+    return ProjectedMesh(mesh.part(kept), pixels[kept])
+
+
+def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack: float) -> Mask:
+    """Which points are on screen for at least one camera turned by up to `slack` [rad] from `rotation`.
+
+    Never too few: a point that a turn brings on screen lies within slack of the part of the view that the picture
+    covers, and no pixel in it moves faster than `_pixels_per_radian`. Points outside of that part are judged by where
+    they would enter it.
+    """
+    reach = _view_angle(lens, size)
+    camera = to_camera(mesh.rays, rotation)
+    near = camera[:, 0] > np.cos(min(reach + slack, np.pi))
+    cosine = np.maximum(camera[:, 0], np.cos(reach))
+    sine = np.hypot(camera[:, 1], camera[:, 2])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inward = np.where(sine > 0, np.sqrt(1.0 - cosine * cosine) / sine, 0.0)
+    camera[:, 1] *= inward
+    camera[:, 2] *= inward
+    camera[:, 0] = cosine
+    # Within a view of more than half the sphere the way around the axis can be longer than the turn.
+    detour = 1.0 if reach <= np.pi / 2 else np.pi
+    margin = detour * slack * _pixels_per_radian(lens, size)
+    return np.asarray(near & _inside(lens.project(camera, size), size, margin))
+
+
+def _inside(pixels: Floats, size: Size, margin: float) -> Mask:
+    x, y = pixels[:, 0], pixels[:, 1]
+    with np.errstate(invalid="ignore"):
+        return np.asarray(
+            (x >= -margin) & (x + 1.0 < size[0] + margin) & (y >= -margin) & (y + 1.0 < size[1] + margin)
+        )
+
+
+@lru_cache(maxsize=32)
+def _view_angle(lens: Lens, size: Size) -> float:
+    """Largest angle from the axis [rad] at which the lens reaches a pixel of the picture."""
+    x, y = np.linspace(0.0, size[0] - 1.0, 65), np.linspace(0.0, size[1] - 1.0, 65)
+    pixels = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2)
+    angles = np.arccos(np.clip(lens.unproject(pixels, size)[:, 0], -1.0, 1.0))
+    if np.isnan(angles).any():
+        return lens.limit
+    # The farthest pixel is on the border, at most half a step of the 64 from one that was looked at.
+    return min(lens.limit, float(angles.max()) * 1.02)
+
+
+@lru_cache(maxsize=32)
+def _pixels_per_radian(lens: Lens, size: Size) -> float:
+    """Largest shift of a pixel [px] for each radian that its ray turns, anywhere in the view."""
+    reach = _view_angle(lens, size)
+    theta, around = np.meshgrid(np.linspace(1e-3, reach, 200), np.linspace(0.0, 2.0 * np.pi, 33))
+    theta, around = theta.ravel(), around.ravel()
+    step = 1e-5
+
+    def at(theta: Floats, around: Floats) -> Floats:
+        rays = np.stack([np.cos(theta), np.sin(theta) * np.cos(around), np.sin(theta) * np.sin(around)], axis=1)
+        return lens.project(rays, size)
+
+    outward = np.linalg.norm(at(theta, around) - at(theta - step, around), axis=1) / step
+    sideways = np.linalg.norm(at(theta, around + step) - at(theta, around), axis=1) / (step * np.sin(theta))
+    # The square root covers turns in both directions at once; 2 % the gaps between the 200 angles.
+    return 1.02 * float(np.hypot(outward, sideways).max())

@@ -1,0 +1,88 @@
+"""The colors of the picture at the points of the mesh."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from .arrays import Floats, Image, Singles
+from .errors import InputError, unknown
+
+# For each format: its channels, and which of them are red, green and blue.
+_CHANNELS = {"bgr": (3, (2, 1, 0)), "rgb": (3, (0, 1, 2)), "bgra": (4, (2, 1, 0)), "rgba": (4, (0, 1, 2))}
+
+# Named after the upper left 2 x 2 pixels; OpenCV names the same patterns by the second row and column.
+_BAYER = {
+    "bayer_rggb": cv2.COLOR_BayerBG2RGB,
+    "bayer_bggr": cv2.COLOR_BayerRG2RGB,
+    "bayer_grbg": cv2.COLOR_BayerGB2RGB,
+    "bayer_gbrg": cv2.COLOR_BayerGR2RGB,
+}
+
+FORMATS = (*_CHANNELS, "grey", *_BAYER)
+"""Pixel formats of a frame."""
+
+SAMPLINGS = ("exact", "fast")
+"""exact: bilinear in floating point. fast: OpenCV's 8-bit way, rounded to whole grey levels and 1/32 px."""
+
+_FOLD = 256  # remap takes tables of at most 32766 a side, so the list of points is folded
+
+
+def checked_image(image: Image, format: str) -> Image:
+    """The image, if it is one of that format: 8 bit, (height, width, channels), at least 2 x 2 px.
+
+    A grey image may come without its last axis. Raises InputError.
+    """
+    if format not in FORMATS:
+        raise InputError(unknown("pixel format", format, FORMATS))
+    if not isinstance(image, np.ndarray) or image.dtype != np.uint8:
+        kind = image.dtype if isinstance(image, np.ndarray) else type(image).__name__
+        raise InputError(f"image must be an array of uint8, not {kind}")
+    channels = _CHANNELS[format][0] if format in _CHANNELS else 1
+    flat = image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 1)
+    if not (image.ndim == 3 and image.shape[2] == channels) and not (channels == 1 and flat):
+        raise InputError(f"a {format} image must be of shape (height, width, {channels}), not {image.shape}")
+    if min(image.shape[:2]) < 2:
+        raise InputError(f"image must be at least 2 x 2 px, not {image.shape[1]} x {image.shape[0]}")
+    return image.reshape(*image.shape[:2]) if channels == 1 else image
+
+
+def sample(image: Image, pixels: Floats, format: str, sampling: str, out: Singles) -> None:
+    """Write the RGB colors, scaled to 0..1, at pixels (n, 2) into `out` (n, 3).
+
+    `image` is one that `checked_image` returned; the pixels must have all four pixels around them in it.
+    """
+    if format in _BAYER:
+        image, format = cv2.cvtColor(image, _BAYER[format]), "rgb"  # type: ignore[assignment]
+    take = _exact if sampling == "exact" else _fast
+    values = take(image, pixels)
+    channels = _CHANNELS[format][1] if format in _CHANNELS else (0, 0, 0)
+    for column, channel in enumerate(channels):
+        np.multiply(values[:, channel], np.float32(1.0 / 255.0), out=out[:, column])
+
+
+def _exact(image: Image, pixels: Floats) -> Singles:
+    """Values (n, channels), 0 to 255, bilinear in floating point."""
+    flat = image.reshape(image.shape[0] * image.shape[1], -1)
+    whole = pixels.astype(np.intp)
+    fraction = (pixels - whole).astype(np.float32)
+    right, down = fraction[:, :1], fraction[:, 1:]
+    corner = whole[:, 1] * image.shape[1] + whole[:, 0]
+
+    def row(first: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Singles:
+        left = np.take(flat, first, axis=0).astype(np.float32)
+        return left + right * (np.take(flat, first + 1, axis=0) - left)
+
+    upper = row(corner)
+    return upper + down * (row(corner + image.shape[1]) - upper)
+
+
+def _fast(image: Image, pixels: Floats) -> Image:
+    """Values (n, channels), 0 to 255, by OpenCV's table of 1/32 px."""
+    rows = -(-len(pixels) // _FOLD)
+    table = np.zeros((rows * _FOLD, 2), dtype=np.float32)
+    table[: len(pixels)] = pixels
+    if rows == 0:
+        return np.empty((0, image.shape[2] if image.ndim == 3 else 1), dtype=np.uint8)
+    values = cv2.remap(image, table.reshape(rows, _FOLD, 2), None, cv2.INTER_LINEAR)  # type: ignore[call-overload]
+    return np.asarray(values.reshape(rows * _FOLD, -1)[: len(pixels)])

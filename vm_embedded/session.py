@@ -1,0 +1,102 @@
+"""The network, run by ONNX Runtime: the only place that imports it."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import onnxruntime
+from onnxruntime.capi import onnxruntime_pybind11_state as states
+
+from .arrays import Indices, Singles
+from .errors import ModelError
+from .onnx_file import ModelFile
+from .settings import Settings
+
+_RUNTIME_ERRORS = (
+    states.EPFail,
+    states.Fail,
+    states.InvalidArgument,
+    states.InvalidGraph,
+    states.InvalidProtobuf,
+    states.ModelLoaded,
+    states.NoModel,
+    states.NotImplemented,
+    states.RuntimeException,
+    RuntimeError,
+    ValueError,
+)
+
+_SELF_TEST_TOLERANCE = 1e-3
+"""Far above what processors differ by, far below what changes an answer."""
+
+
+class Session:
+    """A loaded network.
+
+    Threads are set explicitly, never more than this process may use, and do not spin unless told to: the robot has
+    other work for its cores. Loading runs the model's self-test. Raises ModelError if the file does not load, has
+    other inputs and outputs than its manifest says, or answers its self-test wrongly.
+    """
+
+    def __init__(self, model: ModelFile, settings: Settings) -> None:
+        self.model = model
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = min(settings.threads, len(os.sched_getaffinity(0)))
+        options.inter_op_num_threads = 1
+        options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
+        # The number of points changes with every frame: remembered memory patterns would only pile up.
+        options.enable_mem_pattern = False
+        options.log_severity_level = 4
+        options.add_session_config_entry("session.intra_op.allow_spinning", "1" if settings.spinning else "0")
+        options.add_session_config_entry("session.set_denormal_as_zero", "1")
+        try:
+            self._session = onnxruntime.InferenceSession(model.content, options, providers=["CPUExecutionProvider"])
+        except _RUNTIME_ERRORS as error:
+            raise ModelError(f"{model.path}: ONNX Runtime can't load it: {_first_line(error)}") from error
+        self._check_interface()
+        self.self_test()
+
+    def run(self, points: Singles, neighbors: Indices) -> Singles:
+        """Probabilities (n, C) of points (n + 1, 3), linked by neighbors (n + 1, N); row n is the off-screen point."""
+        if self.model.manifest.edge == "same":
+            itself = np.arange(len(neighbors), dtype=np.int32)[:, None]
+            neighbors = np.where(neighbors == len(neighbors) - 1, itself, neighbors)
+        return self._answer(points, neighbors)[:-1]
+
+    def self_test(self) -> None:
+        """Run the model's own example. Raises ModelError if the answer is not the one that the exporter saw."""
+        test = self.model.manifest.self_test
+        if test is None:
+            return
+        answer = self._answer(test.points, test.neighbors)
+        if answer.shape != test.probabilities.shape:
+            raise ModelError(f"{self.model.path}: self-test answered in shape {answer.shape}")
+        error = float(np.abs(answer - test.probabilities).max())
+        if not error <= _SELF_TEST_TOLERANCE:
+            raise ModelError(f"{self.model.path}: self-test failed, probabilities are off by {error:.2g}")
+
+    def _answer(self, points: Singles, neighbors: Indices) -> Singles:
+        try:
+            outputs = self._session.run(["probabilities"], {"points": points, "neighbors": neighbors})
+        except _RUNTIME_ERRORS as error:
+            raise ModelError(f"{self.model.path}: ONNX Runtime can't run it: {_first_line(error)}") from error
+        return np.asarray(outputs[0])
+
+    def _check_interface(self) -> None:
+        manifest = self.model.manifest
+        found = {
+            node.name: (node.type, list(node.shape)[1:])
+            for node in (*self._session.get_inputs(), *self._session.get_outputs())
+        }
+        expected = {
+            "points": ("tensor(float)", [3]),
+            "neighbors": ("tensor(int32)", [manifest.neighbors]),
+            "probabilities": ("tensor(float)", [len(manifest.classes)]),
+        }
+        if found != expected:
+            raise ModelError(f"{self.model.path}: its inputs and outputs are {found}, its manifest asks for {expected}")
+
+
+def _first_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:300]

@@ -1,0 +1,129 @@
+"""Where frames come from: an image, a directory or glob of images, a video file, or a camera through OpenCV."""
+
+from __future__ import annotations
+
+import glob
+import os
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what is wrong with a file is said here, in one line
+
+import cv2
+import numpy as np
+
+from .arrays import Image
+from .errors import InputError
+
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".pgm", ".ppm", ".tif", ".tiff", ".webp")
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame of a source.
+
+    index: its number, from 0. source: what to call it. read: gives the image, BGR, or as the file has it if the pixel
+    format is another; raises InputError. path: of its file, where it has one of its own. stamp: time in its video
+    [s].
+    """
+
+    index: int
+    source: str
+    read: Callable[[], Image]
+    path: Path | None = None
+    stamp: float | None = None
+
+
+@dataclass(frozen=True)
+class Source:
+    """Frames to iterate over, and how many there are, where that is known."""
+
+    frames: Iterator[Frame]
+    count: int | None
+
+
+def open_source(name: str, raw: bool = False) -> Source:
+    """Open a source by name. `raw` leaves images in the channels that their files have.
+
+    Raises InputError if it does not exist, holds no images or can't be opened.
+    """
+    path = Path(name)
+    if path.is_dir():
+        found = [each for each in path.iterdir() if each.suffix.lower() in IMAGE_SUFFIXES]
+        if not found:
+            raise InputError(f"no images in directory {name} (looked for {', '.join(IMAGE_SUFFIXES)})")
+        return _images(found, raw)
+    if path.is_file() and path.suffix.lower() in IMAGE_SUFFIXES:
+        return _images([path], raw)
+    if path.exists() or name.isdigit():
+        return _video(name)
+    if glob.has_magic(name):
+        found = [Path(each) for each in glob.glob(name) if Path(each).suffix.lower() in IMAGE_SUFFIXES]
+        if not found:
+            raise InputError(f"no images match {name}")
+        return _images(found, raw)
+    raise InputError(f"no such image, directory, video or camera: {name}")
+
+
+def _images(paths: list[Path], raw: bool) -> Source:
+    paths = sorted(paths, key=_natural)
+    frames = (Frame(index, path.name, partial(read_image, path, raw), path) for index, path in enumerate(paths))
+    return Source(frames, len(paths))
+
+
+def _natural(path: Path) -> list[tuple[int, str]]:
+    """Order in which frame9 comes before frame10."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
+
+
+def read_image(path: str | Path, raw: bool = False) -> Image:
+    """An image file as BGR, or with `raw` in the channels it has. Raises InputError if it is missing or broken."""
+    path = Path(path)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+    # OpenCV decodes what there is of a file that was cut short, and calls it success.
+    jpeg_cut = content.startswith(b"\xff\xd8") and b"\xff\xd9" not in content[-1024:]
+    png_cut = content.startswith(b"\x89PNG") and b"IEND" not in content[-1024:]
+    image = None
+    if content and not jpeg_cut and not png_cut:
+        flags = cv2.IMREAD_UNCHANGED if raw else cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+        try:
+            image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
+        except cv2.error:
+            image = None
+    if image is None:
+        raise InputError(f"{path} is {'cut short' if jpeg_cut or png_cut else 'no image that can be decoded'}")
+    return image
+
+
+def _video(name: str) -> Source:
+    """A video file, or a camera by number or device path."""
+    capture = cv2.VideoCapture(int(name) if name.isdigit() else name)
+    live = name.isdigit() or Path(name).is_char_device()
+    if not capture.isOpened():
+        raise InputError(f"can't open {'camera' if live else 'video'} {name}")
+    count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+    good, first = capture.read()
+    if not good:
+        raise InputError(f"{'camera' if live else 'video'} {name} gives no frames")
+    return Source(_captured(capture, first, Path(name).name), None if live or count <= 0 else count)
+
+
+def _captured(capture: cv2.VideoCapture, image: Image | None, name: str) -> Iterator[Frame]:
+    index = 0
+    while image is not None:
+        stamp = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+        yield Frame(index, name, partial(_same, image), None, stamp)
+        good, following = capture.read()
+        image = following if good else None
+        index += 1
+    capture.release()
+
+
+def _same(image: Image) -> Image:
+    return image
