@@ -69,9 +69,7 @@ class MeshCache:
             return View(mesh, height, orientation.rotation, np.eye(3))
         pitch = round(orientation.pitch / self.settings.pitch_step)
         roll = round(orientation.roll / self.settings.roll_step)
-        mesh = self._look_up(
-            (height, pitch, roll, lens, size), lambda: self._prepare(height, pitch, roll, lens, size)
-        )
+        mesh = self._look_up((height, pitch, roll, lens, size), lambda: self._prepare(height, pitch, roll, lens, size))
         return View(mesh, height, orientation.level, rotation_z(orientation.yaw))
 
     def mesh_height(self, height: float) -> float:

@@ -117,7 +117,9 @@ def _run(options: argparse.Namespace) -> int:
     if model is None:
         raise InputError("no model: give --model FILE, a network that vm-export wrote")
     given = {each.name: getattr(options, each.name) for each in fields(Settings)}
-    settings = Settings(**{**configured.settings, **{name: value for name, value in given.items() if value is not None}})
+    settings = Settings(
+        **{**configured.settings, **{name: value for name, value in given.items() if value is not None}}
+    )
     pose = _Pose(read_lens_file(options.lens).lens if options.lens else configured.lens, _fixed(options, configured))
     detector = Detector.from_file(model, settings)
     emit = [name.strip() for name in options.emit_points.split(",")] if options.emit_points else []

@@ -1,13 +1,13 @@
 """vm.toml and what else says how a detector is to be run, checked at the border.
 
-    model = "ball.onnx"             # paths count from the file's own folder
-    lens = "lens.yaml"              # or a table: [lens] projection = ..., see lens_file.py
-    [orientation]
-    height = 0.8                    # [m]
-    pitch = "20deg"                 # [rad] if a bare number
-    roll = 0.0
-    [detector]
-    threads = 1                     # every field of Settings
+model = "ball.onnx"             # paths count from the file's own folder
+lens = "lens.yaml"              # or a table: [lens] projection = ..., see lens_file.py
+[orientation]
+height = 0.8                    # [m]
+pitch = "20deg"                 # [rad] if a bare number
+roll = 0.0
+[detector]
+threads = 1                     # every field of Settings
 """
 
 from __future__ import annotations

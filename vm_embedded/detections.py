@@ -75,9 +75,10 @@ class ClassPoints:
 class Detections:
     """The objects of a frame, most confident first, and the n mesh points behind them.
 
-    manifest: of the network that looked. mesh: the points on screen. heading (3, 3): from the mesh's frame to the frame's own observation plane.
-    probabilities (n, C), in the order of the manifest's classes. threshold: above which a point counts for a class. rejected:
-    clusters that were no objects, with reasons, if they were asked for. timing_ms: milliseconds of each stage.
+    rejected: clusters that were no objects, with reasons, if they were asked for. manifest: of the network that
+    looked. mesh: the points on screen. heading (3, 3): from the mesh's frame to the frame's own observation plane.
+    probabilities (n, C), in the order of the manifest's classes. threshold: above which a point counts for a class.
+    timing_ms: milliseconds of each stage.
     """
 
     objects: tuple[Detection, ...]

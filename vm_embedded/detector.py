@@ -88,9 +88,7 @@ class Detector:
 
     def _rings(self, height: float, mesh_height: float) -> float:
         """Mesh rings that cross an object, seen from `height` [m] through a mesh made for `mesh_height` [m]."""
-        return self.manifest.intersections * float(
-            self.shape.spacing(height) / self.cache.shape.spacing(mesh_height)
-        )
+        return self.manifest.intersections * float(self.shape.spacing(height) / self.cache.shape.spacing(mesh_height))
 
     def _objects(
         self,

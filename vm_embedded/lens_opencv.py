@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
-import cv2
 import numpy as np
 
 from .arrays import Floats
@@ -55,16 +54,18 @@ class CalibratedLens(Lens):
 
     def _normalized(self, pixels: Floats) -> Floats:
         """Distorted coordinates (n, 2) at focal length 1; inverse of `_pixels`."""
-        return (pixels - np.asarray(self.optical_center)) / np.asarray(self.focal_lengths)
+        return np.asarray((pixels - np.asarray(self.optical_center)) / np.asarray(self.focal_lengths))
 
 
 class BrownLens(CalibratedLens):
-    """Rectilinear with OpenCV's coefficients (k1, k2, p1, p2[, k3[, k4, k5, k6]]): plumb_bob and rational_polynomial."""
+    """Rectilinear with OpenCV's coefficients (k1, k2, p1, p2[, k3[, k4, k5, k6]])."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if len(self.coefficients) not in (0, 4, 5, 8):
-            raise InputError(f"a plumb_bob or rational lens has 0, 4, 5 or 8 coefficients, not {len(self.coefficients)}")
+            raise InputError(
+                f"a plumb_bob or rational lens has 0, 4, 5 or 8 coefficients, not {len(self.coefficients)}"
+            )
         if self.fov >= math.pi:
             raise InputError(f"a rectilinear lens covers less than pi rad, not {self.fov}")
 
@@ -79,38 +80,41 @@ class BrownLens(CalibratedLens):
         numerator = 1.0 + square * (k1 + square * (k2 + square * k3))
         return numerator / (1.0 + square * (k4 + square * (k5 + square * k6)))
 
-    def project(self, rays: Floats, size: Size) -> Floats:
+    def _tangential(self, flat: Floats) -> Floats:
+        """Shift (n, 2) of undistorted coordinates (n, 2) by a lens that is not quite parallel to its sensor."""
         p1, p2 = self.coefficients[2:4] if self.coefficients else (0.0, 0.0)
+        right, down = flat[:, 0], flat[:, 1]
+        cross, square = 2.0 * right * down, right * right + down * down
+        return np.stack(
+            [p1 * cross + p2 * (square + 2.0 * right * right), p2 * cross + p1 * (square + 2.0 * down * down)], axis=1
+        )
+
+    def project(self, rays: Floats, size: Size) -> Floats:
         with np.errstate(all="ignore"):
-            right, down = -rays[:, 1] / rays[:, 0], -rays[:, 2] / rays[:, 0]
-            square = right * right + down * down
-            radial = self._radial(square)
-            cross = 2.0 * right * down
-            return self._pixels(
-                right * radial + p1 * cross + p2 * (square + 2.0 * right * right),
-                down * radial + p2 * cross + p1 * (square + 2.0 * down * down),
-            )
+            flat = -rays[:, 1:] / rays[:, :1]
+            radial = self._radial((flat * flat).sum(axis=1))
+            distorted = flat * radial[:, None] + self._tangential(flat)
+        return self._pixels(distorted[:, 0], distorted[:, 1])
 
     def unproject(self, pixels: Floats, size: Size) -> Floats:
-        matrix = np.array(
-            [
-                [self.focal_lengths[0], 0.0, self.optical_center[0]],
-                [0.0, self.focal_lengths[1], self.optical_center[1]],
-                [0.0, 0.0, 1.0],
-            ]
-        )
-        if len(pixels) == 0:
-            return np.empty((0, 3))
-        undistorted = cv2.undistortPointsIter(
-            np.ascontiguousarray(pixels, dtype=np.float64).reshape(-1, 1, 2),
-            matrix,
-            np.asarray(self.coefficients, dtype=np.float64),
-            np.eye(3),
-            np.eye(3),
-            (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-12),
-        ).reshape(-1, 2)
+        distorted = self._normalized(pixels)
+        undistorted = distorted
+        for _ in range(20):  # the tangential part is small, so taking it off by what was found last converges fast
+            undistorted = self._without_radial(distorted - self._tangential(undistorted))
         rays = np.column_stack([np.ones(len(pixels)), -undistorted])
         return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
+
+    def _without_radial(self, distorted: Floats) -> Floats:
+        """Undistorted coordinates (n, 2), the radial part taken off; NaN beyond the limit."""
+        table = np.linspace(0.0, math.tan(self.limit), 4096)
+        radius = np.hypot(distorted[:, 0], distorted[:, 1])
+        found = np.interp(radius, table * self._radial(table * table), table, right=np.nan)
+        for _ in range(4):  # Newton's method from the table's neighborhood
+            step = 1e-6
+            value, ahead = ((r * self._radial(r * r)) for r in (found, found + step))
+            found = found - (value - radius) * step / (ahead - value)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(distorted * np.where(radius > 0, found / radius, 1.0)[:, None])
 
 
 class FisheyeLens(CalibratedLens):

@@ -18,7 +18,7 @@ from .detections import Detection
 from .lens import Lens, Size
 from .projection import ProjectedMesh, to_camera
 from .settings import Settings
-from .shapes import Shape
+from .shapes import Shape, tangents
 
 _CERTAIN = 4.0
 """Log-odds beyond which a point counts no more: one point must not outvote its neighbors."""
@@ -84,7 +84,7 @@ def find_objects(
 def _middle(scene: Scene, members: Members) -> Floats:
     """Center (3,) [m] of an object in the direction of a cluster's mean ray."""
     axis = scene.projected.mesh.rays[members].mean(axis=0, keepdims=True)
-    return scene.shape.center_along(axis / np.linalg.norm(axis), scene.height)[0]
+    return np.asarray(scene.shape.center_along(axis / np.linalg.norm(axis), scene.height)[0])
 
 
 def _near(scene: Scene, members: Members) -> Members:
@@ -109,12 +109,9 @@ def _best_center(scene: Scene, members: Members, near: Members, log_odds: Floats
     center = _middle(scene, members)
     step = 0.5
     for _ in range(24):
-        distance = np.linalg.norm(center)
+        distance = float(np.linalg.norm(center))
         axis = center / distance
-        aside = np.cross(axis, (0.0, 0.0, 1.0) if abs(axis[2]) < 0.9 else (1.0, 0.0, 0.0))
-        aside /= np.linalg.norm(aside)
-        reach = step * scene.shape.radius / distance
-        tried = axis + reach * (_DIRECTIONS @ np.stack([aside, np.cross(axis, aside)]))
+        tried = axis + step * scene.shape.radius / distance * (_DIRECTIONS @ tangents(axis))
         centers = scene.shape.center_along(tried, scene.height)
         best = int(np.argmax(_soft(scene.shape.offset(rays, centers, scene.height), scene) @ log_odds))
         if best:
@@ -137,6 +134,9 @@ def _misfit(scene: Scene, center: Floats, near: Members, p: Floats, settings: Se
     Points within a ring spacing of the outline say little: their pixels show both sides, and networks color them
     either way, rather outwards, because a ring that grazes the object shows some of it. So the inside ends a quarter
     of a spacing before the outline, the band around begins three quarters beyond it, and is 1.5 spacings wide.
+
+    Less than one object from the nadir the mesh is singular and up to twice as many points see an object (the paper's
+    second limitation): what looks like it may cover twice the area there, so the band is farther out by sqrt(2).
     """
     if center[2] >= 0.0 or np.linalg.norm(center) > 1e5 * scene.height:
         return "on the horizon or above it"
@@ -149,7 +149,9 @@ def _misfit(scene: Scene, center: Floats, near: Members, p: Floats, settings: Se
     if len(inside) == 0 or inside.mean() < settings.min_inside:
         share = inside.mean() if len(inside) else 0.0
         return f"mean probability inside its outline is {share:.2f}, below {settings.min_inside:g}"
-    around = p[(offset > 1.0 + 0.75 * scene.spacing) & (offset < 1.0 + 2.25 * scene.spacing)]
+    inclination = math.atan2(math.hypot(center[0], center[1]), -center[2])
+    apparent = offset / (math.sqrt(2.0) if scene.shape.n(inclination, scene.height) < 1.0 else 1.0)
+    around = p[(apparent > 1.0 + 0.75 * scene.spacing) & (apparent < 1.0 + 2.25 * scene.spacing)]
     if len(around) and around.mean() > settings.max_around:
         return f"mean probability around its outline is {around.mean():.2f}, above {settings.max_around:g}"
     return None
@@ -182,7 +184,7 @@ def _describe(
         radius=radius,
         outline=outline,
         bearing=center / distance,
-        position=center + (0.0, 0.0, scene.height),
+        position=center + np.array([0.0, 0.0, scene.height]),
         distance=distance,
         distance_by_angle=distance / scale,
         distances_agree=abs(scale - 1.0) <= scene.spacing,

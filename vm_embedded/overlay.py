@@ -17,7 +17,8 @@ _OTHER = (140, 140, 140)
 def draw(image: Image, detections: Detections) -> Image:
     """A copy of a BGR, BGRA or grey image with mesh points in the color of their class, and objects with outline,
     confidence and distance."""
-    canvas = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image[:, :, :3].copy()
+    colors = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image[:, :, :3]
+    canvas = np.array(colors, dtype=np.uint8, order="C")
     scale = max(max(canvas.shape[:2]) / 1280.0, 0.5)
     _draw_points(canvas, detections)
     for each in detections.rejected:
@@ -58,9 +59,7 @@ def _draw_object(canvas: Image, detection: Detection, color: tuple[int, int, int
     _label(canvas, text, detection.center, detection.radius, color, scale)
 
 
-def _label(
-    canvas: Image, text: str, center: Floats, radius: float, color: tuple[int, int, int], scale: float
-) -> None:
+def _label(canvas: Image, text: str, center: Floats, radius: float, color: tuple[int, int, int], scale: float) -> None:
     """A line of text beside an object, where there is room for it."""
     font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.6 * scale, max(1, round(1.5 * scale))
     (width, height), base = cv2.getTextSize(text, font, size, thickness)

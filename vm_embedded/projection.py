@@ -73,9 +73,7 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
 def _inside(pixels: Floats, size: Size, margin: float) -> Mask:
     x, y = pixels[:, 0], pixels[:, 1]
     with np.errstate(invalid="ignore"):
-        return np.asarray(
-            (x >= -margin) & (x + 1.0 < size[0] + margin) & (y >= -margin) & (y + 1.0 < size[1] + margin)
-        )
+        return np.asarray((x >= -margin) & (x + 1.0 < size[0] + margin) & (y >= -margin) & (y + 1.0 < size[1] + margin))
 
 
 @lru_cache(maxsize=32)
@@ -94,8 +92,8 @@ def _view_angle(lens: Lens, size: Size) -> float:
 def _pixels_per_radian(lens: Lens, size: Size) -> float:
     """Largest shift of a pixel [px] for each radian that its ray turns, anywhere in the view."""
     reach = _view_angle(lens, size)
-    theta, around = np.meshgrid(np.linspace(1e-3, reach, 200), np.linspace(0.0, 2.0 * np.pi, 33))
-    theta, around = theta.ravel(), around.ravel()
+    grid = np.meshgrid(np.linspace(1e-3, reach, 200), np.linspace(0.0, 2.0 * np.pi, 33))
+    theta, around = (axis.reshape(-1) for axis in grid)
     step = 1e-5
 
     def at(theta: Floats, around: Floats) -> Floats:

@@ -153,16 +153,14 @@ class Sphere(Shape):
         distance = np.linalg.norm(centers, axis=1, keepdims=True)
         cosine = np.sqrt(np.maximum(1.0 - (self.radius / distance) ** 2, 0.0))
         # Chords instead of angles: proportional to them within the few degrees of a ball, and no trigonometry.
-        return np.sqrt(np.maximum(1.0 - (centers / distance) @ rays.T, 0.0) / (1.0 - cosine))
+        return np.asarray(np.sqrt(np.maximum(1.0 - (centers / distance) @ rays.T, 0.0) / (1.0 - cosine)))
 
     def outline(self, center: Floats, height: float, count: int = 48) -> Floats:
         distance = float(np.linalg.norm(center))
         axis = center / distance
         sine = min(self.radius / distance, 1.0)
-        aside = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-        aside /= np.linalg.norm(aside)
-        around = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)[:, None]
-        ring = np.cos(around) * aside + np.sin(around) * np.cross(axis, aside)
+        around = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+        ring = np.stack([np.cos(around), np.sin(around)], axis=1) @ tangents(axis)
         return np.asarray(math.sqrt(1.0 - sine * sine) * axis + sine * ring)
 
     def n(self, phi: Number, height: Number) -> Number:
@@ -170,6 +168,14 @@ class Sphere(Shape):
 
     def theta(self, n: Number, height: Number) -> Number:
         return self._theta(n, height - self.radius, height)
+
+
+def tangents(axis: Floats) -> Floats:
+    """Two unit vectors (2, 3) that are orthogonal to the unit vector `axis` (3,) and to each other."""
+    x, y, z = (float(value) for value in axis)
+    level = math.hypot(x, y)
+    across_x, across_y = (-y / level, x / level) if level > 1e-9 else (1.0, 0.0)
+    return np.array([[across_x, across_y, 0.0], [-z * across_y, z * across_x, x * across_y - y * across_x]])
 
 
 SHAPES: dict[str, type[Shape]] = {"circle": Circle, "sphere": Sphere}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import numpy as np
 from .arrays import Image
 from .detections import Detections
 from .errors import InputError
+from .files import written_beside
 from .overlay import draw
 from .sources import Frame
 
@@ -53,28 +53,17 @@ def frame_name(frame: Frame) -> str:
 def save_points(folder: Path, frame: Frame, detections: Detections) -> Path:
     """Write NAME.npz with pixels (n, 2), rays (n, 3) in the frame's observation plane, probabilities (n, C)."""
     path = folder / f"{frame_name(frame)}.npz"
-    beside = path.with_name(path.name + ".part")
-    try:
-        with beside.open("wb") as file:
-            np.savez(
-                file, pixels=detections.pixels, rays=detections.rays, probabilities=detections.probabilities
-            )
-        os.replace(beside, path)
-    except OSError as error:
-        raise InputError(f"can't write {path}: {error.strerror or error}") from error
+    with written_beside(path) as part, part.open("wb") as file:
+        np.savez(file, pixels=detections.pixels, rays=detections.rays, probabilities=detections.probabilities)
     return path
 
 
 def save_overlay(folder: Path, frame: Frame, image: Image, detections: Detections) -> Path:
     """Write NAME.jpg with mesh points and detections drawn into the image."""
     path = folder / f"{frame_name(frame)}.jpg"
-    beside = path.with_name(path.name + ".part")
     _, content = cv2.imencode(".jpg", draw(image, detections), [cv2.IMWRITE_JPEG_QUALITY, 92])
-    try:
-        beside.write_bytes(content.tobytes())
-        os.replace(beside, path)
-    except OSError as error:
-        raise InputError(f"can't write {path}: {error.strerror or error}") from error
+    with written_beside(path) as part:
+        part.write_bytes(content.tobytes())
     return path
 
 

@@ -61,7 +61,8 @@ def open_source(name: str, raw: bool = False) -> Source:
     if path.exists() or name.isdigit():
         return _video(name)
     if glob.has_magic(name):
-        found = [Path(each) for each in glob.glob(name) if Path(each).suffix.lower() in IMAGE_SUFFIXES]
+        matches = glob.glob(name, recursive=True)  # noqa: PTH207 (the pattern may begin anywhere, at / too)
+        found = [Path(each) for each in matches if Path(each).suffix.lower() in IMAGE_SUFFIXES]
         if not found:
             raise InputError(f"no images match {name}")
         return _images(found, raw)
@@ -98,7 +99,7 @@ def read_image(path: str | Path, raw: bool = False) -> Image:
             image = None
     if image is None:
         raise InputError(f"{path} is {'cut short' if jpeg_cut or png_cut else 'no image that can be decoded'}")
-    return image
+    return np.asarray(image, dtype=np.uint8)
 
 
 def _video(name: str) -> Source:
@@ -108,22 +109,24 @@ def _video(name: str) -> Source:
     if not capture.isOpened():
         raise InputError(f"can't open {'camera' if live else 'video'} {name}")
     count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-    good, first = capture.read()
-    if not good:
+    first = _grabbed(capture)
+    if first is None:
         raise InputError(f"{'camera' if live else 'video'} {name} gives no frames")
     return Source(_captured(capture, first, Path(name).name), None if live or count <= 0 else count)
 
 
-def _captured(capture: cv2.VideoCapture, image: Image | None, name: str) -> Iterator[Frame]:
+def _captured(capture: cv2.VideoCapture, first: Image, name: str) -> Iterator[Frame]:
+    image: Image | None = first
     index = 0
     while image is not None:
         stamp = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
-        yield Frame(index, name, partial(_same, image), None, stamp)
-        good, following = capture.read()
-        image = following if good else None
+        yield Frame(index, name, partial(np.asarray, image), None, stamp)
+        image = _grabbed(capture)
         index += 1
     capture.release()
 
 
-def _same(image: Image) -> Image:
-    return image
+def _grabbed(capture: cv2.VideoCapture) -> Image | None:
+    """The next frame, or None at the end."""
+    good, image = capture.read()
+    return np.asarray(image, dtype=np.uint8) if good else None

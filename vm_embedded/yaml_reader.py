@@ -58,7 +58,7 @@ def _wrong(line: _Line, what: str) -> InputError:
 
 def _lines(text: str) -> list[_Line]:
     """Lines with content, without comments."""
-    lines = []
+    lines: list[_Line] = []
     for number, raw in enumerate(text.splitlines(), start=1):
         content = _without_comment(raw).rstrip()
         if not content.strip() or (not lines and (content.startswith("%") or content == "---")):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import pickle
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import torch
 
 from vm_embedded.errors import InputError, ModelError
+from vm_embedded.files import written_beside
 from vm_embedded.manifest import Manifest
 
 from .network import Network, NetworkShape
@@ -33,17 +33,15 @@ class Checkpoint:
             raise ModelError(f"the network has {shape.neighbors} neighbors, mesh {manifest.mesh} {manifest.neighbors}")
 
     def save(self, path: str | Path) -> None:
-        """Write the checkpoint, beside and then renamed."""
-        path = Path(path)
-        beside = path.with_name(path.name + ".part")
+        """Write the checkpoint. Raises InputError."""
         content = {
             "format": _FORMAT,
             "network": self.network.shape.as_dict(),
             "manifest": json.loads(replace(self.manifest, self_test=None).as_json()),
             "state": self.network.state_dict(),
         }
-        torch.save(content, beside)
-        os.replace(beside, path)
+        with written_beside(Path(path)) as part:
+            torch.save(content, part)
 
     @classmethod
     def load(cls, path: str | Path) -> Checkpoint:

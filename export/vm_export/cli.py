@@ -26,7 +26,9 @@ def parser() -> argparse.ArgumentParser:
         epilog="Exit status: 0 written, 1 not written (the reason is on standard error), 2 wrong usage.",
     )
     parser.add_argument("model", type=Path, help="a checkpoint (.pt) or a network of the reference (.yaml)")
-    parser.add_argument("-o", "--output", type=Path, help="file to write; default: the model's name with .onnx or .yaml")
+    parser.add_argument(
+        "-o", "--output", type=Path, help="file to write; default: the model's name with .onnx or .yaml"
+    )
     parser.add_argument("--to-yaml", action="store_true", help="write the reference's format instead")
     facts = parser.add_argument_group("what the file does not say, or says wrongly")
     facts.add_argument("--intersections", type=float, metavar="K", help="rings that cross an object")
@@ -37,7 +39,7 @@ def parser() -> argparse.ArgumentParser:
     facts.add_argument(
         "--classes",
         metavar="NAME[:KIND],...",
-        help="classes in the order of the outputs; kind: object, upright, area or background, known for the usual names",
+        help="classes in the order of the outputs; kind: object, upright, area or background",
     )
     return parser
 

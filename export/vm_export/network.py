@@ -91,12 +91,12 @@ class GraphConvolution(nn.Module):
 
     def __init__(self, inputs: int, outputs: int, neighbors: int) -> None:
         super().__init__()
-        self.kernel = nn.Linear((neighbors + 1) * inputs, outputs)
+        self.linear = nn.Linear((neighbors + 1) * inputs, outputs)
 
     def forward(self, x: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
         """(n + 1, outputs) from x (n + 1, inputs) and neighbors (n + 1, N)."""
         gathered: torch.Tensor = torch.cat([x, x[neighbors].flatten(1)], dim=1)
-        return self.kernel(gathered)  # type: ignore[no-any-return]
+        return self.linear(gathered)  # type: ignore[no-any-return]
 
 
 class SeparableConvolution(nn.Module):
@@ -105,12 +105,12 @@ class SeparableConvolution(nn.Module):
     def __init__(self, inputs: int, outputs: int, neighbors: int) -> None:
         super().__init__()
         self.depthwise = nn.Parameter(torch.randn(neighbors + 1, inputs) / (neighbors + 1) ** 0.5)
-        self.pointwise = nn.Linear(inputs, outputs)
+        self.linear = nn.Linear(inputs, outputs)
 
     def forward(self, x: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
         """(n + 1, outputs) from x (n + 1, inputs) and neighbors (n + 1, N)."""
         mixed = (x[neighbors] * self.depthwise[1:]).sum(dim=1) + x * self.depthwise[0]
-        return self.pointwise(mixed)  # type: ignore[no-any-return]
+        return self.linear(mixed)  # type: ignore[no-any-return]
 
 
 class Dense(nn.Module):
@@ -118,11 +118,11 @@ class Dense(nn.Module):
 
     def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
-        self.kernel = nn.Linear(inputs, outputs)
+        self.linear = nn.Linear(inputs, outputs)
 
     def forward(self, x: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
         """(n + 1, outputs) from x (n + 1, inputs); the neighbors are not used."""
-        return self.kernel(x)  # type: ignore[no-any-return]
+        return self.linear(x)  # type: ignore[no-any-return]
 
 
 class Network(nn.Module):

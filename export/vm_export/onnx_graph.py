@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -14,6 +14,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from vm_embedded.arrays import Indices, Singles
 from vm_embedded.errors import ModelError
+from vm_embedded.files import written_beside
 from vm_embedded.manifest import METADATA_KEY, Manifest, SelfTest
 
 from .checkpoint import Checkpoint
@@ -44,14 +45,15 @@ def build(network: Network, manifest: Manifest) -> bytes:
         weights.append(numpy_helper.from_array(np.ascontiguousarray(value), name))
         return name
 
-    def node(operator: str, inputs: list[str], output: str, **attributes: int) -> str:
+    def node(operator: str, inputs: list[str], output: str, **attributes: Any) -> str:
         nodes.append(helper.make_node(operator, inputs, [output], name=output, **attributes))
         return output
 
     x = "points"
     for index, (spec, layer) in enumerate(zip(network.shape.layers, network.layers, strict=True)):
         name = f"layer{index}"
-        linear = layer.pointwise if isinstance(layer, SeparableConvolution) else layer.kernel
+        assert isinstance(layer, GraphConvolution | SeparableConvolution | Dense)
+        linear = layer.linear
         if not isinstance(layer, Dense):
             gathered = node("Gather", [x, "neighbors"], f"{name}.gathered", axis=0)
         if isinstance(layer, GraphConvolution):
@@ -105,10 +107,9 @@ def build(network: Network, manifest: Manifest) -> bytes:
 def export(checkpoint: Checkpoint, path: str | Path) -> float:
     """Write the model file of a checkpoint and return the largest difference to torch.
 
-    The file is checked in ONNX Runtime before it is written, beside and then renamed. Raises ModelError if a
-    probability differs by more than LARGEST_DIFFERENCE.
+    The file is checked in ONNX Runtime before it is written. Raises ModelError if a probability differs by more than
+    LARGEST_DIFFERENCE, InputError if the file can't be written.
     """
-    path = Path(path)
     network = checkpoint.network.eval()
     test = _example(network, points=12, seed=0)
     content = build(network, replace(checkpoint.manifest, self_test=test))
@@ -117,12 +118,8 @@ def export(checkpoint: Checkpoint, path: str | Path) -> float:
         raise ModelError(
             f"not written: ONNX Runtime and torch differ by {difference:.2g}, allowed are {LARGEST_DIFFERENCE:g}"
         )
-    beside = path.with_name(path.name + ".part")
-    try:
-        beside.write_bytes(content)
-        os.replace(beside, path)
-    except OSError as error:
-        raise ModelError(f"can't write {path}: {error.strerror or error}") from error
+    with written_beside(Path(path)) as part:
+        part.write_bytes(content)
     return difference
 
 

@@ -8,7 +8,6 @@ dense. Its networks read four channels; the fourth, alpha, has zero weights.
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -20,6 +19,7 @@ import yaml
 from torch import nn
 
 from vm_embedded.errors import InputError, VisualMeshError, unknown
+from vm_embedded.files import written_beside
 from vm_embedded.manifest import Manifest, ObjectClass
 from vm_embedded.mesh import RING_NEIGHBORS
 
@@ -119,7 +119,9 @@ def _classes(class_map: object, outputs: int) -> tuple[ObjectClass, ...]:
     if isinstance(class_map, Mapping):
         named = {int(position): str(name) for name, position in class_map.items()}
         if sorted(named) != list(range(outputs)):
-            raise InputError(f"class_map {dict(class_map)} does not number the {outputs} outputs from 0; give --classes")
+            raise InputError(
+                f"class_map {dict(class_map)} does not number the {outputs} outputs from 0; give --classes"
+            )
         return tuple(named_class(named[position]) for position in range(outputs))
     if isinstance(class_map, Sequence) and not isinstance(class_map, str):
         names = [str(each["name"] if isinstance(each, Mapping) else each) for each in class_map]
@@ -149,10 +151,9 @@ def _network(convolutions: Sequence[Sequence[Mapping[str, Any]]], neighbors: int
     network = Network(NetworkShape(tuple(layers), neighbors))
     with torch.no_grad():
         for layer, (kernel, bias) in zip(network.layers, kernels, strict=True):
-            linear = layer.kernel
-            assert isinstance(linear, nn.Linear)
-            linear.weight.copy_(torch.from_numpy(kernel.T))
-            linear.bias.copy_(torch.from_numpy(bias))
+            assert isinstance(layer, GraphConvolution | Dense)
+            layer.linear.weight.copy_(torch.from_numpy(kernel.T))
+            layer.linear.bias.copy_(torch.from_numpy(bias))
     return network
 
 
@@ -169,7 +170,7 @@ def _without_alpha(kernel: np.ndarray, neighbors: int) -> np.ndarray:
 
 
 def write_reference(checkpoint: Checkpoint, path: str | Path) -> None:
-    """Write a checkpoint in the reference's format, beside and then renamed.
+    """Write a checkpoint in the reference's format.
 
     Separable convolutions are multiplied out, and the fourth channel gets its zero weights back. Raises InputError.
     """
@@ -196,22 +197,15 @@ def write_reference(checkpoint: Checkpoint, path: str | Path) -> None:
         "class_map": {each.name: position for position, each in enumerate(manifest.classes)},
         "network": groups,
     }
-    path = Path(path)
-    beside = path.with_name(path.name + ".part")
-    try:
-        with beside.open("w") as file:
-            yaml.dump(data, file, Dumper=getattr(yaml, "CSafeDumper", yaml.SafeDumper), width=10**6)
-        os.replace(beside, path)
-    except OSError as error:
-        raise InputError(f"can't write {path}: {error.strerror or error}") from error
+    with written_beside(Path(path)) as part, part.open("w") as file:
+        yaml.dump(data, file, Dumper=getattr(yaml, "CSafeDumper", yaml.SafeDumper), width=10**6)
 
 
 def _kernel(layer: nn.Module) -> tuple[np.ndarray, np.ndarray]:
     """A layer's kernel (inputs, outputs) and bias (outputs,), of separable ones multiplied out."""
+    assert isinstance(layer, GraphConvolution | SeparableConvolution | Dense)
+    kernel = layer.linear.weight.detach().double().numpy().T
     if isinstance(layer, SeparableConvolution):
-        depthwise = layer.depthwise.detach().double().numpy()
-        pointwise = layer.pointwise.weight.detach().double().numpy().T
-        full = depthwise[:, :, None] * pointwise[None]
-        return full.reshape(-1, full.shape[2]), layer.pointwise.bias.detach().double().numpy()
-    assert isinstance(layer, GraphConvolution | Dense)
-    return layer.kernel.weight.detach().double().numpy().T, layer.kernel.bias.detach().double().numpy()
+        full = layer.depthwise.detach().double().numpy()[:, :, None] * kernel
+        kernel = full.reshape(-1, full.shape[2])
+    return kernel, layer.linear.bias.detach().double().numpy()
