@@ -20,6 +20,9 @@ from .projection import ProjectedMesh, to_camera
 from .settings import Settings
 from .shapes import Shape, tangents
 
+_MOST_CLUSTERS = 100
+"""Clusters that are looked at, largest first: a frame of noise must not cost a second."""
+
 _CERTAIN = 4.0
 """Log-odds beyond which a point counts no more: one point must not outvote its neighbors."""
 
@@ -63,16 +66,14 @@ def find_objects(
     mesh = scene.projected.mesh
     p = probability.astype(np.float64)
     log_odds = np.clip(np.log(np.maximum(p, 1e-12) / np.maximum(1.0 - p, 1e-12)), -_CERTAIN, _CERTAIN)
-    widest = math.ceil(settings.max_widths * scene.rings)
     found: list[Detection] = []
     rejected: list[Detection] = []
-    for members in clusters(mesh.neighbors, probability > settings.threshold):
+    for members in clusters(mesh.neighbors, probability > settings.threshold)[:_MOST_CLUSTERS]:
         near = _near(scene, members)
-        if graph_diameter(mesh.neighbors, members, widest) > widest:
-            center = _middle(scene, members)
-            reason: str | None = f"wider than {widest} steps in the mesh, where an object is {scene.rings:.1f} wide"
-        else:
-            center = _best_center(scene, members, near, log_odds[near])
+        center = _middle(scene, members)
+        reason = _wrong_size(scene, members, center, near, settings)
+        if reason is None:
+            center = _best_center(scene, center, near, log_odds[near])
             reason = _misfit(scene, center, near, p[near], settings) or _repeats(scene, center, found)
         if reason is None:
             found.append(_describe(scene, class_name, center, near, p[near], log_odds[near], None))
@@ -97,16 +98,27 @@ def _near(scene: Scene, members: Members) -> Members:
     return np.flatnonzero(rays @ axis > 1.0 - 0.5 * min(chord, 2.0) ** 2)
 
 
-def _best_center(scene: Scene, members: Members, near: Members, log_odds: Floats) -> Floats:
-    """Center (3,) [m] of the object whose subgraph fits best around a cluster.
+def _wrong_size(scene: Scene, members: Members, center: Floats, near: Members, settings: Settings) -> str | None:
+    """Why a cluster around `center` can't be an object, by its number of points and its width alone, or None."""
+    expected = int((scene.shape.offset(scene.projected.mesh.rays[near], center[None], scene.height) < 1.0).sum())
+    # A filled object has more than half of its points in its cluster; half of that allows for a center that is off.
+    if len(members) < 0.25 * expected:
+        return f"{len(members)} points, where an object there has {expected}"
+    widest = math.ceil(settings.max_widths * scene.rings)
+    if graph_diameter(scene.projected.mesh.neighbors, members, widest) > widest:
+        return f"wider than {widest} steps in the mesh, where an object is {scene.rings:.1f} wide"
+    return None
 
-    The likeliest object has the largest sum of log-odds inside its outline. The sum is climbed from the middle of the
-    cluster, over directions around the best one so far, in steps that halve when none is better. The outline is half
-    a ring spacing soft, so that the sum has no plateaus between points. What is off screen adds nothing, so an object
-    that the border cuts gets its center where it belongs.
+
+def _best_center(scene: Scene, center: Floats, near: Members, log_odds: Floats) -> Floats:
+    """Center (3,) [m] of the object whose subgraph fits best around `center`.
+
+    The likeliest object has the largest sum of log-odds inside its outline. The sum is climbed over directions around
+    the best one so far, in steps that halve when none is better. The outline is half a ring spacing soft, so that the
+    sum has no plateaus between points. What is off screen adds nothing, so an object that the border cuts gets its
+    center where it belongs.
     """
     rays = np.ascontiguousarray(scene.projected.mesh.rays[near])
-    center = _middle(scene, members)
     step = 0.5
     for _ in range(24):
         distance = float(np.linalg.norm(center))

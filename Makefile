@@ -1,0 +1,47 @@
+# Every target sets up what it needs: a virtual environment in .venv, with the versions of deploy/constraints.txt.
+PYTHON ?= python3
+BIN := .venv/bin
+PIP := $(BIN)/pip install --disable-pip-version-check --quiet --constraint deploy/constraints.txt
+DEMO := tests/fixtures/demo
+
+.PHONY: help setup demo test lint fixtures docs clean
+.DELETE_ON_ERROR:
+
+help: ## what can be made
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+setup: .venv/dev ## everything for developing: runtime, torch, tests
+
+demo: .venv/runtime ## find the balls in the frames of the repository
+	@$(BIN)/vm-detect --camera $(DEMO) --model $(DEMO)/ball.onnx --save-overlay demo-out
+	@echo "Annotated pictures: $(CURDIR)/demo-out/"
+
+test: lint ## lint, types and tests
+	$(BIN)/python -m pytest
+
+lint: .venv/dev ## style and types
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+fixtures: .venv/dev ## draw the demo's frames and train its network again (25 minutes)
+	$(BIN)/python -m tests.fixtures.make_demo
+
+docs: .venv/dev ## write the help texts in docs/ again
+	$(BIN)/python docs/help_pages.py
+
+clean: ## remove what was made
+	rm -rf .venv demo-out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
+.venv/made:
+	@$(PYTHON) -c 'import sys; sys.exit("vm-embedded needs Python 3.11 or newer, $(PYTHON) is " + sys.version.split()[0] + "; run make PYTHON=python3.11" if sys.version_info < (3, 11) else 0)'
+	$(PYTHON) -m venv .venv
+	@touch $@
+
+.venv/runtime: .venv/made pyproject.toml deploy/constraints.txt
+	$(PIP) --editable .
+	@touch $@
+
+.venv/dev: .venv/made pyproject.toml deploy/constraints.txt
+	$(PIP) --editable '.[dev]'
+	@touch $@ .venv/runtime

@@ -1,0 +1,160 @@
+"""Objects are found where they are, whatever cuts them, and what can't be one is rejected with its reason."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vm_embedded.lens import Equisolid, Rectilinear
+from vm_embedded.mesh import ring_mesh
+from vm_embedded.objects import Scene, find_objects
+from vm_embedded.orientation import Orientation
+from vm_embedded.projection import project, to_camera
+from vm_embedded.settings import Settings
+from vm_embedded.shapes import Circle, Sphere
+
+SIZE = (1280, 1024)
+K = 5.0
+
+
+def scene_at(height=0.9, pitch=0.6, shape=None, mesh_shape=None, lens=None):
+    shape = shape or Sphere(0.08)
+    mesh_shape = mesh_shape or shape
+    lens = lens or Equisolid(focal_length=500.0, fov=2.6)
+    orientation = Orientation.from_roll_pitch(height, 0.05, pitch)
+    projected = project(ring_mesh(mesh_shape, height, K, 8.0), orientation.level, lens, SIZE)
+    rings = K * float(shape.spacing(height) / mesh_shape.spacing(height))
+    return Scene(shape, height, orientation.level, lens, SIZE, projected, rings)
+
+
+def ideal(scene, *spots, radius=None):
+    """Probabilities (n,) of a perfect network that sees objects at these places (x, y) [m] on the plane."""
+    shape = type(scene.shape)(radius) if radius else scene.shape
+    rays = scene.projected.mesh.rays
+    inside = np.zeros(len(rays), dtype=bool)
+    for spot in spots:
+        center = np.array([[*spot, shape.center_height - scene.height]])
+        inside |= shape.offset(rays, center, scene.height)[0] < 1.0
+    return np.where(inside, 0.97, 0.02).astype(np.float32)
+
+
+def objects_in(scene, probability, **settings):
+    return find_objects(scene, "ball", probability, Settings(**settings), explain=True)
+
+
+@given(distance=st.floats(0.6, 6.0), heading=st.floats(-0.4, 0.4), height=st.floats(0.5, 1.3))
+def test_a_ball_is_found_where_it_is(distance, heading, height):
+    scene = scene_at(height, pitch=np.arctan2(height, distance))
+    spot = np.array([distance * np.cos(heading), distance * np.sin(heading)])
+    found, rejected = objects_in(scene, ideal(scene, spot))
+    assert len(found) == 1, [each.reason for each in rejected]
+    ball = found[0]
+    away = float(np.hypot(distance, height - scene.shape.radius))
+    assert ball.distance == pytest.approx(away, rel=0.05)
+    center = np.array([[*spot, scene.shape.radius - height]])
+    assert scene.shape.offset(ball.bearing[None], center, height)[0, 0] < 0.35
+    np.testing.assert_allclose(ball.position, ball.bearing * ball.distance + [0, 0, height], atol=1e-9)
+    assert ball.position[2] == pytest.approx(scene.shape.radius)
+    assert ball.distances_agree
+    assert ball.confidence > 0.8
+
+
+@given(distance=st.floats(0.6, 4.0))
+def test_a_circle_is_found_where_it_is(distance):
+    scene = scene_at(0.9, pitch=np.arctan2(0.9, distance), shape=Circle(0.1))
+    found, _ = objects_in(scene, ideal(scene, (distance, 0.0)))
+    assert len(found) == 1
+    assert found[0].position[2] == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(found[0].position[:2], (distance, 0.0), atol=0.06)
+
+
+@given(height=st.floats(0.5, 1.3), x=st.floats(-0.2, 0.2), y=st.floats(-0.2, 0.2))
+def test_a_ball_below_the_camera_is_found(height, x, y):
+    scene = scene_at(height, pitch=np.pi / 2)
+    found, rejected = objects_in(scene, ideal(scene, (x, y)))
+    assert len(found) == 1, [each.reason for each in rejected]
+    np.testing.assert_allclose(found[0].position[:2], (x, y), atol=0.05)
+
+
+def test_pixels_are_those_of_the_outline():
+    scene = scene_at(0.9, pitch=0.5, lens=Rectilinear(focal_length=700.0, fov=2.0))
+    found, _ = objects_in(scene, ideal(scene, (1.6, 0.2)))
+    ball = found[0]
+    center = to_camera(ball.bearing[None], scene.rotation)
+    assert np.linalg.norm(scene.lens.project(center, SIZE)[0] - ball.center) < 2.0
+    reach = np.linalg.norm(ball.outline - ball.center, axis=1)
+    assert reach.min() <= ball.radius <= reach.max()
+
+
+def test_an_object_that_the_border_cuts_keeps_its_center():
+    scene = scene_at(0.9, pitch=0.5)
+    rays = scene.projected.mesh.rays
+    border = rays[np.argmax(scene.projected.pixels[:, 1])]  # the lowest point on screen
+    spot = scene.shape.center_along(border[None], scene.height)[0, :2]
+    found, _ = objects_in(scene, ideal(scene, spot))
+    assert len(found) == 1
+    assert np.linalg.norm(found[0].position[:2] - spot) < 0.5 * scene.shape.radius
+
+
+def test_two_objects_are_two():
+    scene = scene_at()
+    found, _ = objects_in(scene, ideal(scene, (1.2, 0.25), (1.2, -0.25)))
+    assert len(found) == 2
+
+
+def test_what_is_much_wider_is_rejected_by_its_diameter():
+    scene = scene_at()
+    found, rejected = objects_in(scene, ideal(scene, (1.3, 0.0), radius=0.3))
+    assert not found
+    assert "wider than" in rejected[0].reason
+
+
+def test_what_is_somewhat_wider_is_rejected_by_the_band_around():
+    scene = scene_at()
+    found, rejected = objects_in(scene, ideal(scene, (1.3, 0.0), radius=0.13))
+    assert not found
+    assert "around its outline" in rejected[0].reason
+
+
+def test_what_is_much_smaller_is_rejected_by_its_inside():
+    scene = scene_at()
+    found, rejected = objects_in(scene, ideal(scene, (1.3, 0.0), radius=0.035))
+    assert not found
+    assert "points, where" in rejected[0].reason or "inside its outline" in rejected[0].reason
+
+
+def test_a_corner_of_an_object_is_too_little_to_tell():
+    scene = scene_at()
+    y = scene.projected.pixels[:, 1]
+    probability = np.full(len(y), 0.02, dtype=np.float32)
+    probability[np.argmax(y)] = 0.97
+    found, rejected = objects_in(scene, probability)
+    assert not found
+    assert len(rejected) == 1
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 1.0))
+@settings(max_examples=15)
+def test_noise_never_breaks_the_search(seed, share):
+    scene = scene_at()
+    random = np.random.default_rng(seed)
+    probability = np.where(random.random(len(scene.projected)) < share, random.random(len(scene.projected)), 0.0)
+    found, rejected = objects_in(scene, probability.astype(np.float32))
+    for each in (*found, *rejected):
+        assert np.isfinite(each.distance)
+        assert 0.0 <= each.confidence <= 1.0
+        assert (each.reason is None) == (each in found)
+
+
+def test_reasons_are_only_collected_when_asked_for():
+    scene = scene_at()
+    _, rejected = find_objects(scene, "ball", ideal(scene, (1.3, 0.0), radius=0.3), Settings())
+    assert rejected == []
+
+
+def test_a_larger_object_radius_is_an_object_of_more_rings():
+    scene = scene_at(shape=Sphere(0.12), mesh_shape=Sphere(0.08))
+    assert scene.rings > K * 1.4
+    found, _ = objects_in(scene, ideal(scene, (1.5, 0.1)))
+    assert len(found) == 1
+    assert found[0].position[2] == pytest.approx(0.12)
