@@ -22,6 +22,11 @@ class ModelError(VisualMeshError):
     """A model file that can't be trusted or run."""
 
 
+def one_line(error: BaseException) -> str:
+    """Another library's error as one line of at most 200 characters."""
+    return (" ".join(str(error).split()) or type(error).__name__)[:200]
+
+
 def unknown(what: str, value: object, allowed: Iterable[str]) -> str:
     """Say which value is not known, what is allowed, and the nearest right one."""
     names = list(allowed)

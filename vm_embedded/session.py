@@ -9,7 +9,7 @@ import onnxruntime
 from onnxruntime.capi import onnxruntime_pybind11_state as states
 
 from .arrays import Indices, Singles
-from .errors import ModelError
+from .errors import ModelError, one_line
 from .onnx_file import ModelFile
 from .settings import Settings
 
@@ -53,7 +53,7 @@ class Session:
         try:
             self._session = onnxruntime.InferenceSession(model.content, options, providers=["CPUExecutionProvider"])
         except _RUNTIME_ERRORS as error:
-            raise ModelError(f"{model.path}: ONNX Runtime can't load it: {_first_line(error)}") from error
+            raise ModelError(f"{model.path}: ONNX Runtime can't load it: {one_line(error)}") from error
         self._check_interface()
         self.self_test()
 
@@ -80,7 +80,7 @@ class Session:
         try:
             outputs = self._session.run(["probabilities"], {"points": points, "neighbors": neighbors})
         except _RUNTIME_ERRORS as error:
-            raise ModelError(f"{self.model.path}: ONNX Runtime can't run it: {_first_line(error)}") from error
+            raise ModelError(f"{self.model.path}: ONNX Runtime can't run it: {one_line(error)}") from error
         return np.asarray(outputs[0])
 
     def _check_interface(self) -> None:
@@ -96,7 +96,3 @@ class Session:
         }
         if found != expected:
             raise ModelError(f"{self.model.path}: its inputs and outputs are {found}, its manifest asks for {expected}")
-
-
-def _first_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:300]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import torch
 
-from vm_embedded.errors import InputError, ModelError
+from vm_embedded.errors import InputError, ModelError, one_line
 from vm_embedded.files import written_beside
 from vm_embedded.manifest import Manifest
 
@@ -51,12 +51,12 @@ class Checkpoint:
         except OSError as error:
             raise InputError(f"can't read {path}: {error.strerror or error}") from error
         except (pickle.UnpicklingError, RuntimeError, EOFError, ValueError, KeyError) as error:
-            raise InputError(f"{path} is no checkpoint: {str(error).splitlines()[0]}") from error
+            raise InputError(f"{path} is no checkpoint: {one_line(error)}") from error
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
             raise InputError(f"{path} is no checkpoint of this format ({_FORMAT!r})")
         network = Network(NetworkShape.from_dict(content["network"]))
         try:
             network.load_state_dict(content["state"])
         except (RuntimeError, KeyError) as error:
-            raise InputError(f"{path}: weights do not fit the network: {str(error).splitlines()[0]}") from error
+            raise InputError(f"{path}: weights do not fit the network: {one_line(error)}") from error
         return cls(network.eval(), Manifest.from_json(json.dumps(content["manifest"])))

@@ -12,6 +12,7 @@ import onnxruntime
 import torch
 from onnx import TensorProto, helper, numpy_helper
 
+import vm_embedded
 from vm_embedded.arrays import Indices, Singles
 from vm_embedded.errors import ModelError
 from vm_embedded.files import written_beside
@@ -112,7 +113,8 @@ def export(checkpoint: Checkpoint, path: str | Path) -> float:
     """
     network = checkpoint.network.eval()
     test = _example(network, points=12, seed=0)
-    content = build(network, replace(checkpoint.manifest, self_test=test))
+    provenance = {**checkpoint.manifest.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"}
+    content = build(network, replace(checkpoint.manifest, self_test=test, provenance=provenance))
     difference = largest_difference(content, network)
     if not difference <= LARGEST_DIFFERENCE:
         raise ModelError(

@@ -18,7 +18,7 @@ import torch
 import yaml
 from torch import nn
 
-from vm_embedded.errors import InputError, VisualMeshError, unknown
+from vm_embedded.errors import InputError, VisualMeshError, one_line, unknown
 from vm_embedded.files import written_beside
 from vm_embedded.manifest import Manifest, ObjectClass
 from vm_embedded.mesh import RING_NEIGHBORS
@@ -78,7 +78,7 @@ def read_reference(path: str | Path, overrides: Overrides) -> Checkpoint:
     except OSError as error:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError) as error:
-        raise InputError(f"{path} is not YAML: {' '.join(str(error).split())[:200]}") from error
+        raise InputError(f"{path} is not YAML: {one_line(error)}") from error
     try:
         return _checkpoint(data, overrides, {"made_from": path.name, "sha256": hashlib.sha256(text).hexdigest()})
     except (KeyError, TypeError, AttributeError) as error:

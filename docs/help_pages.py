@@ -1,0 +1,44 @@
+"""Writes docs/command-line.md from the parsers, so that page and program can't drift apart.
+
+python docs/help_pages.py writes the page; a test checks that it is what this would write.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from vm_embedded import cli as detect
+from vm_export import cli as export
+
+PAGE = Path(__file__).parent / "command-line.md"
+
+
+def page() -> str:
+    """The page's text."""
+    parts = [
+        "# Command line\n\nMade from the programs' own help texts; every program also prints them with `--help`.\n"
+    ]
+    for parser in (detect.parser(), export.parser()):
+        parts.append(f"## {parser.prog}\n\n{parser.description}\n")
+        for group in parser._action_groups:
+            rows = [_row(action) for action in group._group_actions if not isinstance(action, argparse._HelpAction)]
+            if rows:
+                note = f" ({group.description})" if group.description else ""
+                title = (group.title or "").capitalize()
+                parts.append(f"**{title}**{note}\n\n| option | meaning |\n| --- | --- |\n" + "\n".join(rows) + "\n")
+        parts.append(f"{parser.epilog}\n")
+    return "\n".join(parts)
+
+
+def _row(action: argparse.Action) -> str:
+    names = ", ".join(f"`{name}`" for name in action.option_strings) or f"`{action.dest}`"
+    if action.choices:
+        names += " " + " \\| ".join(f"`{choice}`" for choice in action.choices)
+    elif action.option_strings and action.nargs != 0:
+        names += f" `{action.metavar or action.dest.upper()}`"
+    return f"| {names} | {action.help} |"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page())

@@ -1,0 +1,25 @@
+"""The documentation says what the programs do."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGES = [DOCS.parent / "README.md", DOCS.parent / "CHANGELOG.md", *sorted(DOCS.glob("*.md"))]
+
+
+def test_the_command_line_page_is_what_the_parsers_say(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    import help_pages
+
+    sys.modules.pop("help_pages")
+    assert help_pages.PAGE.read_text() == help_pages.page(), "run: make docs"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text()):
+        if not target.startswith("http"):
+            assert (page.parent / target).exists(), f"{page.name} links to {target}"
