@@ -87,7 +87,7 @@ def test_a_line_has_what_the_documentation_says():
     (ball,) = line["detections"]
     assert list(ball) == [
         *("class", "confidence", "center", "radius", "bearing", "position", "distance"),
-        *("distance_by_angle", "distances_agree", "points"),
+        *("angular_radius", "distance_by_angle", "distances_agree", "points"),
     ]
     assert np.linalg.norm(ball["bearing"]) == pytest.approx(1.0, abs=1e-4)
 

@@ -20,10 +20,12 @@ class Detection:
     The plane's frame stands below the camera, z up, with the heading that the frame's orientation had.
 
     class_name: name of its class. confidence: mean probability inside its outline. center (2,), radius [px]: of the
-    disk that covers as many pixels as its outline. outline (m, 2) [px]. bearing (3,): unit vector from the camera to
+    disk that covers as many pixels as its outline. outline (m, 2) [px]: what
+    the lens sees of it. bearing (3,): unit vector from the camera to
     its center. position (3,): its center [m]. distance: from the camera to its center [m], where its bearing meets the
-    plane. distance_by_angle [m]: from its apparent size alone. distances_agree: whether the two differ by less than
-    the mesh can resolve. points: mesh points inside its outline. reason: why it was rejected, or None.
+    plane. angular_radius [rad]: of the size that fits the points best. distance_by_angle [m]: what follows from that
+    size alone. distances_agree: whether the two differ by less than the mesh can resolve. points: mesh points inside
+    its outline. reason: why it was rejected, or None.
     """
 
     class_name: str
@@ -34,6 +36,7 @@ class Detection:
     bearing: Floats
     position: Floats
     distance: float
+    angular_radius: float
     distance_by_angle: float
     distances_agree: bool
     points: int
@@ -49,6 +52,7 @@ class Detection:
             "bearing": [round(float(value), 5) for value in self.bearing],
             "position": [round(float(value), 3) for value in self.position],
             "distance": round(self.distance, 3),
+            "angular_radius": round(self.angular_radius, 5),
             "distance_by_angle": round(self.distance_by_angle, 3),
             "distances_agree": self.distances_agree,
             "points": self.points,

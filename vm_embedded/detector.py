@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
-from .arrays import Image, Singles
-from .cache import MeshCache, View
-from .detections import Detection, Detections
-from .lens import Lens, Size
+from .arrays import Image
+from .cache import MeshCache
+from .detections import Detections
+from .lens import Lens
 from .objects import Scene, find_objects
 from .onnx_file import ModelFile, read_model
 from .orientation import Orientation
-from .projection import ProjectedMesh, project
+from .projection import project
 from .sampling import checked_image, sample
 from .session import Session
 from .settings import Settings
@@ -71,13 +70,12 @@ class Detector:
         with _timed(timing, "infer"):
             probabilities = self.session.run(points, projected.mesh.neighbors)
         with _timed(timing, "cluster"):
-            found, rejected = self._objects(
-                projected, probabilities, view, orientation.height, rings, lens, size, explain
-            )
+            scene = Scene(self.shape, orientation.height, view.rotation, view.heading, lens, size, projected, rings)
+            found, rejected = find_objects(scene, self.manifest.classes, probabilities, self.settings, explain)
         timing["total"] = 1e3 * (perf_counter() - started)
         return Detections(
-            objects=tuple(sorted(found, key=lambda each: -each.confidence)),
-            rejected=tuple(rejected),
+            objects=found,
+            rejected=rejected,
             manifest=self.manifest,
             mesh=projected,
             heading=view.heading,
@@ -89,32 +87,6 @@ class Detector:
     def _rings(self, height: float, mesh_height: float) -> float:
         """Mesh rings that cross an object, seen from `height` [m] through a mesh made for `mesh_height` [m]."""
         return self.manifest.intersections * float(self.shape.spacing(height) / self.cache.shape.spacing(mesh_height))
-
-    def _objects(
-        self,
-        projected: ProjectedMesh,
-        probabilities: Singles,
-        view: View,
-        height: float,
-        rings: float,
-        lens: Lens,
-        size: Size,
-        explain: bool,
-    ) -> tuple[list[Detection], list[Detection]]:
-        """Objects and rejected clusters of every object class, in the frame's own observation plane."""
-        scene = Scene(self.shape, height, view.rotation, lens, size, projected, rings)
-        found: list[Detection] = []
-        rejected: list[Detection] = []
-        for column, each in enumerate(self.manifest.classes):
-            if each.kind == "object":
-                good, bad = find_objects(scene, each.name, probabilities[:, column], self.settings, explain)
-                found += good
-                rejected += bad
-        turn = view.heading
-        return tuple(
-            [replace(each, bearing=turn @ each.bearing, position=turn @ each.position) for each in some]
-            for some in (found, rejected)
-        )  # type: ignore[return-value]
 
 
 @contextmanager

@@ -8,6 +8,7 @@ best; it must be filled, and the band around it empty.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from .arrays import Floats, Singles
 from .clustering import Members, clusters, graph_diameter
 from .detections import Detection
 from .lens import Lens, Size
+from .manifest import ObjectClass
 from .projection import ProjectedMesh, to_camera
 from .settings import Settings
 from .shapes import Shape, tangents
@@ -35,12 +37,17 @@ _SCALES = np.geomspace(0.6, 1.8, 25)
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Where objects are sought: the shape, the camera's height [m] and rotation (3, 3) to the mesh frame, the lens,
-    the image size, the points on screen, and `rings`, the number of mesh rings that cross an object here."""
+    """Where objects are sought.
+
+    shape: of the object. height: of the camera [m]. rotation (3, 3): camera to mesh frame, in which the search works.
+    heading (3, 3): mesh frame to the observation plane, in which its answers are. lens and image size. projected: the
+    points on screen. rings: number of mesh rings that cross an object here.
+    """
 
     shape: Shape
     height: float
     rotation: Floats
+    heading: Floats
     lens: Lens
     size: Size
     projected: ProjectedMesh
@@ -52,34 +59,49 @@ class Scene:
         return 2.0 / self.rings
 
     def pixels(self, rays: Floats) -> Floats:
-        """Pixels (n, 2) of rays (n, 3)."""
-        return self.lens.project(to_camera(rays, self.rotation), self.size)
+        """Pixels (m, 2) of those of the rays (n, 3) that the lens sees, on screen or not."""
+        camera = to_camera(rays, self.rotation)
+        return self.lens.project(camera[self.lens.sees(camera)], self.size)
 
 
 def find_objects(
-    scene: Scene, class_name: str, probability: Singles, settings: Settings, explain: bool = False
-) -> tuple[list[Detection], list[Detection]]:
-    """Objects of one class, and with `explain` the clusters that were rejected, from the points' probabilities (n,).
+    scene: Scene, classes: Sequence[ObjectClass], probabilities: Singles, settings: Settings, explain: bool = False
+) -> tuple[tuple[Detection, ...], tuple[Detection, ...]]:
+    """The objects that the points' probabilities (n, C) show, most confident first, and the rejected clusters.
 
-    Bearings and positions are in the mesh frame.
+    Only classes of the kind "object" are looked for, and only with `explain` are the rejected ones described.
     """
-    mesh = scene.projected.mesh
-    p = probability.astype(np.float64)
-    log_odds = np.clip(np.log(np.maximum(p, 1e-12) / np.maximum(1.0 - p, 1e-12)), -_CERTAIN, _CERTAIN)
     found: list[Detection] = []
     rejected: list[Detection] = []
-    for members in clusters(mesh.neighbors, probability > settings.threshold)[:_MOST_CLUSTERS]:
+    for each, probability in zip(classes, probabilities.T, strict=True):
+        if each.kind == "object":
+            _find(scene, each.name, probability.astype(np.float64), settings, found, rejected if explain else None)
+    return tuple(sorted(found, key=lambda each: -each.confidence)), tuple(rejected)
+
+
+def _find(
+    scene: Scene,
+    class_name: str,
+    p: Floats,
+    settings: Settings,
+    found: list[Detection],
+    rejected: list[Detection] | None,
+) -> None:
+    """Add the objects of one class, from its probabilities (n,), to `found` and all else to `rejected`."""
+    log_odds = np.clip(np.log(np.maximum(p, 1e-12) / np.maximum(1.0 - p, 1e-12)), -_CERTAIN, _CERTAIN)
+    centers: list[Floats] = []
+    for members in clusters(scene.projected.mesh.neighbors, p > settings.threshold)[:_MOST_CLUSTERS]:
         near = _near(scene, members)
         center = _middle(scene, members)
         reason = _wrong_size(scene, members, center, near, settings)
         if reason is None:
             center = _best_center(scene, center, near, log_odds[near])
-            reason = _misfit(scene, center, near, p[near], settings) or _repeats(scene, center, found)
+            reason = _misfit(scene, center, near, p[near], settings) or _repeats(scene, center, centers)
         if reason is None:
+            centers.append(center)
             found.append(_describe(scene, class_name, center, near, p[near], log_odds[near], None))
-        elif explain:
+        elif rejected is not None:
             rejected.append(_describe(scene, class_name, center, near, p[near], log_odds[near], reason))
-    return found, rejected
 
 
 def _middle(scene: Scene, members: Members) -> Floats:
@@ -169,12 +191,12 @@ def _misfit(scene: Scene, center: Floats, near: Members, p: Floats, settings: Se
     return None
 
 
-def _repeats(scene: Scene, center: Floats, found: list[Detection]) -> str | None:
-    """Why an object at `center` is one that was found already, or None."""
+def _repeats(scene: Scene, center: Floats, others: list[Floats]) -> str | None:
+    """Why an object at `center` is one of the others, whose center it covers, or None."""
     ray = (center / np.linalg.norm(center))[None]
-    for other in found:
-        if scene.shape.offset(ray, (other.bearing * other.distance)[None], scene.height)[0, 0] < 1.0:
-            return f"the same object as the one at {other.distance:.2f} m"
+    for other in others:
+        if scene.shape.offset(ray, other[None], scene.height)[0, 0] < 1.0:
+            return f"the same object as the one at {np.linalg.norm(other):.2f} m"
     return None
 
 
@@ -188,16 +210,18 @@ def _describe(
     sums = _soft(offset / _SCALES[:, None], scene) @ log_odds
     scale = float(_SCALES[int(np.argmax(sums))])
     outline = scene.pixels(scene.shape.outline(center, scene.height))
-    middle, radius = _disk(outline)
+    # An object at the edge of the lens's view may have no outline in it.
+    middle, radius = _disk(outline if len(outline) > 2 else scene.projected.pixels[near])
     return Detection(
         class_name=class_name,
         confidence=float(inside.mean()) if len(inside) else 0.0,
         center=middle,
         radius=radius,
         outline=outline,
-        bearing=center / distance,
-        position=center + np.array([0.0, 0.0, scene.height]),
+        bearing=scene.heading @ center / distance,
+        position=scene.heading @ center + (0.0, 0.0, scene.height),
         distance=distance,
+        angular_radius=math.asin(min(scale * scene.shape.radius / distance, 1.0)),
         distance_by_angle=distance / scale,
         distances_agree=abs(scale - 1.0) <= scene.spacing,
         points=len(inside),

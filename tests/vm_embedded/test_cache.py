@@ -1,0 +1,230 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from vm_embedded.cache import MeshCache
+from vm_embedded.errors import GeometryError
+from vm_embedded.lens import Equidistant, Equisolid, Rectilinear
+from vm_embedded.manifest import Manifest, ObjectClass
+from vm_embedded.mesh import ring_mesh
+from vm_embedded.orientation import Orientation
+from vm_embedded.projection import project
+from vm_embedded.settings import Settings
+
+from .strategies import SIZE, lenses, orientations, random_direction, reals, rotation, seeds
+
+LENS = Equisolid(focal_length=300.0, fov=2.2)
+
+
+def manifest(**changes):
+    values = {
+        "shape": "sphere",
+        "radius": 0.1,
+        "object_radius": 0.1,
+        "intersections": 2.0,
+        "mesh": "ring6",
+        "max_distance": 3.0,
+        "edge": "hard",
+        "classes": (ObjectClass("ball", "object"),),
+    }
+    return Manifest(**(values | changes))
+
+
+def built(cache, height):
+    """The whole mesh for a height, without the cache."""
+    facts = cache.manifest
+    return ring_mesh(facts.mesh_shape, height, facts.intersections, facts.max_distance, facts.mesh)
+
+
+def assert_same_as_without(cache, orientation, lens, size):
+    """The prepared part gives what the whole mesh gives, to the last digit."""
+    view = cache.view(orientation, lens, size)
+    prepared = project(view.mesh, view.rotation, lens, size)
+    whole = project(built(cache, view.mesh_height), view.rotation, lens, size)
+    np.testing.assert_array_equal(prepared.mesh.rays, whole.mesh.rays)
+    np.testing.assert_array_equal(prepared.mesh.neighbors, whole.mesh.neighbors)
+    np.testing.assert_array_equal(prepared.pixels, whole.pixels)
+    np.testing.assert_allclose(view.heading @ view.rotation, orientation.rotation, atol=1e-12)
+
+
+@st.composite
+def buckets(draw):
+    """Settings, and the middle of a bucket: height, roll and pitch."""
+    steps = draw(reals(1e-3, 0.6)), draw(reals(1e-3, 0.6))
+    roll = round(draw(reals(-math.pi, math.pi)) / steps[0]) * steps[0]
+    pitch = round(draw(reals(-1.0, 0.5 * math.pi)) / steps[1]) * steps[1]
+    return Settings(roll_step=steps[0], pitch_step=steps[1]), draw(reals(0.3, 1.5)), roll, pitch
+
+
+def within(bucket, random):
+    """A random orientation of the bucket, often in its corners."""
+    settings, height, roll, pitch = bucket
+    away = 0.499 * np.sign(random.uniform(-1.0, 1.0, 2)) * random.random(2) ** 0.3
+    pitch = min(max(pitch + away[1] * settings.pitch_step, -0.5 * math.pi), 0.5 * math.pi)
+    yaw = random.uniform(-math.pi, math.pi)
+    return Orientation.from_roll_pitch(height, roll + away[0] * settings.roll_step, pitch, yaw)
+
+
+AHEAD = (Settings(), 0.8, 0.0, 0.4)
+
+
+@given(buckets(), lenses(), seeds)
+@example(AHEAD, Equisolid(focal_length=100.0, fov=2.0 * math.pi), 0)
+@example(AHEAD, Equidistant(focal_length=60.0, fov=2.0 * math.pi), 0)
+def test_a_bucket_never_changes_an_answer(bucket, lens, seed):
+    cache = MeshCache(manifest(), bucket[0])
+    random = np.random.default_rng(seed)
+    for _ in range(6):
+        assert_same_as_without(cache, within(bucket, random), lens, SIZE)
+    assert cache.hits + cache.misses == 6
+
+
+@given(buckets(), lenses(), seeds)
+def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(bucket, lens, seed):
+    """Matrices from files are rotations to some digits only; those that Orientation accepts are answered alike."""
+    cache = MeshCache(manifest(), bucket[0])
+    random = np.random.default_rng(seed)
+    for _ in range(6):
+        exact = within(bucket, random)
+        rough = Orientation(exact.height, exact.rotation + 2.8e-4 * random.uniform(-1.0, 1.0, (3, 3)))
+        assert_same_as_without(cache, rough, lens, SIZE)
+
+
+@given(orientations(0.3, 1.5), lenses(), seeds)
+def test_yaw_asks_for_nothing_new(orientation, lens, seed):
+    cache = MeshCache(manifest(), Settings())
+    random = np.random.default_rng(seed)
+    first = cache.view(orientation, lens, SIZE)
+    yaw = rotation([0.0, 0.0, random.uniform(-3.0, 3.0)])
+    second = cache.view(Orientation(orientation.height, yaw @ orientation.rotation), lens, SIZE)
+    np.testing.assert_allclose(second.rotation, first.rotation, atol=1e-9)
+    np.testing.assert_allclose(second.heading, yaw @ first.heading, atol=1e-9)
+
+
+@given(reals(0.2001, 50.0), reals(0.01, 2.0), reals(0.5, 12.0), st.sampled_from(["sphere", "circle"]))
+def test_mesh_height_is_never_off_by_more_than_the_tolerance(height, tolerance, k, shape):
+    """In rings across an object: k from the mesh's height is k + tolerance or less at the camera's, and back."""
+    cache = MeshCache(manifest(intersections=k, shape=shape), Settings(height_tolerance=tolerance))
+    found = cache.mesh_height(height)
+    assert abs(k * cache.shape.intersection_ratio(height, found) - k) <= tolerance * (1.0 + 1e-9) + 1e-9
+    assert abs(k * cache.shape.intersection_ratio(found, height) - k) <= tolerance * (1.0 + 1e-9) + 1e-9
+
+
+@given(reals(0.01, 1.0), seeds)
+def test_heights_share_few_meshes(tolerance, seed):
+    cache = MeshCache(manifest(), Settings(height_tolerance=tolerance))
+    heights = np.random.default_rng(seed).uniform(0.5, 1.0, 200)
+    found = {cache.mesh_height(height) for height in heights}
+    spread = math.log(float(cache.shape.spacing(0.5) / cache.shape.spacing(1.0)))
+    assert len(found) <= spread / (2.0 * math.log1p(tolerance / 2.0)) + 2
+    assert all(cache.mesh_height(height) == pytest.approx(height, rel=1e-9) for height in found)
+
+
+@given(orientations(0.3, 1.5))
+def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(orientation):
+    cache = MeshCache(manifest(), Settings(height_tolerance=0.0))
+    view = cache.view(orientation, LENS, SIZE)
+    assert view.mesh_height == orientation.height
+    np.testing.assert_array_equal(view.rotation, orientation.rotation)
+    np.testing.assert_array_equal(view.heading, np.eye(3))
+    whole = built(cache, orientation.height)
+    np.testing.assert_array_equal(view.mesh.rays, whole.rays)
+    np.testing.assert_array_equal(view.mesh.neighbors, whole.neighbors)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 0.5])
+def test_a_camera_that_looks_at_the_sky_has_no_points(tolerance):
+    cache = MeshCache(manifest(), Settings(height_tolerance=tolerance))
+    lens = Rectilinear(focal_length=600.0, fov=1.2)
+    view = cache.view(Orientation.from_roll_pitch(0.8, pitch=-1.2), lens, SIZE)
+    assert len(project(view.mesh, view.rotation, lens, SIZE)) == 0
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 0.5])
+@pytest.mark.parametrize("height", [0.05, 0.1, 0.2])
+def test_a_camera_below_the_top_of_the_ball_is_refused(tolerance, height):
+    cache = MeshCache(manifest(), Settings(height_tolerance=tolerance))
+    with pytest.raises(GeometryError, match="height"):
+        cache.view(Orientation.from_roll_pitch(height, pitch=0.3), LENS, SIZE)
+    assert cache.nbytes == 0
+
+
+def test_hits_and_misses_are_counted():
+    cache = MeshCache(manifest(), Settings())
+    assert (cache.hits, cache.misses, cache.hit_rate, cache.nbytes) == (0, 0, 0.0, 0)
+    ahead = Orientation.from_roll_pitch(0.8, pitch=0.4)
+    down = Orientation.from_roll_pitch(0.8, pitch=1.2)
+    for orientation, counts in ((ahead, (0, 1)), (ahead, (1, 1)), (down, (1, 2)), (ahead, (2, 2)), (down, (3, 2))):
+        cache.view(orientation, LENS, SIZE)
+        assert (cache.hits, cache.misses) == counts
+    assert cache.hit_rate == 0.6
+    cache.view(ahead, Equisolid(focal_length=301.0, fov=2.2), SIZE)
+    assert cache.misses == 3
+    cache.view(ahead, LENS, (320, 240))
+    assert cache.misses == 4
+
+
+def test_a_hit_gives_the_same_mesh():
+    cache = MeshCache(manifest(), Settings())
+    ahead = Orientation.from_roll_pitch(0.8, pitch=0.4)
+    assert cache.view(ahead, LENS, SIZE).mesh is cache.view(ahead, LENS, SIZE).mesh
+
+
+def test_nbytes_is_what_is_held():
+    cache = MeshCache(manifest(), Settings())
+    first = cache.view(Orientation.from_roll_pitch(0.8, pitch=0.4), LENS, SIZE)
+    whole = built(cache, first.mesh_height)
+    assert cache.nbytes == whole.nbytes + first.mesh.nbytes
+    second = cache.view(Orientation.from_roll_pitch(0.8, pitch=1.2), LENS, SIZE)
+    assert cache.nbytes == whole.nbytes + first.mesh.nbytes + second.mesh.nbytes
+
+
+def test_the_least_recently_used_mesh_goes_first():
+    low, middle, high = (Orientation.from_roll_pitch(height, pitch=0.4) for height in (0.5, 0.7, 0.9))
+    free = MeshCache(manifest(), Settings(height_tolerance=0.0))
+    sizes = [free.view(each, LENS, SIZE).mesh.nbytes for each in (low, middle, high)]
+    room_for_two = sum(sorted(sizes)[1:]) / 2**20
+    cache = MeshCache(manifest(), Settings(height_tolerance=0.0, cache_mib=room_for_two))
+
+    def is_hit(orientation):
+        before = cache.hits
+        cache.view(orientation, LENS, SIZE)
+        return cache.hits > before
+
+    assert [is_hit(each) for each in (low, middle, low, high, low, middle)] == [False, False, True, False, True, False]
+    assert cache.nbytes == sizes[0] + sizes[1]
+
+
+@given(st.lists(st.integers(0, 5), min_size=1, max_size=20), reals(0.0, 0.6))
+def test_the_memory_limit_is_obeyed_and_changes_no_answer(order, cache_mib):
+    cache = MeshCache(manifest(), Settings(cache_mib=cache_mib))
+    free = MeshCache(manifest(), Settings())
+    for index in order:
+        orientation = Orientation.from_roll_pitch(0.5 + 0.1 * (index % 3), pitch=0.3 + 0.2 * index)
+        limited, unlimited = (each.view(orientation, LENS, SIZE) for each in (cache, free))
+        assert cache.nbytes <= cache_mib * 2**20
+        np.testing.assert_array_equal(limited.mesh.rays, unlimited.mesh.rays)
+        np.testing.assert_array_equal(limited.mesh.neighbors, unlimited.mesh.neighbors)
+    assert cache.hits + cache.misses == len(order)
+
+
+def test_without_memory_nothing_is_held():
+    cache = MeshCache(manifest(), Settings(cache_mib=0.0))
+    orientation = Orientation.from_roll_pitch(0.8, pitch=0.4)
+    for _ in range(3):
+        assert len(cache.view(orientation, LENS, SIZE).mesh) > 0
+    assert (cache.hits, cache.misses, cache.nbytes) == (0, 3, 0)
+
+
+@given(seeds)
+def test_a_camera_that_wanders_is_answered_right(seed):
+    """Through many buckets with one cache, straight down and upside down included."""
+    random = np.random.default_rng(seed)
+    cache = MeshCache(manifest(max_distance=2.0), Settings(cache_mib=2.0))
+    matrix = Orientation.from_roll_pitch(1.0, pitch=1.5).rotation
+    for _ in range(5):
+        matrix = matrix @ rotation(0.4 * random_direction(random))
+        assert_same_as_without(cache, Orientation(random.uniform(0.3, 1.2), matrix), LENS, SIZE)
