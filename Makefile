@@ -24,11 +24,12 @@ lint: .venv/dev ## style and types
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-fixtures: .venv/dev ## draw the demo's frames and train its network again (25 minutes)
+fixtures: .venv/dev ## draw the demo's frames and train its network again (about 30 minutes)
 	$(BIN)/python -m tests.fixtures.make_demo
 
-docs: .venv/dev ## write the help texts in docs/ again
+docs: .venv/dev demo ## write the help texts and the demo's picture in docs/ again
 	$(BIN)/python docs/help_pages.py
+	$(BIN)/python docs/demo_picture.py
 
 clean: ## remove what was made
 	rm -rf .venv demo-out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -4,6 +4,7 @@ import json
 import os
 import pty
 import shutil
+import signal
 import subprocess
 import sys
 import tomllib
@@ -323,6 +324,27 @@ def test_a_reader_that_closes_early_ends_it_quietly(folder):
         process.stdout.close()
         assert process.stderr.read() == ""
     assert process.returncode == 0
+
+
+def test_a_full_disk_behind_standard_output_is_one_line(folder):
+    command = [str(COMMAND), "--camera", str(folder), "--model", str(MODEL)]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1
+    assert "can't write results" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_an_interrupt_ends_it_with_130(folder):
+    for number in range(20, 80):
+        shutil.copy(IMAGES[0], folder / f"image{number}.jpg")
+        shutil.copy(folder / "lens0000000.yaml", folder / f"lens{number}.yaml")
+    command = [str(COMMAND), "--camera", str(folder), "--model", str(MODEL)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        assert "Traceback" not in process.stderr.read()
+    assert process.returncode == 130
 
 
 def test_progress_is_shown_on_a_terminal_and_nowhere_else(folder):

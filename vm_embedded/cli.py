@@ -78,6 +78,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever read the lines has seen enough; keep the interpreter from complaining when it flushes at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_OK
+    except OSError as error:  # a full disk behind standard output, say
+        _complain(f"can't write results: {error.strerror or error}")
+        return EXIT_FAILED
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
 

@@ -42,7 +42,7 @@ def read_lens_file(path: str | Path) -> LensFile:
         if path.stat().st_size > _LARGEST:
             raise InputError(f"{path}: too large for a lens file")
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:  # ValueError: not text, or a path with a zero byte
         raise InputError(f"can't read lens file {path}: {getattr(error, 'strerror', None) or error}") from error
     try:
         if path.suffix.lower() == ".toml":

@@ -52,8 +52,8 @@ def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
         if size > max_mib * 2**20:
             raise ModelError(f"{path}: {size / 2**20:.1f} MiB is too large for a model (allowed: {max_mib:g} MiB)")
         content = path.read_bytes()
-    except OSError as error:
-        raise ModelError(f"can't read the model {path}: {error.strerror or error}") from error
+    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
+        raise ModelError(f"can't read the model {path}: {getattr(error, 'strerror', None) or error}") from error
     try:
         metadata = _metadata(content)
         if METADATA_KEY not in metadata:

@@ -50,7 +50,13 @@ def open_source(name: str, raw: bool = False) -> Source:
 
     Raises InputError if it does not exist, holds no images or can't be opened.
     """
-    path = Path(name)
+    try:
+        return _open(name, Path(name), raw)
+    except OSError as error:
+        raise InputError(f"can't open {name[:200]}: {error.strerror or error}") from error
+
+
+def _open(name: str, path: Path, raw: bool) -> Source:
     if path.is_dir():
         found = [each for each in path.iterdir() if each.suffix.lower() in IMAGE_SUFFIXES]
         if not found:

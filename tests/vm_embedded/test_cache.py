@@ -93,6 +93,15 @@ def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(bucket, l
         assert_same_as_without(cache, rough, lens, SIZE)
 
 
+@pytest.mark.parametrize("stretch", [1.0 - 4.9e-4, 1.0 + 4.9e-4])
+@pytest.mark.parametrize("fov", [0.2, 0.8, 1.6])
+def test_a_bucket_never_changes_an_answer_of_rotations_that_are_a_little_too_long_or_short(fov, stretch):
+    cache = MeshCache(manifest(intersections=20.0, max_distance=1.5), Settings(pitch_step=1e-3, roll_step=1e-3))
+    for pitch in (0.8, 1.0, 1.2):
+        stretched = Orientation(0.8, stretch * Orientation.from_roll_pitch(0.8, pitch=pitch).rotation)
+        assert_same_as_without(cache, stretched, Rectilinear(focal_length=400.0, fov=fov), SIZE)
+
+
 @given(orientations(0.3, 1.5), lenses(), seeds)
 def test_yaw_asks_for_nothing_new(orientation, lens, seed):
     cache = MeshCache(manifest(), Settings())
