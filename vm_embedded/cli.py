@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
+import cv2
+
 from .configuration import Configuration, angle, length, read_configuration
 from .detector import Detector
 from .errors import InputError, VisualMeshError
@@ -69,6 +71,9 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-detect and return its exit status."""
     options = parser().parse_args(arguments)
+    # What is wrong with a file or camera is said here, in one line; OpenCV and FFmpeg would add theirs.
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         return _run(options)
     except VisualMeshError as error:

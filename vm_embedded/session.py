@@ -49,7 +49,6 @@ class Session:
         options.enable_mem_pattern = False
         options.log_severity_level = 4
         options.add_session_config_entry("session.intra_op.allow_spinning", "1" if settings.spinning else "0")
-        options.add_session_config_entry("session.set_denormal_as_zero", "1")
         try:
             self._session = onnxruntime.InferenceSession(model.content, options, providers=["CPUExecutionProvider"])
         except _RUNTIME_ERRORS as error:
