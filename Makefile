@@ -24,7 +24,7 @@ lint: .venv/dev ## style and types
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-fixtures: .venv/dev ## draw the demo's frames and train its network again (about 30 minutes)
+fixtures: .venv/dev ## draw the demo's frames and train its network again (about 20 minutes)
 	$(BIN)/python -m tests.fixtures.make_demo
 
 docs: .venv/dev demo ## write the help texts and the demo's picture in docs/ again

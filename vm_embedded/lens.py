@@ -83,18 +83,30 @@ def undistort(radius: Number, distortion: tuple[float, float]) -> Number:
 
 
 def distort(radius: Floats, distortion: tuple[float, float]) -> Floats:
-    """Distorted radius r_d [px], the inverse of `undistort`, by Newton's method to 1e-9 px."""
+    """Distorted radius r_d [px], the inverse of `undistort`, to 1e-9 px.
+
+    Newton's method, kept between bounds: where it would leave them the middle is taken. Radii that no pixel has are
+    taken for the largest one that there is.
+    """
     k0, k1 = distortion
-    distorted = np.minimum(radius, monotone_radius(distortion))
-    for _ in range(50):
+    largest = monotone_radius(distortion)
+    target = np.minimum(radius, undistort(largest, distortion)) if math.isfinite(largest) else radius
+    # A polynomial that always grows never falls below 4/9 of the identity.
+    low, high = np.zeros_like(target), np.minimum(2.25 * target, largest)
+    distorted = np.minimum(target, high)
+    moving = np.ones(target.shape, dtype=bool)
+    for _ in range(100):
         square = distorted * distorted
-        slope = 1.0 + square * (3.0 * k0 + square * 5.0 * k1)
+        error = undistort(distorted, distortion) - target
+        low, high = np.where(error < 0, distorted, low), np.where(error > 0, distorted, high)
         with np.errstate(divide="ignore", invalid="ignore"):
-            step = (undistort(distorted, distortion) - radius) / slope
-        step = np.nan_to_num(step, nan=0.0, posinf=0.0, neginf=0.0)
-        distorted = np.clip(distorted - step, 0.0, monotone_radius(distortion))
-        if np.abs(step).max(initial=0.0) < 1e-9:
+            newton = distorted - error / (1.0 + square * (3.0 * k0 + square * 5.0 * k1))
+        better = np.where((newton >= low) & (newton <= high), newton, 0.5 * (low + high))
+        # Each radius stops by itself, so that its digits don't depend on the others.
+        moving &= np.abs(better - distorted) > 1e-10
+        if not moving.any():
             break
+        distorted = np.where(moving, better, distorted)
     return distorted
 
 

@@ -67,6 +67,8 @@ def lens_from_table(table: Mapping[str, Any]) -> Lens:
 
     Raises InputError naming an unknown or missing key.
     """
+    if not isinstance(table, Mapping):
+        raise InputError(f"lens must be a table, not {str(table)[:60]}")
     for key in table:
         if key not in _LENS_KEYS:
             raise InputError(unknown("lens key", key, _LENS_KEYS))
@@ -125,16 +127,20 @@ def _data(value: Any) -> Any:
 
 
 def _number(value: Any, name: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{name} must be a number, not {value!r}")
-    return float(value)
+    try:
+        number = math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(f"{name} must be a number, not {repr(value)[:60]}")
+    return number
 
 
 def _numbers(value: Any, name: str, count: int | None = None) -> list[float]:
     """A flat list of numbers from a list, or a list of lists."""
     try:
         numbers = np.asarray(value, dtype=np.float64).ravel()
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name} must be a list of numbers, not {str(value)[:60]}") from error
     if not np.isfinite(numbers).all() or (count is not None and len(numbers) != count):
         raise InputError(f"{name} must be {count or 'finite'} numbers, not {str(value)[:60]}")

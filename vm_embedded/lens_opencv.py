@@ -162,7 +162,7 @@ class FisheyeLens(CalibratedLens):
 
 
 def _growing_until(radius: Callable[[Floats], Floats], steps: Floats) -> float:
-    """Last of `steps` up to which `radius` grows."""
+    """Last of `steps` up to which `radius` surely grows: its maximum lies on either side of the largest value seen."""
     with np.errstate(all="ignore"):
         growing = np.diff(radius(steps)) > 0
-    return float(steps[-1] if growing.all() else steps[int(np.argmin(growing))])
+    return float(steps[-1] if growing.all() else steps[max(int(np.argmin(growing)) - 1, 0)])

@@ -6,7 +6,6 @@ It travels as JSON in the .onnx file's metadata under the key `visual_mesh`.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
@@ -28,6 +27,10 @@ EDGES = ("hard", "same")
 """Where a missing neighbor leads. hard: to the off-screen point, whose input is -1. same: to the point itself."""
 
 
+_LARGEST = 1e9
+"""Beyond every radius, distance and number of rings."""
+
+
 @dataclass(frozen=True)
 class ObjectClass:
     """One output of the network: its name and its kind, one of KINDS."""
@@ -36,6 +39,8 @@ class ObjectClass:
     kind: str
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise ModelError(f"name of a class must be text, not {self.name!r}")
         if self.kind not in KINDS:
             raise ModelError(unknown(f"kind of class {self.name!r}", self.kind, KINDS))
 
@@ -115,7 +120,7 @@ class Manifest:
                 raise ModelError(unknown(f"{name} in the model's manifest", getattr(self, name), allowed))
         for name in ("radius", "object_radius", "intersections", "max_distance", "scale"):
             value = getattr(self, name)
-            if not isinstance(value, int | float) or not (math.isfinite(value) and value > 0):
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= _LARGEST:
                 raise ModelError(f"{name} in the model's manifest must be a number above 0, not {value!r}")
         if abs(self.scale * 255.0 - 1.0) > 1e-6:
             raise ModelError(f"scale in the model's manifest must be 1/255, not {self.scale!r}")

@@ -66,6 +66,7 @@ def ring_mesh(shape: Shape, height: float, intersections: float, max_distance: f
     if not (math.isfinite(max_distance) and max_distance > 0):
         raise GeometryError(f"maximum distance must be above 0 m, not {max_distance}")
 
+    shape.spacing(height)  # raises GeometryError for a height without a mesh
     last = float(shape.n(math.atan(max_distance / height), height)) * intersections
     # One ring more than the closed form gives, since its last digit may fall short; the rule itself decides.
     i = np.arange(1, math.floor(last) + 2)

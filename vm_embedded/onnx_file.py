@@ -95,6 +95,8 @@ def _fields(data: memoryview) -> Iterator[tuple[int, int | memoryview]]:
     position = 0
     while position < len(data):
         tag, position = _varint(data, position)
+        if tag >> 32:  # other readers would cut it down to another field's number
+            raise ModelError("not an ONNX file")
         number, wire = tag >> 3, tag & 7
         if wire == 0:
             value, position = _varint(data, position)

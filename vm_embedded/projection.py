@@ -56,7 +56,8 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     """
     reach = _view_angle(lens, size)
     camera = to_camera(mesh.rays, rotation)
-    near = camera[:, 0] > np.cos(min(reach + slack, np.pi))
+    # A rotation that is not quite one may shorten rays by up to 5e-4; the lens compares their x as it is.
+    near = camera[:, 0] > np.cos(min(reach + slack, np.pi)) - 1e-3
     cosine = np.maximum(camera[:, 0], np.cos(reach))
     sine = np.hypot(camera[:, 1], camera[:, 2])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -92,7 +93,8 @@ def _view_angle(lens: Lens, size: Size) -> float:
 def _pixels_per_radian(lens: Lens, size: Size) -> float:
     """Largest shift of a pixel [px] for each radian that its ray turns, anywhere in the view."""
     reach = _view_angle(lens, size)
-    grid = np.meshgrid(np.linspace(1e-3, reach, 200), np.linspace(0.0, 2.0 * np.pi, 33))
+    # Straight behind the camera every direction is the same one, and the speed around the axis has no limit.
+    grid = np.meshgrid(np.linspace(1e-3, min(reach, np.pi - 1e-3), 200), np.linspace(0.0, 2.0 * np.pi, 33))
     theta, around = (axis.reshape(-1) for axis in grid)
     step = 1e-5
 

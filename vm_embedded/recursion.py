@@ -55,8 +55,8 @@ def sample_radius(intersections: Fraction, radius: float, height: float, step: S
         raise GeometryError(f"intersections must be above 0, not {intersections}")
     p, q = intersections.numerator, intersections.denominator
     target = repeat(step, q, 0.0, radius, height)
-    # A small object never needs to be larger than q large ones side by side, nor than the camera's height allows.
-    low, high = 0.0, min(q * radius, height / 2.0)
+    # A small object never needs to be larger than q large ones side by side; above h / 2 a sphere has no next phi.
+    low, high = 0.0, q * radius if step is circle_phi1 else min(q * radius, height / 2.0)
     while high - low > 1e-15 * high:
         middle = 0.5 * (low + high)
         if middle in (low, high):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import Field, dataclass, field, fields
 from typing import Any
 
@@ -72,7 +71,7 @@ def check_setting(each: Field[Any], value: object) -> None:
         whole = isinstance(each.default, int)
         kind, unit = ("a whole number" if whole else "a number"), each.metadata["unit"]
         fits = isinstance(value, int) if whole else isinstance(value, int | float)
-        if not fits or isinstance(value, bool) or not (math.isfinite(value) and limits[0] <= value <= limits[1]):  # type: ignore[arg-type]
+        if not fits or isinstance(value, bool) or not limits[0] <= value <= limits[1]:
             raise InputError(
                 f"{each.name} must be {kind} from {limits[0]:g} to {limits[1]:g}{' ' + unit if unit else ''}, "
                 f"not {value!r}"

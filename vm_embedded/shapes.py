@@ -85,7 +85,7 @@ class Shape(ABC):
 
     def _theta(self, n: Number, tangent_height: Number, height: Number) -> Number:
         n = np.asarray(n, dtype=np.float64)
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             sine = self.radius / (tangent_height * np.tan(self.phi(n, height)))
         beyond = 2.0 * np.arcsin(np.minimum(sine, 1.0))
         return np.where(n <= 0.5, 2.0 * np.pi / (1.0 + 2.0 * n), beyond)

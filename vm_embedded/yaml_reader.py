@@ -60,12 +60,15 @@ def _lines(text: str) -> list[_Line]:
     """Lines with content, without comments."""
     lines: list[_Line] = []
     for number, raw in enumerate(text.splitlines(), start=1):
-        content = _without_comment(raw).rstrip()
-        if not content.strip() or (not lines and (content.startswith("%") or content == "---")):
+        try:
+            content = _without_comment(raw).rstrip(" \t")
+        except ValueError as error:
+            raise _wrong(_Line(number, 0, raw.strip(" \t")), str(error)) from error
+        if not content.strip(" \t") or (not lines and (content.startswith("%") or content == "---")):
             continue
         if content == "...":
             break
-        line = _Line(number, len(content) - len(content.lstrip(" ")), content.strip())
+        line = _Line(number, len(content) - len(content.lstrip(" ")), content.strip(" \t"))
         if "\t" in raw[: line.indent + 1] or content.startswith("---"):
             raise _wrong(line, "tabs for indentation and several documents are not supported")
         lines.append(line)
@@ -76,11 +79,15 @@ def _without_comment(raw: str) -> str:
     quote = ""
     for position, character in enumerate(raw):
         if quote:
+            if (quote == '"' and character == "\\") or (character == quote == raw[position + 1 : position + 2]):
+                raise ValueError("escapes in quotes are not supported")
             quote = "" if character == quote else quote
         elif character in "\"'" and (position == 0 or raw[position - 1] in " [{,:"):
             quote = character
         elif character == "#" and (position == 0 or raw[position - 1] in " \t"):
             return raw[:position]
+    if quote:
+        raise ValueError("quote is never closed")
     return raw
 
 
@@ -115,7 +122,7 @@ def _sequence(lines: list[_Line], at: int, indent: int, depth: int) -> tuple[lis
     items = []
     while at < len(lines) and lines[at].indent == indent and (lines[at].text + " ").startswith("- "):
         line = lines[at]
-        content = line.text[1:].lstrip()
+        content = line.text[1:].lstrip(" \t")
         if content:
             # What follows the dash is a block of its own that begins in that column.
             lines[at] = _Line(line.number, indent + len(line.text) - len(content), content)
@@ -133,7 +140,7 @@ def _mapping(lines: list[_Line], at: int, indent: int, depth: int) -> tuple[dict
         match = _KEY.match(line.text)
         if not match:
             break
-        key, content = match.group(1).strip("\"'"), _TAG.sub("", match.group(2) or "", count=1)
+        key, content = _unquoted(match.group(1)), _TAG.sub("", match.group(2) or "", count=1)
         if key in table:
             raise _wrong(line, "key stands there twice")
         if content:
@@ -142,6 +149,10 @@ def _mapping(lines: list[_Line], at: int, indent: int, depth: int) -> tuple[dict
             dashed = at + 1 < len(lines) and (lines[at + 1].text + " ").startswith("- ")
             table[key], at = _nested(lines, at + 1, indent if dashed else indent + 1, depth)
     return table, at
+
+
+def _unquoted(key: str) -> str:
+    return key[1:-1] if key[0] in "\"'" else key
 
 
 def _nested(lines: list[_Line], at: int, least: int, depth: int) -> tuple[Any, int]:
@@ -155,7 +166,7 @@ def _inline(line: _Line, content: str) -> Any:
     """A scalar or flow collection that fills the rest of a line."""
     if content[0] in "[{":
         value, end = _flow(line, content, 0, 0)
-        if content[end:].strip():
+        if content[end:].strip(" \t"):
             raise _wrong(line, "something follows a closed bracket")
         return value
     return _scalar(line, content)
@@ -173,9 +184,9 @@ def _flow(line: _Line, content: str, at: int, depth: int) -> tuple[Any, int]:
         return content[at + 1 : end], end + 1
     if content[at] not in "[{":
         match = _PLAIN_IN_FLOW.match(content, at)
-        if not match:
+        if not match or not match.group().strip(" \t") or match.group().startswith("? "):
             raise _wrong(line, "a value is missing")
-        return _scalar(line, match.group().strip()), match.end()
+        return _scalar(line, match.group().strip(" \t")), match.end()
     closing = "]" if content[at] == "[" else "}"
     items: list[Any] = []
     table: dict[str, Any] = {}
@@ -205,7 +216,7 @@ def _space(content: str, at: int) -> int:
 
 def _scalar(line: _Line, content: str) -> Any:
     if content[0] in "\"'":
-        if len(content) < 2 or content[-1] != content[0]:
+        if len(content) < 2 or content[-1] != content[0] or content[0] in content[1:-1]:
             raise _wrong(line, "quote is never closed")
         return content[1:-1]
     if content.lower() in _WORDS:

@@ -15,6 +15,14 @@ RADIUS = 400.0
 """Distance of the corners of a picture of SIZE from its center [px]."""
 
 
+def attempt(kind, function, *arguments):
+    """What a function returns, or the error of this kind that it raises."""
+    try:
+        return function(*arguments)
+    except kind as error:
+        return error
+
+
 def reals(low, high):
     return st.floats(low, high, allow_nan=False, allow_infinity=False)
 
@@ -56,13 +64,16 @@ def camera_matrices(draw):
 
 
 @st.composite
-def brown_lenses(draw, largest_fov=math.radians(160.0)):
+def brown_lenses(draw):
     count = draw(st.sampled_from([0, 4, 5, 8]))
     limits = (0.4, 0.15, 0.002, 0.002, 0.05)
     coefficients = [draw(reals(-limit, limit)) for limit in limits[: min(count, 5)]]
     coefficients += [draw(reals(0.0, limit)) for limit in ((0.4, 0.1, 0.02) if count == 8 else ())]
     return BrownLens(
-        **draw(camera_matrices()), coefficients=tuple(coefficients), fov=draw(reals(0.3, largest_fov)), size=SIZE
+        **draw(camera_matrices()),
+        coefficients=tuple(coefficients),
+        fov=draw(reals(0.3, math.radians(160.0))),
+        size=SIZE,
     )
 
 

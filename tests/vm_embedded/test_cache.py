@@ -82,7 +82,11 @@ def test_a_bucket_never_changes_an_answer(bucket, lens, seed):
     assert cache.hits + cache.misses == 6
 
 
+BROAD = (Settings(roll_step=0.5, pitch_step=0.5), 1.0, 0.0, 0.0)
+
+
 @given(buckets(), lenses(), seeds)
+@example(BROAD, Equisolid(focal_length=127.0, fov=1.0, distortion=(-1e-6, 0.0)), 0)
 def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(bucket, lens, seed):
     """Matrices from files are rotations to some digits only; those that Orientation accepts are answered alike."""
     cache = MeshCache(manifest(), bucket[0])

@@ -1,5 +1,6 @@
 import math
 import re
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from vm_embedded.configuration import Configuration, angle, length, read_configuration
 from vm_embedded.errors import InputError
 from vm_embedded.lens import Equisolid, Rectilinear
+from vm_embedded.settings import Settings
 
 FULL = """\
 model = "models/ball.onnx"
@@ -82,10 +84,6 @@ def test_a_full_configuration_is_read(write):
 
 
 def test_the_full_configuration_of_this_test_has_every_setting(write):
-    from dataclasses import fields
-
-    from vm_embedded.settings import Settings
-
     settings = read_configuration(write(FULL)).settings
     assert set(settings) == {each.name for each in fields(Settings)}
     assert Settings(**settings).threads == 2
@@ -148,7 +146,7 @@ WRONG = {
     "step out of range": ("[detector]\npitch_step = 0\n", "pitch_step .*from 0.001 to 1 rad, not 0"),
     "number for a word": ("[detector]\nsampling = 1\n", "sampling 1 .*exact, fast"),
     "word for a switch": ("[detector]\nspinning = 'yes'\n", "spinning must be true or false, not 'yes'"),
-    "unknown format": ("[detector]\nformat = 'brg'\n", "format 'brg'.*'bgr'"),
+    "unknown format": ("[detector]\nformat = 'gray'\n", "format 'gray'.*'grey'"),
     "not TOML": ("model = ball.onnx\n", "line 1"),
     "not TOML further down": ("model = 'a'\n\n[detector\n", "line 3"),
     "key twice": ("model = 'a'\nmodel = 'b'\n", "line 2"),
@@ -190,7 +188,8 @@ def test_an_angle_without_a_unit_is_in_radians(radians):
 
 
 @pytest.mark.parametrize(
-    "value", ["", "deg", "20 degrees", "20°", "1.2.3deg", "--5deg", "infdeg", "1e999deg", "nan", None, True, [1.0], "0.3rad"]
+    "value",
+    ["", "deg", "20 degrees", "20°", "1.2.3deg", "--5deg", "infdeg", "1e999deg", "nan", None, True, [1.0], "0.3rad"],
 )
 def test_what_is_no_angle_is_refused_by_value(value):
     with pytest.raises(InputError, match=re.escape(repr(value))):
@@ -203,7 +202,9 @@ def test_a_length_is_a_number_or_its_text(metres):
     assert length(repr(metres)) == metres
 
 
-@pytest.mark.parametrize("value", ["", "0.8m", "tall", "inf", None, False, {}, math.nan, 10**400], ids=lambda each: str(each)[:8])
+@pytest.mark.parametrize(
+    "value", ["", "0.8m", "tall", "inf", None, False, {}, math.nan, 10**400], ids=lambda each: str(each)[:8]
+)
 def test_what_is_no_length_is_refused_by_value(value):
     with pytest.raises(InputError, match=re.escape(repr(value)[:20])):
         length(value)

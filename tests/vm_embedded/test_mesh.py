@@ -145,6 +145,17 @@ def test_an_object_has_k_points_around_the_vertical_on_every_ring(case):
     assert (across < k + theta / (2.0 * np.pi)).all()
 
 
+@pytest.mark.parametrize("shape", [Circle(0.1), Sphere(0.1)])
+def test_rings_whose_size_is_a_whole_number_have_just_that(shape):
+    """Up to n = 1 / 2 ring i has k + 2 i points for a whole k, and float noise must not make it one more."""
+    for k in range(2, 60):
+        distance = math.tan(float(shape.phi(0.5, 1.0))) * (1.0 + 1e-9)
+        depth, counts = np.unique(ring_mesh(shape, 1.0, k, distance).rays[:, 2], return_counts=True)
+        expected = [1, *(k + 2 * i for i in range(1, k // 2 + 1))]
+        assert len(depth) == len(expected)
+        np.testing.assert_array_equal(counts, expected)
+
+
 @given(meshes())
 def test_left_and_right_are_mutual(case):
     mesh = case[0]

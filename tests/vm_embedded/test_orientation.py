@@ -176,7 +176,7 @@ WRONG_ROTATIONS = {
     "NaN": np.full((3, 3), math.nan),
     "one infinity": np.eye(3) + np.diag([math.inf, 0.0, 0.0]),
     "stretched": 1.01 * np.eye(3),
-    "sheared": np.eye(3) + [[0.0, 0.02, 0.0], [0.0] * 3, [0.0] * 3],
+    "sheared": np.eye(3) + np.diag([0.02, 0.0], 1),
     "mirrored": np.diag([1.0, -1.0, 1.0]),
     "inverted": -np.eye(3),
     "zero": np.zeros((3, 3)),

@@ -148,9 +148,7 @@ def test_no_point_is_dropped_by_a_lens_that_turns_inside_of_the_picture(k1, slac
 @given(lenses(), orientations(), slacks, slacks, seeds)
 def test_more_slack_never_keeps_fewer_points(lens, orientation, first, second, seed):
     mesh = scattered_mesh(1000, np.random.default_rng(seed))
-    less, more = (
-        may_be_on_screen(mesh, orientation.rotation, lens, SIZE, slack) for slack in sorted((first, second))
-    )
+    less, more = (may_be_on_screen(mesh, orientation.rotation, lens, SIZE, slack) for slack in sorted((first, second)))
     assert not (less & ~more).any()
 
 
