@@ -10,8 +10,8 @@ from .detections import Detection, Detections
 
 # BGR. Objects stand out, classes that cover areas stay in the background.
 _OBJECT, _REJECTED, _INK = (60, 220, 255), (90, 90, 255), (30, 30, 30)
-_CLASS_COLORS = ((60, 220, 255), (255, 140, 60), (255, 255, 255), (90, 200, 90), (220, 120, 220), (120, 120, 255))
-_OTHER = (140, 140, 140)
+_UPRIGHT, _OTHER = (255, 120, 60), (140, 140, 140)
+_AREAS = ((255, 255, 255), (190, 255, 170), (230, 160, 230), (220, 220, 120))
 
 
 def draw(image: Image, detections: Detections) -> Image:
@@ -19,7 +19,7 @@ def draw(image: Image, detections: Detections) -> Image:
     confidence and distance."""
     colors = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image[:, :, :3]
     canvas = np.array(colors, dtype=np.uint8, order="C")
-    scale = max(max(canvas.shape[:2]) / 1280.0, 0.5)
+    scale = max(max(canvas.shape[:2]) / 1280.0, 0.8)
     _draw_points(canvas, detections)
     for each in detections.rejected:
         _draw_object(canvas, each, _REJECTED, scale)
@@ -29,15 +29,18 @@ def draw(image: Image, detections: Detections) -> Image:
 
 
 def _draw_points(canvas: Image, detections: Detections) -> None:
-    """Mesh points: those of a class as crosses of five pixels, all others as one."""
+    """Mesh points: those of objects and uprights as crosses of five pixels, all others as one."""
     pixels = np.rint(detections.pixels).astype(np.intp)
     _dot(canvas, pixels, _OTHER)
+    areas = 0
     for column, each in enumerate(detections.manifest.classes):
-        if each.kind != "background":
-            chosen = pixels[detections.probabilities[:, column] > detections.threshold]
-            color = _CLASS_COLORS[column % len(_CLASS_COLORS)]
+        chosen = pixels[detections.probabilities[:, column] > detections.threshold]
+        if each.kind == "area":
+            _dot(canvas, chosen, _AREAS[areas % len(_AREAS)])
+            areas += 1
+        elif each.kind != "background":
             for shift in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)):
-                _dot(canvas, chosen + shift, color)
+                _dot(canvas, chosen + shift, _OBJECT if each.kind == "object" else _UPRIGHT)
 
 
 def _dot(canvas: Image, pixels: np.ndarray, color: tuple[int, int, int]) -> None:
