@@ -340,7 +340,12 @@ def test_an_interrupt_ends_it_with_130(folder):
         shutil.copy(IMAGES[0], folder / f"image{number}.jpg")
         shutil.copy(folder / "lens0000000.yaml", folder / f"lens{number}.yaml")
     command = [str(COMMAND), "--camera", str(folder), "--model", str(MODEL)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+
+    def heed_interrupts():  # a shell's background jobs ignore them, and so would their children
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, preexec_fn=heed_interrupts, **pipes) as process:
         assert process.stdout.readline()
         process.send_signal(signal.SIGINT)
         assert "Traceback" not in process.stderr.read()
