@@ -17,9 +17,13 @@ from .errors import InputError, VisualMeshError
 from .lens import Lens
 from .lens_file import read_lens_file
 from .orientation import Orientation
+from .sampling import FORMATS
 from .settings import Settings
 from .sinks import json_line, make_folder, save_overlay, save_points
 from .sources import Frame, open_source
+
+_FILE_FORMATS = tuple(name for name in FORMATS if name not in ("rgb", "bgra", "rgba"))
+"""What OpenCV gives: colors as BGR, or the one channel of a grey or Bayer file as it is."""
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
@@ -30,7 +34,8 @@ def parser() -> argparse.ArgumentParser:
         prog="vm-detect",
         description="Find objects in frames: one line of JSON for each frame on standard output.",
         epilog="Exit status: 0 at least one frame was processed (bad ones are named on standard error), 1 none was, "
-        "2 wrong usage, 130 interrupted. Angles are radians, or degrees with a suffix as in 20deg.",
+        "2 wrong usage, 130 interrupted. Angles are radians, or degrees with a suffix as in 20deg; negative ones in "
+        "degrees need an equals sign, --pitch=-20deg.",
     )
     parser.add_argument(
         "--camera",
@@ -133,6 +138,11 @@ def _run(options: argparse.Namespace) -> int:
     emit = [name.strip() for name in options.emit_points.split(",")] if options.emit_points else []
     for name in emit:
         detector.manifest.column(name)
+    if settings.format not in _FILE_FORMATS:
+        raise InputError(
+            f"--format {settings.format} is for frames handed over in Python; those read here are "
+            f"{', '.join(_FILE_FORMATS)}"
+        )
     source = open_source(options.camera, raw=settings.format != "bgr")
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:

@@ -109,7 +109,12 @@ def angle(value: object) -> float:
     """An angle [rad] from a number or text in radians, or from text in degrees such as "20deg". Raises InputError."""
     what = f"{value!r} is not an angle; write radians, or degrees as in 20deg"
     degrees = _DEGREES.fullmatch(value) if isinstance(value, str) else None
-    return math.radians(_finite(degrees.group(1), what)) if degrees else _finite(value, what)
+    if degrees:
+        return math.radians(_finite(degrees.group(1), what))
+    number = _finite(value, what)
+    if abs(number) > 2.0 * math.pi:
+        raise InputError(f"{number:g} rad is more than a turn; did you mean {number:g}deg?")
+    return number
 
 
 def _finite(value: object, what: str) -> float:

@@ -46,7 +46,8 @@ class Orientation:
             raise GeometryError("camera rotation must be 3 x 3 finite numbers (NaN or infinity in the orientation?)")
         error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
         if error > 1e-3 or np.linalg.det(rotation) < 0:
-            raise GeometryError(f"camera rotation is not a rotation: R R^T is off the identity by {error:.2g}")
+            mirrored = "; it mirrors" if np.linalg.det(rotation) < 0 else ""
+            raise GeometryError(f"camera rotation is no rotation: R R^T is off the identity by {error:.2g}{mirrored}")
         object.__setattr__(self, "rotation", frozen(rotation))
 
     @classmethod

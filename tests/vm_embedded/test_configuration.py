@@ -181,10 +181,16 @@ def test_an_angle_in_degrees_is_made_radians(degrees, form):
     assert angle(form.format(degrees)) == math.radians(degrees)
 
 
-@given(st.floats(-10.0, 10.0))
+@given(st.floats(-6.28, 6.28))
 def test_an_angle_without_a_unit_is_in_radians(radians):
     assert angle(radians) == radians
     assert angle(repr(radians)) == radians
+
+
+@given(st.floats(6.29, 1000.0), st.sampled_from([1, -1]))
+def test_more_than_a_turn_of_radians_was_meant_in_degrees(number, sign):
+    with pytest.raises(InputError, match="deg"):
+        angle(sign * number)
 
 
 @pytest.mark.parametrize(
