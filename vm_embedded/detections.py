@@ -21,10 +21,10 @@ class Detection:
 
     class_name: name of its class. confidence: mean probability inside its outline. center (2,), radius [px]: of the
     disk that covers as many pixels as its outline. outline (m, 2) [px]: what the lens sees of it. bearing (3,): unit
-    vector from the camera to its center. position (3,): its center [m]. distance: from the camera to its center [m], where its bearing meets the
-    plane. angular_radius [rad]: of the size that fits the points best. distance_by_angle [m]: what follows from that
-    size alone. distances_agree: whether the two differ by less than the mesh can resolve. points: mesh points inside
-    its outline. reason: why it was rejected, or None.
+    vector from the camera to its center. position (3,): its center [m]. distance: from the camera to its center [m],
+    where its bearing meets the plane. angular_radius [rad]: of the size that fits the points best. distance_by_angle
+    [m]: what follows from that size alone. distances_agree: whether the two differ by less than the mesh can resolve.
+    points: mesh points inside its outline. reason: why it was rejected, or None.
     """
 
     class_name: str
