@@ -17,7 +17,7 @@ LAYERS = [
     {"errors", "arrays", "files"},
     {"shapes", "recursion", "lens", "lens_opencv", "orientation", "yaml_reader"},
     {"mesh"},
-    {"projection", "sampling", "clustering", "manifest", "onnx_file", "detections", "lens_file", "settings", "objects"},
+    {"projection", "sampling", "clustering", "manifest", "layout", "onnx_file", "detections", "lens_file", "settings", "objects"},
     {"cache", "session"},
     {"detector"},
     {"configuration", "sources", "overlay", "sinks"},

@@ -11,16 +11,20 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
 from .arrays import Floats
+from .layout import Layout, laid_out
 from .lens import Lens, Size
 from .manifest import Manifest
 from .mesh import Mesh, ring_mesh
 from .orientation import Orientation, rotation_z
 from .projection import may_be_on_screen
 from .settings import Settings
+
+_Kept = TypeVar("_Kept", Mesh, Layout)
 
 _ROUNDING = 2e-3
 """Slack [rad] for rotations that are not quite rotations, as far as Orientation lets them pass."""
@@ -30,11 +34,12 @@ _ROUNDING = 2e-3
 class View:
     """What a frame is projected with.
 
-    mesh: the points that may be on screen. mesh_height: the camera height that it was built for [m]. rotation (3, 3):
-    camera to mesh frame. heading (3, 3): mesh frame to the frame's observation plane, a turn around the vertical.
+    layout: the points that may be on screen, as the network takes them. mesh_height: the camera height that their mesh
+    was built for [m]. rotation (3, 3): camera to mesh frame. heading (3, 3): mesh frame to the frame's observation
+    plane, a turn around the vertical.
     """
 
-    mesh: Mesh
+    layout: Layout
     mesh_height: float
     rotation: Floats
     heading: Floats
@@ -54,7 +59,7 @@ class MeshCache:
         self.misses = 0
         self.nbytes = 0
         self._limit = settings.cache_mib * 2**20
-        self._meshes: OrderedDict[Hashable, Mesh] = OrderedDict()
+        self._kept: OrderedDict[Hashable, Any] = OrderedDict()
 
     @property
     def hit_rate(self) -> float:
@@ -66,11 +71,13 @@ class MeshCache:
         height = self.mesh_height(orientation.height)
         if self.settings.height_tolerance == 0.0:
             mesh = self._look_up(height, lambda: self._build(height))
-            return View(mesh, height, orientation.rotation, np.eye(3))
+            layout = self._arranged(mesh, orientation, lens, size, _ROUNDING)
+            return View(layout, height, orientation.rotation, np.eye(3))
         pitch = round(orientation.pitch / self.settings.pitch_step)
         roll = round(orientation.roll / self.settings.roll_step)
-        mesh = self._look_up((height, pitch, roll, lens, size), lambda: self._prepare(height, pitch, roll, lens, size))
-        return View(mesh, height, orientation.level, rotation_z(orientation.yaw))
+        key = (height, pitch, roll, lens, size)
+        layout = self._look_up(key, lambda: self._prepare(height, pitch, roll, lens, size))
+        return View(layout, height, orientation.level, rotation_z(orientation.yaw))
 
     def mesh_height(self, height: float) -> float:
         """Height [m] of the mesh that serves a camera height [m].
@@ -89,24 +96,28 @@ class MeshCache:
         manifest = self.manifest
         return ring_mesh(self.shape, height, manifest.intersections, manifest.max_distance, manifest.mesh)
 
-    def _prepare(self, height: float, pitch: int, roll: int, lens: Lens, size: Size) -> Mesh:
-        """The part of the mesh that orientations of this bucket can bring on screen."""
+    def _prepare(self, height: float, pitch: int, roll: int, lens: Lens, size: Size) -> Layout:
+        """What orientations of this bucket can bring on screen."""
         mesh = self._look_up(height, lambda: self._build(height), counted=False)
         pitch_step, roll_step = self.settings.pitch_step, self.settings.roll_step
         middle = Orientation.from_roll_pitch(height, roll * roll_step, pitch * pitch_step)
         # Turns around two axes add up to at most the sum of their angles.
-        slack = 0.5 * (pitch_step + roll_step) + _ROUNDING
-        return mesh.part(np.flatnonzero(may_be_on_screen(mesh, middle.rotation, lens, size, slack)))
+        return self._arranged(mesh, middle, lens, size, 0.5 * (pitch_step + roll_step) + _ROUNDING)
 
-    def _look_up(self, key: Hashable, make: Callable[[], Mesh], counted: bool = True) -> Mesh:
-        mesh = self._meshes.get(key)
+    def _arranged(self, mesh: Mesh, middle: Orientation, lens: Lens, size: Size, slack: float) -> Layout:
+        """What orientations within `slack` [rad] of the middle one can bring on screen of a mesh."""
+        kept = np.flatnonzero(may_be_on_screen(mesh, middle.rotation, lens, size, slack))
+        return laid_out(mesh.part(kept), self.manifest)
+
+    def _look_up(self, key: Hashable, make: Callable[[], _Kept], counted: bool = True) -> _Kept:
+        kept: _Kept | None = self._kept.get(key)
         if counted:
-            self.hits += mesh is not None
-            self.misses += mesh is None
-        if mesh is None:
-            mesh = self._meshes[key] = make()
-            self.nbytes += mesh.nbytes
-        self._meshes.move_to_end(key)
-        while self.nbytes > self._limit and self._meshes:
-            self.nbytes -= self._meshes.popitem(last=False)[1].nbytes
-        return mesh
+            self.hits += kept is not None
+            self.misses += kept is None
+        if kept is None:
+            kept = self._kept[key] = make()
+            self.nbytes += kept.nbytes
+        self._kept.move_to_end(key)
+        while self.nbytes > self._limit and self._kept:
+            self.nbytes -= self._kept.popitem(last=False)[1].nbytes
+        return kept

@@ -5,29 +5,26 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from .arrays import Indices, Mask
+from .arrays import Indices
 
 Members = npt.NDArray[np.intp]
-"""Positions of points in a mesh, ascending."""
+"""Positions of points in a mesh."""
 
 _Edges = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 
-def clusters(neighbors: Indices, positive: Mask) -> list[Members]:
-    """The connected components of the points that are `positive` (n,), largest first.
+def clusters(neighbors: Indices, members: Members) -> list[Members]:
+    """The connected components of the points `members`, each in their order, largest first, then as they come.
 
     Two points are connected if either is a neighbor (n + 1, N) of the other. Labels spread along all links at once,
     the smaller one winning, and jump to the label of their label, so the rounds needed grow with the logarithm of a
     component's width, and nothing loops over points.
     """
-    members = np.flatnonzero(positive)
     a, b = _edges(neighbors, members)
     label = np.arange(len(members))
     while True:
-        smaller = np.minimum(label[a], label[b])
         spread = label.copy()
-        np.minimum.at(spread, label[a], smaller)
-        np.minimum.at(spread, label[b], smaller)
+        np.minimum.at(spread, label[a], label[b])
         spread = spread[spread]
         if np.array_equal(spread, label):
             break
@@ -49,14 +46,23 @@ def graph_diameter(neighbors: Indices, members: Members, limit: int) -> int:
     return int(_steps(edges, len(members), far, limit).max())
 
 
+def wider_than(neighbors: Indices, members: Members, middle: int, limit: int) -> bool:
+    """Whether the graph diameter of `members` is above `limit`.
+
+    Nearly always one sweep from the member in the `middle` tells: no two are farther apart than twice its reach.
+    """
+    reach = int(_steps(_edges(neighbors, members), len(members), middle, limit).max())
+    return 2 * reach > limit and graph_diameter(neighbors, members, limit) > limit
+
+
 def _edges(neighbors: Indices, members: Members) -> _Edges:
-    """Links between members, as positions in `members`, each in the direction that the mesh gives."""
+    """Links between members, as positions in `members`, in both directions."""
     position = np.full(len(neighbors), -1)
     position[members] = np.arange(len(members))
-    ends = position[neighbors[members]]
-    starts = np.repeat(np.arange(len(members)), neighbors.shape[1])
-    inside = ends.ravel() >= 0
-    return starts[inside], ends.ravel()[inside]
+    ends = position[neighbors[members]].ravel()
+    linked = np.flatnonzero(ends >= 0)
+    starts, ends = linked // neighbors.shape[1], ends[linked]
+    return np.concatenate([starts, ends]), np.concatenate([ends, starts])
 
 
 def _steps(edges: _Edges, count: int, start: int, limit: int) -> npt.NDArray[np.intp]:
@@ -65,7 +71,7 @@ def _steps(edges: _Edges, count: int, start: int, limit: int) -> npt.NDArray[np.
     steps = np.full(count, -1)
     steps[start] = 0
     for step in range(1, limit + 2):
-        reached = np.concatenate([b[steps[a] == step - 1], a[steps[b] == step - 1]])
+        reached = b[steps[a] == step - 1]
         fresh = reached[steps[reached] < 0]
         if len(fresh) == 0:
             break

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from .arrays import Floats, Singles
+from .arrays import Floats, Indices, Singles
+from .layout import Layout
 from .manifest import Manifest
 from .projection import ProjectedMesh
 
@@ -76,20 +78,21 @@ class ClassPoints:
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """The objects of a frame, most confident first, and the n mesh points behind them.
+    """The objects of a frame, most confident first, and the n mesh points on screen behind them.
 
     rejected: clusters that were no objects, with reasons, if they were asked for. manifest: of the network that
-    looked. mesh: the points on screen. heading (3, 3): from the mesh's frame to the frame's own observation plane.
-    probabilities (n, C), in the order of the manifest's classes. threshold: above which a point counts for a class.
-    timing_ms: milliseconds of each stage.
+    looked. layout, projected, answers (m, C): what it took and gave. heading (3, 3): from the mesh's frame to the
+    frame's own observation plane. threshold: above which a point counts for a class. timing_ms: milliseconds of each
+    stage.
     """
 
     objects: tuple[Detection, ...]
     rejected: tuple[Detection, ...]
     manifest: Manifest
-    mesh: ProjectedMesh
+    layout: Layout
+    projected: ProjectedMesh
+    answers: Singles
     heading: Floats
-    probabilities: Singles
     threshold: float
     timing_ms: dict[str, float] = field(default_factory=dict)
 
@@ -102,15 +105,26 @@ class Detections:
     def __getitem__(self, index: int) -> Detection:
         return self.objects[index]
 
-    @property
-    def pixels(self) -> Floats:
-        """Pixels (n, 2) of the mesh points."""
-        return self.mesh.pixels
+    @cached_property
+    def _shown(self) -> Indices:
+        """Slots (n,) of the points on screen, in the order of the mesh."""
+        places = self.layout.places
+        return places[self.projected.on_screen[places]]
 
-    @property
+    @cached_property
+    def pixels(self) -> Floats:
+        """Pixels (n, 2) of the points."""
+        return self.projected.pixels[self._shown]
+
+    @cached_property
     def rays(self) -> Floats:
-        """Unit vectors (n, 3) to the mesh points, in the frame's own observation plane."""
-        return np.asarray(self.mesh.mesh.rays @ self.heading.T)
+        """Unit vectors (n, 3) to the points, in the frame's own observation plane."""
+        return np.asarray(self.layout.mesh.rays[self._shown] @ self.heading.T)
+
+    @cached_property
+    def probabilities(self) -> Singles:
+        """Probabilities (n, C) of the points, in the order of the manifest's classes."""
+        return self.answers[self._shown]
 
     def points_of(self, class_name: str) -> ClassPoints:
         """The points of a class, whose probability is above the threshold. Raises InputError for an unknown class."""

@@ -7,8 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
 
-import numpy as np
-
 from .arrays import Image
 from .cache import MeshCache
 from .detections import Detections
@@ -62,24 +60,37 @@ class Detector:
         with _timed(timing, "mesh"):
             view = self.cache.view(orientation, lens, size)
             rings = self._rings(orientation.height, view.mesh_height)
+        layout = view.layout
         with _timed(timing, "project"):
-            projected = project(view.mesh, view.rotation, lens, size)
+            projected = project(layout.mesh, view.rotation, lens, size)
         with _timed(timing, "sample"):
-            points = np.full((len(projected) + 1, 3), -1.0, dtype=np.float32)  # the last one is the off-screen point
-            sample(image, projected.pixels, self.settings.format, self.settings.sampling, out=points[:-1])
+            points = layout.points()
+            sample(image, projected.pixels, self.settings.format, self.settings.sampling, layout.colors(points))
         with _timed(timing, "infer"):
-            probabilities = self.session.run(points, projected.mesh.neighbors)
+            probabilities = self.session.run(layout, points, projected.on_screen)
         with _timed(timing, "cluster"):
-            scene = Scene(self.shape, orientation.height, view.rotation, view.heading, lens, size, projected, rings)
+            projected = projected.only(layout.original)
+            scene = Scene(
+                shape=self.shape,
+                height=orientation.height,
+                rotation=view.rotation,
+                heading=view.heading,
+                lens=lens,
+                size=size,
+                projected=projected,
+                order=layout.slots,
+                rings=rings,
+            )
             found, rejected = find_objects(scene, self.manifest.classes, probabilities, self.settings, explain)
         timing["total"] = 1e3 * (perf_counter() - started)
         return Detections(
             objects=found,
             rejected=rejected,
             manifest=self.manifest,
-            mesh=projected,
+            layout=layout,
+            projected=projected,
+            answers=probabilities,
             heading=view.heading,
-            probabilities=probabilities,
             threshold=self.settings.threshold,
             timing_ms=timing,
         )

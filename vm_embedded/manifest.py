@@ -18,7 +18,7 @@ from .mesh import RING_NEIGHBORS
 from .shapes import SHAPES, Shape, shape_named
 
 METADATA_KEY = "visual_mesh"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 KINDS = ("object", "upright", "area", "background")
 """What a class is. object: has the mesh's shape and is located. upright, area: points with bearings. background."""
@@ -26,6 +26,8 @@ KINDS = ("object", "upright", "area", "background")
 EDGES = ("hard", "same")
 """Where a missing neighbor leads. hard: to the off-screen point, whose input is -1. same: to the point itself."""
 
+LAYOUTS = ("plain", "runs")
+"""How the network takes its points. plain: as rows. runs: as columns, ring by ring; see layout.py."""
 
 _LARGEST = 1e9
 """Beyond every radius, distance and number of rings."""
@@ -88,7 +90,7 @@ class Manifest:
 
     shape: circle or sphere. radius: the object's radius that the mesh is made for [m]. object_radius: that of the
     real object [m]. intersections: rings across an object of `radius`. mesh: ring4, ring6 or ring8. max_distance of
-    the mesh [m]. edge: one of EDGES. classes: in the order of the network's outputs. channels, scale: a point's input
+    the mesh [m]. edge: one of EDGES. classes: in the order of the network's outputs. layout: one of LAYOUTS; runs needs edge hard. channels, scale: a point's input
     is its color in this order, times scale. sampling: the rule at pixels, "bilinear". provenance: who made it from
     what. Raises ModelError for values that this runtime does not know.
     """
@@ -102,6 +104,7 @@ class Manifest:
     edge: str
     classes: tuple[ObjectClass, ...]
     self_test: SelfTest | None = None
+    layout: str = "plain"
     channels: str = "rgb"
     scale: float = 1.0 / 255.0
     sampling: str = "bilinear"
@@ -112,12 +115,15 @@ class Manifest:
             "shape": tuple(SHAPES),
             "mesh": tuple(RING_NEIGHBORS),
             "edge": EDGES,
+            "layout": LAYOUTS,
             "channels": ("rgb",),
             "sampling": ("bilinear",),
         }
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
                 raise ModelError(unknown(f"{name} in the model's manifest", getattr(self, name), allowed))
+        if self.layout == "runs" and self.edge != "hard":
+            raise ModelError(f"layout runs needs edge hard; for edge {self.edge} there is layout plain")
         for name in ("radius", "object_radius", "intersections", "max_distance", "scale"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= _LARGEST:

@@ -15,6 +15,16 @@ from .shapes import Shape
 RING_NEIGHBORS = {"ring4": 4, "ring6": 6, "ring8": 8}
 """Neighbors of a point in each mesh model."""
 
+SELF = -1
+"""The point itself, where others are named by their position among its neighbors."""
+
+RUNS: dict[str, tuple[tuple[int, ...], ...]] = {
+    "ring4": ((0, SELF, 2), (1,), (3,)),
+    "ring6": ((0, SELF, 3), (1, 2), (5, 4)),
+    "ring8": ((0, SELF, 4), (1, 3), (2,), (7, 5), (6,)),
+}
+"""Neighbors that follow each other in their ring, in groups of at most three; together all of a point's neighbors."""
+
 # Float noise must not change the size of a ring; no real count comes this close to a whole number from above.
 _CEIL_EPSILON = 1e-9
 

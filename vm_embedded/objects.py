@@ -11,10 +11,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
-from .arrays import Floats, Singles
-from .clustering import Members, clusters, graph_diameter
+from .arrays import Floats, Indices, Mask, Singles
+from .clustering import Members, clusters, wider_than
 from .detections import Detection
 from .lens import Lens, Size
 from .manifest import ObjectClass
@@ -28,8 +29,11 @@ _MOST_CLUSTERS = 100
 _CERTAIN = 4.0
 """Log-odds beyond which a point counts no more: one point must not outvote its neighbors."""
 
-_DIRECTIONS = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [0.7, 0.7], [0.7, -0.7], [-0.7, 0.7], [-0.7, -0.7]])
-"""Where the search looks next; staying comes first, so that it wins a draw."""
+_GRID = np.stack(np.meshgrid(np.linspace(-1.0, 1.0, 5), np.linspace(-1.0, 1.0, 5)), axis=2).reshape(-1, 2)
+"""Where the search for a center looks, in units of its reach."""
+
+_REACHES = (1.0, 0.5, 0.25, 0.125)
+"""Reach of each round of the search, in object radii."""
 
 _SCALES = np.geomspace(0.6, 1.8, 25)
 """Apparent sizes that are tried, as shares of the expected one."""
@@ -41,7 +45,8 @@ class Scene:
 
     shape: of the object. height: of the camera [m]. rotation (3, 3): camera to mesh frame, in which the search works.
     heading (3, 3): mesh frame to the observation plane, in which its answers are. lens and image size. projected: the
-    points on screen. rings: number of mesh rings that cross an object here.
+    mesh; only what is on screen counts. order: rank of each point; in this order they are summed, so that digits don't
+    depend on how the mesh lies in memory. rings: number of mesh rings that cross an object here.
     """
 
     shape: Shape
@@ -51,12 +56,18 @@ class Scene:
     lens: Lens
     size: Size
     projected: ProjectedMesh
+    order: Indices
     rings: float
 
     @property
     def spacing(self) -> float:
         """Distance between rings, in units of the outline that `Shape.offset` counts in."""
         return 2.0 / self.rings
+
+    def sorted(self, chosen: Mask) -> Members:
+        """The chosen points (n,) that are on screen."""
+        members = np.flatnonzero(chosen & self.projected.on_screen)
+        return members[np.argsort(self.order[members])]
 
     def pixels(self, rays: Floats) -> Floats:
         """Pixels (m, 2) of those of the rays (n, 3) that the lens sees, on screen or not."""
@@ -75,33 +86,37 @@ def find_objects(
     rejected: list[Detection] = []
     for each, probability in zip(classes, probabilities.T, strict=True):
         if each.kind == "object":
-            _find(scene, each.name, probability.astype(np.float64), settings, found, rejected if explain else None)
+            _find(scene, each.name, probability, settings, found, rejected if explain else None)
     return tuple(sorted(found, key=lambda each: -each.confidence)), tuple(rejected)
 
 
 def _find(
     scene: Scene,
     class_name: str,
-    p: Floats,
+    p: Singles,
     settings: Settings,
     found: list[Detection],
     rejected: list[Detection] | None,
 ) -> None:
     """Add the objects of one class, from its probabilities (n,), to `found` and all else to `rejected`."""
-    log_odds = np.clip(np.log(np.maximum(p, 1e-12) / np.maximum(1.0 - p, 1e-12)), -_CERTAIN, _CERTAIN)
+    members = scene.sorted(p > settings.threshold)
+    if len(members) == 0:
+        return
     centers: list[Floats] = []
-    for members in clusters(scene.projected.mesh.neighbors, p > settings.threshold)[:_MOST_CLUSTERS]:
-        near = _near(scene, members)
-        center = _middle(scene, members)
-        reason = _wrong_size(scene, members, center, near, settings)
+    for cluster in clusters(scene.projected.mesh.neighbors, members)[:_MOST_CLUSTERS]:
+        near = _near(scene, cluster)
+        p_near = p[near].astype(np.float64)
+        log_odds = np.log(np.maximum(p_near, 1e-12) / np.maximum(1.0 - p_near, 1e-12)).clip(-_CERTAIN, _CERTAIN)
+        center = _middle(scene, cluster)
+        reason = _wrong_size(scene, cluster, center, near, settings)
         if reason is None:
-            center = _best_center(scene, center, near, log_odds[near])
-            reason = _misfit(scene, center, near, p[near], settings) or _repeats(scene, center, centers)
+            center = _best_center(scene, center, near, log_odds)
+            reason = _misfit(scene, center, near, p_near, settings) or _repeats(scene, center, centers)
         if reason is None:
             centers.append(center)
-            found.append(_describe(scene, class_name, center, near, p[near], log_odds[near], None))
+            found.append(_describe(scene, class_name, center, near, p_near, log_odds, None))
         elif rejected is not None:
-            rejected.append(_describe(scene, class_name, center, near, p[near], log_odds[near], reason))
+            rejected.append(_describe(scene, class_name, center, near, p_near, log_odds, reason))
 
 
 def _middle(scene: Scene, members: Members) -> Floats:
@@ -117,7 +132,7 @@ def _near(scene: Scene, members: Members) -> Members:
     distance = float(np.linalg.norm(center))
     axis = center / distance
     chord = math.sqrt(2.0 * max(1.0 - float((rays[members] @ axis).min()), 0.0)) + 3.0 * scene.shape.radius / distance
-    return np.flatnonzero(rays @ axis > 1.0 - 0.5 * min(chord, 2.0) ** 2)
+    return scene.sorted(rays @ axis > 1.0 - 0.5 * min(chord, 2.0) ** 2)
 
 
 def _wrong_size(scene: Scene, members: Members, center: Floats, near: Members, settings: Settings) -> str | None:
@@ -127,7 +142,8 @@ def _wrong_size(scene: Scene, members: Members, center: Floats, near: Members, s
     if len(members) < 0.25 * expected:
         return f"{len(members)} points, where an object there has {expected}"
     widest = math.ceil(settings.max_widths * scene.rings)
-    if graph_diameter(scene.projected.mesh.neighbors, members, widest) > widest:
+    middle = int(np.argmax(scene.projected.mesh.rays[members] @ center))
+    if wider_than(scene.projected.mesh.neighbors, members, middle, widest):
         return f"wider than {widest} steps in the mesh, where an object is {scene.rings:.1f} wide"
     return None
 
@@ -135,25 +151,17 @@ def _wrong_size(scene: Scene, members: Members, center: Floats, near: Members, s
 def _best_center(scene: Scene, center: Floats, near: Members, log_odds: Floats) -> Floats:
     """Center (3,) [m] of the object whose subgraph fits best around `center`.
 
-    The likeliest object has the largest sum of log-odds inside its outline. The sum is climbed over directions around
-    the best one so far, in steps that halve when none is better. The outline is half a ring spacing soft, so that the
-    sum has no plateaus between points. What is off screen adds nothing, so an object that the border cuts gets its
-    center where it belongs.
+    The likeliest object has the largest sum of log-odds inside its outline: the best of a grid of places, then of ever
+    finer ones around it. The outline is half a ring spacing soft, so that the sum has no plateaus between points. What
+    is off screen adds nothing, so an object that the border cuts gets its center where it belongs.
     """
     rays = np.ascontiguousarray(scene.projected.mesh.rays[near])
-    step = 0.5
-    for _ in range(24):
+    for reach in _REACHES:
         distance = float(np.linalg.norm(center))
         axis = center / distance
-        tried = axis + step * scene.shape.radius / distance * (_DIRECTIONS @ tangents(axis))
+        tried = axis + reach * scene.shape.radius / distance * (_GRID @ tangents(axis))
         centers = scene.shape.center_along(tried, scene.height)
-        best = int(np.argmax(_soft(scene.shape.offset(rays, centers, scene.height), scene) @ log_odds))
-        if best:
-            center = centers[best]
-        elif step < 0.05:
-            break
-        else:
-            step *= 0.5
+        center = centers[int(np.argmax(_soft(scene.shape.offset(rays, centers, scene.height), scene) @ log_odds))]
     return center
 
 
@@ -232,10 +240,8 @@ def _describe(
 def _disk(outline: Floats) -> tuple[Floats, float]:
     """Centroid (2,) and equal-area radius [px] of a polygon (m, 2)."""
     origin = outline.mean(axis=0)
-    a = outline - origin
-    b = np.roll(a, -1, axis=0)
-    cross = a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]
-    area = float(cross.sum()) / 2.0
-    if abs(area) < 1e-9:
+    moments = cv2.moments((outline - origin).astype(np.float32))
+    area = moments["m00"]
+    if area < 1e-9:
         return origin, 0.0
-    return origin + ((a + b) * cross[:, None]).sum(axis=0) / (6.0 * area), math.sqrt(abs(area) / math.pi)
+    return origin + (moments["m10"] / area, moments["m01"] / area), math.sqrt(area / math.pi)

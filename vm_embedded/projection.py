@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from .arrays import Floats, Mask
 from .lens import Lens, Size
@@ -14,13 +15,30 @@ from .mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class ProjectedMesh:
-    """The n points of a mesh that are on screen: their graph, and their pixels (n, 2)."""
+    """The n points of a mesh, their pixels (n, 2), and which of them are on_screen (n,).
+
+    Pixels of points that are not are without meaning.
+    """
 
     mesh: Mesh
     pixels: Floats
+    on_screen: Mask
 
     def __len__(self) -> int:
         return len(self.mesh)
+
+    def part(self, kept: npt.NDArray[np.intp]) -> ProjectedMesh:
+        """The points `kept`, in that order."""
+        return ProjectedMesh(self.mesh.part(kept), self.pixels[kept], self.on_screen[kept])
+
+    def only(self, chosen: Mask) -> ProjectedMesh:
+        """The same mesh, of which at most the chosen points (n,) are on screen."""
+        return ProjectedMesh(self.mesh, self.pixels, self.on_screen & chosen)
+
+    @property
+    def visible(self) -> ProjectedMesh:
+        """The points on screen."""
+        return self.part(np.flatnonzero(self.on_screen))
 
 
 def to_camera(rays: Floats, rotation: Floats) -> Floats:
@@ -28,23 +46,26 @@ def to_camera(rays: Floats, rotation: Floats) -> Floats:
 
     Written out instead of as a matrix product, so that a ray's digits don't depend on how many others there are.
     """
-    camera = np.empty(rays.shape, order="F")
-    for column in range(3):
-        r = rotation[:, column]
-        camera[:, column] = rays[:, 0] * r[0] + rays[:, 1] * r[1] + rays[:, 2] * r[2]
-    return camera
+    camera = np.empty((3, len(rays)))
+    term = np.empty(len(rays))
+    for sums, (a, b, c) in zip(camera, rotation.T.tolist(), strict=True):
+        np.multiply(rays[:, 0], a, out=sums)
+        np.multiply(rays[:, 1], b, out=term)
+        sums += term
+        np.multiply(rays[:, 2], c, out=term)
+        sums += term
+    return camera.T
 
 
 def project(mesh: Mesh, rotation: Floats, lens: Lens, size: Size) -> ProjectedMesh:
-    """The points of the mesh that are on screen.
+    """The mesh in the picture.
 
     rotation (3, 3) maps camera to mesh coordinates. On screen means: seen by the lens, and with all four pixels
     around the point in the picture, 0 <= x and x + 1 < width, the same for y.
     """
     camera = to_camera(mesh.rays, rotation)
     pixels = lens.project(camera, size)
-    kept = np.flatnonzero(lens.sees(camera) & _inside(pixels, size, 0.0))
-    return ProjectedMesh(mesh.part(kept), pixels[kept])
+    return ProjectedMesh(mesh, pixels, lens.sees(camera) & _inside(pixels, size, 0.0))
 
 
 def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack: float) -> Mask:
@@ -55,9 +76,10 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     they would enter it.
     """
     reach = _view_angle(lens, size)
-    camera = to_camera(mesh.rays, rotation)
+    ahead = mesh.rays @ rotation[:, 0]
     # A rotation that is not quite one may shorten rays by up to 5e-4; the lens compares their x as it is.
-    near = camera[:, 0] > np.cos(min(reach + slack, np.pi)) - 1e-3
+    near = np.flatnonzero(ahead > np.cos(min(reach + slack, np.pi)) - 1e-3)
+    camera = to_camera(mesh.rays[near], rotation)
     cosine = np.maximum(camera[:, 0], np.cos(reach))
     sine = np.hypot(camera[:, 1], camera[:, 2])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -68,13 +90,17 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     # Within a view of more than half the sphere the way around the axis can be longer than the turn.
     detour = 1.0 if reach <= np.pi / 2 else np.pi
     margin = detour * slack * _pixels_per_radian(lens, size)
-    return np.asarray(near & _inside(lens.project(camera, size), size, margin))
+    possible = np.zeros(len(mesh), dtype=bool)
+    possible[near] = _inside(lens.project(camera, size), size, margin)
+    return possible
 
 
 def _inside(pixels: Floats, size: Size, margin: float) -> Mask:
-    x, y = pixels[:, 0], pixels[:, 1]
-    with np.errstate(invalid="ignore"):
-        return np.asarray((x >= -margin) & (x + 1.0 < size[0] + margin) & (y >= -margin) & (y + 1.0 < size[1] + margin))
+    inside = np.ones(len(pixels), dtype=bool)
+    for axis in range(2):
+        inside &= pixels[:, axis] >= -margin
+        inside &= pixels[:, axis] < size[axis] - 1 + margin
+    return inside
 
 
 @lru_cache(maxsize=32)

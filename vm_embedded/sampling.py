@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from .arrays import Floats, Image, Singles
 from .errors import InputError, unknown
@@ -50,39 +51,44 @@ def checked_image(image: Image, format: str) -> Image:
 def sample(image: Image, pixels: Floats, format: str, sampling: str, out: Singles) -> None:
     """Write the RGB colors, scaled to 0..1, at pixels (n, 2) into `out` (n, 3).
 
-    `image` is one that `checked_image` returned; the pixels must have all four pixels around them in it.
+    `image` is one that `checked_image` returned. Pixels without all four pixels around them in it give any color.
     """
     if format in _BAYER:
         image, format = cv2.cvtColor(image, _BAYER[format]), "rgb"  # type: ignore[assignment]
     take = _exact if sampling == "exact" else _fast
-    values = take(image, pixels)
+    with np.errstate(invalid="ignore", over="ignore"):  # what the lens doesn't see has any pixel, NaN too
+        planes = take(image, pixels)
     channels = _CHANNELS[format][1] if format in _CHANNELS else (0, 0, 0)
     for column, channel in enumerate(channels):
-        np.multiply(values[:, channel], np.float32(1.0 / 255.0), out=out[:, column])
+        np.multiply(planes[channel], np.float32(1.0 / 255.0), out=out[:, column])
 
 
 def _exact(image: Image, pixels: Floats) -> Singles:
-    """Values (n, channels), 0 to 255, bilinear in floating point."""
-    flat = image.reshape(image.shape[0] * image.shape[1], -1)
-    whole = pixels.astype(np.intp)
-    fraction = (pixels - whole).astype(np.float32)
-    right, down = fraction[:, :1], fraction[:, 1:]
-    corner = whole[:, 1] * image.shape[1] + whole[:, 0]
-
-    def row(first: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Singles:
-        left = np.take(flat, first, axis=0).astype(np.float32)
-        return left + right * (np.take(flat, first + 1, axis=0) - left)
-
-    upper = row(corner)
-    return upper + down * (row(corner + image.shape[1]) - upper)
+    """Values (channels, n), 0 to 255, bilinear in floating point."""
+    x, y = pixels.T
+    left, upper = np.floor(x), np.floor(y)
+    right, down = (x - left).astype(np.float32), (y - upper).astype(np.float32)
+    corners = np.empty((2, 2, len(pixels), 2), dtype=np.float32)
+    corners[..., 0] = left, left + 1.0
+    corners[0, ..., 1], corners[1, ..., 1] = upper, upper + 1.0
+    values = _remapped(image, corners.reshape(-1, 2), cv2.INTER_NEAREST)
+    rows = values.reshape(len(values), 2, 2, len(pixels))
+    above, below = (row[:, 0] + right * (row[:, 1] - row[:, 0]) for row in (rows[:, 0], rows[:, 1]))
+    return np.asarray(above + down * (below - above))
 
 
-def _fast(image: Image, pixels: Floats) -> Image:
-    """Values (n, channels), 0 to 255, by OpenCV's table of 1/32 px."""
+def _fast(image: Image, pixels: Floats) -> Singles:
+    """Values (channels, n), 0 to 255, by OpenCV's table of 1/32 px."""
+    return _remapped(image, pixels, cv2.INTER_LINEAR)
+
+
+def _remapped(image: Image, pixels: npt.NDArray[np.floating], interpolation: int) -> Singles:
+    """Values (channels, n), 0 to 255, at pixels (n, 2)."""
     rows = -(-len(pixels) // _FOLD)
+    if rows == 0:
+        return np.empty((image.shape[2] if image.ndim == 3 else 1, 0), dtype=np.float32)
     table = np.zeros((rows * _FOLD, 2), dtype=np.float32)
     table[: len(pixels)] = pixels
-    if rows == 0:
-        return np.empty((0, image.shape[2] if image.ndim == 3 else 1), dtype=np.uint8)
-    values = cv2.remap(image, table.reshape(rows, _FOLD, 2), None, cv2.INTER_LINEAR)  # type: ignore[call-overload]
-    return np.asarray(values.reshape(rows * _FOLD, -1)[: len(pixels)])
+    values = cv2.remap(image, table.reshape(rows, _FOLD, 2), None, interpolation)  # type: ignore[call-overload]
+    planes = cv2.dnn.blobFromImage(values)  # one plane for each channel, as float32
+    return np.asarray(planes.reshape(-1, rows * _FOLD)[:, : len(pixels)])

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import onnxruntime
 from onnxruntime.capi import onnxruntime_pybind11_state as states
 
-from .arrays import Indices, Singles
+from .arrays import Mask, Singles
 from .errors import ModelError, one_line
+from .layout import Layout, laid_out
+from .manifest import SelfTest
+from .mesh import RUNS, Mesh
 from .onnx_file import ModelFile
 from .settings import Settings
 
@@ -56,42 +60,45 @@ class Session:
         self._check_interface()
         self.self_test()
 
-    def run(self, points: Singles, neighbors: Indices) -> Singles:
-        """Probabilities (n, C) of points (n + 1, 3), linked by neighbors (n + 1, N); row n is the off-screen point."""
-        if self.model.manifest.edge == "same":
-            itself = np.arange(len(neighbors), dtype=np.int32)[:, None]
-            neighbors = np.where(neighbors == len(neighbors) - 1, itself, neighbors)
-        return self._answer(points, neighbors)[:-1]
+    def run(self, layout: Layout, points: Singles, on_screen: Mask) -> Singles:
+        """Probabilities (m, C) of a layout's slots, from its `points`, colored, and those (m,) that are on screen."""
+        try:
+            outputs = self._session.run(["probabilities"], layout.feeds(points, on_screen))
+        except _RUNTIME_ERRORS as error:
+            raise ModelError(f"{self.model.path}: ONNX Runtime can't run it: {one_line(error)}") from error
+        return layout.answers(np.asarray(outputs[0]))
+
+    def answer(self, test: SelfTest) -> Singles:
+        """Probabilities (n, C) of an example's points."""
+        mesh = Mesh(np.zeros((len(test.points) - 1, 3)), test.neighbors)
+        # The example's missing neighbors are the off-screen point, whatever the network was trained with.
+        layout = laid_out(mesh, replace(self.model.manifest, edge="hard"))
+        points = layout.points()
+        layout.colors(points)[:] = test.points[layout.slots]
+        return self.run(layout, points, layout.slots < len(mesh))[layout.places]
 
     def self_test(self) -> None:
         """Run the model's own example. Raises ModelError if the answer is not the one that the exporter saw."""
         test = self.model.manifest.self_test
         if test is None:
             return
-        answer = self._answer(test.points, test.neighbors)
-        if answer.shape != test.probabilities.shape:
+        answer, expected = self.answer(test), test.probabilities[:-1]
+        if answer.shape != expected.shape:
             raise ModelError(f"{self.model.path}: self-test answered in shape {answer.shape}")
-        error = float(np.abs(answer - test.probabilities).max())
+        error = float(np.abs(answer - expected).max(initial=0.0))
         if not error <= _SELF_TEST_TOLERANCE:
             raise ModelError(f"{self.model.path}: self-test failed, probabilities are off by {error:.2g}")
-
-    def _answer(self, points: Singles, neighbors: Indices) -> Singles:
-        try:
-            outputs = self._session.run(["probabilities"], {"points": points, "neighbors": neighbors})
-        except _RUNTIME_ERRORS as error:
-            raise ModelError(f"{self.model.path}: ONNX Runtime can't run it: {one_line(error)}") from error
-        return np.asarray(outputs[0])
 
     def _check_interface(self) -> None:
         manifest = self.model.manifest
         found = {
-            node.name: (node.type, list(node.shape)[1:])
+            node.name: (node.type, [size for size in node.shape if isinstance(size, int)])
             for node in (*self._session.get_inputs(), *self._session.get_outputs())
         }
-        expected = {
-            "points": ("tensor(float)", [3]),
-            "neighbors": ("tensor(int32)", [manifest.neighbors]),
-            "probabilities": ("tensor(float)", [len(manifest.classes)]),
-        }
+        expected = {"points": ("tensor(float)", [3]), "probabilities": ("tensor(float)", [len(manifest.classes)])}
+        if manifest.layout == "plain":
+            expected["neighbors"] = ("tensor(int32)", [manifest.neighbors])
+        else:
+            expected["columns"] = ("tensor(int64)", [len(RUNS[manifest.mesh])])
         if found != expected:
             raise ModelError(f"{self.model.path}: its inputs and outputs are {found}, its manifest asks for {expected}")

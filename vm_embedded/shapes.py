@@ -99,7 +99,7 @@ class Circle(Shape):
         return 0.0
 
     def spacing(self, height: Number) -> Number:
-        if not np.all(np.isfinite(height) & (np.asarray(height) > 0)):
+        if not _between(height, 0.0, math.inf):
             raise GeometryError(f"camera height must be above 0 m for a circle, not {height} m")
         return 2.0 * self.radius / height
 
@@ -137,7 +137,7 @@ class Sphere(Shape):
         return self.radius
 
     def spacing(self, height: Number) -> Number:
-        if not np.all(np.isfinite(height) & (np.asarray(height) > 2.0 * self.radius)):
+        if not _between(height, 2.0 * self.radius, math.inf):
             raise GeometryError(
                 f"camera height must be above the ball's diameter, {2.0 * self.radius:g} m, not {height} m"
             )
@@ -168,6 +168,12 @@ class Sphere(Shape):
 
     def theta(self, n: Number, height: Number) -> Number:
         return self._theta(n, height - self.radius, height)
+
+
+def _between(value: Number, low: float, high: float) -> bool:
+    """Whether a number, or every one of an array, lies between two others."""
+    inside = (value > low) & (value < high)
+    return inside if isinstance(inside, bool) else bool(np.all(inside))
 
 
 def tangents(axis: Floats) -> Floats:

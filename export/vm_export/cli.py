@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vm_embedded.errors import InputError, VisualMeshError
-from vm_embedded.manifest import EDGES
+from vm_embedded.manifest import EDGES, LAYOUTS
 
 if TYPE_CHECKING:
     from .checkpoint import Checkpoint
@@ -28,6 +28,11 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("model", type=Path, help="a checkpoint (.pt) or a network of the reference (.yaml)")
     parser.add_argument(
         "-o", "--output", type=Path, help="file to write; default: the model's name with .onnx or .yaml"
+    )
+    parser.add_argument(
+        "--layout",
+        choices=LAYOUTS,
+        help="write one file, in this layout; default: the fastest one, and beside it the portable NAME.plain.onnx",
     )
     parser.add_argument("--to-yaml", action="store_true", help="write the reference's format instead")
     facts = parser.add_argument_group("what the file does not say, or says wrongly")
@@ -59,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     # Imported here, so that a robot without torch still gets help texts and one clear line.
-    from .onnx_graph import export
+    from .onnx_graph import export, fastest_layout
     from .reference import write_reference
 
     output = options.output or options.model.with_suffix(".yaml" if options.to_yaml else ".onnx")
@@ -75,8 +80,14 @@ def _run(options: argparse.Namespace) -> int:
         write_reference(checkpoint, output)
         print(f"{output}: written in the reference's format")
         return EXIT_OK
-    difference = export(checkpoint, output)
-    print(f"{output}: {output.stat().st_size / 1000:.1f} kB, largest difference to torch {difference:.1e}")
+    layout = options.layout or fastest_layout(manifest)
+    files = {output: layout}
+    if options.layout is None and layout != "plain":
+        files[output.with_suffix(".plain" + output.suffix)] = "plain"
+    for path, layout in files.items():
+        difference = export(checkpoint, path, layout)
+        size = path.stat().st_size / 1000
+        print(f"{path}: layout {layout}, {size:.1f} kB, largest difference to torch {difference:.1e}")
     return EXIT_OK
 
 

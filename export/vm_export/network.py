@@ -91,6 +91,7 @@ class GraphConvolution(nn.Module):
 
     def __init__(self, inputs: int, outputs: int, neighbors: int) -> None:
         super().__init__()
+        self.neighbors = neighbors
         self.linear = nn.Linear((neighbors + 1) * inputs, outputs)
 
     def forward(self, x: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
@@ -125,6 +126,9 @@ class Dense(nn.Module):
         return self.linear(x)  # type: ignore[no-any-return]
 
 
+GraphLayer = GraphConvolution | SeparableConvolution | Dense
+
+
 class Network(nn.Module):
     """A Visual Mesh network: (points, neighbors) to probabilities, or to logits in training.
 
@@ -144,6 +148,11 @@ class Network(nn.Module):
                 nn.init.normal_(module.weight, std=module.in_features**-0.5)
                 nn.init.zeros_(module.bias)
 
+    @property
+    def typed_layers(self) -> list[GraphLayer]:
+        """The layers, as what they are."""
+        return [layer for layer in self.layers if isinstance(layer, GraphLayer)]
+
     def logits(self, points: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
         """Outputs (n + 1, C) before the head, from points (n + 1, 3) and neighbors (n + 1, N)."""
         x = points
@@ -157,7 +166,7 @@ class Network(nn.Module):
         return logits.softmax(dim=1) if self.shape.layers[-1].activation == "softmax" else logits.sigmoid()
 
 
-def _make(layer: Layer, inputs: int, neighbors: int) -> nn.Module:
+def _make(layer: Layer, inputs: int, neighbors: int) -> GraphLayer:
     if layer.kind == "dense":
         return Dense(inputs, layer.width)
     kind = GraphConvolution if layer.kind == "convolution" else SeparableConvolution

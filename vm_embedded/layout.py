@@ -1,0 +1,212 @@
+"""How a network takes a mesh: in which order its points, and by which indices their neighbors.
+
+A layout is prepared once for a mesh. Each frame then only says which points are on screen: links to all others lead to
+the off-screen point. Both layouts give the same answers; the manifest names the one that a model file was written for.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+import numpy.typing as npt
+
+from .arrays import Indices, Mask, Singles, frozen
+from .manifest import Manifest
+from .mesh import RUNS, SELF, Mesh
+
+Feeds = dict[str, npt.NDArray[np.generic]]
+"""A network's inputs by name."""
+
+_OFF_SCREEN = np.float32(-1.0)
+"""Color of the off-screen point."""
+
+_GAP = 1
+"""The middle one of three gaps that come first: all around it is off screen, so it is what the off-screen point is."""
+
+_GAPS_BEHIND = 2
+"""The network drops the last two columns of a table."""
+
+
+class Layout(ABC):
+    """A mesh of n points in a network's order.
+
+    slots: the point of each of its m slots, or n in gaps. places: the slot of each point (n,). original: which slots
+    (m,) these are; all others are gaps or copies of points. mesh: the slots as a mesh, in which nothing leads to gaps
+    and copies.
+    """
+
+    slots: Indices
+    places: Indices
+    original: Mask
+    mesh: Mesh
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it holds [bytes]."""
+        return self.slots.nbytes + self.places.nbytes + self.original.nbytes + self.mesh.nbytes
+
+    @abstractmethod
+    def points(self) -> Singles:
+        """An array for the network's input `points`."""
+
+    @abstractmethod
+    def colors(self, points: Singles) -> Singles:
+        """Where in such an array the colors (m, 3) of the slots go."""
+
+    @abstractmethod
+    def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
+        """The network's inputs from the colored `points` and the slots (m,) that are on screen."""
+
+    @abstractmethod
+    def answers(self, output: Singles) -> Singles:
+        """Probabilities (m, C) of the slots from the network's output; without meaning off screen."""
+
+
+class PlainLayout(Layout):
+    """Points as rows and a row of neighbors for each; the off-screen point is the last row."""
+
+    def __init__(self, mesh: Mesh, edge: str) -> None:
+        self.slots = frozen(np.arange(len(mesh), dtype=np.int32))
+        self.places = self.slots
+        self.original = frozen(np.ones(len(mesh), dtype=bool))
+        self.mesh = mesh
+        self._edge = edge
+
+    def points(self) -> Singles:
+        return np.empty((len(self.mesh) + 1, 3), dtype=np.float32)
+
+    def colors(self, points: Singles) -> Singles:
+        return points[:-1]
+
+    def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
+        points[-1] = _OFF_SCREEN
+        neighbors, missing = self.mesh.neighbors, np.int32(len(self.mesh))
+        shown = np.append(on_screen, False)[neighbors]
+        instead = np.arange(missing + 1, dtype=np.int32)[:, None] if self._edge == "same" else missing
+        return {"points": points, "neighbors": np.where(shown, neighbors, instead)}
+
+    def answers(self, output: Singles) -> Singles:
+        return output[:-1]
+
+
+class RunsLayout(Layout):
+    """Points as columns, such that neighbors which follow each other in a ring follow each other in memory.
+
+    The neighbors of a point form groups (mesh.RUNS) of up to three that follow each other. So a group's part of a
+    convolution is one of width 3 along memory, and a point needs one look-up for each group, not for each neighbor.
+
+    The slots are the points in their order, with a gap wherever the next one is no neighbor. Gaps stand for the
+    off-screen point. Behind them come copies of the groups that are torn apart there, where a ring closes and around
+    the nadir. Each slot, copies and gaps too, looks up what its point would, so all copies of a point keep its value
+    through all layers.
+
+    columns: (G, m), where slot s finds its group g in a layer's table (G (m - 1),). The sum around slot s stands in
+    column s + 1 of its group, because that is how the network gets a window of width 3 without moving data.
+    """
+
+    def __init__(self, mesh: Mesh, model: str) -> None:
+        slots, places, columns = _runs(mesh.neighbors, RUNS[model])
+        count, width = len(slots), mesh.neighbors.shape[1]
+        rays = np.append(mesh.rays.T, np.full((3, 1), np.nan), axis=1)[:, slots]
+        neighbors = np.full((count + 1, width), count, dtype=np.int32)
+        neighbors[places] = np.append(places, count).astype(np.int32)[mesh.neighbors[:-1]]
+        self.slots = frozen(slots.astype(np.int32))
+        self.places = frozen(places.astype(np.int32))
+        original = np.zeros(count, dtype=bool)
+        original[places] = True
+        self.original = frozen(original)
+        self.mesh = Mesh(frozen(rays).T, frozen(neighbors))
+        starts = (count - 1) * np.arange(len(columns), dtype=np.int64)[:, None] + 1
+        self.columns = frozen(columns + starts)
+        self._off_screen = frozen(_GAP + starts)
+
+    @property
+    def nbytes(self) -> int:
+        return super().nbytes + self.columns.nbytes
+
+    def points(self) -> Singles:
+        return np.empty((3, len(self.mesh)), dtype=np.float32)
+
+    def colors(self, points: Singles) -> Singles:
+        return points.T
+
+    def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
+        np.copyto(points, _OFF_SCREEN, where=~on_screen)
+        return {"points": points, "columns": np.where(on_screen, self.columns, self._off_screen)}
+
+    def answers(self, output: Singles) -> Singles:
+        return output.T
+
+
+def laid_out(mesh: Mesh, manifest: Manifest) -> Layout:
+    """The mesh as a manifest's network takes it."""
+    return PlainLayout(mesh, manifest.edge) if manifest.layout == "plain" else RunsLayout(mesh, manifest.mesh)
+
+
+_Positions = npt.NDArray[np.int64]
+
+
+def _runs(neighbors: Indices, groups: tuple[tuple[int, ...], ...]) -> tuple[_Positions, _Positions, _Positions]:
+    """The point of each slot (m,), n for gaps; the slot of each point (n,); and for each group of the slots' points,
+    the slot in its middle (G, m)."""
+    n = len(neighbors) - 1
+    slots = _in_runs(neighbors[:n, groups[0][0]], neighbors[:n, groups[0][-1]])
+    slot = np.full(n + 1, _GAP)
+    shown = np.flatnonzero(slots < n)
+    slot[slots[shown]] = shown
+
+    points = np.arange(n)
+    parts, middles, count = [slots], [], len(slots)
+    for group in groups:
+        wanted = np.stack([points if each == SELF else neighbors[:n, each] for each in group])
+        center = len(group) // 3
+        middle = np.full(n + 1, _GAP)
+        for offset, targets in enumerate(wanted, start=-center):
+            np.copyto(middle[:n], slot[targets] - offset, where=targets < n)
+        torn = np.zeros(n, dtype=bool)
+        for offset, targets in enumerate(wanted, start=-center):
+            torn |= slots[middle[:n] + offset] != targets
+        copies, which = np.unique(wanted[:, torn], axis=1, return_inverse=True)
+        middle[:n][torn] = count + len(group) * which.reshape(-1) + center
+        parts.append(copies.T.reshape(-1))
+        count += copies.size
+        middles.append(middle)
+    slots = np.concatenate([*parts, np.full(_GAPS_BEHIND, n)])
+    return slots, slot[:n], np.stack([middle[slots] for middle in middles])
+
+
+def _in_runs(left: Indices, right: Indices) -> _Positions:
+    """Points of slots, n in gaps: three gaps, then the n points, each followed by its right neighbor or by a gap.
+
+    Points in a row are joined at once; the loop is over the pieces, two for a ring that the view cuts in two.
+    """
+    n = len(left)
+    points = np.arange(n)
+    starts = np.flatnonzero(np.append(True, (right[:-1] != points[1:]) | (left[1:] != points[:-1]))[:n])
+    ends = np.append(starts[1:], n) - 1
+    piece = np.full(n + 1, -1)
+    piece[starts] = np.arange(len(starts))
+    follower = piece[right[ends]]  # the piece that begins with the right neighbor of a piece's end
+    follower[left[starts[follower]] != ends] = -1
+    leads = np.ones(len(starts), dtype=bool)
+    leads[follower[follower >= 0]] = False
+
+    order: list[int] = []
+    gaps_after: list[int] = []
+    waiting = np.ones(len(starts), dtype=bool)
+    for first in (*np.flatnonzero(leads).tolist(), *np.flatnonzero(~leads).tolist()):  # the latter close in a circle
+        each = first
+        while each >= 0 and waiting[each]:
+            waiting[each] = False
+            order.append(each)
+            gaps_after.append(0)
+            each = int(follower[each])
+        if gaps_after:
+            gaps_after[-1] = 1
+    lengths = (ends - starts + 1)[order]
+    place = 3 + np.cumsum(np.append(0, lengths + gaps_after))
+    slots = np.full(place[-1], n)
+    within = points - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    slots[np.repeat(place[:-1], lengths) + within] = np.repeat(starts[order], lengths) + within
+    return slots
