@@ -4,7 +4,7 @@ BIN := .venv/bin
 PIP := $(BIN)/pip install --disable-pip-version-check --quiet --constraint deploy/constraints.txt
 DEMO := tests/fixtures/demo
 
-.PHONY: help setup demo test lint fixtures docs clean
+.PHONY: help setup demo test lint bench fixtures docs clean
 .DELETE_ON_ERROR:
 
 help: ## what can be made
@@ -23,6 +23,10 @@ lint: .venv/dev ## style and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+bench: .venv/bench ## measure against the plain graph and the peers; write results.json and docs/performance.md (10 minutes)
+	$(BIN)/python -m benchmarks.run
+	$(BIN)/python -m benchmarks.report
 
 fixtures: .venv/dev ## draw the demo's frames and train its network again (about 20 minutes)
 	$(BIN)/python -m tests.fixtures.make_demo
@@ -46,3 +50,7 @@ clean: ## remove what was made
 .venv/dev: .venv/made pyproject.toml deploy/constraints.txt
 	$(PIP) --editable '.[dev]'
 	@touch $@ .venv/runtime
+
+.venv/bench: .venv/made pyproject.toml deploy/constraints.txt
+	$(PIP) --editable '.[dev,bench]'
+	@touch $@ .venv/dev .venv/runtime

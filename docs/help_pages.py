@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from vm_embedded import bench_cli as bench
 from vm_embedded import cli as detect
 from vm_export import cli as export
 
@@ -19,7 +20,7 @@ def page() -> str:
     parts = [
         "# Command line\n\nMade from the programs' own help texts; every program also prints them with `--help`.\n"
     ]
-    for parser in (detect.parser(), export.parser()):
+    for parser in (detect.parser(), bench.parser(), export.parser()):
         parts.append(f"## {parser.prog}\n\n{parser.description}\n")
         for group in parser._action_groups:
             rows = [_row(action) for action in group._group_actions if not isinstance(action, argparse._HelpAction)]

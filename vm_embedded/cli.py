@@ -6,19 +6,18 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 
-from .configuration import Configuration, angle, length, read_configuration
 from .detector import Detector
 from .errors import InputError, VisualMeshError
 from .lens import Lens
 from .lens_file import read_lens_file
+from .options import ANGLES, add_model, add_pose, add_settings, read_options
 from .orientation import Orientation
 from .sampling import FORMATS
-from .settings import Settings
 from .sinks import json_line, make_folder, save_overlay, save_points
 from .sources import Frame, open_source
 
@@ -34,8 +33,7 @@ def parser() -> argparse.ArgumentParser:
         prog="vm-detect",
         description="Find objects in frames: one line of JSON for each frame on standard output.",
         epilog="Exit status: 0 at least one frame was processed (bad ones are named on standard error), 1 none was, "
-        "2 wrong usage, 130 interrupted. Angles are radians, or degrees with a suffix as in 20deg; negative ones in "
-        "degrees need an equals sign, --pitch=-20deg.",
+        "2 wrong usage, 130 interrupted. " + ANGLES,
     )
     parser.add_argument(
         "--camera",
@@ -43,33 +41,14 @@ def parser() -> argparse.ArgumentParser:
         metavar="SOURCE",
         help="an image, a directory or quoted glob of images, a video file, or a camera's number or device",
     )
-    parser.add_argument("--model", type=Path, metavar="FILE", help="network that vm-export wrote (.onnx)")
-    parser.add_argument("--config", type=Path, metavar="FILE", help="vm.toml; options on the command line override it")
-    pose = parser.add_argument_group(
-        "lens and orientation", "for frames imageNAME.* without a lensNAME.yaml beside them, which goes first"
-    )
-    pose.add_argument("--lens", type=Path, metavar="FILE", help="lens file: reference or calibration YAML, or TOML")
-    pose.add_argument("--height", metavar="M", help="height of the camera over the plane [m]")
-    pose.add_argument("--pitch", metavar="ANGLE", help="angle of the optical axis below the horizon; default 0")
-    pose.add_argument("--roll", metavar="ANGLE", help="lean of the camera to the right; default 0")
+    add_model(parser)
+    add_pose(parser, "for frames imageNAME.* without a lensNAME.yaml beside them, which goes first")
     output = parser.add_argument_group("output")
     output.add_argument("--save-overlay", type=Path, metavar="DIR", help="write pictures with what was found")
     output.add_argument("--save-points", type=Path, metavar="DIR", help="write NAME.npz: pixels, rays, probabilities")
     output.add_argument("--emit-points", metavar="CLASS,...", help="list the points of these classes in the JSON")
     output.add_argument("--explain", action="store_true", help="list rejected clusters in the JSON, with reasons")
-    settings = parser.add_argument_group("settings")
-    for each in fields(Settings):
-        unit, limits = each.metadata["unit"], each.metadata.get("range")
-        default = "the model's" if each.default is None else each.default
-        help = f"{each.metadata['help']}{f' [{unit}]' if unit else ''}; default {default}"
-        option = "--" + each.name.replace("_", "-")
-        if "allowed" in each.metadata:
-            settings.add_argument(option, choices=each.metadata["allowed"], help=help)
-        elif limits is None:
-            settings.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=help)
-        else:
-            kind = int if isinstance(each.default, int) else float
-            settings.add_argument(option, type=kind, metavar="N" if kind is int else "X", help=help)
+    add_settings(parser)
     return parser
 
 
@@ -125,16 +104,10 @@ def _lens_beside(path: Path | None) -> Path | None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    configured = read_configuration(options.config) if options.config else Configuration()
-    model = options.model or configured.model
-    if model is None:
-        raise InputError("no model: give --model FILE, a network that vm-export wrote")
-    given = {each.name: getattr(options, each.name) for each in fields(Settings)}
-    settings = Settings(
-        **{**configured.settings, **{name: value for name, value in given.items() if value is not None}}
-    )
-    pose = _Pose(read_lens_file(options.lens).lens if options.lens else configured.lens, _fixed(options, configured))
-    detector = Detector.from_file(model, settings)
+    given = read_options(options)
+    settings = given.settings
+    pose = _Pose(given.lens, given.orientation)
+    detector = Detector.from_file(given.model, settings)
     emit = [name.strip() for name in options.emit_points.split(",")] if options.emit_points else []
     for name in emit:
         detector.manifest.column(name)
@@ -174,18 +147,6 @@ def _process(frame: Frame, detector: Detector, pose: _Pose, options: argparse.Na
     if options.save_overlay is not None:
         save_overlay(options.save_overlay, frame, image, detections)
     return json_line(frame, detections, emit, options.explain)
-
-
-def _fixed(options: argparse.Namespace, configured: Configuration) -> Orientation | None:
-    """The orientation of the command line and the configuration, or None without a height."""
-    height = length(options.height) if options.height is not None else configured.height
-    pitch = angle(options.pitch) if options.pitch is not None else configured.pitch
-    roll = angle(options.roll) if options.roll is not None else configured.roll
-    if height is None:
-        if pitch is not None or roll is not None:
-            raise InputError("pitch and roll need a height: give --height")
-        return None
-    return Orientation.from_roll_pitch(height, roll or 0.0, pitch or 0.0)
 
 
 def _complain(message: str) -> None:

@@ -90,9 +90,10 @@ class Manifest:
 
     shape: circle or sphere. radius: the object's radius that the mesh is made for [m]. object_radius: that of the
     real object [m]. intersections: rings across an object of `radius`. mesh: ring4, ring6 or ring8. max_distance of
-    the mesh [m]. edge: one of EDGES. classes: in the order of the network's outputs. layout: one of LAYOUTS; runs needs edge hard. channels, scale: a point's input
-    is its color in this order, times scale. sampling: the rule at pixels, "bilinear". provenance: who made it from
-    what. Raises ModelError for values that this runtime does not know.
+    the mesh [m]. edge: one of EDGES. classes: in the order of the network's outputs. layout: one of LAYOUTS; runs needs
+    edge hard. operations: multiplications and additions for each point. channels, scale: a point's input is its color
+    in this order, times scale. sampling: the rule at pixels, "bilinear". provenance: who made it from what. Raises
+    ModelError for values that this runtime does not know.
     """
 
     shape: str
@@ -105,6 +106,7 @@ class Manifest:
     classes: tuple[ObjectClass, ...]
     self_test: SelfTest | None = None
     layout: str = "plain"
+    operations: int = 0
     channels: str = "rgb"
     scale: float = 1.0 / 255.0
     sampling: str = "bilinear"
@@ -128,6 +130,8 @@ class Manifest:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= _LARGEST:
                 raise ModelError(f"{name} in the model's manifest must be a number above 0, not {value!r}")
+        if isinstance(self.operations, bool) or not isinstance(self.operations, int) or self.operations < 0:
+            raise ModelError(f"operations in the model's manifest must be a whole number, not {self.operations!r}")
         if abs(self.scale * 255.0 - 1.0) > 1e-6:
             raise ModelError(f"scale in the model's manifest must be 1/255, not {self.scale!r}")
         names = [each.name for each in self.classes]

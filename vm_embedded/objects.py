@@ -32,10 +32,10 @@ _CERTAIN = 4.0
 _GRID = np.stack(np.meshgrid(np.linspace(-1.0, 1.0, 5), np.linspace(-1.0, 1.0, 5)), axis=2).reshape(-1, 2)
 """Where the search for a center looks, in units of its reach."""
 
-_REACHES = (1.0, 0.5, 0.25, 0.125)
+_REACHES = (1.0, 0.3, 0.1)
 """Reach of each round of the search, in object radii."""
 
-_SCALES = np.geomspace(0.6, 1.8, 25)
+_SCALES = np.geomspace(0.6, 1.8, 15)
 """Apparent sizes that are tried, as shares of the expected one."""
 
 
@@ -104,10 +104,10 @@ def _find(
         return
     centers: list[Floats] = []
     for cluster in clusters(scene.projected.mesh.neighbors, members)[:_MOST_CLUSTERS]:
-        near = _near(scene, cluster)
+        center = _middle(scene, cluster)
+        near = _near(scene, cluster, center)
         p_near = p[near].astype(np.float64)
         log_odds = np.log(np.maximum(p_near, 1e-12) / np.maximum(1.0 - p_near, 1e-12)).clip(-_CERTAIN, _CERTAIN)
-        center = _middle(scene, cluster)
         reason = _wrong_size(scene, cluster, center, near, settings)
         if reason is None:
             center = _best_center(scene, center, near, log_odds)
@@ -125,10 +125,9 @@ def _middle(scene: Scene, members: Members) -> Floats:
     return np.asarray(scene.shape.center_along(axis / np.linalg.norm(axis), scene.height)[0])
 
 
-def _near(scene: Scene, members: Members) -> Members:
-    """The points of a cluster and those up to three object radii around it."""
+def _near(scene: Scene, members: Members, center: Floats) -> Members:
+    """The points of a cluster in the direction of `center`, and those up to three object radii around it."""
     rays = scene.projected.mesh.rays
-    center = _middle(scene, members)
     distance = float(np.linalg.norm(center))
     axis = center / distance
     chord = math.sqrt(2.0 * max(1.0 - float((rays[members] @ axis).min()), 0.0)) + 3.0 * scene.shape.radius / distance
@@ -244,4 +243,5 @@ def _disk(outline: Floats) -> tuple[Floats, float]:
     area = moments["m00"]
     if area < 1e-9:
         return origin, 0.0
-    return origin + (moments["m10"] / area, moments["m01"] / area), math.sqrt(area / math.pi)
+    shift = np.array([moments["m10"], moments["m01"]]) / area
+    return origin + shift, math.sqrt(area / math.pi)

@@ -17,6 +17,8 @@ from .mesh import RUNS, Mesh
 from .onnx_file import ModelFile
 from .settings import Settings
 
+RUNTIME_VERSION: str = onnxruntime.__version__
+
 _RUNTIME_ERRORS = (
     states.EPFail,
     states.Fail,
@@ -46,7 +48,8 @@ class Session:
     def __init__(self, model: ModelFile, settings: Settings) -> None:
         self.model = model
         options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = min(settings.threads, len(os.sched_getaffinity(0)))
+        self.threads = min(settings.threads, len(os.sched_getaffinity(0)))
+        options.intra_op_num_threads = self.threads
         options.inter_op_num_threads = 1
         options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
         # The number of points changes with every frame: remembered memory patterns would only pile up.

@@ -43,12 +43,12 @@ class Graph:
         doc: str,
     ) -> bytes:
         """The bytes of a model file, the same for the same graph; inputs and outputs by name: type and shape."""
-        infos = [
+        takes, gives = (
             [helper.make_tensor_value_info(name, kind, shape) for name, (kind, shape) in each.items()]
             for each in (inputs, outputs)
-        ]
+        )
         model = helper.make_model(
-            helper.make_graph(self._nodes, "visual_mesh", *infos, list(self._constants.values())),
+            helper.make_graph(self._nodes, "visual_mesh", takes, gives, list(self._constants.values())),
             opset_imports=[helper.make_opsetid("", _OPSET), helper.make_opsetid("ai.onnx.ml", _ML_OPSET)],
             ir_version=_IR_VERSION,
             producer_name="vm-export",

@@ -70,6 +70,17 @@ class NetworkShape:
         """Number of outputs."""
         return self.layers[-1].width
 
+    @property
+    def operations(self) -> int:
+        """Multiplications and additions for each point, activations not counted."""
+        total, inputs = 0, 3
+        for layer in self.layers:
+            places = 1 if layer.kind == "dense" else self.neighbors + 1
+            mixed = places * inputs * layer.width if layer.kind == "convolution" else inputs * layer.width
+            total += 2 * (mixed + (places * inputs if layer.kind == "separable" else 0))
+            inputs = layer.width
+        return total
+
     def as_dict(self) -> dict[str, Any]:
         """Plain values for a checkpoint."""
         return asdict(self)

@@ -48,7 +48,13 @@ def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) 
     network = checkpoint.network.eval()
     test = _example(network, points=12, seed=0)
     provenance = {**checkpoint.manifest.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"}
-    manifest = replace(checkpoint.manifest, layout=layout, self_test=test, provenance=provenance)
+    manifest = replace(
+        checkpoint.manifest,
+        layout=layout,
+        operations=network.shape.operations,
+        self_test=test,
+        provenance=provenance,
+    )
     content = build(network, manifest)
     difference = largest_difference(content, network, manifest)
     if not difference <= LARGEST_DIFFERENCE:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from vm_embedded.manifest import METADATA_KEY, Manifest
 
 from .graph import FLOAT, INT32, Graph
@@ -39,7 +41,7 @@ def plain_graph(network: Network, manifest: Manifest) -> bytes:
         bias = graph.constant(f"{name}.bias", linear.bias.detach().numpy())
         x = graph.node("Gemm", [x, kernel, bias], f"{name}.linear")
         last = index == len(network.shape.layers) - 1
-        attributes = {"axis": 1} if spec.activation == "softmax" else {}
+        attributes: dict[str, Any] = {"axis": 1} if spec.activation == "softmax" else {}
         output = "probabilities" if last else f"{name}.activation"
         x = graph.node(_OPERATORS[spec.activation], [x], output, **attributes)
 

@@ -1,0 +1,49 @@
+"""Frames to measure on: the 15 of the paper's dataset where they lie beside the checkout, else the demo's six."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from vm_embedded import Lens, Orientation, read_lens_file
+from vm_embedded.arrays import Image
+from vm_embedded.sources import read_image
+
+_TOP = Path(__file__).parents[1]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame with all that a detector needs."""
+
+    name: str
+    image: Image
+    lens: Lens
+    orientation: Orientation
+
+    @property
+    def size(self) -> tuple[int, int]:
+        return self.image.shape[1], self.image.shape[0]
+
+
+def frames() -> tuple[str, list[Frame]]:
+    """What the frames are, and the frames."""
+    shared = Path(os.environ.get("VM_SHARED", _TOP.parent / "shared")) / "reference" / "images"
+    if shared.is_dir():
+        return "the 15 reference images", _read(shared)
+    return "the demo's frames, since the reference images are not there", demo_frames()
+
+
+def demo_frames() -> list[Frame]:
+    """The demo's six frames."""
+    return _read(_TOP / "tests" / "fixtures" / "demo")
+
+
+def _read(folder: Path) -> list[Frame]:
+    found = []
+    for path in sorted(folder.glob("image*.jpg")):
+        file = read_lens_file(path.with_name(f"lens{path.stem[5:]}.yaml"))
+        assert file.orientation is not None
+        found.append(Frame(path.name, read_image(path), file.lens, file.orientation))
+    return found

@@ -1,0 +1,190 @@
+"""From results.json to the tables and plots of docs/performance.md; the text between the tables stays as it is."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+
+RESULTS = Path(__file__).with_name("results.json")
+DOCS = Path(__file__).parents[1] / "docs"
+PAGE = DOCS / "performance.md"
+
+
+def table(heads: list[str], rows: list[list[str]]) -> str:
+    lines = [heads, ["---"] + ["---:"] * (len(heads) - 1), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def ms(value: float) -> str:
+    return f"{value:.2f}" if value < 10 else f"{value:.1f}"
+
+
+def machine(found: dict[str, Any]) -> str:
+    about = found["machine"]
+    return (
+        f"{about['processor']}, {about['cores']} cores, {about['vectors']}, {found['sgemm_gflops']:g} GFLOP/s in "
+        f"single-precision matrix products on one core; Python {about['python']}, numpy {about['numpy']}, onnxruntime "
+        f"{about['onnxruntime']}, OpenCV {about['opencv']}. Frames: {found['frames']}."
+    )
+
+
+def sessions(found: dict[str, Any]) -> str:
+    rows = []
+    for name, part in found["sessions"].items():
+        row = part["median_frame"]
+        operations = found["operations_per_point"][name]
+        floor = 1e3 * operations * row["points"] / (1e9 * found["sgemm_gflops"])
+        values = [ms(row[kind]["p50"]) for kind in ("plain", "numpy", "runs")]
+        spread = part["plain_over_runs_all"]
+        over = [f"{part['plain_over_runs']:.1f}", f"{min(spread):.1f} to {max(spread):.1f}", f"{floor:.3f}"]
+        rows.append([name, str(row["points"]), *values, *over])
+    heads = ["network", "points", "plain", "numpy", "runs", "plain / runs", "over all frames", "floor"]
+    return table(heads, rows)
+
+
+def whole_calls(found: dict[str, Any]) -> str:
+    rows = [
+        [
+            name,
+            str(row["points"]),
+            ms(row["session"]["p50"]),
+            ms(row["whole"]["p50"]),
+            ms(row["whole"]["p99"]),
+            f"{row['whole_over_session']:.2f}",
+            f"{row['p99_over_p50']:.2f}",
+        ]
+        for name, row in found["whole_calls"].items()
+    ]
+    heads = ["network, sampling", "points", "session", "whole call", "p99", "whole / session", "p99 / p50"]
+    return table(heads, rows)
+
+
+def with_a_ball(found: dict[str, Any]) -> str:
+    row = found["with_a_ball"]
+    heads = ["points", "found", *row["stages_ms"], "total", "p99"]
+    values = [ms(value) for value in row["stages_ms"].values()]
+    return table(
+        heads,
+        [[str(row["points"]), str(row["found"]), *values, ms(row["total"]["p50"]), ms(row["total"]["p99"])]],
+    )
+
+
+def peers(found: dict[str, Any]) -> str:
+    calls = found["peers"]["calls"]
+    base = calls["Visual Mesh 5x4 exact"]
+    rows = [
+        [name, ms(row["p50"]), ms(row["p99"]), f"{row['p50'] / base['p50']:.1f}", ms(row["first"])]
+        for name, row in sorted(calls.items(), key=lambda item: item[1]["p50"])
+    ]
+    return table(["detector", "whole call", "p99", "times 5x4 exact", "after another's call"], rows)
+
+
+def growth(found: dict[str, Any]) -> str:
+    names = {"intersections": "k", "distance": "m", "resolution": "megapixels"}
+    parts = []
+    for part, key in names.items():
+        rows = [[f"{row[key]:g}", str(row["points"]), ms(row["total"]["p50"])] for row in found["growth"][part]]
+        parts.append(table([f"{part} [{key}]" if part != "intersections" else part, "points", "whole call"], rows))
+    threads = [
+        [row["network"], str(row["threads"]), str(row["points"]), ms(row["total"]["p50"]), ms(row["total"]["p99"])]
+        for row in found["growth"]["threads"]
+    ]
+    parts.append(table(["network", "threads", "points", "whole call", "p99"], threads))
+    return "\n\n".join(parts)
+
+
+def walks(found: dict[str, Any]) -> str:
+    rows = [
+        [
+            name,
+            f"{100 * row['hit_rate_after_first_swing']:.1f} %",
+            f"{row['cache_mib']:.1f}",
+            ms(row["bucket_ms"]["p50"]),
+            ms(row["bucket_ms"]["p99"]),
+            ms(row["mesh_and_bucket_ms"]["p50"]),
+            ms(row["mesh_and_bucket_ms"]["p99"]),
+        ]
+        for name, row in found["walks"].items()
+    ]
+    heads = ["mesh of", "hits after the first swing", "MiB", "cold bucket", "p99", "with a new mesh", "p99"]
+    return table(heads, rows)
+
+
+def soak(found: dict[str, Any]) -> str:
+    row = found["soak"]
+    marks = table(
+        ["frames", *(f"{mark['frames']:,}" for mark in row["marks"])],
+        [["RSS [MiB]", *(f"{mark['rss_mib']:.1f}" for mark in row["marks"])]],
+    )
+    return f"{marks}\n\nGrowth since a tenth of the run: {100 * row['growth_since_a_tenth']:.2f} %."
+
+
+TABLES = {
+    "machine": machine,
+    "sessions": sessions,
+    "whole-calls": whole_calls,
+    "with-a-ball": with_a_ball,
+    "peers": peers,
+    "growth": growth,
+    "walks": walks,
+    "soak": soak,
+}
+
+
+def plot_peers(found: dict[str, Any], path: Path) -> None:
+    calls = sorted(found["peers"]["calls"].items(), key=lambda item: -item[1]["p50"])
+    figure, axes = pyplot.subplots(figsize=(7.5, 3.6), layout="constrained")
+    colors = ["#2a7f62" if name.startswith("Visual") else "#9aa5b1" for name, _ in calls]
+    bars = axes.barh([name for name, _ in calls], [row["p50"] for _, row in calls], color=colors)
+    axes.bar_label(bars, labels=[f" {ms(row['p50'])} ms" for _, row in calls], fontsize=8)
+    axes.set_xscale("log")
+    axes.set_xlim(0.1, 200)
+    axes.set_xlabel("whole call on one core [ms], log scale")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(labelsize=8)
+    figure.savefig(path, dpi=130)
+    pyplot.close(figure)
+
+
+def plot_growth(found: dict[str, Any], path: Path) -> None:
+    figure, (left, right) = pyplot.subplots(1, 2, figsize=(7.5, 3.0), layout="constrained", sharey=True)
+    for part, mark in (("intersections", "o"), ("distance", "s")):
+        rows = found["growth"][part]
+        left.plot([row["points"] for row in rows], [row["total"]["p50"] for row in rows], mark, label=f"more {part}")
+    left.set_xlabel("points")
+    left.set_ylabel("whole call, five layers [ms]")
+    left.legend(frameon=False, fontsize=8)
+    rows = found["growth"]["resolution"]
+    right.plot([row["megapixels"] for row in rows], [row["total"]["p50"] for row in rows], "o-", color="#2a7f62")
+    right.set_xscale("log")
+    right.set_xlabel("picture [megapixels], log scale")
+    for axes in (left, right):
+        axes.set_ylim(0, None)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.tick_params(labelsize=8)
+    figure.savefig(path, dpi=130)
+    pyplot.close(figure)
+
+
+def main() -> None:
+    found = json.loads(RESULTS.read_text())
+    text = PAGE.read_text()
+    for name, made in TABLES.items():
+        pattern = re.compile(rf"(<!-- {name} -->\n).*?(\n<!-- end -->)", re.DOTALL)
+        if not pattern.search(text):
+            raise SystemExit(f"{PAGE} has no place for the table {name}")
+        text = pattern.sub(lambda match, made=made: match[1] + made(found) + match[2], text)  # type: ignore[misc]
+    PAGE.write_text(text)
+    plot_peers(found, DOCS / "performance-peers.png")
+    plot_growth(found, DOCS / "performance-growth.png")
+
+
+if __name__ == "__main__":
+    main()

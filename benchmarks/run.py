@@ -1,0 +1,287 @@
+"""All figures of docs/performance.md: `make bench`. One pinned core; calls that are compared take turns.
+
+Writes benchmarks/results.json. With --quick fewer rounds, to see that it works.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import cv2
+import numpy as np
+
+from vm_embedded import Detector, Orientation, Settings
+from vm_embedded.bench import cold, machine, measure, rss_mib, sgemm_rate, walk
+from vm_embedded.cache import MeshCache
+from vm_embedded.layout import laid_out
+from vm_embedded.mesh import Mesh, ring_mesh
+from vm_embedded.onnx_file import ModelFile
+from vm_embedded.projection import project
+from vm_export.network import Network
+
+from .frames import Frame, demo_frames, frames
+from .networks import NETWORKS, NumpyLoop, checkpoint, model_file
+from .peers import PEERS, PeerDetector
+from .timing import interleaved, summary
+
+RESULTS = Path(__file__).with_name("results.json")
+DEMO = Path(__file__).parents[1] / "tests" / "fixtures" / "demo" / "ball.onnx"
+SOAK_FRAMES = 200_000
+
+
+class Models:
+    """The networks of NETWORKS in both layouts, as files in a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.networks: dict[str, Network] = {}
+        self._files: dict[tuple[str, str], ModelFile] = {}
+        for name, (shape, intersections, max_distance) in NETWORKS.items():
+            made = checkpoint(shape, intersections, max_distance)
+            self.networks[name] = made.network
+            for layout in ("plain", "runs"):
+                self._files[name, layout] = model_file(made, layout, folder / f"{name}.{layout}.onnx")
+
+    def detector(self, name: str, layout: str = "runs", **settings: Any) -> Detector:
+        return Detector(self._files[name, layout], Settings(**settings))
+
+    def other(self, name: str, intersections: float, max_distance: float, **settings: Any) -> Detector:
+        """The same network on another mesh."""
+        made = checkpoint(NETWORKS[name][0], intersections, max_distance)
+        return Detector(model_file(made, "runs", self.folder / "other.onnx"), Settings(**settings))
+
+
+def mesh_on_screen(detector: Detector, frame: Frame) -> Mesh:
+    """The points of a frame, of a mesh at its own height."""
+    manifest = detector.manifest
+    mesh = ring_mesh(
+        manifest.mesh_shape, frame.orientation.height, manifest.intersections, manifest.max_distance, manifest.mesh
+    )
+    return project(mesh, frame.orientation.level, frame.lens.for_image(frame.size), frame.size).visible.mesh
+
+
+def session_call(detector: Detector, mesh: Mesh) -> Callable[[], object]:
+    """The session alone on a mesh, its inputs ready."""
+    layout = laid_out(mesh, detector.manifest)
+    points = layout.points()
+    layout.colors(points)[:] = np.random.default_rng(0).random((len(layout.slots), 3), dtype=np.float32)
+    feeds = layout.feeds(points, layout.slots < len(mesh))
+    session = detector.session._session
+    return lambda: session.run(["probabilities"], feeds)
+
+
+def numpy_call(network: Network, mesh: Mesh) -> Callable[[], object]:
+    loop = NumpyLoop(network, len(mesh))
+    points = np.random.default_rng(0).random((len(mesh) + 1, 3), dtype=np.float32)
+    itself = np.arange(len(mesh) + 1, dtype=np.intp)[:, None]
+    neighbors = np.concatenate([itself, mesh.neighbors], axis=1)
+    return lambda: loop.run(points, neighbors)
+
+
+def sessions(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
+    """Plain graph, fast graph and numpy loop, session only, for each network over the frames."""
+    found: dict[str, Any] = {}
+    for name in NETWORKS:
+        plain, fast = models.detector(name, "plain"), models.detector(name, "runs")
+        rows = []
+        for frame in work:
+            mesh = mesh_on_screen(fast, frame)
+            times = interleaved(
+                {
+                    "plain": session_call(plain, mesh),
+                    "runs": session_call(fast, mesh),
+                    "numpy": numpy_call(models.networks[name], mesh),
+                },
+                rounds if len(mesh) < 10_000 else max(rounds // 5, 5),
+            )
+            rows.append({"frame": frame.name, "points": len(mesh), **times})
+        rows.sort(key=lambda row: row["points"])
+        median = rows[len(rows) // 2]
+        found[name] = {
+            "median_frame": median,
+            "plain_over_runs": round(median["plain"]["p50"] / median["runs"]["p50"], 2),
+            "plain_over_runs_all": [round(row["plain"]["p50"] / row["runs"]["p50"], 2) for row in rows],
+            "frames": rows,
+        }
+    return found
+
+
+def median_frame(models: Models, work: list[Frame], name: str) -> Frame:
+    detector = models.detector(name)
+    return sorted(work, key=lambda frame: len(mesh_on_screen(detector, frame)))[len(work) // 2]
+
+
+def whole_calls(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
+    """From frame to detections, warm, against the session alone on the same inputs."""
+    found: dict[str, Any] = {}
+    for name in NETWORKS:
+        frame = median_frame(models, work, name)
+        for sampling in ("exact", "fast"):
+            detector = models.detector(name, sampling=sampling)
+            seen = detector.detect(frame.image, frame.orientation, frame.lens)
+            calls = {
+                "whole": lambda d=detector, f=frame: d.detect(f.image, f.orientation, f.lens),
+                "session": session_call(detector, mesh_on_screen(detector, frame)),
+            }
+            times = interleaved(calls, rounds)  # type: ignore[arg-type]
+            row: dict[str, Any] = dict(times)
+            row |= {"frame": frame.name, "points": len(seen.pixels), "slots": len(seen.layout.slots)}
+            row["whole_over_session"] = round(row["whole"]["p50"] / row["session"]["p50"], 2)
+            row["p99_over_p50"] = round(row["whole"]["p99"] / row["whole"]["p50"], 2)
+            found[f"{name} {sampling}"] = row
+    return found
+
+
+def with_a_ball(rounds: int) -> dict[str, Any]:
+    """The demo's network, eight layers of eight, on a frame in which it finds a ball."""
+    frame = demo_frames()[0]
+    detector = Detector.from_file(DEMO)
+    runs = measure([detector], frame.image, frame.lens, [frame.orientation] * (rounds + 5))
+    seen = detector.detect(frame.image, frame.orientation, frame.lens)
+    stages = {name: round(float(np.median(values[5:])), 4) for name, values in runs[0].stages.items()}
+    return {"found": len(seen), "points": len(seen.pixels), "total": summary(runs[0].total[5:]), "stages_ms": stages}
+
+
+def peers(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
+    """Whole calls on the same frame, in turns: the Visual Mesh with five and nine layers, and the peers."""
+    frame = median_frame(models, work, "5x4")
+    calls: dict[str, Callable[[], object]] = {}
+    for name in ("5x4", "9x4"):
+        for sampling in ("exact", "fast"):
+            ours = models.detector(name, sampling=sampling)
+            calls[f"Visual Mesh {name} {sampling}"] = lambda d=ours: d.detect(  # type: ignore[misc]
+                frame.image, frame.orientation, frame.lens
+            )
+    for peer in PEERS:
+        detector = PeerDetector(peer)
+        calls[peer.name] = lambda d=detector: d.detect(frame.image)  # type: ignore[misc]
+    times = interleaved(calls, max(rounds // 4, 5))
+    found: dict[str, Any] = {"frame": frame.name, "calls": times}
+    for name in list(calls)[:4]:
+        found[f"fastest peer over {name}"] = {
+            which: round(min(times[peer.name][which] for peer in PEERS) / times[name][which], 1)
+            for which in ("p50", "first")
+        }
+    return found
+
+
+def growth(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
+    """How a whole call of five layers grows with intersections, distance, resolution and threads."""
+    frame = median_frame(models, work, "5x4")
+
+    def row(detector: Detector, frame: Frame, **what: float) -> dict[str, Any]:
+        orientations = [frame.orientation] * (rounds // 2 + 5)
+        run = measure([detector], frame.image, frame.lens, orientations)[0]
+        return {**what, "points": int(run.points[0]), "total": summary(run.total[5:])}
+
+    found: dict[str, Any] = {
+        "intersections": [row(models.other("5x4", k, 10.0), frame, k=k) for k in (2.0, 3.0, 4.0, 5.0, 6.0, 8.0)],
+        "distance": [row(models.other("5x4", 4.0, d), frame, m=d) for d in (2.5, 5.0, 10.0, 20.0, 40.0)],
+        "resolution": [],
+        "threads": [],
+    }
+    for factor in (0.25, 0.5, 1.0, 2.0, 4.0):
+        image = cv2.resize(frame.image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+        size = image.shape[1], image.shape[0]
+        scaled = replace(frame, image=np.asarray(image), lens=frame.lens.scaled(factor, size))
+        found["resolution"].append(row(models.detector("5x4"), scaled, megapixels=round(size[0] * size[1] / 1e6, 2)))
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, _ALL_CORES)
+    for name in ("5x4", "13x16"):
+        other = median_frame(models, work, name)
+        for threads in range(1, len(_ALL_CORES) + 1):
+            what = {"network": name, "threads": threads}
+            found["threads"].append(row(models.detector(name, threads=threads), other, **what))  # type: ignore[arg-type]
+    os.sched_setaffinity(0, allowed)
+    return found
+
+
+def walks(models: Models, work: list[Frame], seconds: float) -> dict[str, Any]:
+    """A robot that walks for a while: hits of the cache after its first swing, its memory, and what cold calls cost."""
+    found: dict[str, Any] = {}
+    for name in ("5x4", "13x16"):
+        frame = median_frame(models, work, name)
+        detector = models.detector(name)
+        lens = frame.lens.for_image(frame.size)
+        middle = Orientation.from_roll_pitch(frame.orientation.height, 0.0, frame.orientation.pitch)
+        steps = walk(middle, np.deg2rad(10.0), 0.03, int(30 * seconds))
+        cache, largest = MeshCache(detector.manifest, detector.settings), 0.0
+        for number, orientation in enumerate(steps):
+            if number == 30:
+                cache.hits = cache.misses = 0
+            cache.view(orientation, lens, frame.size)
+            largest = max(largest, cache.nbytes / 2**20)
+        found[name] = {
+            "height_m": round(middle.height, 2),
+            "hit_rate_after_first_swing": round(cache.hit_rate, 4),
+            "cache_mib": round(largest, 1),
+            **cold(detector, frame.lens, frame.size, [each.orientation for each in work for _ in range(4)]),
+        }
+    return found
+
+
+def soak(models: Models, work: list[Frame], count: int) -> dict[str, Any]:
+    """RSS over many frames of changing shapes: five layers, orientations all over, small images to save time."""
+    detector = models.detector("5x4", sampling="fast", cache_mib=16.0)
+    random = np.random.default_rng(0)
+    frame = median_frame(models, work, "5x4")
+    started, marks = perf_counter(), []
+    for number in range(count):
+        height = frame.orientation.height * random.uniform(0.8, 1.2)
+        orientation = Orientation.from_roll_pitch(height, random.normal(0.0, 0.15), random.normal(0.5, 0.25))
+        detector.detect(frame.image, orientation, frame.lens)
+        if number + 1 in (count // 20, count // 10, count // 4, count // 2, 3 * count // 4, count):
+            marks.append({"frames": number + 1, "rss_mib": round(rss_mib(), 1)})
+    return {
+        "frames": count,
+        "seconds": round(perf_counter() - started),
+        "hit_rate": round(detector.cache.hit_rate, 4),
+        "marks": marks,
+        "growth_since_a_tenth": round(marks[-1]["rss_mib"] / marks[1]["rss_mib"] - 1.0, 4),
+    }
+
+
+_ALL_CORES = os.sched_getaffinity(0)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--output", type=Path, default=RESULTS)
+    options = parser.parse_args()
+    rounds, seconds, soaked = (20, 5.0, 2000) if options.quick else (400, 60.0, SOAK_FRAMES)
+    os.sched_setaffinity(0, {max(_ALL_CORES)})
+    what, work = frames()
+    print(f"on {what}", file=sys.stderr)
+    with tempfile.TemporaryDirectory() as folder:
+        models = Models(Path(folder))
+        rate = sgemm_rate()
+        found: dict[str, Any] = {"machine": machine() | {"cores": len(_ALL_CORES)}, "frames": what}
+        found["sgemm_gflops"] = round(rate / 1e9, 1)
+        found["operations_per_point"] = {name: shape.operations for name, (shape, _, _) in NETWORKS.items()}
+        parts: dict[str, Callable[[], dict[str, Any]]] = {
+            "sessions": lambda: sessions(models, work, rounds // 2),
+            "whole_calls": lambda: whole_calls(models, work, rounds),
+            "with_a_ball": lambda: with_a_ball(rounds),
+            "peers": lambda: peers(models, work, rounds),
+            "growth": lambda: growth(models, work, rounds),
+            "walks": lambda: walks(models, work, seconds),
+            "soak": lambda: soak(models, work, soaked),
+        }
+        for number, (name, part) in enumerate(parts.items(), start=1):
+            print(f"[{number}/{len(parts)}] {name}", file=sys.stderr, flush=True)
+            found[name] = part()
+    options.output.write_text(json.dumps(found, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
