@@ -101,20 +101,18 @@ def growth(found: dict[str, Any]) -> str:
 
 
 def walks(found: dict[str, Any]) -> str:
-    rows = [
-        [
-            name,
-            f"{100 * row['hit_rate_after_first_swing']:.1f} %",
-            f"{row['cache_mib']:.1f}",
-            ms(row["bucket_ms"]["p50"]),
-            ms(row["bucket_ms"]["p99"]),
-            ms(row["mesh_and_bucket_ms"]["p50"]),
-            ms(row["mesh_and_bucket_ms"]["p99"]),
+    rows, colds = [], []
+    for name, part in found["walks"].items():
+        rows += [
+            [name, f"{row['height_m']:g}", f"{100 * row['hit_rate']:.1f} %", f"{row['cache_mib']:.1f}"]
+            for row in part["walks"]
         ]
-        for name, row in found["walks"].items()
-    ]
-    heads = ["mesh of", "hits after the first swing", "MiB", "cold bucket", "p99", "with a new mesh", "p99"]
-    return table(heads, rows)
+        cold = [
+            ms(part["cold"][kind][share]) for kind in ("bucket_ms", "mesh_and_bucket_ms") for share in ("p50", "p99")
+        ]
+        colds.append([name, *cold])
+    heads = ["mesh of", "height [m]", "hits after the first swing", "cache [MiB]"]
+    return table(heads, rows) + "\n\n" + table(["mesh of", "cold bucket", "p99", "with a new mesh", "p99"], colds)
 
 
 def soak(found: dict[str, Any]) -> str:

@@ -66,7 +66,8 @@ def mesh_on_screen(detector: Detector, frame: Frame) -> Mesh:
     mesh = ring_mesh(
         manifest.mesh_shape, frame.orientation.height, manifest.intersections, manifest.max_distance, manifest.mesh
     )
-    return project(mesh, frame.orientation.level, frame.lens.for_image(frame.size), frame.size).visible.mesh
+    seen = project(mesh, frame.orientation.level, frame.lens.for_image(frame.size), frame.size)
+    return mesh.part(np.flatnonzero(seen.on_screen))
 
 
 def session_call(detector: Detector, mesh: Mesh) -> Callable[[], object]:
@@ -206,26 +207,24 @@ def growth(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
 
 
 def walks(models: Models, work: list[Frame], seconds: float) -> dict[str, Any]:
-    """A robot that walks for a while: hits of the cache after its first swing, its memory, and what cold calls cost."""
+    """Robots that walk for a while: hits of the cache after the first swing, its memory, and what cold calls cost."""
     found: dict[str, Any] = {}
     for name in ("5x4", "13x16"):
         frame = median_frame(models, work, name)
         detector = models.detector(name)
         lens = frame.lens.for_image(frame.size)
-        middle = Orientation.from_roll_pitch(frame.orientation.height, 0.0, frame.orientation.pitch)
-        steps = walk(middle, np.deg2rad(10.0), 0.03, int(30 * seconds))
-        cache, largest = MeshCache(detector.manifest, detector.settings), 0.0
-        for number, orientation in enumerate(steps):
-            if number == 30:
-                cache.hits = cache.misses = 0
-            cache.view(orientation, lens, frame.size)
-            largest = max(largest, cache.nbytes / 2**20)
-        found[name] = {
-            "height_m": round(middle.height, 2),
-            "hit_rate_after_first_swing": round(cache.hit_rate, 4),
-            "cache_mib": round(largest, 1),
-            **cold(detector, frame.lens, frame.size, [each.orientation for each in work for _ in range(4)]),
-        }
+        rows = []
+        for height in (0.5, 0.8, 1.1):
+            cache, largest = MeshCache(detector.manifest, detector.settings), 0.0
+            middle = Orientation.from_roll_pitch(height, 0.0, 0.35)
+            for number, orientation in enumerate(walk(middle, np.deg2rad(10.0), 0.03, int(30 * seconds))):
+                if number == 30:
+                    cache.hits = cache.misses = 0
+                cache.view(orientation, lens, frame.size)
+                largest = max(largest, cache.nbytes / 2**20)
+            rows.append({"height_m": height, "hit_rate": round(cache.hit_rate, 4), "cache_mib": round(largest, 1)})
+        orientations = [each.orientation for each in work for _ in range(4)]
+        found[name] = {"walks": rows, "cold": cold(detector, frame.lens, frame.size, orientations)}
     return found
 
 

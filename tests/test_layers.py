@@ -17,11 +17,23 @@ LAYERS = [
     {"errors", "arrays", "files"},
     {"shapes", "recursion", "lens", "lens_opencv", "orientation", "yaml_reader"},
     {"mesh"},
-    {"projection", "sampling", "clustering", "manifest", "layout", "onnx_file", "detections", "lens_file", "settings", "objects"},
+    {
+        "projection",
+        "sampling",
+        "clustering",
+        "manifest",
+        "layout",
+        "onnx_file",
+        "detections",
+        "lens_file",
+        "settings",
+        "objects",
+    },
     {"cache", "session"},
     {"detector"},
-    {"configuration", "sources", "overlay", "sinks"},
-    {"cli"},
+    {"configuration", "sources", "overlay", "sinks", "bench"},
+    {"options", "tuning"},
+    {"cli", "bench_cli"},
 ]
 LAYER_OF = {name: number for number, names in enumerate(LAYERS) for name in names}
 

@@ -86,9 +86,9 @@ def steps_from(sources, shared, index, rays):
 
     file = read_lens_file(shared / f"reference/images/lens{index:07d}.yaml")
     mesh = ring_mesh(Sphere(0.0949996), file.orientation.height, 6, 20.0)
-    projected = project(mesh, file.orientation.rotation, file.lens, (1280, 1024))
-    np.testing.assert_allclose(projected.mesh.rays, rays, atol=1e-12)
-    neighbors = projected.mesh.neighbors
+    projected = project(mesh, file.orientation.rotation, file.lens, (1280, 1024)).visible
+    np.testing.assert_allclose(projected.graph.rays, rays, atol=1e-12)
+    neighbors = projected.graph.neighbors
     steps = np.full(len(neighbors), 1000)
     steps[sources] = 0
     for _ in range(RECEPTIVE_STEPS + 1):

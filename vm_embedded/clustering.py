@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from .arrays import Indices
+from .mesh import Graph
 
 Members = npt.NDArray[np.intp]
 """Positions of points in a mesh."""
@@ -13,14 +13,14 @@ Members = npt.NDArray[np.intp]
 _Edges = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 
-def clusters(neighbors: Indices, members: Members) -> list[Members]:
+def clusters(graph: Graph, members: Members) -> list[Members]:
     """The connected components of the points `members`, each in their order, largest first, then as they come.
 
-    Two points are connected if either is a neighbor (n + 1, N) of the other. Labels spread along all links at once,
+    Two points are connected if either is a neighbor of the other. Labels spread along all links at once,
     the smaller one winning, and jump to the label of their label, so the rounds needed grow with the logarithm of a
     component's width, and nothing loops over points.
     """
-    a, b = _edges(neighbors, members)
+    a, b = _edges(graph, members)
     label = np.arange(len(members))
     while True:
         spread = label.copy()
@@ -35,33 +35,34 @@ def clusters(neighbors: Indices, members: Members) -> list[Members]:
     return sorted(parts, key=len, reverse=True)
 
 
-def graph_diameter(neighbors: Indices, members: Members, limit: int) -> int:
+def graph_diameter(graph: Graph, members: Members, limit: int) -> int:
     """Steps between the two members farthest apart, going through members only.
 
     Found by two breadth-first sweeps, the second from the end of the first: exact for chains, at most a step or two
     short for round clusters. Counting stops at limit + 1.
     """
-    edges = _edges(neighbors, members)
+    edges = _edges(graph, members)
     far = int(np.argmax(_steps(edges, len(members), 0, limit)))
     return int(_steps(edges, len(members), far, limit).max())
 
 
-def wider_than(neighbors: Indices, members: Members, middle: int, limit: int) -> bool:
+def wider_than(graph: Graph, members: Members, middle: int, limit: int) -> bool:
     """Whether the graph diameter of `members` is above `limit`.
 
     Nearly always one sweep from the member in the `middle` tells: no two are farther apart than twice its reach.
     """
-    reach = int(_steps(_edges(neighbors, members), len(members), middle, limit).max())
-    return 2 * reach > limit and graph_diameter(neighbors, members, limit) > limit
+    reach = int(_steps(_edges(graph, members), len(members), middle, limit).max())
+    return 2 * reach > limit and graph_diameter(graph, members, limit) > limit
 
 
-def _edges(neighbors: Indices, members: Members) -> _Edges:
+def _edges(graph: Graph, members: Members) -> _Edges:
     """Links between members, as positions in `members`, in both directions."""
-    position = np.full(len(neighbors), -1)
+    position = np.full(len(graph) + 1, -1)
     position[members] = np.arange(len(members))
-    ends = position[neighbors[members]].ravel()
+    links = graph.links(members)
+    ends = position[links].ravel()
     linked = np.flatnonzero(ends >= 0)
-    starts, ends = linked // neighbors.shape[1], ends[linked]
+    starts, ends = linked // links.shape[1], ends[linked]
     return np.concatenate([starts, ends]), np.concatenate([ends, starts])
 
 

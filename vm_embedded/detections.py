@@ -12,7 +12,7 @@ import numpy as np
 from .arrays import Floats, Indices, Singles
 from .layout import Layout
 from .manifest import Manifest
-from .projection import ProjectedMesh
+from .projection import Projection
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class Detections:
     rejected: tuple[Detection, ...]
     manifest: Manifest
     layout: Layout
-    projected: ProjectedMesh
+    projected: Projection[Layout]
     answers: Singles
     heading: Floats
     threshold: float
@@ -119,7 +119,7 @@ class Detections:
     @cached_property
     def rays(self) -> Floats:
         """Unit vectors (n, 3) to the points, in the frame's own observation plane."""
-        return np.asarray(self.layout.mesh.rays[self._shown] @ self.heading.T)
+        return np.asarray(self.layout.rays[self._shown] @ self.heading.T)
 
     @cached_property
     def probabilities(self) -> Singles:

@@ -62,7 +62,7 @@ class Detector:
             rings = self._rings(orientation.height, view.mesh_height)
         layout = view.layout
         with _timed(timing, "project"):
-            projected = project(layout.mesh, view.rotation, lens, size)
+            projected = project(layout, view.rotation, lens, size)
         with _timed(timing, "sample"):
             points = layout.points()
             sample(image, projected.pixels, self.settings.format, self.settings.sampling, layout.colors(points))

@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 import numpy.typing as npt
 
-from .arrays import Indices, Mask, Singles, frozen
+from .arrays import Floats, Indices, Mask, Singles, frozen
 from .manifest import Manifest
 from .mesh import RUNS, SELF, Mesh
 
@@ -32,19 +32,27 @@ class Layout(ABC):
     """A mesh of n points in a network's order.
 
     slots: the point of each of its m slots, or n in gaps. places: the slot of each point (n,). original: which slots
-    (m,) these are; all others are gaps or copies of points. mesh: the slots as a mesh, in which nothing leads to gaps
-    and copies.
+    (m,) these are; all others are gaps or copies of points. rays: (m, 3), NaN in gaps.
+
+    As a graph (mesh.Graph) it consists of its slots; nothing is linked to gaps and copies.
     """
 
     slots: Indices
     places: Indices
     original: Mask
-    mesh: Mesh
+    rays: Floats
+
+    def __len__(self) -> int:
+        return len(self.slots)
+
+    @abstractmethod
+    def links(self, members: npt.NDArray[np.integer]) -> Indices:
+        """Neighbors (k, N) of originals (k,), as slots; m is the off-screen point."""
 
     @property
     def nbytes(self) -> int:
         """Memory that it holds [bytes]."""
-        return self.slots.nbytes + self.places.nbytes + self.original.nbytes + self.mesh.nbytes
+        return self.slots.nbytes + self.places.nbytes + self.original.nbytes + self.rays.nbytes
 
     @abstractmethod
     def points(self) -> Singles:
@@ -67,21 +75,28 @@ class PlainLayout(Layout):
     """Points as rows and a row of neighbors for each; the off-screen point is the last row."""
 
     def __init__(self, mesh: Mesh, edge: str) -> None:
-        self.slots = frozen(np.arange(len(mesh), dtype=np.int32))
-        self.places = self.slots
+        self.slots = self.places = frozen(np.arange(len(mesh), dtype=np.int32))
         self.original = frozen(np.ones(len(mesh), dtype=bool))
-        self.mesh = mesh
+        self.rays = mesh.rays
+        self._neighbors = mesh.neighbors
         self._edge = edge
 
+    def links(self, members: npt.NDArray[np.integer]) -> Indices:
+        return np.take(self._neighbors, members, axis=0)
+
+    @property
+    def nbytes(self) -> int:
+        return super().nbytes + self._neighbors.nbytes
+
     def points(self) -> Singles:
-        return np.empty((len(self.mesh) + 1, 3), dtype=np.float32)
+        return np.empty((len(self) + 1, 3), dtype=np.float32)
 
     def colors(self, points: Singles) -> Singles:
         return points[:-1]
 
     def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
         points[-1] = _OFF_SCREEN
-        neighbors, missing = self.mesh.neighbors, np.int32(len(self.mesh))
+        neighbors, missing = self._neighbors, np.int32(len(self))
         shown = np.append(on_screen, False)[neighbors]
         instead = np.arange(missing + 1, dtype=np.int32)[:, None] if self._edge == "same" else missing
         return {"points": points, "neighbors": np.where(shown, neighbors, instead)}
@@ -106,34 +121,44 @@ class RunsLayout(Layout):
     """
 
     def __init__(self, mesh: Mesh, model: str) -> None:
-        slots, places, columns = _runs(mesh.neighbors, RUNS[model])
-        count, width = len(slots), mesh.neighbors.shape[1]
-        rays = np.append(mesh.rays.T, np.full((3, 1), np.nan), axis=1)[:, slots]
-        neighbors = np.full((count + 1, width), count, dtype=np.int32)
-        neighbors[places] = np.append(places, count).astype(np.int32)[mesh.neighbors[:-1]]
+        self._groups = RUNS[model]
+        slots, places, middles = _runs(mesh.neighbors, self._groups)
+        count = len(slots)
         self.slots = frozen(slots.astype(np.int32))
         self.places = frozen(places.astype(np.int32))
         original = np.zeros(count, dtype=bool)
         original[places] = True
         self.original = frozen(original)
-        self.mesh = Mesh(frozen(rays).T, frozen(neighbors))
-        starts = (count - 1) * np.arange(len(columns), dtype=np.int64)[:, None] + 1
-        self.columns = frozen(columns + starts)
-        self._off_screen = frozen(_GAP + starts)
+        self.rays = frozen(np.take(np.append(mesh.rays.T, np.full((3, 1), np.nan), axis=1), slots, axis=1)).T
+        self._starts = 1 + (count - 1) * np.arange(len(middles), dtype=np.int32)[:, None]
+        self.columns = frozen(middles.astype(np.int32) + self._starts)
+
+    def links(self, members: npt.NDArray[np.integer]) -> Indices:
+        places = np.append(self.places, np.int32(len(self)))
+        found = np.empty((len(members), sum(map(len, self._groups)) - 1), dtype=np.int32)
+        for group, columns, start in zip(self._groups, self.columns, self._starts, strict=True):
+            middle = columns[members] - start
+            for offset, neighbor in enumerate(group, start=-(len(group) // 3)):
+                if neighbor != SELF:
+                    found[:, neighbor] = places[self.slots[middle + offset]]
+        return found
 
     @property
     def nbytes(self) -> int:
         return super().nbytes + self.columns.nbytes
 
     def points(self) -> Singles:
-        return np.empty((3, len(self.mesh)), dtype=np.float32)
+        return np.empty((3, len(self)), dtype=np.float32)
 
     def colors(self, points: Singles) -> Singles:
         return points.T
 
     def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
-        np.copyto(points, _OFF_SCREEN, where=~on_screen)
-        return {"points": points, "columns": np.where(on_screen, self.columns, self._off_screen)}
+        off_screen = ~on_screen
+        np.copyto(points, _OFF_SCREEN, where=off_screen)
+        columns = self.columns.astype(np.int64)
+        np.copyto(columns, _GAP + self._starts, where=off_screen)
+        return {"points": points, "columns": columns}
 
     def answers(self, output: Singles) -> Singles:
         return output.T
@@ -184,7 +209,7 @@ def _in_runs(left: Indices, right: Indices) -> _Positions:
     n = len(left)
     points = np.arange(n)
     starts = np.flatnonzero(np.append(True, (right[:-1] != points[1:]) | (left[1:] != points[:-1]))[:n])
-    ends = np.append(starts[1:], n) - 1
+    ends = np.append(starts[1:], n)[: len(starts)] - 1
     piece = np.full(n + 1, -1)
     piece[starts] = np.arange(len(starts))
     follower = piece[right[ends]]  # the piece that begins with the right neighbor of a piece's end
@@ -204,9 +229,10 @@ def _in_runs(left: Indices, right: Indices) -> _Positions:
             each = int(follower[each])
         if gaps_after:
             gaps_after[-1] = 1
-    lengths = (ends - starts + 1)[order]
-    place = 3 + np.cumsum(np.append(0, lengths + gaps_after))
+    ordered = starts[np.array(order, dtype=np.intp)]
+    lengths = (ends - starts + 1)[np.array(order, dtype=np.intp)]
+    place = 3 + np.cumsum(np.append(0, lengths + np.array(gaps_after, dtype=np.intp)))
     slots = np.full(place[-1], n)
     within = points - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    slots[np.repeat(place[:-1], lengths) + within] = np.repeat(starts[order], lengths) + within
+    slots[np.repeat(place[:-1], lengths) + within] = np.repeat(ordered, lengths) + within
     return slots

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +30,19 @@ RUNS: dict[str, tuple[tuple[int, ...], ...]] = {
 _CEIL_EPSILON = 1e-9
 
 
+class Graph(Protocol):
+    """n points that are linked."""
+
+    @property
+    def rays(self) -> Floats:
+        """Unit vectors (n, 3) in the observation-plane frame, from the camera."""
+
+    def __len__(self) -> int: ...
+
+    def links(self, members: npt.NDArray[np.integer]) -> Indices:
+        """Neighbors (m, N) of some points (m,); n is the off-screen point."""
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """n points and their neighbors, or any part of such a mesh.
@@ -43,6 +57,10 @@ class Mesh:
 
     def __len__(self) -> int:
         return len(self.rays)
+
+    def links(self, members: npt.NDArray[np.integer]) -> Indices:
+        """Neighbors (m, N) of some points (m,)."""
+        return np.take(self.neighbors, members, axis=0)
 
     @property
     def nbytes(self) -> int:

@@ -19,7 +19,8 @@ from .clustering import Members, clusters, wider_than
 from .detections import Detection
 from .lens import Lens, Size
 from .manifest import ObjectClass
-from .projection import ProjectedMesh, to_camera
+from .mesh import Graph
+from .projection import Projection, to_camera
 from .settings import Settings
 from .shapes import Shape, tangents
 
@@ -55,7 +56,7 @@ class Scene:
     heading: Floats
     lens: Lens
     size: Size
-    projected: ProjectedMesh
+    projected: Projection[Graph]
     order: Indices
     rings: float
 
@@ -103,7 +104,7 @@ def _find(
     if len(members) == 0:
         return
     centers: list[Floats] = []
-    for cluster in clusters(scene.projected.mesh.neighbors, members)[:_MOST_CLUSTERS]:
+    for cluster in clusters(scene.projected.graph, members)[:_MOST_CLUSTERS]:
         center = _middle(scene, cluster)
         near = _near(scene, cluster, center)
         p_near = p[near].astype(np.float64)
@@ -121,13 +122,13 @@ def _find(
 
 def _middle(scene: Scene, members: Members) -> Floats:
     """Center (3,) [m] of an object in the direction of a cluster's mean ray."""
-    axis = scene.projected.mesh.rays[members].mean(axis=0, keepdims=True)
+    axis = scene.projected.graph.rays[members].mean(axis=0, keepdims=True)
     return np.asarray(scene.shape.center_along(axis / np.linalg.norm(axis), scene.height)[0])
 
 
 def _near(scene: Scene, members: Members, center: Floats) -> Members:
     """The points of a cluster in the direction of `center`, and those up to three object radii around it."""
-    rays = scene.projected.mesh.rays
+    rays = scene.projected.graph.rays
     distance = float(np.linalg.norm(center))
     axis = center / distance
     chord = math.sqrt(2.0 * max(1.0 - float((rays[members] @ axis).min()), 0.0)) + 3.0 * scene.shape.radius / distance
@@ -136,13 +137,13 @@ def _near(scene: Scene, members: Members, center: Floats) -> Members:
 
 def _wrong_size(scene: Scene, members: Members, center: Floats, near: Members, settings: Settings) -> str | None:
     """Why a cluster around `center` can't be an object, by its number of points and its width alone, or None."""
-    expected = int((scene.shape.offset(scene.projected.mesh.rays[near], center[None], scene.height) < 1.0).sum())
+    expected = int((scene.shape.offset(scene.projected.graph.rays[near], center[None], scene.height) < 1.0).sum())
     # A filled object has more than half of its points in its cluster; half of that allows for a center that is off.
     if len(members) < 0.25 * expected:
         return f"{len(members)} points, where an object there has {expected}"
     widest = math.ceil(settings.max_widths * scene.rings)
-    middle = int(np.argmax(scene.projected.mesh.rays[members] @ center))
-    if wider_than(scene.projected.mesh.neighbors, members, middle, widest):
+    middle = int(np.argmax(scene.projected.graph.rays[members] @ center))
+    if wider_than(scene.projected.graph, members, middle, widest):
         return f"wider than {widest} steps in the mesh, where an object is {scene.rings:.1f} wide"
     return None
 
@@ -154,7 +155,7 @@ def _best_center(scene: Scene, center: Floats, near: Members, log_odds: Floats) 
     finer ones around it. The outline is half a ring spacing soft, so that the sum has no plateaus between points. What
     is off screen adds nothing, so an object that the border cuts gets its center where it belongs.
     """
-    rays = np.ascontiguousarray(scene.projected.mesh.rays[near])
+    rays = np.ascontiguousarray(scene.projected.graph.rays[near])
     for reach in _REACHES:
         distance = float(np.linalg.norm(center))
         axis = center / distance
@@ -181,7 +182,7 @@ def _misfit(scene: Scene, center: Floats, near: Members, p: Floats, settings: Se
     """
     if center[2] >= 0.0 or np.linalg.norm(center) > 1e5 * scene.height:
         return "on the horizon or above it"
-    offset = scene.shape.offset(scene.projected.mesh.rays[near], center[None], scene.height)[0]
+    offset = scene.shape.offset(scene.projected.graph.rays[near], center[None], scene.height)[0]
     whole = math.pi / 4.0 * scene.rings**2
     visible = int((offset < 1.0).sum())
     if visible < settings.min_visible * whole:
@@ -210,7 +211,7 @@ def _repeats(scene: Scene, center: Floats, others: list[Floats]) -> str | None:
 def _describe(
     scene: Scene, class_name: str, center: Floats, near: Members, p: Floats, log_odds: Floats, reason: str | None
 ) -> Detection:
-    offset = scene.shape.offset(scene.projected.mesh.rays[near], center[None], scene.height)[0]
+    offset = scene.shape.offset(scene.projected.graph.rays[near], center[None], scene.height)[0]
     inside = p[offset < 1.0]
     distance = float(np.linalg.norm(center))
     # The size that fits best at this bearing, not knowing how far away the plane puts it.

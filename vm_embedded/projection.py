@@ -4,41 +4,41 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Generic, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from .arrays import Floats, Mask
 from .lens import Lens, Size
-from .mesh import Mesh
+from .mesh import Graph, Mesh
+
+AnyGraph = TypeVar("AnyGraph", bound=Graph)
+G = TypeVar("G", bound=Graph, covariant=True)
 
 
 @dataclass(frozen=True, eq=False)
-class ProjectedMesh:
-    """The n points of a mesh, their pixels (n, 2), and which of them are on_screen (n,).
+class Projection(Generic[G]):
+    """The n points of a graph, their pixels (n, 2), and which of them are on_screen (n,).
 
     Pixels of points that are not are without meaning.
     """
 
-    mesh: Mesh
+    graph: G
     pixels: Floats
     on_screen: Mask
 
     def __len__(self) -> int:
-        return len(self.mesh)
-
-    def part(self, kept: npt.NDArray[np.intp]) -> ProjectedMesh:
-        """The points `kept`, in that order."""
-        return ProjectedMesh(self.mesh.part(kept), self.pixels[kept], self.on_screen[kept])
-
-    def only(self, chosen: Mask) -> ProjectedMesh:
-        """The same mesh, of which at most the chosen points (n,) are on screen."""
-        return ProjectedMesh(self.mesh, self.pixels, self.on_screen & chosen)
+        return len(self.graph)
 
     @property
-    def visible(self) -> ProjectedMesh:
-        """The points on screen."""
-        return self.part(np.flatnonzero(self.on_screen))
+    def visible(self: Projection[Mesh]) -> Projection[Mesh]:
+        """The points of a mesh that are on screen."""
+        kept = np.flatnonzero(self.on_screen)
+        return Projection(self.graph.part(kept), self.pixels[kept], self.on_screen[kept])
+
+    def only(self, chosen: Mask) -> Projection[G]:
+        """The same graph, of which at most the chosen points (n,) are on screen."""
+        return Projection(self.graph, self.pixels, self.on_screen & chosen)
 
 
 def to_camera(rays: Floats, rotation: Floats) -> Floats:
@@ -57,15 +57,15 @@ def to_camera(rays: Floats, rotation: Floats) -> Floats:
     return camera.T
 
 
-def project(mesh: Mesh, rotation: Floats, lens: Lens, size: Size) -> ProjectedMesh:
-    """The mesh in the picture.
+def project(graph: AnyGraph, rotation: Floats, lens: Lens, size: Size) -> Projection[AnyGraph]:
+    """A graph in the picture.
 
     rotation (3, 3) maps camera to mesh coordinates. On screen means: seen by the lens, and with all four pixels
     around the point in the picture, 0 <= x and x + 1 < width, the same for y.
     """
-    camera = to_camera(mesh.rays, rotation)
+    camera = to_camera(graph.rays, rotation)
     pixels = lens.project(camera, size)
-    return ProjectedMesh(mesh, pixels, lens.sees(camera) & _inside(pixels, size, 0.0))
+    return Projection(graph, pixels, lens.sees(camera) & _inside(pixels, size, 0.0))
 
 
 def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack: float) -> Mask:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from vm_embedded.cache import MeshCache
 from vm_embedded.errors import GeometryError
 from vm_embedded.lens import Equidistant, Equisolid, Rectilinear
-from vm_embedded.manifest import Manifest, ObjectClass
+from vm_embedded.manifest import LAYOUTS, Manifest, ObjectClass
 from vm_embedded.mesh import ring_mesh
 from vm_embedded.orientation import Orientation
 from vm_embedded.projection import project
@@ -17,6 +17,8 @@ from vm_embedded.settings import Settings
 from .strategies import SIZE, lenses, orientations, random_direction, reals, rotation, seeds
 
 LENS = Equisolid(focal_length=300.0, fov=2.2)
+
+in_both_layouts = pytest.mark.parametrize("layout", LAYOUTS)
 
 
 def manifest(**changes):
@@ -42,11 +44,18 @@ def built(cache, height):
 def assert_same_as_without(cache, orientation, lens, size):
     """The prepared part gives what the whole mesh gives, to the last digit."""
     view = cache.view(orientation, lens, size)
-    prepared = project(view.mesh, view.rotation, lens, size)
-    whole = project(built(cache, view.mesh_height), view.rotation, lens, size)
-    np.testing.assert_array_equal(prepared.mesh.rays, whole.mesh.rays)
-    np.testing.assert_array_equal(prepared.mesh.neighbors, whole.mesh.neighbors)
-    np.testing.assert_array_equal(prepared.pixels, whole.pixels)
+    slots, places = view.layout.slots, view.layout.places
+    prepared = project(view.layout, view.rotation, lens, size)
+    shown = places[prepared.on_screen[places]]
+    whole = project(built(cache, view.mesh_height), view.rotation, lens, size).visible
+    np.testing.assert_array_equal(view.layout.rays[shown], whole.graph.rays)
+    np.testing.assert_array_equal(prepared.pixels[shown], whole.pixels)
+    rank = np.full(len(view.layout) + 1, len(shown))
+    rank[shown] = np.arange(len(shown))
+    np.testing.assert_array_equal(rank[view.layout.links(shown)], whole.graph.neighbors[:-1])
+    # Copies of a point are on screen where it is, and gaps never.
+    np.testing.assert_array_equal(prepared.on_screen, np.append(prepared.on_screen[places], False)[slots])
+    assert prepared.only(view.layout.original).on_screen.sum() == len(whole)
     np.testing.assert_allclose(view.heading @ view.rotation, orientation.rotation, atol=1e-12)
 
 
@@ -71,11 +80,12 @@ def within(bucket, random):
 AHEAD = (Settings(), 0.8, 0.0, 0.4)
 
 
+@in_both_layouts
 @given(buckets(), lenses(), seeds)
 @example(AHEAD, Equisolid(focal_length=100.0, fov=2.0 * math.pi), 0)
 @example(AHEAD, Equidistant(focal_length=60.0, fov=2.0 * math.pi), 0)
-def test_a_bucket_never_changes_an_answer(bucket, lens, seed):
-    cache = MeshCache(manifest(), bucket[0])
+def test_a_bucket_never_changes_an_answer(layout, bucket, lens, seed):
+    cache = MeshCache(manifest(layout=layout), bucket[0])
     random = np.random.default_rng(seed)
     for _ in range(6):
         assert_same_as_without(cache, within(bucket, random), lens, SIZE)
@@ -85,11 +95,12 @@ def test_a_bucket_never_changes_an_answer(bucket, lens, seed):
 BROAD = (Settings(roll_step=0.5, pitch_step=0.5), 1.0, 0.0, 0.0)
 
 
+@in_both_layouts
 @given(buckets(), lenses(), seeds)
 @example(BROAD, Equisolid(focal_length=127.0, fov=1.0, distortion=(-1e-6, 0.0)), 0)
-def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(bucket, lens, seed):
+def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(layout, bucket, lens, seed):
     """Matrices from files are rotations to some digits only; those that Orientation accepts are answered alike."""
-    cache = MeshCache(manifest(), bucket[0])
+    cache = MeshCache(manifest(layout=layout), bucket[0])
     random = np.random.default_rng(seed)
     for _ in range(6):
         exact = within(bucket, random)
@@ -97,10 +108,12 @@ def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(bucket, l
         assert_same_as_without(cache, rough, lens, SIZE)
 
 
+@in_both_layouts
 @pytest.mark.parametrize("stretch", [1.0 - 4.9e-4, 1.0 + 4.9e-4])
 @pytest.mark.parametrize("fov", [0.2, 0.8, 1.6])
-def test_a_bucket_never_changes_an_answer_of_rotations_that_are_a_little_too_long_or_short(fov, stretch):
-    cache = MeshCache(manifest(intersections=20.0, max_distance=1.5), Settings(pitch_step=1e-3, roll_step=1e-3))
+def test_a_bucket_never_changes_an_answer_of_rotations_that_are_a_little_too_long_or_short(fov, stretch, layout):
+    fine = manifest(intersections=20.0, max_distance=1.5, layout=layout)
+    cache = MeshCache(fine, Settings(pitch_step=1e-3, roll_step=1e-3))
     for pitch in (0.8, 1.0, 1.2):
         stretched = Orientation(0.8, stretch * Orientation.from_roll_pitch(0.8, pitch=pitch).rotation)
         assert_same_as_without(cache, stretched, Rectilinear(focal_length=400.0, fov=fov), SIZE)
@@ -136,24 +149,25 @@ def test_heights_share_few_meshes(tolerance, seed):
     assert all(cache.mesh_height(height) == pytest.approx(height, rel=1e-9) for height in found)
 
 
+@in_both_layouts
 @given(orientations(0.3, 1.5))
-def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(orientation):
-    cache = MeshCache(manifest(), Settings(height_tolerance=0.0))
+def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(layout, orientation):
+    cache = MeshCache(manifest(layout=layout), Settings(height_tolerance=0.0))
     view = cache.view(orientation, LENS, SIZE)
     assert view.mesh_height == orientation.height
     np.testing.assert_array_equal(view.rotation, orientation.rotation)
     np.testing.assert_array_equal(view.heading, np.eye(3))
-    whole = built(cache, orientation.height)
-    np.testing.assert_array_equal(view.mesh.rays, whole.rays)
-    np.testing.assert_array_equal(view.mesh.neighbors, whole.neighbors)
+    assert_same_as_without(cache, orientation, LENS, SIZE)
 
 
+@in_both_layouts
 @pytest.mark.parametrize("tolerance", [0.0, 0.5])
-def test_a_camera_that_looks_at_the_sky_has_no_points(tolerance):
-    cache = MeshCache(manifest(), Settings(height_tolerance=tolerance))
+def test_a_camera_that_looks_at_the_sky_has_no_points(tolerance, layout):
+    cache = MeshCache(manifest(layout=layout), Settings(height_tolerance=tolerance))
     lens = Rectilinear(focal_length=600.0, fov=1.2)
     view = cache.view(Orientation.from_roll_pitch(0.8, pitch=-1.2), lens, SIZE)
-    assert len(project(view.mesh, view.rotation, lens, SIZE)) == 0
+    assert len(view.layout.places) == 0
+    assert not project(view.layout, view.rotation, lens, SIZE).on_screen.any()
 
 
 @pytest.mark.parametrize("tolerance", [0.0, 0.5])
@@ -180,25 +194,27 @@ def test_hits_and_misses_are_counted():
     assert cache.misses == 4
 
 
-def test_a_hit_gives_the_same_mesh():
-    cache = MeshCache(manifest(), Settings())
+@in_both_layouts
+def test_a_hit_gives_the_same_layout(layout):
+    cache = MeshCache(manifest(layout=layout), Settings())
     ahead = Orientation.from_roll_pitch(0.8, pitch=0.4)
-    assert cache.view(ahead, LENS, SIZE).mesh is cache.view(ahead, LENS, SIZE).mesh
+    assert cache.view(ahead, LENS, SIZE).layout is cache.view(ahead, LENS, SIZE).layout
 
 
-def test_nbytes_is_what_is_held():
-    cache = MeshCache(manifest(), Settings())
+@in_both_layouts
+def test_nbytes_is_what_is_held(layout):
+    cache = MeshCache(manifest(layout=layout), Settings())
     first = cache.view(Orientation.from_roll_pitch(0.8, pitch=0.4), LENS, SIZE)
     whole = built(cache, first.mesh_height)
-    assert cache.nbytes == whole.nbytes + first.mesh.nbytes
+    assert cache.nbytes == whole.nbytes + first.layout.nbytes
     second = cache.view(Orientation.from_roll_pitch(0.8, pitch=1.2), LENS, SIZE)
-    assert cache.nbytes == whole.nbytes + first.mesh.nbytes + second.mesh.nbytes
+    assert cache.nbytes == whole.nbytes + first.layout.nbytes + second.layout.nbytes
 
 
 def test_the_least_recently_used_mesh_goes_first():
     low, middle, high = (Orientation.from_roll_pitch(height, pitch=0.4) for height in (0.5, 0.7, 0.9))
     free = MeshCache(manifest(), Settings(height_tolerance=0.0))
-    sizes = [free.view(each, LENS, SIZE).mesh.nbytes for each in (low, middle, high)]
+    sizes = [built(free, each.height).nbytes for each in (low, middle, high)]
     room_for_two = sum(sorted(sizes)[1:]) / 2**20
     cache = MeshCache(manifest(), Settings(height_tolerance=0.0, cache_mib=room_for_two))
 
@@ -211,16 +227,20 @@ def test_the_least_recently_used_mesh_goes_first():
     assert cache.nbytes == sizes[0] + sizes[1]
 
 
+@in_both_layouts
 @given(st.lists(st.integers(0, 5), min_size=1, max_size=20), reals(0.0, 0.6))
-def test_the_memory_limit_is_obeyed_and_changes_no_answer(order, cache_mib):
-    cache = MeshCache(manifest(), Settings(cache_mib=cache_mib))
-    free = MeshCache(manifest(), Settings())
+def test_the_memory_limit_is_obeyed_and_changes_no_answer(layout, order, cache_mib):
+    cache = MeshCache(manifest(layout=layout), Settings(cache_mib=cache_mib))
+    free = MeshCache(manifest(layout=layout), Settings())
     for index in order:
         orientation = Orientation.from_roll_pitch(0.5 + 0.1 * (index % 3), pitch=0.3 + 0.2 * index)
         limited, unlimited = (each.view(orientation, LENS, SIZE) for each in (cache, free))
         assert cache.nbytes <= cache_mib * 2**20
-        np.testing.assert_array_equal(limited.mesh.rays, unlimited.mesh.rays)
-        np.testing.assert_array_equal(limited.mesh.neighbors, unlimited.mesh.neighbors)
+        np.testing.assert_array_equal(limited.layout.rays, unlimited.layout.rays)
+        places = limited.layout.places
+        np.testing.assert_array_equal(limited.layout.links(places), unlimited.layout.links(places))
+        np.testing.assert_array_equal(limited.layout.slots, unlimited.layout.slots)
+        np.testing.assert_array_equal(limited.layout.places, unlimited.layout.places)
     assert cache.hits + cache.misses == len(order)
 
 
@@ -228,7 +248,7 @@ def test_without_memory_nothing_is_held():
     cache = MeshCache(manifest(), Settings(cache_mib=0.0))
     orientation = Orientation.from_roll_pitch(0.8, pitch=0.4)
     for _ in range(3):
-        assert len(cache.view(orientation, LENS, SIZE).mesh) > 0
+        assert len(cache.view(orientation, LENS, SIZE).layout.places) > 0
     assert (cache.hits, cache.misses, cache.nbytes) == (0, 3, 0)
 
 
@@ -236,7 +256,8 @@ def test_without_memory_nothing_is_held():
 def test_a_camera_that_wanders_is_answered_right(seed):
     """Through many buckets with one cache, straight down and upside down included."""
     random = np.random.default_rng(seed)
-    cache = MeshCache(manifest(max_distance=2.0), Settings(cache_mib=2.0))
+    layout = LAYOUTS[seed % len(LAYOUTS)]
+    cache = MeshCache(manifest(max_distance=2.0, layout=layout), Settings(cache_mib=2.0))
     matrix = Orientation.from_roll_pitch(1.0, pitch=1.5).rotation
     for _ in range(5):
         matrix = matrix @ rotation(0.4 * random_direction(random))

@@ -11,17 +11,31 @@ from hypothesis import strategies as st
 from onnx import helper
 
 import vm_embedded
-from tests.demo import FOLDER, IMAGES, MODEL
+from tests.demo import CHECKPOINT, FOLDER, IMAGES, MODEL
 from vm_embedded import Detector, GeometryError, InputError, ModelError, Orientation, Settings, read_lens_file
-from vm_embedded.cache import View
-from vm_embedded.manifest import METADATA_KEY
+from vm_embedded.layout import PlainLayout, RunsLayout, laid_out
+from vm_embedded.manifest import LAYOUTS, METADATA_KEY
+from vm_embedded.mesh import Mesh
 from vm_embedded.onnx_file import read_model
 from vm_embedded.sources import read_image
+from vm_export.checkpoint import Checkpoint
+from vm_export.onnx_graph import export
+
+in_both_layouts = pytest.mark.parametrize("layout", LAYOUTS)
 
 
 @pytest.fixture(scope="module")
 def detector():
     return Detector.from_file(MODEL)
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory):
+    """The demo's network in every layout."""
+    folder = tmp_path_factory.mktemp("models")
+    for layout in LAYOUTS:
+        export(Checkpoint.load(CHECKPOINT), folder / f"{layout}.onnx", layout)
+    return {layout: folder / f"{layout}.onnx" for layout in LAYOUTS}
 
 
 def frame(index=0):
@@ -36,12 +50,13 @@ def without_bucket(detector, image, orientation, lens):
 
     def whole(orientation, lens, size):
         view = prepared(orientation, lens, size)
-        return View(fresh.cache._build(view.mesh_height), view.mesh_height, view.rotation, view.heading)
+        return replace(view, layout=laid_out(fresh.cache._build(view.mesh_height), fresh.manifest))
 
     fresh.cache.view = whole
     return fresh.detect(image, orientation, lens)
 
 
+@in_both_layouts
 @given(
     index=st.integers(0, 5),
     pitch=st.floats(-0.5, 0.5),
@@ -49,9 +64,9 @@ def without_bucket(detector, image, orientation, lens):
     steps=st.floats(0.01, 0.3),
 )
 @settings(max_examples=25)
-def test_a_bucket_never_changes_an_answer(detector, index, pitch, roll, steps):
+def test_a_bucket_never_changes_an_answer(models, layout, index, pitch, roll, steps):
     image, orientation, lens = frame(index)
-    detector = Detector(detector.session.model, Settings(pitch_step=steps, roll_step=steps))
+    detector = Detector(read_model(models[layout]), Settings(pitch_step=steps, roll_step=steps))
     # Anywhere in its bucket, from the frame's own orientation on.
     turned = Orientation.from_roll_pitch(
         orientation.height, orientation.roll + roll * steps, orientation.pitch + pitch * steps, orientation.yaw
@@ -60,10 +75,38 @@ def test_a_bucket_never_changes_an_answer(detector, index, pitch, roll, steps):
     again = detector.detect(image, turned, lens)
     theirs = without_bucket(detector, image, turned, lens)
     for other in (again, theirs):
+        np.testing.assert_array_equal(ours.rays, other.rays)
         np.testing.assert_array_equal(ours.pixels, other.pixels)
         np.testing.assert_array_equal(ours.probabilities, other.probabilities)
         assert [each.as_dict() for each in ours] == [each.as_dict() for each in other]
     assert detector.cache.hits == 1
+
+
+@pytest.mark.parametrize("index", range(len(IMAGES)))
+def test_both_layouts_find_the_same(models, index):
+    one, other = (Detector.from_file(path).detect(*frame(index), explain=True) for path in models.values())
+    np.testing.assert_array_equal(one.rays, other.rays)
+    np.testing.assert_array_equal(one.pixels, other.pixels)
+    np.testing.assert_allclose(one.probabilities, other.probabilities, atol=1e-4)
+    assert len(one) == len(other) >= 1
+    for ours, theirs in zip(one, other, strict=True):
+        assert ours.class_name == theirs.class_name
+        assert ours.confidence == pytest.approx(theirs.confidence, abs=1e-4)
+        np.testing.assert_allclose(ours.position, theirs.position, atol=1e-6)
+    assert [each.reason for each in one.rejected] == [each.reason for each in other.rejected]
+
+
+@in_both_layouts
+@pytest.mark.parametrize("tolerance", [0.0, 0.5])
+def test_a_camera_that_looks_at_the_sky_sees_nothing_and_says_so(models, layout, tolerance):
+    image, orientation, lens = frame()
+    detector = Detector.from_file(models[layout], Settings(height_tolerance=tolerance))
+    found = detector.detect(image, Orientation.from_roll_pitch(orientation.height, pitch=-1.5), lens, explain=True)
+    assert (len(found), len(found.rejected)) == (0, 0)
+    assert found.rays.shape == (0, 3)
+    assert found.pixels.shape == (0, 2)
+    assert found.probabilities.shape == (0, len(detector.manifest.classes))
+    assert len(found.points_of("field")) == 0
 
 
 def test_yaw_turns_positions_and_nothing_else(detector):
@@ -121,30 +164,45 @@ def test_bad_frames_are_refused(detector):
         detector.detect(image, orientation, replace(lens, size=(100, 100)))
 
 
-def changed(path, change):
-    """A copy of the demo's model with something changed in it."""
-    model = onnx.load(MODEL)
+def changed(path, change, source=MODEL):
+    """A copy of a model with something changed in it."""
+    model = onnx.load(source)
     change(model)
     onnx.save(model, path)
     return path
 
 
-def test_a_network_that_answers_its_self_test_wrongly_is_refused(tmp_path):
+def claim(**entries):
+    """A change of what a model says about itself."""
+
+    def change(model):
+        manifest = json.loads(next(each.value for each in model.metadata_props if each.key == METADATA_KEY))
+        helper.set_model_props(model, {METADATA_KEY: json.dumps(manifest | entries)})
+
+    return change
+
+
+@in_both_layouts
+def test_a_network_that_answers_its_self_test_wrongly_is_refused(models, layout, tmp_path):
     def break_weights(model):
         weights = next(each for each in model.graph.initializer if each.name == "layer0.kernel")
         weights.CopyFrom(onnx.numpy_helper.from_array(-onnx.numpy_helper.to_array(weights), weights.name))
 
     with pytest.raises(ModelError, match="self-test failed"):
-        Detector.from_file(changed(tmp_path / "model.onnx", break_weights))
+        Detector.from_file(changed(tmp_path / "model.onnx", break_weights, models[layout]))
 
 
-def test_a_network_with_other_inputs_than_its_manifest_is_refused(tmp_path):
-    def claim_another_mesh(model):
-        manifest = json.loads(next(each.value for each in model.metadata_props if each.key == METADATA_KEY))
-        helper.set_model_props(model, {METADATA_KEY: json.dumps(manifest | {"mesh": "ring8"})})
+@in_both_layouts
+def test_a_network_with_other_inputs_than_its_manifest_is_refused(models, layout, tmp_path):
+    (other,) = set(LAYOUTS) - {layout}
+    for entries in ({"mesh": "ring8"}, {"layout": other}):
+        with pytest.raises(ModelError, match="inputs and outputs"):
+            Detector.from_file(changed(tmp_path / "model.onnx", claim(**entries), models[layout]))
 
-    with pytest.raises(ModelError, match="inputs and outputs"):
-        Detector.from_file(changed(tmp_path / "model.onnx", claim_another_mesh))
+
+def test_a_network_in_runs_that_wants_missing_neighbors_to_be_the_point_itself_is_refused(models, tmp_path):
+    with pytest.raises(ModelError, match="layout runs needs edge hard"):
+        Detector.from_file(changed(tmp_path / "model.onnx", claim(edge="same"), models["runs"]))
 
 
 def test_a_network_with_an_unknown_operator_is_refused(tmp_path):
@@ -155,26 +213,58 @@ def test_a_network_with_an_unknown_operator_is_refused(tmp_path):
         Detector.from_file(changed(tmp_path / "model.onnx", rename))
 
 
-def test_neighbors_out_of_range_are_an_error_and_not_a_crash():
-    session = Detector.from_file(MODEL).session
-    points = np.zeros((3, 3), dtype=np.float32)
-    with pytest.raises(ModelError, match="can't run"):
-        session.run(points, np.full((3, 6), 99, dtype=np.int32))
+class Broken(PlainLayout):
+    """A layout that hands out indices which no point has."""
+
+    def feeds(self, points, on_screen):
+        feeds = super().feeds(points, on_screen)
+        return feeds | {"neighbors": np.full_like(feeds["neighbors"], 99)}
 
 
-def test_the_edge_policy_same_links_missing_neighbors_to_the_point_itself(tmp_path):
-    def claim_same(model):
-        manifest = json.loads(next(each.value for each in model.metadata_props if each.key == METADATA_KEY))
-        helper.set_model_props(model, {METADATA_KEY: json.dumps(manifest | {"edge": "same"})})
+class BrokenRuns(RunsLayout):
+    """The same for runs."""
 
-    hard = Detector.from_file(MODEL).session
-    same = Detector.from_file(changed(tmp_path / "model.onnx", claim_same)).session
-    points = np.vstack([np.random.default_rng(0).random((4, 3)), -np.ones((1, 3))]).astype(np.float32)
+    def feeds(self, points, on_screen):
+        feeds = super().feeds(points, on_screen)
+        return feeds | {"columns": np.full_like(feeds["columns"], 9999)}
+
+
+def small_mesh():
+    """Four points in a ring, each with two neighbors and four missing ones."""
     neighbors = np.full((5, 6), 4, dtype=np.int32)
     neighbors[:4, :2] = [[1, 2], [2, 3], [3, 0], [0, 1]]
-    alone = np.where(neighbors == 4, np.arange(5, dtype=np.int32)[:, None], neighbors)
-    np.testing.assert_array_equal(same.run(points, neighbors), hard.run(points, alone))
-    assert np.abs(same.run(points, neighbors) - hard.run(points, neighbors)).max() > 1e-3
+    return Mesh(np.zeros((4, 3)), neighbors)
+
+
+@in_both_layouts
+def test_neighbors_out_of_range_are_an_error_and_not_a_crash(models, layout):
+    session = Detector.from_file(models[layout]).session
+    broken = Broken(small_mesh(), "hard") if layout == "plain" else BrokenRuns(small_mesh(), "ring6")
+    points = broken.points()
+    points[:] = 0.0
+    with pytest.raises(ModelError, match="can't run"):
+        session.run(broken, points, broken.slots < 4)
+
+
+def test_the_edge_policy_same_links_missing_neighbors_to_the_point_itself(models, tmp_path):
+    hard = Detector.from_file(models["plain"]).session
+    same = Detector.from_file(changed(tmp_path / "model.onnx", claim(edge="same"), models["plain"])).session
+    mesh = small_mesh()
+    alone = Mesh(mesh.rays, np.where(mesh.neighbors == 4, np.arange(5, dtype=np.int32)[:, None], mesh.neighbors))
+    colors = np.random.default_rng(0).random((4, 3)).astype(np.float32)
+
+    def answers(session, mesh, shown=(True, True, True, True)):
+        layout = laid_out(mesh, session.model.manifest)
+        points = layout.points()
+        layout.colors(points)[:] = colors
+        return session.run(layout, points, np.array(shown))
+
+    np.testing.assert_array_equal(answers(same, mesh), answers(hard, alone))
+    assert np.abs(answers(same, mesh) - answers(hard, mesh)).max() > 1e-3
+    # A neighbor off screen is a missing one: 0 led to 1 and 2, and 3 to 0 and 1.
+    alone.neighbors[0, 0], alone.neighbors[3, 1] = 0, 3
+    found, expected = (answers(*each)[[0, 2, 3]] for each in ((same, mesh, (True, False, True, True)), (hard, alone)))
+    np.testing.assert_array_equal(found, expected)
 
 
 def test_the_three_lines_of_the_readme_work():

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError, InputError, ModelError
-from vm_embedded.manifest import EDGES, FORMAT_VERSION, KINDS, Manifest, ObjectClass, SelfTest
+from vm_embedded.manifest import EDGES, FORMAT_VERSION, KINDS, LAYOUTS, Manifest, ObjectClass, SelfTest
 from vm_embedded.mesh import RING_NEIGHBORS
 from vm_embedded.shapes import SHAPES, Circle, Sphere
 
@@ -33,17 +33,21 @@ classes = st.lists(
     unique_by=lambda each: each.name,
 ).map(tuple)
 
+orders = st.sampled_from([(edge, layout) for edge in EDGES for layout in LAYOUTS if (edge, layout) != ("same", "runs")])
+"""Edges and the layouts that there are for them."""
+
 manifests = st.builds(
-    Manifest,
+    lambda order, **entries: Manifest(edge=order[0], layout=order[1], **entries),
+    order=orders,
     shape=st.sampled_from(sorted(SHAPES)),
     radius=reals(1e-3, 10.0),
     object_radius=reals(1e-3, 10.0),
     intersections=reals(0.1, 20.0),
     mesh=st.sampled_from(sorted(RING_NEIGHBORS)),
     max_distance=reals(0.1, 100.0),
-    edge=st.sampled_from(EDGES),
     classes=classes,
     self_test=st.one_of(st.none(), self_tests()),
+    operations=st.integers(0, 10**7),
     provenance=st.dictionaries(st.text(max_size=8), st.text(max_size=8), max_size=3),
 )
 
@@ -119,7 +123,7 @@ def test_an_unknown_entry_names_itself_and_the_nearest_known_one():
         Manifest.from_json(changed(max_distanse=1.0))
 
 
-@pytest.mark.parametrize("version", [0, FORMAT_VERSION + 1, "1", None, 1.5, ..., [1]], ids=str)
+@pytest.mark.parametrize("version", [0, 1, FORMAT_VERSION + 1, "1", None, 1.5, ..., [1]], ids=str)
 def test_another_version_is_refused_with_both_and_what_to_do(version):
     with pytest.raises(ModelError, match=rf"version .*reads {FORMAT_VERSION}.*export the model again"):
         Manifest.from_json(changed(format_version=version))
@@ -144,6 +148,8 @@ def test_json_that_is_no_table_is_refused(text):
         ("shape", "Sphere", "sphere"),
         ("mesh", "ring5", "ring6"),
         ("edge", "herd", "hard"),
+        ("layout", "plane", "plain"),
+        ("layout", "rows", "runs"),
         ("channels", "bgr", "rgb"),
         ("sampling", "linear", "bilinear"),
     ],
@@ -175,10 +181,23 @@ def test_a_number_of_more_digits_than_a_float_has_is_refused(entry):
         Manifest.from_json(changed(**{entry: 10**400}))
 
 
+@pytest.mark.parametrize("wrong", [-1, 1.5, 2.0, True, "3", None, math.nan, [1]])
+def test_operations_are_a_whole_number(wrong):
+    with pytest.raises(ModelError, match="operations"):
+        Manifest.from_json(changed(operations=wrong))
+
+
 @pytest.mark.parametrize("scale", [1.0, 1.0 / 256.0, 255.0])
 def test_another_scale_of_colors_is_refused(scale):
     with pytest.raises(ModelError, match="1/255"):
         Manifest.from_json(changed(scale=scale))
+
+
+def test_runs_are_refused_for_missing_neighbors_that_are_the_point_itself():
+    assert Manifest.from_json(changed(layout="runs")).layout == "runs"
+    assert Manifest.from_json(changed(edge="same")).layout == "plain"
+    with pytest.raises(ModelError, match="runs needs edge hard"):
+        Manifest.from_json(changed(layout="runs", edge="same"))
 
 
 ONE = {"name": "ball", "kind": "object"}

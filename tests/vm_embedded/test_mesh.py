@@ -253,7 +253,7 @@ def test_meshes_are_read_only_and_column_by_column(case):
 @given(reals(0.05, 0.2), reals(2.5, 10.0), reals(1.0, 4.0), st.sampled_from([Circle, Sphere]), reals(0.0, 1.0))
 def test_the_same_number_of_rings_crosses_an_object_at_every_distance(radius, clearance, k, kind, share):
     shape, height = kind(radius), 2.0 * radius * clearance
-    mesh = ring_mesh(shape, height, k, 10.0 * height)
+    mesh = ring_mesh(shape, height, k, 20.0 * height)
     rings = np.unique(np.arccos(np.clip(-mesh.rays[:, 2], -1.0, 1.0)))
     # From beside the nadir to where the object's far end is still within the mesh.
     distance = 1.5 * radius + share * (5.0 * height - 1.5 * radius)

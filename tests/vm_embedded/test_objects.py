@@ -1,6 +1,7 @@
 """Objects are found where they are, whatever cuts them, and what can't be one is rejected with its reason."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from vm_embedded.manifest import ObjectClass
 from vm_embedded.mesh import ring_mesh
 from vm_embedded.objects import Scene, find_objects
 from vm_embedded.orientation import Orientation
-from vm_embedded.projection import project, to_camera
+from vm_embedded.projection import Projection, project, to_camera
 from vm_embedded.settings import Settings
 from vm_embedded.shapes import Circle, Sphere
 
@@ -28,18 +29,29 @@ def scene_at(height=0.9, pitch=0.6, shape=None, mesh_shape=None, lens=None):
     orientation = Orientation.from_roll_pitch(height, 0.05, pitch)
     projected = project(ring_mesh(mesh_shape, height, K, 8.0), orientation.level, lens, SIZE)
     rings = K * float(shape.spacing(height) / mesh_shape.spacing(height))
-    return Scene(shape, height, orientation.level, np.eye(3), lens, SIZE, projected, rings)
+    order = np.arange(len(projected), dtype=np.int32)
+    return Scene(shape, height, orientation.level, np.eye(3), lens, SIZE, projected, order, rings)
 
 
 def ideal(scene, *spots, radius=None):
-    """Probabilities (n,) of a perfect network that sees objects at these places (x, y) [m] on the plane."""
+    """Probabilities (n,) of a perfect network that sees objects at these places (x, y) [m] on the plane.
+
+    What is off screen has any answer, and none at all.
+    """
     shape = type(scene.shape)(radius) if radius else scene.shape
-    rays = scene.projected.mesh.rays
+    rays = scene.projected.graph.rays
     inside = np.zeros(len(rays), dtype=bool)
     for spot in spots:
         center = np.array([[*spot, shape.center_height - scene.height]])
         inside |= shape.offset(rays, center, scene.height)[0] < 1.0
-    return np.where(inside, 0.97, 0.02).astype(np.float32)
+    seen = np.where(inside, 0.97, 0.02)
+    nonsense = np.resize([0.97, np.nan, 0.99, 0.0], len(rays))
+    return np.where(scene.projected.on_screen, seen, nonsense).astype(np.float32)
+
+
+def lowest_of(scene):
+    """The point on screen that is lowest in the picture."""
+    return int(np.argmax(np.where(scene.projected.on_screen, scene.projected.pixels[:, 1], -np.inf)))
 
 
 def objects_in(scene, probability, **settings):
@@ -93,8 +105,7 @@ def test_pixels_are_those_of_the_outline():
 
 def test_an_object_that_the_border_cuts_keeps_its_center():
     scene = scene_at(0.9, pitch=0.5)
-    rays = scene.projected.mesh.rays
-    border = rays[np.argmax(scene.projected.pixels[:, 1])]  # the lowest point on screen
+    border = scene.projected.graph.rays[lowest_of(scene)]
     spot = scene.shape.center_along(border[None], scene.height)[0, :2]
     found, _ = objects_in(scene, ideal(scene, spot))
     assert len(found) == 1
@@ -130,9 +141,8 @@ def test_what_is_much_smaller_is_rejected_by_its_inside():
 
 def test_a_corner_of_an_object_is_too_little_to_tell():
     scene = scene_at()
-    y = scene.projected.pixels[:, 1]
-    probability = np.full(len(y), 0.02, dtype=np.float32)
-    probability[np.argmax(y)] = 0.97
+    probability = ideal(scene)
+    probability[lowest_of(scene)] = 0.97
     found, rejected = objects_in(scene, probability)
     assert not found
     assert len(rejected) == 1
@@ -163,3 +173,37 @@ def test_a_larger_object_radius_is_an_object_of_more_rings():
     found, _ = objects_in(scene, ideal(scene, (1.5, 0.1)))
     assert len(found) == 1
     assert found[0].position[2] == pytest.approx(0.12)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.2))
+@settings(max_examples=25)
+def test_how_the_mesh_lies_in_memory_changes_no_digit(seed, noise):
+    random = np.random.default_rng(seed)
+    scene = scene_at(random.uniform(0.6, 1.2), pitch=random.uniform(0.3, 1.5))
+    spots = [(random.uniform(0.3, 2.5), random.uniform(-0.8, 0.8)) for _ in range(3)]
+    probability = ideal(scene, *spots)
+    probability = np.where(random.random(len(probability)) < noise, random.random(len(probability)), probability)
+    order = random.permutation(len(probability))
+    seen = scene.projected
+    moved = Projection(seen.graph.part(order), seen.pixels[order], seen.on_screen[order])
+    shuffled = replace(scene, projected=moved, order=order.astype(np.int32))
+    plain = objects_in(scene, probability)
+    other = objects_in(shuffled, probability[order])
+    for before, after in zip(plain, other, strict=True):
+        assert [each.as_dict() for each in before] == [each.as_dict() for each in after]
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=15)
+def test_what_is_off_screen_changes_nothing(seed):
+    """Neither its probabilities nor whether the mesh has it at all."""
+    random = np.random.default_rng(seed)
+    scene = scene_at(0.9, pitch=random.uniform(0.3, 1.2))
+    spot = scene.shape.center_along(scene.projected.graph.rays[[lowest_of(scene)]], scene.height)[0, :2]
+    probability = ideal(scene, spot, (1.2, 0.3))
+    shown = np.flatnonzero(scene.projected.on_screen)
+    visible = replace(scene, projected=scene.projected.visible, order=np.arange(len(shown), dtype=np.int32))
+    with_it, without_it = objects_in(scene, probability), objects_in(visible, probability[shown])
+    assert len(with_it[0]) == 2
+    for one, other in zip(with_it, without_it, strict=True):
+        assert [each.as_dict() for each in one] == [each.as_dict() for each in other]

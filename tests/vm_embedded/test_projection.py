@@ -57,25 +57,41 @@ def test_points_on_screen_are_those_of_the_conventions(lens, orientation, size, 
     mesh = scattered_mesh(2000, np.random.default_rng(seed))
     shown = on_screen(mesh.rays, orientation.rotation, lens, size)
     projected = project(mesh, orientation.rotation, lens, size)
-    np.testing.assert_array_equal(projected.mesh.rays, mesh.rays[shown])
+    assert projected.graph is mesh
+    assert len(projected) == len(projected.pixels) == len(mesh)
+    np.testing.assert_array_equal(projected.on_screen, shown)
+    visible = projected.visible
+    np.testing.assert_array_equal(visible.graph.rays, mesh.rays[shown])
+    np.testing.assert_array_equal(visible.pixels, projected.pixels[shown])
     np.testing.assert_allclose(
-        projected.pixels, lens.project(mesh.rays[shown] @ orientation.rotation, size), rtol=1e-9, atol=1e-3
+        visible.pixels, lens.project(mesh.rays[shown] @ orientation.rotation, size), rtol=1e-9, atol=1e-3
     )
-    assert len(projected) == shown.sum() == len(projected.pixels)
+    assert len(visible) == shown.sum() == len(visible.pixels) == visible.on_screen.sum()
+
+
+@given(lenses(), orientations(), seeds)
+def test_only_some_points_are_those_that_are_on_screen_too(lens, orientation, seed):
+    random = np.random.default_rng(seed)
+    projected = project(scattered_mesh(1000, random), orientation.rotation, lens, SIZE)
+    chosen = random.random(1000) < 0.5
+    some = projected.only(chosen)
+    np.testing.assert_array_equal(some.on_screen, projected.on_screen & chosen)
+    np.testing.assert_array_equal(some.pixels, projected.pixels)
+    assert some.graph is projected.graph
 
 
 @given(lenses(), orientations(0.3, 1.5), sizes)
 def test_projected_points_keep_their_links_on_screen(lens, orientation, size):
     mesh = ring_mesh(Sphere(0.1), orientation.height, 2.0, 3.0)
-    projected = project(mesh, orientation.rotation, lens, size)
+    visible = project(mesh, orientation.rotation, lens, size).visible
     kept = np.flatnonzero(on_screen(mesh.rays, orientation.rotation, lens, size))
-    np.testing.assert_array_equal(projected.mesh.neighbors, mesh.part(kept).neighbors)
+    np.testing.assert_array_equal(visible.graph.neighbors, mesh.part(kept).neighbors)
 
 
 @given(lenses(), orientations(), seeds)
 def test_all_four_pixels_around_a_point_are_in_the_picture(lens, orientation, seed):
     mesh = scattered_mesh(1000, np.random.default_rng(seed))
-    corner = project(mesh, orientation.rotation, lens, SIZE).pixels.astype(int)
+    corner = project(mesh, orientation.rotation, lens, SIZE).visible.pixels.astype(int)
     assert (corner >= 0).all()
     assert (corner + 1 < SIZE).all()
 
@@ -86,8 +102,8 @@ def test_turning_camera_and_mesh_together_changes_no_pixel(lens, orientation, ya
     turn = rotation([0.0, 0.0, yaw])
     turned = project(
         type(mesh)(np.asfortranarray(mesh.rays @ turn.T), mesh.neighbors), turn @ orientation.rotation, lens, SIZE
-    )
-    plain = project(mesh, orientation.rotation, lens, SIZE)
+    ).visible
+    plain = project(mesh, orientation.rotation, lens, SIZE).visible
     if len(turned) == len(plain):  # noise may decide on a point at the very border
         np.testing.assert_allclose(turned.pixels, plain.pixels, atol=1e-3)
     assert abs(len(turned) - len(plain)) <= 2
@@ -174,9 +190,11 @@ def test_a_camera_that_looks_at_the_sky_has_no_points():
     mesh = ring_mesh(Sphere(0.1), 0.8, 4.0, 5.0)
     lens = Rectilinear(focal_length=600.0, fov=1.2)
     projected = project(mesh, Orientation.from_roll_pitch(0.8, pitch=-1.2).rotation, lens, SIZE)
-    assert len(projected) == 0
-    assert projected.pixels.shape == (0, 2)
-    np.testing.assert_array_equal(projected.mesh.neighbors, np.zeros((1, 6)))
+    assert not projected.on_screen.any()
+    visible = projected.visible
+    assert len(visible) == 0
+    assert visible.pixels.shape == (0, 2)
+    np.testing.assert_array_equal(visible.graph.neighbors, np.zeros((1, 6)))
 
 
 @pytest.mark.parametrize("index", [0, 1, 5, 10])

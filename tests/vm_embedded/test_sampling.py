@@ -1,3 +1,5 @@
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -199,6 +201,44 @@ def test_colors_are_from_0_to_1(format, sampling, seed):
     values = sampled(image, pixels_in(random, 40, 10, 10), format, sampling)
     assert (values >= 0.0).all()
     assert (values <= 1.0).all()
+
+
+FAR = [
+    np.nan,
+    np.inf,
+    -np.inf,
+    1e300,
+    -1e300,
+    1e38,
+    -1e38,
+    2.0**63,
+    -(2.0**63),
+    2.0**31,
+    -(2.0**31),
+    1e9,
+    -1e9,
+    32768.0,
+]
+"""Where a lens may put what it does not see."""
+
+
+@pytest.mark.parametrize("sampling", SAMPLINGS)
+@pytest.mark.parametrize("format", FORMATS)
+@given(st.integers(0, 300), seeds)
+def test_pixels_off_screen_have_any_color_and_disturb_no_other(format, sampling, count, seed):
+    random = np.random.default_rng(seed)
+    channels = {"bgr": 3, "rgb": 3, "bgra": 4, "rgba": 4}.get(format, 1)
+    image = noise(random, 12, 18, channels)
+    pixels = pixels_in(random, count, 12, 18)
+    expected = sampled(image, pixels, format, sampling)
+    off_screen = random.random(count) < 0.5
+    near = random.uniform(-30.0, 40.0, (count, 2))
+    pixels[off_screen] = np.where(random.random((count, 2)) < 0.5, random.choice(FAR, (count, 2)), near)[off_screen]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        values = sampled(image, pixels, format, sampling)
+    assert values.shape == expected.shape
+    np.testing.assert_array_equal(values[~off_screen], expected[~off_screen])
 
 
 @pytest.mark.parametrize("format", FORMATS)

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,15 +16,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError, ModelError
-from vm_embedded.manifest import EDGES, Manifest, ObjectClass
+from vm_embedded.manifest import EDGES, LAYOUTS, Manifest, ObjectClass
 from vm_embedded.mesh import RING_NEIGHBORS
 from vm_embedded.onnx_file import read_model
+from vm_embedded.session import Session
+from vm_embedded.settings import Settings as RuntimeSettings
 from vm_export import onnx_graph
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import ACTIVATIONS, HEADS, GraphConvolution, Layer, Network, NetworkShape
 from vm_export.reference import Overrides, read_reference, write_reference
 
 COMMAND = Path(sys.executable).parent / "vm-export"
+
+in_both_layouts = pytest.mark.parametrize("layout", LAYOUTS)
 
 
 def manifest(classes=("ball", "environment"), mesh="ring6", **changes):
@@ -65,13 +70,15 @@ def network_shapes(draw):
     return NetworkShape((first, *inner, last), draw(st.sampled_from([4, 6, 8])))
 
 
+@in_both_layouts
 @given(shape=network_shapes(), seed=st.integers(0, 1000))
 @settings(max_examples=25)
-def test_every_network_gives_the_same_answers_in_onnx_runtime(shape, seed):
+def test_every_network_gives_the_same_answers_in_onnx_runtime(layout, shape, seed):
     mesh = {value: key for key, value in RING_NEIGHBORS.items()}[shape.neighbors]
     made = checkpoint(seed, shape, mesh)
-    content = onnx_graph.build(made.network, made.manifest)
-    assert onnx_graph.largest_difference(content, made.network) < 1e-4
+    facts = replace(made.manifest, layout=layout)
+    content = onnx_graph.build(made.network, facts)
+    assert onnx_graph.largest_difference(content, made.network, facts) < 1e-4
 
 
 def test_graph_convolution_is_the_matrix_product_of_the_convention():
@@ -85,32 +92,57 @@ def test_graph_convolution_is_the_matrix_product_of_the_convention():
     np.testing.assert_allclose(layer(x, neighbors).detach().numpy(), expected, atol=1e-5)
 
 
-def test_the_file_describes_itself_and_is_one_file_of_stock_operators(tmp_path):
+DOMAINS = {"plain": {""}, "runs": {"", "ai.onnx.ml"}}
+"""Where each layout's operators come from: the standard, and its part for machine learning on tables."""
+
+
+@in_both_layouts
+def test_the_file_describes_itself_and_is_one_file_of_stock_operators(layout, tmp_path):
     made = checkpoint()
-    difference = onnx_graph.export(made, tmp_path / "model.onnx")
+    difference = onnx_graph.export(made, tmp_path / "model.onnx", layout)
     assert difference < 1e-4
     assert [path.name for path in tmp_path.iterdir()] == ["model.onnx"]
     graph = onnx.load(tmp_path / "model.onnx")
-    assert {entry.domain for entry in graph.opset_import} == {""}
-    assert {node.domain for node in graph.graph.node} == {""}
+    assert {node.domain for node in graph.graph.node} == DOMAINS[layout]
+    assert {entry.domain for entry in graph.opset_import} == DOMAINS[layout]
     read = read_model(tmp_path / "model.onnx").manifest
     assert read.classes == made.manifest.classes
     assert read.intersections == made.manifest.intersections
+    assert read.layout == layout
     assert read.self_test is not None
 
 
-def test_the_same_checkpoint_gives_the_same_bytes(tmp_path):
+def test_the_fastest_layout_is_the_one_that_is_written(tmp_path):
+    assert onnx_graph.fastest_layout(manifest()) == "runs"
+    assert onnx_graph.fastest_layout(manifest(edge="same")) == "plain"
+    for edge, layout in (("hard", "runs"), ("same", "plain")):
+        made = Checkpoint(checkpoint().network, manifest(edge=edge))
+        onnx_graph.export(made, tmp_path / "model.onnx")
+        assert read_model(tmp_path / "model.onnx").manifest.layout == layout
+
+
+def test_a_layout_that_there_is_not_is_refused(tmp_path):
+    with pytest.raises(ModelError, match=r"layout .*'run'.*'runs'"):
+        onnx_graph.export(checkpoint(), tmp_path / "model.onnx", "run")
+    with pytest.raises(ModelError, match="runs needs edge hard"):
+        onnx_graph.export(Checkpoint(checkpoint().network, manifest(edge="same")), tmp_path / "model.onnx", "runs")
+    assert not list(tmp_path.iterdir())
+
+
+@in_both_layouts
+def test_the_same_checkpoint_gives_the_same_bytes(layout, tmp_path):
     for name in ("a", "b"):
-        onnx_graph.export(checkpoint(3), tmp_path / name)
+        onnx_graph.export(checkpoint(3), tmp_path / name, layout)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
-def test_a_graph_that_differs_from_torch_is_not_written(tmp_path, monkeypatch):
-    other = onnx_graph.build(checkpoint(5).network, manifest(("class0", "class1")))
+@in_both_layouts
+def test_a_graph_that_differs_from_torch_is_not_written(layout, tmp_path, monkeypatch):
+    other = onnx_graph.build(checkpoint(5).network, manifest(("class0", "class1"), layout=layout))
     monkeypatch.setattr(onnx_graph, "build", lambda network, manifest: other)
     (tmp_path / "model.onnx").write_text("the file of before")
     with pytest.raises(ModelError, match="differ by"):
-        onnx_graph.export(checkpoint(4), tmp_path / "model.onnx")
+        onnx_graph.export(checkpoint(4), tmp_path / "model.onnx", layout)
     assert (tmp_path / "model.onnx").read_text() == "the file of before"
 
 
@@ -256,6 +288,69 @@ def test_command_names_its_output_after_the_model(tmp_path):
     assert yaml.safe_load((tmp_path / "model.yaml").read_text())["mesh"] == "RING6"
 
 
+def names_in(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_command_writes_the_fastest_layout_and_the_portable_one_beside_it(tmp_path):
+    made = checkpoint()
+    made.save(tmp_path / "model.pt")
+    done = run(tmp_path / "model.pt")
+    assert names_in(tmp_path) == ["model.onnx", "model.plain.onnx", "model.pt"]
+    both = [read_model(tmp_path / name) for name in ("model.onnx", "model.plain.onnx")]
+    assert [each.manifest.layout for each in both] == ["runs", "plain"]
+    assert replace(both[0].manifest, layout="plain").as_json() == both[1].manifest.as_json()
+    test = onnx_graph._example(made.network, 300, 1)
+    for each in both:
+        answer = Session(each, RuntimeSettings()).answer(test)
+        np.testing.assert_allclose(answer, test.probabilities[:-1], atol=1e-5)
+        (line,) = [line for line in done.stdout.splitlines() if line.startswith(f"{each.path}:")]
+        assert f"layout {each.manifest.layout}" in line
+        assert "largest difference" in line
+
+
+def test_command_names_the_portable_file_after_the_output(tmp_path):
+    checkpoint().save(tmp_path / "model.pt")
+    run(tmp_path / "model.pt", "-o", tmp_path / "ball.v2.onnx")
+    assert names_in(tmp_path) == ["ball.v2.onnx", "ball.v2.plain.onnx", "model.pt"]
+    assert read_model(tmp_path / "ball.v2.onnx").manifest.layout == "runs"
+    assert read_model(tmp_path / "ball.v2.plain.onnx").manifest.layout == "plain"
+
+
+def test_command_writes_one_file_where_the_portable_layout_is_the_fastest(tmp_path):
+    checkpoint().save(tmp_path / "model.pt")
+    run(tmp_path / "model.pt", "--edge", "same")
+    assert names_in(tmp_path) == ["model.onnx", "model.pt"]
+    assert read_model(tmp_path / "model.onnx").manifest.layout == "plain"
+
+
+@pytest.mark.parametrize(("layout", "mesh"), [("plain", "ring4"), ("runs", "ring8")])
+def test_command_writes_one_file_in_the_layout_that_it_is_told(layout, mesh, tmp_path):
+    checkpoint(mesh=mesh).save(tmp_path / "model.pt")
+    done = run(tmp_path / "model.pt", "--layout", layout)
+    assert names_in(tmp_path) == ["model.onnx", "model.pt"]
+    read = read_model(tmp_path / "model.onnx")
+    assert (read.manifest.layout, read.manifest.mesh) == (layout, mesh)
+    Session(read, RuntimeSettings())  # runs the self-test
+    assert f"layout {layout}" in done.stdout
+
+
+def test_command_takes_a_layout_for_networks_of_the_reference(tmp_path):
+    path = reference_file(tmp_path / "model.yaml")
+    run(path, "--layout", "runs")
+    assert names_in(tmp_path) == ["model.onnx", "model.yaml"]
+    assert read_model(tmp_path / "model.onnx").manifest.layout == "runs"
+
+
+def test_command_never_writes_over_its_input(tmp_path):
+    """Not by the portable file's name either, which nobody typed."""
+    checkpoint().save(tmp_path / "model.plain.pt")
+    before = (tmp_path / "model.plain.pt").read_bytes()
+    assert "--output" in run(tmp_path / "model.plain.pt", "-o", tmp_path / "model.pt", code=1).stderr
+    assert (tmp_path / "model.plain.pt").read_bytes() == before
+    assert names_in(tmp_path) == ["model.plain.pt"]
+
+
 def test_command_takes_class_names(tmp_path):
     path = reference_file(tmp_path / "model.yaml")
     run(path, "--classes", "penguin:object, nothing:background")
@@ -275,6 +370,7 @@ def test_command_takes_class_names(tmp_path):
         (("model.pt", "-o", "no/such/folder/model.onnx"), "can't write"),
         (("model.pt", "--intersections", "-1"), "intersections"),
         (("model.pt", "--object-radius", "nan"), "object_radius"),
+        (("model.pt", "--layout", "runs", "--edge", "same"), "runs needs edge hard"),
     ],
 )
 def test_command_says_in_one_line_what_is_wrong(tmp_path, arguments, message):
