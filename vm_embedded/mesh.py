@@ -101,56 +101,58 @@ def ring_mesh(shape: Shape, height: float, intersections: float, max_distance: f
     phi = shape.phi(i / intersections, height)
     phi = phi[height * np.tan(phi) < max_distance]
     theta = shape.theta(i[: len(phi)] / intersections, height)
-    counts = np.ceil(2.0 * np.pi * intersections / theta - _CEIL_EPSILON).astype(np.int64)
-    counts = np.concatenate([[1], counts])
+    counts = np.ceil(2.0 * np.pi * intersections / theta - _CEIL_EPSILON).astype(np.int32)
+    counts = np.concatenate([np.ones(1, dtype=np.int32), counts])
     phi = np.concatenate([[0.0], phi])
 
-    ring = np.repeat(np.arange(len(counts)), counts)
-    start = np.concatenate([[0], np.cumsum(counts)])
-    j = np.arange(start[-1]) - start[ring]
-    angle = 2.0 * np.pi * j / counts[ring]
-    rays = np.empty((len(ring), 3), order="F")
-    rays[:, 0] = np.cos(angle) * np.sin(phi)[ring]
-    rays[:, 1] = np.sin(angle) * np.sin(phi)[ring]
-    rays[:, 2] = -np.cos(phi)[ring]
-    return Mesh(frozen(rays), frozen(_ring_neighbors(counts, start, ring, j, RING_NEIGHBORS[model])))
+    start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    j = np.arange(start[-1], dtype=np.int32) - np.repeat(start[:-1], counts)
+    angle = 2.0 * np.pi * j / np.repeat(counts, counts)
+    sine = np.repeat(np.sin(phi), counts)
+    rays = np.empty((len(j), 3), order="F")
+    np.multiply(np.cos(angle), sine, out=rays[:, 0])
+    np.multiply(np.sin(angle), sine, out=rays[:, 1])
+    rays[:, 2] = np.repeat(-np.cos(phi), counts)
+    return Mesh(frozen(rays), frozen(_ring_neighbors(counts, start, j, RING_NEIGHBORS[model])))
 
 
-def _ring_neighbors(
-    counts: npt.NDArray[np.int64],
-    start: npt.NDArray[np.int64],
-    ring: npt.NDArray[np.int64],
-    j: npt.NDArray[np.int64],
-    width: int,
-) -> Indices:
-    """Neighbor table (n + 1, width) of rings with `counts` points that begin at `start`."""
+def _ring_neighbors(counts: Indices, start: Indices, j: Indices, width: int) -> Indices:
+    """Neighbor table (n + 1, width) of rings with `counts` points that begin at `start`; j is a point's place in its."""
     missing = int(start[-1])
-    count = counts[ring]
-    fraction = j / count  # double precision and not whole numbers, because that is what the reference rounds
+    fraction = j / np.repeat(counts, counts)  # and not whole numbers, because that is what the reference rounds
 
-    def in_ring(other: npt.NDArray[np.int64], index: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-        exists = (other >= 0) & (other < len(counts))
-        safe = np.clip(other, 0, len(counts) - 1)
-        return np.where(exists, start[safe] + index % counts[safe], missing)
+    def around(rings: slice, index: Indices) -> Indices:
+        """Points at a place in another ring; the place after its last is its first."""
+        first, size = np.repeat(padded_start[rings], counts), np.repeat(padded_counts[rings], counts)
+        return np.where(index == size, first, first + index)
 
-    outer, inner = ring + 1, ring - 1
-    out_position = fraction * np.append(counts, 1)[outer]
-    in_position = fraction * counts[inner]
-    left, right = in_ring(ring, j - 1), in_ring(ring, j + 1)
-    out_floor, in_floor = out_position.astype(np.int64), in_position.astype(np.int64)
-    top_left, top_right = in_ring(outer, out_floor), in_ring(outer, out_floor + 1)
-    bottom_left, bottom_right = in_ring(inner, in_floor), in_ring(inner, in_floor + 1)
-    # Halves are rounded upwards, as C's round does for these positive numbers.
-    top = in_ring(outer, np.floor(out_position + 0.5).astype(np.int64))
-    bottom = in_ring(inner, np.floor(in_position + 0.5).astype(np.int64))
-    columns = {
-        4: (left, top, right, bottom),
-        6: (left, top_left, top_right, right, bottom_right, bottom_left),
-        8: (left, top_left, top, top_right, right, bottom_right, bottom, bottom_left),
-    }[width]
+    padded_counts, padded_start = np.pad(counts, 1, constant_values=1), np.pad(start, (1, 0))
+    inner, own, outer = slice(0, len(counts)), slice(1, len(counts) + 1), slice(2, len(counts) + 2)
+    out_position = fraction * np.repeat(padded_counts[outer], counts)
+    in_position = fraction * np.repeat(padded_counts[inner], counts)
+    out_floor, in_floor = out_position.astype(np.int32), in_position.astype(np.int32)
 
     neighbors = np.empty((missing + 1, width), dtype=np.int32)
-    neighbors[:missing] = np.stack(columns, axis=1)
+    own_size = np.repeat(counts, counts)
+    left = around(own, np.where(j == 0, own_size, j) - 1)
+    right = around(own, j + 1)
+    if width in (4, 8):  # halves are rounded upwards, as C's round does for these positive numbers
+        top = around(outer, np.floor(out_position + 0.5).astype(np.int32))
+        bottom = around(inner, np.floor(in_position + 0.5).astype(np.int32))
+    if width in (6, 8):
+        top_left, top_right = around(outer, out_floor), around(outer, out_floor + 1)
+        bottom_left, bottom_right = around(inner, in_floor), around(inner, in_floor + 1)
+    columns: list[Indices]
+    if width == 4:
+        columns, outwards = [left, top, right, bottom], [1]
+    elif width == 6:
+        columns, outwards = [left, top_left, top_right, right, bottom_right, bottom_left], [1, 2]
+    else:
+        columns = [left, top_left, top, top_right, right, bottom_right, bottom, bottom_left]
+        outwards = [1, 2, 3]
+    for column, points in enumerate(columns):
+        neighbors[:missing, column] = points
+    neighbors[start[-2] : missing, outwards] = missing
     # The nadir's neighbors are spread evenly over ring 1.
     neighbors[0] = 1 + (np.arange(width) * counts[1]) // width if len(counts) > 1 else missing
     neighbors[missing] = missing

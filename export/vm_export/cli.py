@@ -68,8 +68,9 @@ def _run(options: argparse.Namespace) -> int:
     from .reference import write_reference
 
     output = options.output or options.model.with_suffix(".yaml" if options.to_yaml else ".onnx")
-    if output.resolve() == options.model.resolve():
-        raise InputError(f"{output} is the input; give another file with --output")
+    portable = output.with_suffix(".plain" + output.suffix)
+    if options.model.resolve() in (output.resolve(), portable.resolve()):
+        raise InputError(f"{output} would be written over the input; give another file with --output")
     checkpoint = _load(options.model, _overrides(options))
     manifest = checkpoint.manifest
     classes = ", ".join(f"{each.name} ({each.kind})" for each in manifest.classes)
@@ -83,7 +84,7 @@ def _run(options: argparse.Namespace) -> int:
     layout = options.layout or fastest_layout(manifest)
     files = {output: layout}
     if options.layout is None and layout != "plain":
-        files[output.with_suffix(".plain" + output.suffix)] = "plain"
+        files[portable] = "plain"
     for path, layout in files.items():
         difference = export(checkpoint, path, layout)
         size = path.stat().st_size / 1000

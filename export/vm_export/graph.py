@@ -9,7 +9,7 @@ import numpy.typing as npt
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-_OPSET, _ML_OPSET = 17, 3
+_OPSETS = {"": 17, "ai.onnx.ml": 3}
 _IR_VERSION = 8
 """What ONNX Runtime has read since 1.12: a robot's may be older than the workstation's."""
 
@@ -47,9 +47,10 @@ class Graph:
             [helper.make_tensor_value_info(name, kind, shape) for name, (kind, shape) in each.items()]
             for each in (inputs, outputs)
         )
+        domains = sorted({node.domain for node in self._nodes})
         model = helper.make_model(
             helper.make_graph(self._nodes, "visual_mesh", takes, gives, list(self._constants.values())),
-            opset_imports=[helper.make_opsetid("", _OPSET), helper.make_opsetid("ai.onnx.ml", _ML_OPSET)],
+            opset_imports=[helper.make_opsetid(domain, _OPSETS[domain]) for domain in domains],
             ir_version=_IR_VERSION,
             producer_name="vm-export",
             doc_string=doc,

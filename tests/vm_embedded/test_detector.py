@@ -193,6 +193,17 @@ def test_a_network_that_answers_its_self_test_wrongly_is_refused(models, layout,
 
 
 @in_both_layouts
+@pytest.mark.parametrize("width", [0, 4, 8])
+def test_a_self_test_of_another_mesh_is_refused(models, layout, width, tmp_path):
+    test = read_model(models[layout]).manifest.self_test.as_dict()
+    other = [(row + row)[:width] for row in test["neighbors"]]
+    with pytest.raises(ModelError):
+        Detector.from_file(
+            changed(tmp_path / "model.onnx", claim(self_test=test | {"neighbors": other}), models[layout])
+        )
+
+
+@in_both_layouts
 def test_a_network_with_other_inputs_than_its_manifest_is_refused(models, layout, tmp_path):
     (other,) = set(LAYOUTS) - {layout}
     for entries in ({"mesh": "ring8"}, {"layout": other}):
