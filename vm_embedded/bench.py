@@ -90,15 +90,25 @@ class Run:
         }
 
 
-def measure(detectors: Sequence[Detector], image: Image, lens: Lens, orientations: Sequence[Orientation]) -> list[Run]:
-    """Run detectors over the same walk, frame by frame in turns, so that whatever else happens meets all of them."""
+def measure(
+    detectors: Sequence[Detector],
+    image: Image,
+    lens: Lens,
+    orientations: Sequence[Orientation],
+    done: Callable[[int], None] = lambda frames: None,
+) -> list[Run]:
+    """Run detectors over the same walk, frame by frame in turns, so that whatever else happens meets all of them.
+
+    `done` is told the number of frames after each.
+    """
     timings: list[list[dict[str, float]]] = [[] for _ in detectors]
     points: list[list[int]] = [[] for _ in detectors]
-    for orientation in orientations:
+    for frame, orientation in enumerate(orientations, start=1):
         for number, detector in enumerate(detectors):
             found = detector.detect(image, orientation, lens)
             timings[number].append(found.timing_ms)
             points[number].append(int(found.projected.on_screen.sum()))
+        done(frame)
     return [
         Run(
             detector,

@@ -20,6 +20,7 @@ from .lens import Lens, Rectilinear, Size
 from .onnx_file import read_model
 from .options import ANGLES, add_model, add_pose, add_settings, read_options
 from .orientation import Orientation
+from .progress import Progress
 from .sampling import checked_image
 from .sources import read_image
 from .tuning import tuned, write_settings
@@ -89,7 +90,9 @@ def _run(options: argparse.Namespace) -> int:
     orientations = walk(middle, swing, sway, options.frames)
     counts = range(1, min(most, len(os.sched_getaffinity(0))) + 1)
     detectors = [Detector(model, replace(given.settings, threads=count)) for count in counts]
-    runs = measure(detectors, image, lens, orientations)
+    progress = Progress(options.frames)
+    runs = measure(detectors, image, lens, orientations, progress.show)
+    progress.clear()
     rate = sgemm_rate()
     operations = model.manifest.operations
     floor_ns = 1e9 * operations / rate if operations else None

@@ -17,6 +17,7 @@ from .lens import Lens
 from .lens_file import read_lens_file
 from .options import ANGLES, add_model, add_pose, add_settings, read_options
 from .orientation import Orientation
+from .progress import Progress
 from .sampling import FORMATS
 from .sinks import json_line, make_folder, save_overlay, save_points
 from .sources import Frame, open_source
@@ -122,7 +123,7 @@ def _run(options: argparse.Namespace) -> int:
             make_folder(folder)
 
     processed = 0
-    progress = _Progress(source.count)
+    progress = Progress(source.count)
     for frame in source.frames:
         try:
             line = _process(frame, detector, pose, options, emit)
@@ -151,23 +152,6 @@ def _process(frame: Frame, detector: Detector, pose: _Pose, options: argparse.Na
 
 def _complain(message: str) -> None:
     print(f"vm-detect: {' '.join(message.split())}", file=sys.stderr)
-
-
-class _Progress:
-    """A bar on standard error, if that is a terminal and the number of frames is known."""
-
-    def __init__(self, count: int | None) -> None:
-        self._count = count if count and count > 1 and sys.stderr.isatty() else None
-
-    def show(self, done: int) -> None:
-        if self._count:
-            filled = 30 * done // self._count
-            bar = "#" * filled + "." * (30 - filled)
-            print(f"\r[{bar}] {done}/{self._count}", end="", file=sys.stderr, flush=True)
-
-    def clear(self) -> None:
-        if self._count:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":
