@@ -111,10 +111,10 @@ class RunsLayout(Layout):
     The neighbors of a point form groups (mesh.RUNS) of up to three that follow each other. So a group's part of a
     convolution is one of width 3 along memory, and a point needs one look-up for each group, not for each neighbor.
 
-    The slots are the points in their order, with a gap wherever the next one is no neighbor. Gaps stand for the
-    off-screen point. Behind them come copies of the groups that are torn apart there, where a ring closes and around
-    the nadir. Each slot, copies and gaps too, looks up what its point would, so all copies of a point keep its value
-    through all layers.
+    The slots are the points, each followed by its right neighbor or, where that is off screen, by a gap, which stands
+    for the off-screen point. Behind them come copies of the groups that are torn apart there, where a ring closes and
+    around the nadir. Each slot, copies and gaps too, looks up what its point would, so all copies of a point keep its
+    value through all layers.
 
     columns: (G, m), where slot s finds its group g in a layer's table (G (m - 1),). The sum around slot s stands in
     column s + 1 of its group, because that is how the network gets a window of width 3 without moving data.

@@ -117,7 +117,7 @@ def ring_mesh(shape: Shape, height: float, intersections: float, max_distance: f
 
 
 def _ring_neighbors(counts: Indices, start: Indices, j: Indices, width: int) -> Indices:
-    """Neighbor table (n + 1, width) of rings with `counts` points that begin at `start`; j is a point's place in its."""
+    """Neighbor table (n + 1, width) of rings of `counts` points from `start` on; j is a point's place in its ring."""
     missing = int(start[-1])
     fraction = j / np.repeat(counts, counts)  # and not whole numbers, because that is what the reference rounds
 

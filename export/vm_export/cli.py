@@ -81,7 +81,7 @@ def _run(options: argparse.Namespace) -> int:
         write_reference(checkpoint, output)
         print(f"{output}: written in the reference's format")
         return EXIT_OK
-    layout = options.layout or fastest_layout(manifest)
+    layout = options.layout or fastest_layout(checkpoint)
     files = {output: layout}
     if options.layout is None and layout != "plain":
         files[portable] = "plain"

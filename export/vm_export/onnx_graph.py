@@ -25,12 +25,20 @@ from .runs_graph import runs_graph
 LARGEST_DIFFERENCE = 1e-4
 """Probability by which ONNX Runtime may differ from torch."""
 
+_WIDEST = {"convolution": 64, "separable": 32, "dense": 1024}
+"""Width of a layer of each kind up to which layout runs was measured to be faster; see docs/performance.md."""
+
 _CHECKED_POINTS = (1, 2, 7, 64, 1000, 5000)
 
 
-def fastest_layout(manifest: Manifest) -> str:
-    """The fastest layout that a network can have."""
-    return "runs" if manifest.edge == "hard" else "plain"
+def fastest_layout(checkpoint: Checkpoint) -> str:
+    """The fastest layout that a network can have, by its shape.
+
+    Runs save look-ups and cost multiplications: two in nine of a convolution's are by zero, and separable ones become
+    full ones. So the wider a layer, the less they gain.
+    """
+    narrow = all(layer.width <= _WIDEST[layer.kind] for layer in checkpoint.network.shape.layers)
+    return "runs" if narrow and checkpoint.manifest.edge == "hard" else "plain"
 
 
 def build(network: Network, manifest: Manifest) -> bytes:
@@ -44,7 +52,7 @@ def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) 
     The file is checked in ONNX Runtime before it is written. Raises ModelError if a probability differs by more than
     LARGEST_DIFFERENCE, or for a layout that does not fit the manifest; InputError if the file can't be written.
     """
-    layout = layout or fastest_layout(checkpoint.manifest)
+    layout = layout or fastest_layout(checkpoint)
     network = checkpoint.network.eval()
     test = _example(network, points=12, seed=0)
     provenance = {**checkpoint.manifest.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"}

@@ -113,8 +113,15 @@ def test_the_file_describes_itself_and_is_one_file_of_stock_operators(layout, tm
 
 
 def test_the_fastest_layout_is_the_one_that_is_written(tmp_path):
-    assert onnx_graph.fastest_layout(manifest()) == "runs"
-    assert onnx_graph.fastest_layout(manifest(edge="same")) == "plain"
+    for kind, width, layout in (
+        ("convolution", 4, "runs"),
+        ("convolution", 64, "runs"),
+        ("convolution", 65, "plain"),
+        ("separable", 32, "runs"),
+        ("separable", 33, "plain"),
+    ):
+        network = Network(NetworkShape.uniform(3, width, 2, kind=kind))
+        assert onnx_graph.fastest_layout(Checkpoint(network, manifest(("class0", "class1")))) == layout
     for edge, layout in (("hard", "runs"), ("same", "plain")):
         made = Checkpoint(checkpoint().network, manifest(edge=edge))
         onnx_graph.export(made, tmp_path / "model.onnx")
