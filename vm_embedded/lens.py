@@ -179,7 +179,7 @@ class RadialLens(Lens):
         return self.fov / 2.0 if math.isnan(turning_angle) else min(self.fov / 2.0, turning_angle)
 
     def project(self, rays: Floats, size: Size) -> Floats:
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             factor = self.radius_over_sine(rays[:, 0])
             if self.distortion != (0.0, 0.0):
                 undistorted = factor * np.hypot(rays[:, 1], rays[:, 2])

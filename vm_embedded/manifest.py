@@ -173,8 +173,8 @@ class Manifest:
         version = data.pop("format_version", None)
         if version != FORMAT_VERSION:
             raise ModelError(
-                f"the model's manifest has format version {version!r}, this runtime reads {FORMAT_VERSION}: "
-                "export the model again with the vm-export of this release"
+                f"the model's manifest has format version {version!r}, this release reads {FORMAT_VERSION}: "
+                "make the file again with the tools of this release"
             )
         known = [each.name for each in fields(cls)]
         for key in data:

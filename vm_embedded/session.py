@@ -85,6 +85,8 @@ class Session:
         test = self.model.manifest.self_test
         if test is None:
             return
+        if test.neighbors.shape[1] != self.model.manifest.neighbors:
+            raise ModelError(f"{self.model.path}: self-test is for {test.neighbors.shape[1]} neighbors a point")
         answer, expected = self.answer(test), test.probabilities[:-1]
         if answer.shape != expected.shape:
             raise ModelError(f"{self.model.path}: self-test answered in shape {answer.shape}")

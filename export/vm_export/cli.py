@@ -71,6 +71,8 @@ def _run(options: argparse.Namespace) -> int:
     portable = output.with_suffix(".plain" + output.suffix)
     if options.model.resolve() in (output.resolve(), portable.resolve()):
         raise InputError(f"{output} would be written over the input; give another file with --output")
+    if options.to_yaml and options.layout:
+        raise InputError("--layout is for ONNX files, and --to-yaml writes none")
     checkpoint = _load(options.model, _overrides(options))
     manifest = checkpoint.manifest
     classes = ", ".join(f"{each.name} ({each.kind})" for each in manifest.classes)
@@ -82,9 +84,8 @@ def _run(options: argparse.Namespace) -> int:
         print(f"{output}: written in the reference's format")
         return EXIT_OK
     layout = options.layout or fastest_layout(checkpoint)
-    files = {output: layout}
-    if options.layout is None and layout != "plain":
-        files[portable] = "plain"
+    files = {portable: "plain"} if options.layout is None and layout != "plain" else {}
+    files[output] = layout
     for path, layout in files.items():
         difference = export(checkpoint, path, layout)
         size = path.stat().st_size / 1000

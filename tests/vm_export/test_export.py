@@ -400,3 +400,16 @@ def test_command_without_its_extra_says_what_to_install(missing, tmp_path):
 def test_edges_are_the_manifest_s():
     assert EDGES == ("hard", "same")
     assert json.loads(manifest(edge="same").as_json())["edge"] == "same"
+
+
+def test_command_refuses_a_layout_for_the_reference_s_format(tmp_path):
+    checkpoint().save(tmp_path / "model.pt")
+    assert "--layout" in run(tmp_path / "model.pt", "--to-yaml", "--layout", "plain", code=1).stderr
+    assert names_in(tmp_path) == ["model.pt"]
+
+
+def test_a_portable_file_that_can_not_be_written_leaves_no_half_of_the_work(tmp_path):
+    checkpoint().save(tmp_path / "model.pt")
+    (tmp_path / "model.plain.onnx").mkdir()
+    assert "model.plain.onnx" in run(tmp_path / "model.pt", code=1).stderr
+    assert names_in(tmp_path) == ["model.plain.onnx", "model.pt"]
