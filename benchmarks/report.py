@@ -175,10 +175,10 @@ def main() -> None:
     found = json.loads(RESULTS.read_text())
     text = PAGE.read_text()
     for name, made in TABLES.items():
-        pattern = re.compile(rf"(<!-- {name} -->\n).*?(\n<!-- end -->)", re.DOTALL)
+        pattern = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
         if not pattern.search(text):
             raise SystemExit(f"{PAGE} has no place for the table {name}")
-        text = pattern.sub(lambda match, made=made: match[1] + made(found) + match[2], text)  # type: ignore[misc]
+        text = pattern.sub(lambda match, made=made: match[1] + made(found) + "\n" + match[2], text)  # type: ignore[misc]
     PAGE.write_text(text)
     plot_peers(found, DOCS / "performance-peers.png")
     plot_growth(found, DOCS / "performance-growth.png")

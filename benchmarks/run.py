@@ -165,7 +165,7 @@ def peers(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
     for peer in PEERS:
         detector = PeerDetector(peer)
         calls[peer.name] = lambda d=detector: d.detect(frame.image)  # type: ignore[misc]
-    times = interleaved(calls, max(rounds // 4, 5))
+    times = interleaved(calls, max(rounds // 20, 3), row=10)
     found: dict[str, Any] = {"frame": frame.name, "calls": times}
     for name in list(calls)[:4]:
         found[f"fastest peer over {name}"] = {
@@ -259,6 +259,7 @@ def main() -> None:
     options = parser.parse_args()
     rounds, seconds, soaked = (20, 5.0, 2000) if options.quick else (400, 60.0, SOAK_FRAMES)
     os.sched_setaffinity(0, {max(_ALL_CORES)})
+    cv2.setNumThreads(1)
     what, work = frames()
     print(f"on {what}", file=sys.stderr)
     with tempfile.TemporaryDirectory() as folder:

@@ -1,7 +1,7 @@
 """Calls timed in turns, so that whatever else the machine does meets all of them.
 
-Each turn makes a call twice. The first one finds in the processor's caches what the call before it left there; the
-second one is what a call costs that follows its like. Both are kept.
+Each turn makes a call several times in a row. The first one finds in the processor's caches what the call before it
+left there; the others are what a call costs that follows its like. Both are kept.
 """
 
 from __future__ import annotations
@@ -12,22 +12,25 @@ from time import perf_counter
 import numpy as np
 
 
-def interleaved(calls: Mapping[str, Callable[[], object]], rounds: int, warm: int = 3) -> dict[str, dict[str, float]]:
-    """Of each call: p50 and p99 of its second time, and p50 of its first, `first` [ms]."""
-    times: dict[str, list[tuple[float, float]]] = {name: [] for name in calls}
+def interleaved(
+    calls: Mapping[str, Callable[[], object]], rounds: int, row: int = 2, warm: int = 2
+) -> dict[str, dict[str, float]]:
+    """Of each call, made `row` times in a row in each turn: p50 and p99 of all but the first of a row, and p50 of the
+    first ones, `first` [ms]. The first `warm` turns don't count."""
+    times: dict[str, list[list[float]]] = {name: [] for name in calls}
     for number in range(rounds + warm):
         for name, call in calls.items():
-            started = perf_counter()
-            call()
-            between = perf_counter()
-            call()
-            ended = perf_counter()
+            rows = []
+            for _ in range(row):
+                started = perf_counter()
+                call()
+                rows.append(1e3 * (perf_counter() - started))
             if number >= warm:
-                times[name].append((1e3 * (between - started), 1e3 * (ended - between)))
+                times[name].append(rows)
     found = {}
-    for name, pairs in times.items():
-        first, second = np.array(pairs).T
-        found[name] = {**summary(second), "first": round(float(np.median(first)), 4)}
+    for name, rows in times.items():
+        values = np.array(rows)
+        found[name] = {**summary(values[:, 1:]), "first": round(float(np.median(values[:, 0])), 4)}
     return found
 
 

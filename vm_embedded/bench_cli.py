@@ -11,6 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
+
 from .bench import STAGES, cold, drawn_image, machine, measure, rss_mib, sgemm_rate, walk
 from .configuration import angle, length
 from .detector import Detector
@@ -65,6 +67,7 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-bench and return its exit status."""
     options = parser().parse_args(arguments)
+    cv2.setNumThreads(1)  # as vm-detect does
     try:
         return _run(options)
     except VisualMeshError as error:

@@ -59,6 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # What is wrong with a file or camera is said here, in one line; OpenCV and FFmpeg would add theirs.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    cv2.setNumThreads(1)  # a few thousand pixels of a frame are no work for all cores
     try:
         return _run(options)
     except VisualMeshError as error:

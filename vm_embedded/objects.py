@@ -20,7 +20,7 @@ from .detections import Detection
 from .lens import Lens, Size
 from .manifest import ObjectClass
 from .mesh import Graph
-from .projection import Projection, to_camera
+from .projection import Projection, along, to_camera
 from .settings import Settings
 from .shapes import Shape, tangents
 
@@ -131,8 +131,9 @@ def _near(scene: Scene, members: Members, center: Floats) -> Members:
     rays = scene.projected.graph.rays
     distance = float(np.linalg.norm(center))
     axis = center / distance
-    chord = math.sqrt(2.0 * max(1.0 - float((rays[members] @ axis).min()), 0.0)) + 3.0 * scene.shape.radius / distance
-    return scene.sorted(rays @ axis > 1.0 - 0.5 * min(chord, 2.0) ** 2)
+    cosines = along(rays, axis)
+    chord = math.sqrt(2.0 * max(1.0 - float(cosines[members].min()), 0.0)) + 3.0 * scene.shape.radius / distance
+    return scene.sorted(cosines > 1.0 - 0.5 * min(chord, 2.0) ** 2)
 
 
 def _wrong_size(scene: Scene, members: Members, center: Floats, near: Members, settings: Settings) -> str | None:

@@ -41,6 +41,18 @@ class Projection(Generic[G]):
         return Projection(self.graph, self.pixels, self.on_screen & chosen)
 
 
+def along(rays: Floats, direction: Floats) -> Floats:
+    """Cosines (n,) between rays (n, 3) and a unit vector (3,).
+
+    Not a matrix product, because numpy's would start threads on every core for that.
+    """
+    x, y, z = direction.tolist()
+    cosines: Floats = rays[:, 0] * x
+    cosines += rays[:, 1] * y
+    cosines += rays[:, 2] * z
+    return cosines
+
+
 def to_camera(rays: Floats, rotation: Floats) -> Floats:
     """Rays (n, 3) in the camera frame, R^T ray, column by column in memory.
 
@@ -76,7 +88,7 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     they would enter it.
     """
     reach = _view_angle(lens, size)
-    ahead = mesh.rays @ rotation[:, 0]
+    ahead = along(mesh.rays, rotation[:, 0])
     # A rotation that is not quite one may shorten rays by up to 5e-4; the lens compares their x as it is.
     near = np.flatnonzero(ahead > np.cos(min(reach + slack, np.pi)) - 1e-3)
     camera = to_camera(mesh.rays[near], rotation)
