@@ -30,6 +30,8 @@ class Frame:
 def frames() -> tuple[str, list[Frame]]:
     """What the frames are, and the frames."""
     shared = Path(os.environ.get("VM_SHARED", _TOP.parent / "shared")) / "reference" / "images"
+    if "VM_SHARED" in os.environ and not shared.is_dir():
+        raise SystemExit(f"VM_SHARED: there is no folder {shared}")
     if shared.is_dir():
         return "the 15 reference images", _read(shared)
     return "the demo's frames, since the reference images are not there", demo_frames()

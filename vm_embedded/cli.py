@@ -18,12 +18,8 @@ from .lens_file import read_lens_file
 from .options import ANGLES, add_model, add_pose, add_settings, read_options
 from .orientation import Orientation
 from .progress import Progress
-from .sampling import FORMATS
 from .sinks import json_line, make_folder, save_overlay, save_points
-from .sources import Frame, open_source
-
-_FILE_FORMATS = tuple(name for name in FORMATS if name not in ("rgb", "bgra", "rgba"))
-"""What OpenCV gives: colors as BGR, or the one channel of a grey or Bayer file as it is."""
+from .sources import Frame, check_file_format, open_source
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
@@ -113,11 +109,7 @@ def _run(options: argparse.Namespace) -> int:
     emit = [name.strip() for name in options.emit_points.split(",")] if options.emit_points else []
     for name in emit:
         detector.manifest.column(name)
-    if settings.format not in _FILE_FORMATS:
-        raise InputError(
-            f"--format {settings.format} is for frames handed over in Python; those read here are "
-            f"{', '.join(_FILE_FORMATS)}"
-        )
+    check_file_format(settings.format)
     source = open_source(options.camera, raw=settings.format != "bgr")
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:

@@ -21,12 +21,16 @@ ANGLES = (
 
 @dataclass(frozen=True)
 class Given:
-    """What the user gave; lens and orientation are None where nothing was said."""
+    """What the user gave; None where nothing was said.
+
+    lens_orientation: what the file of --lens says, from a frame of its own.
+    """
 
     model: Path
     lens: Lens | None
     orientation: Orientation | None
     settings: Settings
+    lens_orientation: Orientation | None = None
 
 
 def add_model(parser: argparse.ArgumentParser) -> None:
@@ -69,8 +73,14 @@ def read_options(options: argparse.Namespace) -> Given:
         raise InputError("no model: give --model FILE, a network that vm-export wrote")
     given = {each.name: getattr(options, each.name) for each in fields(Settings)}
     settings = {**configured.settings, **{name: value for name, value in given.items() if value is not None}}
-    lens = read_lens_file(options.lens).lens if options.lens else configured.lens
-    return Given(model, lens, _orientation(options, configured), Settings(**settings))
+    file = read_lens_file(options.lens) if options.lens else None
+    return Given(
+        model,
+        file.lens if file else configured.lens,
+        _orientation(options, configured),
+        Settings(**settings),
+        file.orientation if file else None,
+    )
 
 
 def _orientation(options: argparse.Namespace, configured: Configuration) -> Orientation | None:

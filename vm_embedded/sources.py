@@ -14,8 +14,19 @@ import numpy as np
 
 from .arrays import Image
 from .errors import InputError
+from .sampling import FORMATS
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".pgm", ".ppm", ".tif", ".tiff", ".webp")
+
+
+def check_file_format(format: str) -> None:
+    """Raise InputError for a pixel format that frames read here can't have.
+
+    OpenCV gives colors as BGR, or the one channel of a grey or Bayer file as it is.
+    """
+    if format in ("rgb", "bgra", "rgba"):
+        allowed = ", ".join(name for name in FORMATS if name not in ("rgb", "bgra", "rgba"))
+        raise InputError(f"--format {format} is for frames handed over in Python; those read here are {allowed}")
 
 
 @dataclass(frozen=True)

@@ -69,8 +69,9 @@ def _run(options: argparse.Namespace) -> int:
 
     output = options.output or options.model.with_suffix(".yaml" if options.to_yaml else ".onnx")
     portable = output.with_suffix(".plain" + output.suffix)
-    if options.model.resolve() in (output.resolve(), portable.resolve()):
-        raise InputError(f"{output} would be written over the input; give another file with --output")
+    for path in (output,) if options.to_yaml or options.layout else (output, portable):
+        if path.resolve() == options.model.resolve():
+            raise InputError(f"{path} is the input and would be written over; give another file with --output")
     if options.to_yaml and options.layout:
         raise InputError("--layout is for ONNX files, and --to-yaml writes none")
     checkpoint = _load(options.model, _overrides(options))

@@ -13,12 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.demo import FOLDER, IMAGES, MODEL
-from vm_embedded import Detector, InputError, Orientation, Rectilinear, Settings
+from vm_embedded import Detector, InputError, Orientation, Rectilinear, Settings, read_lens_file
 from vm_embedded.bench import STAGES, cold, drawn_image, measure, walk
 from vm_embedded.configuration import read_configuration
 from vm_embedded.onnx_file import read_model
 from vm_embedded.sampling import FORMATS, checked_image
-from vm_embedded.tuning import edited_settings, write_settings
+from vm_embedded.tuning import check_editable, edited_settings, write_settings
 
 COMMAND = Path(sys.executable).with_name("vm-bench")
 
@@ -64,7 +64,7 @@ def test_command_takes_the_user_s_frame_lens_and_orientation():
 def test_tuned_settings_are_written_and_read_by_vm_detect(tmp_path):
     path = tmp_path / "vm.toml"
     path.write_text('# ours\nmodel = "ball.onnx"\n\n[detector]\nthreads = 7 # too many\nsampling = "fast"\n')
-    out = run("--model", MODEL, "--frames", 6, "--up-to", 1, "--size", "320x240", "--tune", path).stdout
+    out = run("--model", MODEL, "--frames", 300, "--up-to", 1, "--size", "320x240", "--tune", path).stdout
     assert "pitch_step" in out
     settings = read_configuration(path).settings
     assert settings["threads"] == 1
@@ -80,6 +80,12 @@ def test_tuned_settings_are_written_and_read_by_vm_detect(tmp_path):
         ((), "--model"),
         (("--model", "nowhere.onnx"), "nowhere.onnx"),
         (("--model", MODEL, "--size", "640"), "1280x1024"),
+        (("--model", MODEL, "--size", "\u00b2x\u00b2"), "1280x1024"),
+        (("--model", MODEL, "--size", "640x480", "--image", IMAGES[0]), "--size"),
+        (("--model", MODEL, "--height", "0.5", "--sway", "0.6"), "--sway"),
+        (("--model", MODEL, "--frames", "5", "--tune", "vm.toml"), "at least 300"),
+        (("--model", MODEL, "--height-tolerance", "0", "--tune", "vm.toml"), "--height-tolerance"),
+        (("--model", MODEL, "--tune", "/nowhere/vm.toml"), "/nowhere"),
         (("--model", MODEL, "--frames", "0"), "at least 1"),
         (("--model", MODEL, "--swing", "wide"), "wide"),
         (("--model", MODEL, "--image", "nowhere.png"), "nowhere.png"),
@@ -96,15 +102,38 @@ def test_what_is_wrong_is_said_in_one_line(options, says):
     assert says in error
 
 
+def test_command_takes_the_orientation_of_a_reference_lens_file():
+    lens = FOLDER / "lens0000000.yaml"
+    options = ("--model", MODEL, "--lens", lens, "--frames", 2, "--up-to", 1, "--json", "-")
+    walked = json.loads(run(*options).stdout)["walk"]
+    orientation = read_lens_file(lens).orientation
+    assert walked["height_m"] == orientation.height
+    assert walked["pitch_rad"] == orientation.pitch
+    assert walked["roll_rad"] == orientation.roll
+
+
+def test_command_measures_the_threads_that_are_asked_for():
+    options = ("--model", MODEL, "--threads", 2, "--frames", 2, "--json", "-")
+    (only,) = json.loads(run(*options).stdout)["runs"]
+    assert only["threads"] in (1, 2)  # never more than there are
+    assert only["hit_rate"] < 1.0
+
+
 @pytest.mark.parametrize(
     "content", ["[detector", "detector = 3\n", 'detector = {threads = 2}\n"', "detector.threads = 2\n"]
 )
 def test_a_file_that_can_not_be_edited_is_left_as_it_is(content, tmp_path):
     path = tmp_path / "vm.toml"
     path.write_text(content)
-    with pytest.raises(InputError, match="can't be edited"):
-        write_settings(path, {"threads": 1})
-    assert path.read_text() == content
+    for edit in (check_editable, lambda path: write_settings(path, {"threads": 1})):
+        with pytest.raises(InputError, match=r"can't be edited: write|can't read"):
+            edit(path)
+        assert path.read_text() == content
+
+
+def test_line_endings_are_kept():
+    text = "# a\u2028b\r\n[detector]\r\nthreads = 2\r\n"
+    assert edited_settings(text, {"threads": 1}) == text.replace("2\r", "1\r")
 
 
 @given(
@@ -136,7 +165,11 @@ def test_a_walk_swings_as_far_as_it_is_told(swing, sway):
         assert max(values) <= center + reach + 1e-9
         assert max(values) >= center + 0.9 * reach - 1e-9
         assert min(values) <= center - 0.9 * reach + 1e-9
-    np.testing.assert_allclose(steps[0].rotation, steps[30].rotation, atol=1e-9)  # a stride a second
+
+
+def test_no_two_frames_of_a_walk_are_the_same():
+    steps = walk(Orientation.from_roll_pitch(0.8, 0.0, 0.4), 0.17, 0.03, 1800)
+    assert len({(round(each.roll, 6), round(each.pitch, 6)) for each in steps}) == 1800
 
 
 @pytest.mark.parametrize("format", FORMATS)

@@ -1,0 +1,73 @@
+"""Files are written beside and renamed, and stay what they are."""
+
+import os
+import stat
+import threading
+
+import pytest
+
+from vm_embedded import InputError
+from vm_embedded.files import check_writable, written_beside
+
+
+def write(path, text="new"):
+    with written_beside(path) as part:
+        part.write_text(text)
+
+
+def test_a_file_is_replaced_and_keeps_its_mode(tmp_path):
+    path = tmp_path / "a.json"
+    path.write_text("old")
+    path.chmod(0o640)
+    write(path)
+    assert path.read_text() == "new"
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+    assert [each.name for each in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_what_a_link_leads_to_is_replaced_and_not_the_link(tmp_path):
+    (tmp_path / "there").mkdir()
+    real, link = tmp_path / "there" / "real.json", tmp_path / "link.json"
+    real.write_text("old")
+    link.symlink_to(real)
+    write(link)
+    assert link.is_symlink()
+    assert real.read_text() == "new"
+
+
+def test_a_pipe_is_written_to(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    read = []
+    reader = threading.Thread(target=lambda: read.append(pipe.read_text()))
+    reader.start()
+    write(pipe)
+    reader.join(10)
+    assert read == ["new"]
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+def test_work_that_fails_leaves_the_old_file(tmp_path):
+    path = tmp_path / "a.json"
+    path.write_text("old")
+    with pytest.raises(ZeroDivisionError), written_beside(path) as part:
+        part.write_text(f"half {1 / 0}")
+    assert path.read_text() == "old"
+    assert [each.name for each in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_a_read_only_file_is_left_alone(tmp_path, monkeypatch):
+    path = tmp_path / "a.json"
+    path.write_text("old")
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write everything
+    with pytest.raises(InputError, match="read-only"):
+        write(path)
+    assert path.read_text() == "old"
+
+
+@pytest.mark.parametrize("name", ["nowhere/a.json", "."])
+def test_what_can_not_be_written_is_said_before_the_work_and_after(tmp_path, name):
+    with pytest.raises(InputError, match="can't write"):
+        check_writable(tmp_path / name)
+    with pytest.raises(InputError, match="can't write"):
+        write(tmp_path / name)
