@@ -25,7 +25,8 @@ _GAP = 1
 """The middle one of three gaps that come first: all around it is off screen, so it is what the off-screen point is."""
 
 _GAPS_BEHIND = 2
-"""The network drops the last two columns of a table."""
+"""The last two slots are in no window's middle: the windows end with the network's third copy of the points, which lacks
+three (vm_export/runs_graph.py)."""
 
 
 class Layout(ABC):
@@ -116,6 +117,9 @@ class RunsLayout(Layout):
     around the nadir. Each slot, copies and gaps too, looks up what its point would, so all copies of a point keep its
     value through all layers.
 
+    An example, with - for gaps: points 4 5 6 of a ring and 7 8 9 10 of the next one lie as - - - 4 5 6 - 7 8 9 10 -,
+    and if point 6 has 10 and 7 as its upper pair, a copy of the two follows.
+
     columns: (G, m), where slot s finds its group g in a layer's table (G (m - 1),). The sum around slot s stands in
     column s + 1 of its group, because that is how the network gets a window of width 3 without moving data.
     """
@@ -185,8 +189,8 @@ def _runs(neighbors: Indices, groups: tuple[tuple[int, ...], ...]) -> tuple[_Pos
     parts, middles, count = [slots], [], len(slots)
     for group in groups:
         wanted = np.stack([points if each == SELF else neighbors[:n, each] for each in group])
-        center = len(group) // 3
-        middle = np.full(n + 1, _GAP)
+        center = len(group) // 3  # of three the second is the middle of the window, of two and of one the first
+        middle = np.full(n + 1, _GAP)  # where any of them is on screen, the others should lie beside it
         for offset, targets in enumerate(wanted, start=-center):
             np.copyto(middle[:n], slot[targets] - offset, where=targets < n)
         torn = np.zeros(n, dtype=bool)
