@@ -25,8 +25,8 @@ _GAP = 1
 """The middle one of three gaps that come first: all around it is off screen, so it is what the off-screen point is."""
 
 _GAPS_BEHIND = 2
-"""The last two slots are in no window's middle: the windows end with the network's third copy of the points, which lacks
-three (vm_export/runs_graph.py)."""
+"""The last two slots are in no window's middle: the windows end with the network's third copy of the points, which
+lacks three (vm_export/runs_graph.py)."""
 
 
 class Layout(ABC):
