@@ -167,7 +167,7 @@ def peers(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
             calls[f"Visual Mesh {kind[0]} {kind[1]}"] = lambda d=ours: d.detect(  # type: ignore[misc]
                 frame.image, frame.orientation, frame.lens
             )
-    times = interleaved(calls, max(rounds // 20, 3), row=10)
+    times = interleaved(calls, max(rounds // 20, 3), row=30)
     found: dict[str, Any] = {"frame": frame.name, "calls": times}
     for name in [each for each in calls if each.startswith("Visual")]:
         found[f"fastest peer over {name}"] = {
@@ -257,6 +257,7 @@ _ALL_CORES = os.sched_getaffinity(0)
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--only", metavar="PART", help="measure this part again, and keep the others of the output")
     parser.add_argument("--output", type=Path, default=RESULTS)
     options = parser.parse_args()
     if not options.output.parent.is_dir():
@@ -281,6 +282,11 @@ def main() -> None:
             "walks": lambda: walks(models, work, seconds),
             "soak": lambda: soak(models, work, soaked),
         }
+        if options.only is not None:
+            if options.only not in parts:
+                parser.error(f"there is no part {options.only!r}; there are {', '.join(parts)}")
+            found = json.loads(options.output.read_text())
+            parts = {options.only: parts[options.only]}
         for number, (name, part) in enumerate(parts.items(), start=1):
             print(f"[{number}/{len(parts)}] {name}", file=sys.stderr, flush=True)
             found[name] = part()
