@@ -26,7 +26,8 @@ LARGEST_DIFFERENCE = 1e-4
 """Probability by which ONNX Runtime may differ from torch."""
 
 _WIDEST = {"convolution": 64, "separable": 32, "dense": 1024}
-"""Width of a layer of each kind up to which layout runs was measured to be faster; see docs/performance.md."""
+"""Width of a layer of each kind up to which layout runs is chosen: where it was measured to be faster, for convolutions
+and separable ones (docs/performance.md); dense layers have no look-ups, so their width hardly matters."""
 
 _CHECKED_POINTS = (1, 2, 7, 64, 1000, 5000)
 
