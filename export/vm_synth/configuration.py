@@ -1,0 +1,168 @@
+"""scene.toml: all ranges that pictures are drawn from, a section for each part of the scene."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import Field, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from vm_embedded.errors import InputError, VisualMeshError, unknown
+
+from .balls import BallRanges
+from .bodies import BodyRanges
+from .camera import CameraRanges
+from .environment import MapRanges
+from .field import FieldRanges
+from .ranges import check_entries, drawn, one_of, share
+from .sensor import SensorRanges
+
+CLASSES = ("ball", "goal", "line", "field", "environment", "robot")
+"""What pixels count as, by position."""
+
+
+@dataclass(frozen=True)
+class GroundRanges:
+    """Section [ground]."""
+
+    photographed: float = share(0.4, "pictures on the real floor of the map, where it has a flat one; else on a field")
+    detail: tuple[float, float] = drawn(
+        0.02,
+        0.12,
+        "strength of the grain that a photographed floor gets, as maps are coarser than pictures",
+        "",
+        (0, 1),
+    )
+    light: tuple[float, float] = drawn(0.0, 0.2, "unevenness of the light on a field", "", (0.0, 1.0))
+
+    def __post_init__(self) -> None:
+        check_entries(self)
+
+
+@dataclass(frozen=True)
+class TargetRanges:
+    """Section [ball]: where the ball is."""
+
+    radius: tuple[float, float] = drawn(0.05, 0.12, "radius of the ball", "m", (0.005, 1.0))
+    distance: tuple[float, float] = drawn(
+        0.0, 10.0, "distance on the plane, drawn so that the size in the picture is uniform", "m", (0.0, 100.0)
+    )
+    missing: float = share(0.1, "pictures without a ball")
+    cut: float = share(0.15, "pictures whose border may cut the ball")
+    hidden: float = share(0.2, "pictures with something between ball and camera, beside it or before it")
+    off_plane: float = share(0.08, "pictures with a ball on a pedestal or in the air")
+    off_plane_height: tuple[float, float] = drawn(0.1, 1.2, "its height over the plane", "m", (0.01, 5.0))
+    off_plane_label: str = one_of(CLASSES, "environment", "what such a ball counts as")
+    wrong_size: float = share(0.25, "pictures with a ball of another size, which counts as environment")
+    smaller: tuple[float, float] = drawn(0.25, 0.6, "its radius, if smaller, in radii of the ball", "", (0.01, 1.0))
+    larger: tuple[float, float] = drawn(1.7, 3.0, "its radius, if larger, in radii of the ball", "", (1.0, 20.0))
+
+    def __post_init__(self) -> None:
+        check_entries(self)
+
+
+@dataclass(frozen=True)
+class ThingRanges:
+    """Section [things]: how many things stand around."""
+
+    robots: tuple[float, float] = drawn(0, 3, "robots", "", (0, 20))
+    clutter: tuple[float, float] = drawn(0, 4, "things of 5 to 50 cm", "", (0, 50))
+    round_things: tuple[float, float] = drawn(0, 2, "round things that are no ball", "", (0, 50))
+    furniture: tuple[float, float] = drawn(0, 1, "tables, chairs, poles and boards", "", (0, 20))
+    people: tuple[float, float] = drawn(0, 1, "people and legs", "", (0, 20))
+    carrier: float = share(0.35, "pictures that show who or what carries the camera, or holds something before it")
+    distance: tuple[float, float] = drawn(0.25, 9.0, "distance from the camera on the plane", "m", (0.13, 100.0))
+
+    def __post_init__(self) -> None:
+        check_entries(self)
+
+
+def _section(kind: type) -> Any:
+    return field(default_factory=kind)
+
+
+@dataclass(frozen=True)
+class SceneConfiguration:
+    """All sections."""
+
+    maps: MapRanges = _section(MapRanges)
+    camera: CameraRanges = _section(CameraRanges)
+    ground: GroundRanges = _section(GroundRanges)
+    field: FieldRanges = _section(FieldRanges)
+    ball: TargetRanges = _section(TargetRanges)
+    ball_design: BallRanges = _section(BallRanges)
+    things: ThingRanges = _section(ThingRanges)
+    bodies: BodyRanges = _section(BodyRanges)
+    sensor: SensorRanges = _section(SensorRanges)
+
+
+def read_scene_configuration(path: Path | None) -> SceneConfiguration:
+    """Read a scene.toml; all defaults without one. Raises InputError naming file, section, entry and what is allowed."""
+    if path is None:
+        return SceneConfiguration()
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"can't read configuration {path}: {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"configuration {path}: {error}") from error
+    try:
+        return _configuration(table)
+    except VisualMeshError as error:
+        raise InputError(f"configuration {path}: {error}") from error
+
+
+def _configuration(table: Mapping[str, Any]) -> SceneConfiguration:
+    kinds = {each.name: each.default_factory for each in fields(SceneConfiguration)}
+    sections = {}
+    for name, entries in table.items():
+        if name not in kinds:
+            raise InputError(unknown("section", name, kinds))
+        if not isinstance(entries, Mapping):
+            raise InputError(f"{name} must be a section, [{name}], not {entries!r}")
+        kind: Any = kinds[name]
+        known = [each.name for each in fields(kind)]
+        for key in entries:
+            if key not in known:
+                raise InputError(unknown(f"entry in [{name}]", key, known))
+        try:
+            sections[name] = kind(**entries)
+        except InputError as error:
+            raise InputError(f"[{name}] {error}") from error
+    return SceneConfiguration(**sections)
+
+
+def documented(configuration: SceneConfiguration) -> Iterator[str]:
+    """Lines of a scene.toml with every entry, its meaning, unit and limits."""
+    for section in fields(configuration):
+        values = getattr(configuration, section.name)
+        yield f"[{section.name}]"
+        for entry in fields(values):
+            yield from _entry(entry, getattr(values, entry.name))
+        yield ""
+
+
+def _entry(entry: Field[Any], value: Any) -> Iterator[str]:
+    unit = f" [{entry.metadata['unit']}]" if entry.metadata.get("unit") else ""
+    yield f"# {entry.metadata['help']}{unit}{_limits(entry)}"
+    yield f"{entry.name} = {_toml(value)}"
+
+
+def _limits(entry: Field[Any]) -> str:
+    if "allowed" in entry.metadata:
+        return f"; of {', '.join(entry.metadata['allowed'])}"
+    low, high = entry.metadata.get("limits", (None, None))
+    if low is None:
+        return ""
+    return f"; {low:g} to {high:g}" if high != float("inf") else f"; at least {low:g}"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{name} = {_toml(each)}" for name, each in value.items()) + " }" if value else "{}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml(each) for each in value) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str) else f"{value:g}"

@@ -1,0 +1,221 @@
+"""Primitive solids: flat faces have vertices of their own, round ones share them with smooth normals.
+
+Unless said otherwise a primitive is centered on the origin with its axis along z. All are white until painted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from vm_embedded.arrays import Floats
+
+from .solids import Point, Solid, along, between, distance, rotation
+
+_SMOOTH = float(np.cos(np.radians(50.0)))
+"""Faces of a profile that turn by less than this angle share a smooth normal."""
+
+
+def box(x: float, y: float, z: float) -> Solid:
+    """A box with these sides [m]."""
+    return _cube(np.array([-1.0, 1.0]), np.array([x, y, z]) / 2.0, 0.0)
+
+
+def rounded_box(x: float, y: float, z: float, radius: float) -> Solid:
+    """A box with these sides [m] whose edges are rounded with a radius [m], at most half the shortest side."""
+    half = np.array([x, y, z]) / 2.0
+    return _cube(np.array([-1.0, -0.7, 0.0, 0.0, 0.7, 1.0]), half, min(radius, float(half.min()) * 0.999))
+
+
+def lathe(profile: Sequence[tuple[float, float]], segments: int = 16) -> Solid:
+    """A profile of (radius, z) [m] turned around z; it runs upwards on the outside, and inwards on top."""
+    steps = [(a, b) for a, b in pairwise(profile) if a != b]
+    slopes = np.array([(b[1] - a[1], a[0] - b[0]) for a, b in steps])
+    slopes /= np.linalg.norm(slopes, axis=1, keepdims=True)
+    rows, leans = [], []
+    for k, (start, end) in enumerate(steps):
+        rows += [start, end]
+        leans += [_shared(slopes, k, k - 1), _shared(slopes, k, k + 1)]
+    around = np.arange(segments) * (2.0 * np.pi / segments)
+    circle = np.stack([np.cos(around), np.sin(around)], axis=1)
+    here = np.arange(segments)
+    there = (here + 1) % segments
+    triangles = []
+    for k, (start, end) in enumerate(steps):
+        low, high = 2 * k * segments, (2 * k + 1) * segments
+        if start[0] > 0.0:
+            triangles.append(np.stack([low + here, low + there, high + there], axis=1))
+        if end[0] > 0.0:
+            triangles.append(np.stack([low + here, high + there, high + here], axis=1))
+    return _solid(_swept(np.array(rows), circle), _swept(np.array(leans), circle), np.concatenate(triangles))
+
+
+def cylinder(radius: float, height: float, segments: int = 16, top: float | None = None) -> Solid:
+    """A closed cylinder, or a cone or its stump where the radius at the top [m] is another."""
+    upper = radius if top is None else top
+    half = height / 2.0
+    return lathe([(0.0, -half), (radius, -half), (upper, half), (0.0, half)], segments)
+
+
+def sphere(radius: float, segments: int = 16) -> Solid:
+    """A sphere; stretch it for an ellipsoid."""
+    return lathe(arc(radius, -np.pi / 2.0, np.pi / 2.0, max(segments // 2, 4)), segments)
+
+
+def dome(radius: float, height: float, segments: int = 20) -> Solid:
+    """Half an ellipsoid that lies on z = 0."""
+    upper = lathe([(0.0, 0.0), *arc(radius, 0.0, np.pi / 2.0, segments // 3)], segments)
+    return upper.stretched(1.0, 1.0, height / radius)
+
+
+def torus(radius: float, thickness: float, segments: int = 32, sides: int = 12) -> Solid:
+    """A ring around z: radius of its middle line [m] and thickness [m]."""
+    around = np.append(np.arange(sides), 0) * (2.0 * np.pi / sides) - np.pi / 2.0
+    ring = [(radius + thickness / 2.0 * float(np.cos(a)), thickness / 2.0 * float(np.sin(a))) for a in around]
+    return lathe(ring, segments)
+
+
+def capsule(start: Point, end: Point, radius: float, last: float | None = None, segments: int = 10) -> Solid:
+    """A rod with round ends from point to point, with a radius [m] at its start and another at its end."""
+    final = radius if last is None else last
+    half = max(distance(start, end), 1e-4) / 2.0
+    lower = [(r, z - half) for r, z in arc(radius, -np.pi / 2.0, 0.0, 3)]
+    upper = [(r, z + half) for r, z in arc(final, 0.0, np.pi / 2.0, 3)]
+    return between(lathe([*lower, *upper], segments), start, end)
+
+
+def rod(start: Point, end: Point, radius: float, last: float | None = None, segments: int = 10) -> Solid:
+    """A rod with flat ends from point to point."""
+    return between(cylinder(radius, distance(start, end), segments, last), start, end)
+
+
+def beam(start: Point, end: Point, x: float, y: float) -> Solid:
+    """A box from point to point with sides x and y [m] across."""
+    return between(box(x, y, distance(start, end)), start, end)
+
+
+def axle(center: Point, radius: float, width: float, segments: int = 14) -> Solid:
+    """A closed cylinder with its axis along y: wheels, joints, ears."""
+    return cylinder(radius, width, segments).turned(rotation(roll=np.pi / 2.0)).shifted(center)
+
+
+def cord(points: Floats, radius: float, sides: int = 5) -> Solid:
+    """A string along points (k, 3) [m], open at its ends."""
+    ahead = np.gradient(points, axis=0)
+    around = np.arange(sides) * (2.0 * np.pi / sides)
+    circle = np.stack([np.cos(around), np.sin(around), np.zeros(sides)], axis=1)
+    normals = np.stack([circle @ along((0.0, 0.0, 0.0), step).T for step in list(ahead)])
+    here = np.arange(sides)
+    there = (here + 1) % sides
+    starts = (np.arange(len(points) - 1) * sides)[:, None, None]
+    quads = np.concatenate(
+        [np.stack([here, there, there + sides], 1), np.stack([here, there + sides, here + sides], 1)]
+    )
+    vertices = points[:, None] + radius * normals
+    return _solid(vertices.reshape(-1, 3), normals.reshape(-1, 3), (starts + quads).reshape(-1, 3))
+
+
+def sheet(outline: Floats, thickness: float) -> Solid:
+    """A flat thing on z = 0 with an outline (k, 2) [m], counterclockwise and seen whole from the origin."""
+    count = len(outline)
+    ring = np.column_stack([outline, np.full(count, thickness)])
+    wall = np.column_stack([np.roll(outline, -1, axis=0) - outline, np.zeros(count)])
+    outward = np.stack([wall[:, 1], -wall[:, 0], wall[:, 2]], axis=1)
+    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-12)
+    here = np.arange(count)
+    there = (here + 1) % count
+    floor = ring * (1.0, 1.0, 0.0)
+    vertices = np.concatenate([[[0.0, 0.0, thickness]], ring, ring, ring[there], floor, floor[there]])
+    normals = np.concatenate([np.tile([0.0, 0.0, 1.0], (count + 1, 1)), np.tile(outward, (4, 1))])
+    top = np.stack([np.zeros_like(here), 1 + here, 1 + there], axis=1)
+    a, b, c, d = (1 + k * count + here for k in (1, 2, 3, 4))
+    return _solid(vertices, normals, np.concatenate([top, np.stack([a, c, d], 1), np.stack([a, d, b], 1)]))
+
+
+def icosphere(radius: float, splits: int = 3) -> Solid:
+    """A sphere of even triangles (20 * 4 ** splits), for patterns."""
+    golden = (1.0 + 5.0**0.5) / 2.0
+    corners = [(a, b * golden, 0.0) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
+    points = np.array([np.roll(corner, k) for k in range(3) for corner in corners])
+    near = np.linalg.norm(points[:, None] - points[None], axis=2) < 2.1
+    faces = [
+        (i, j, k) for i in range(12) for j in range(i) for k in range(j) if near[i, j] and near[j, k] and near[i, k]
+    ]
+    corner = points[np.array(faces)]
+    inward = (
+        np.einsum("ij,ij->i", np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), corner[:, 0]) < 0.0
+    )
+    corner[inward] = corner[inward][:, ::-1]
+    for _ in range(splits):
+        a, b, c = corner[:, 0], corner[:, 1], corner[:, 2]
+        ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
+        corner = np.concatenate(
+            [np.stack(each, axis=1) for each in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+        )
+        corner /= np.linalg.norm(corner, axis=2, keepdims=True)
+    # Rounding makes equal corners of neighboring triangles the same bits.
+    corners_, triangles = np.unique(corner.reshape(-1, 3).round(9), axis=0, return_inverse=True)
+    normals = corners_ / np.linalg.norm(corners_, axis=1, keepdims=True)
+    return _solid(radius * normals, normals, triangles.reshape(-1, 3))
+
+
+def arc(radius: float, first: float, last: float, steps: int) -> list[tuple[float, float]]:
+    """Part of a circle as a profile of a lathe, between two angles [rad] over the horizontal."""
+    angles = np.linspace(first, last, steps + 1)
+    across = np.where(np.isclose(np.abs(angles), np.pi / 2.0), 0.0, radius * np.cos(angles))
+    return [(float(r), float(radius * np.sin(a))) for r, a in zip(across, angles, strict=True)]
+
+
+def _cube(grid: Floats, half: Floats, radius: float) -> Solid:
+    """Six faces with lines at `grid`: -1 and 1 are the faces of the box, 0 where its rounding begins."""
+    count = len(grid)
+    side = np.sign(grid + np.linspace(-1e-9, 1e-9, count))
+    first, second = (each.ravel() for each in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
+    corner = np.arange(count - 1)
+    quad = (corner[:, None] * count + corner[None]).reshape(-1, 1)
+    face = np.concatenate([quad + np.array(step) for step in ([0, count, count + 1], [0, count + 1, 1])])
+    vertices: list[Floats] = []
+    normals: list[Floats] = []
+    triangles: list[npt.NDArray[Any]] = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            a, b = (axis + 1) % 3, (axis + 2) % 3
+            signs, parts = np.empty((count * count, 3)), np.empty((count * count, 3))
+            signs[:, axis], signs[:, a], signs[:, b] = sign, side[first], side[second]
+            parts[:, axis], parts[:, a], parts[:, b] = sign, grid[first], grid[second]
+            flat = np.zeros_like(parts)
+            flat[:, axis] = sign
+            lean = parts / np.linalg.norm(parts, axis=1, keepdims=True) if radius else flat
+            vertices.append(signs * (half - radius) + radius * lean)
+            normals.append(lean)
+            triangles.append((face if sign > 0.0 else face[:, ::-1]) + len(triangles) * count * count)
+    return _solid(np.concatenate(vertices), np.concatenate(normals), np.concatenate(triangles))
+
+
+def _shared(slopes: Floats, face: int, neighbor: int) -> tuple[float, float]:
+    """Normal (radius, z) of a face at its border with a neighbor."""
+    normal = slopes[face]
+    if 0 <= neighbor < len(slopes) and normal @ slopes[neighbor] > _SMOOTH:
+        normal = normal + slopes[neighbor]
+        normal = normal / np.linalg.norm(normal)
+    return float(normal[0]), float(normal[1])
+
+
+def _swept(rows: Floats, circle: Floats) -> Floats:
+    """Rows of (radius, z) (k, 2) around a circle (n, 2) as points (k * n, 3)."""
+    around = rows[:, None, :1] * circle[None]
+    return np.concatenate([around, np.broadcast_to(rows[:, None, 1:], (len(rows), len(circle), 1))], 2).reshape(-1, 3)
+
+
+def _solid(vertices: Floats, normals: Floats, triangles: npt.NDArray[Any]) -> Solid:
+    return Solid(
+        vertices.astype(np.float32),
+        normals.astype(np.float32),
+        triangles.astype(np.int32),
+        np.full((len(vertices), 3), 0.8, dtype=np.float32),
+        np.full(len(vertices), 0.5, dtype=np.float32),
+    )

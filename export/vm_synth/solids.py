@@ -1,0 +1,180 @@
+"""Triangle meshes with a color and a roughness per vertex, and the bodies of a scene that are made of them.
+
+Frame: observation plane z = 0, z up, metres. Rotations are 3 x 3 matrices that turn column vectors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from vm_embedded.arrays import Floats, Indices, Mask, Singles
+
+from .paints import Paint
+
+LABELS = ("goal", "environment", "robot")
+"""What a body counts as."""
+
+Point = Sequence[float] | Floats
+"""Three numbers [m]."""
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A mesh: vertices (n, 3) [m], unit normals (n, 3), triangles (m, 3), linear albedo (n, 3), roughness (n,)."""
+
+    vertices: Singles
+    normals: Singles
+    triangles: Indices
+    colors: Singles
+    roughness: Singles
+
+    @property
+    def low(self) -> Floats:
+        """Lowest coordinates (3,) [m]."""
+        return np.asarray(self.vertices.min(axis=0), dtype=np.float64)
+
+    @property
+    def high(self) -> Floats:
+        """Highest coordinates (3,) [m]."""
+        return np.asarray(self.vertices.max(axis=0), dtype=np.float64)
+
+    def shifted(self, by: Point) -> Self:
+        """The same, moved by (3,) [m]."""
+        return replace(self, vertices=self.vertices + np.asarray(by, dtype=np.float32))
+
+    def turned(self, rotation: Floats) -> Self:
+        """The same, turned by a rotation (3, 3) around the origin."""
+        turn = rotation.T.astype(np.float32)
+        return replace(self, vertices=self.vertices @ turn, normals=_unit(self.normals @ turn))
+
+    def stretched(self, x: float, y: float, z: float) -> Self:
+        """The same, scaled along the axes by positive factors."""
+        factors = np.array([x, y, z], dtype=np.float32)
+        return replace(self, vertices=self.vertices * factors, normals=_unit(self.normals / factors))
+
+    def painted(self, paint: Paint, where: Mask | None = None) -> Self:
+        """The same with a paint, on the vertices of a mask (n,) or on all."""
+        chosen = np.ones(len(self.vertices), dtype=np.bool_) if where is None else where
+        color = np.asarray(paint.color, dtype=np.float32)
+        return replace(
+            self,
+            colors=np.where(chosen[:, None], color, self.colors).astype(np.float32),
+            roughness=np.where(chosen, np.float32(paint.roughness), self.roughness).astype(np.float32),
+        )
+
+    def stained(self, random: np.random.Generator, depth: float, scale: float) -> Self:
+        """The same with smooth brightness changes of up to `depth` (0..1) and of the size `scale` [m]."""
+        shade = 1.0 - depth * (0.5 + 0.5 * waves(random, self.vertices, scale))
+        return replace(self, colors=np.clip(self.colors * shade[:, None], 0.0, 1.0).astype(np.float32))
+
+
+@dataclass(frozen=True)
+class Body(Solid):
+    """A solid in the scene: its label, one of LABELS, and a name for what it is."""
+
+    label: str
+    name: str
+
+    def moved(self, rotation_about_z: float, position: Point) -> Self:
+        """The same, turned around the vertical axis by an angle [rad], then moved by a position (3,) [m]."""
+        return self.turned(rotation(yaw=rotation_about_z)).shifted(position)
+
+
+@dataclass(frozen=True)
+class Joined(Solid):
+    """Many bodies as one mesh; labels (m,) are positions in LABELS, one per triangle."""
+
+    labels: Indices
+
+
+def joined(bodies: Sequence[Body]) -> Joined:
+    """Bodies as one mesh, which may be empty."""
+    whole = merged(bodies)
+    labels = [np.full(len(body.triangles), LABELS.index(body.label), dtype=np.int32) for body in bodies]
+    return Joined(**vars(whole), labels=np.concatenate([np.zeros(0, dtype=np.int32), *labels]))
+
+
+def merged(solids: Iterable[Solid]) -> Solid:
+    """Solids as one."""
+    parts = [_EMPTY, *solids]
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
+    return Solid(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.normals for part in parts]),
+        np.concatenate([part.triangles + np.int32(start) for part, start in zip(parts, starts, strict=True)]),
+        np.concatenate([part.colors for part in parts]),
+        np.concatenate([part.roughness for part in parts]),
+    )
+
+
+def body(solids: Iterable[Solid], label: str, name: str) -> Body:
+    """A body from solids that are in their places."""
+    return Body(**vars(merged(solids)), label=label, name=name)
+
+
+def standing(solids: Iterable[Solid], label: str, name: str) -> Body:
+    """A body from solids, moved up or down so that it stands on the plane."""
+    whole = body(solids, label, name)
+    return whole.shifted((0.0, 0.0, -whole.low[2]))
+
+
+def sized(whole: Body, size: float) -> Body:
+    """The same body, scaled so that its longest side is `size` [m], standing on the plane around the origin."""
+    factor = size / float((whole.high - whole.low).max())
+    middle = (whole.low + whole.high) / 2.0
+    return whole.shifted((-middle[0], -middle[1], -whole.low[2])).stretched(factor, factor, factor)
+
+
+def rotation(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Floats:
+    """Rotation (3, 3) by angles [rad] about x, then y, then z."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]])
+    about_y = np.array([[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]])
+    about_z = np.array([[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]])
+    return np.asarray(about_z @ about_y @ about_x)
+
+
+def along(start: Point, end: Point) -> Floats:
+    """Rotation (3, 3) that takes z to the direction from start to end, and x as near to forward as it can."""
+    up = _direction(np.subtract(end, start))
+    forward = np.array([1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 else np.array([0.0, 0.0, -1.0])
+    side = _direction(np.cross(up, forward))
+    return np.stack([np.cross(side, up), side, up], axis=1)
+
+
+def between(solid: Solid, start: Point, end: Point) -> Solid:
+    """A solid that is centered on the origin, put midway between two points with its z axis along them."""
+    return solid.turned(along(start, end)).shifted(np.add(start, end) / 2.0)
+
+
+def distance(start: Point, end: Point) -> float:
+    """Distance of two points [m]."""
+    return float(np.linalg.norm(np.subtract(end, start)))
+
+
+def waves(random: np.random.Generator, points: Singles, scale: float) -> Singles:
+    """Smooth noise (n,) from -1 to 1 at points (n, 3) [m], with features of the size `scale` [m]."""
+    directions = random.normal(size=(5, 3)) * (2.5 / scale)
+    phases = random.uniform(0.0, 2.0 * np.pi, 5)
+    return np.asarray(np.sin(points @ directions.T + phases).mean(axis=1) * 1.5).clip(-1.0, 1.0).astype(np.float32)
+
+
+def _direction(vector: Floats) -> Floats:
+    return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-12))
+
+
+def _unit(vectors: Singles) -> Singles:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True), dtype=np.float32)
+
+
+_EMPTY = Solid(
+    np.zeros((0, 3), dtype=np.float32),
+    np.zeros((0, 3), dtype=np.float32),
+    np.zeros((0, 3), dtype=np.int32),
+    np.zeros((0, 3), dtype=np.float32),
+    np.zeros(0, dtype=np.float32),
+)
