@@ -26,7 +26,7 @@ CLASSES = ("ball", "goal", "line", "field", "environment", "robot")
 class GroundRanges:
     """Section [ground]."""
 
-    photographed: float = share(0.4, "pictures on the real floor of the map, where it has a flat one; else on a field")
+    photographed: float = share(0.5, "pictures on the real floor of the map, where it has a flat one; else on a field")
     detail: tuple[float, float] = drawn(
         0.02,
         0.12,

@@ -81,6 +81,7 @@ def _panel(a: Floats, b: Floats, c: Floats, d: Floats, spacing: float) -> list[F
     def strands(a: Floats, b: Floats, c: Floats, d: Floats) -> list[Floats]:
         count = max(int(distance(a + b, c + d) / 2.0 / spacing), 2)
         lows, highs = (np.linspace(start, end, count + 1) for start, end in ((a, c), (b, d)))
-        return [np.linspace(low, high, 5) for low, high in zip(lows, highs, strict=True)]
+        pairs = zip(lows, highs, strict=True)
+        return [np.linspace(low, high, 5) for low, high in pairs if distance(low, high) > 0.0]
 
     return strands(a, b, c, d) + strands(a, c, b, d)

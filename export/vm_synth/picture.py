@@ -21,8 +21,8 @@ from .environment import Environment
 from .field import ground_noise, paint_ground
 from .ranges import uniform
 from .scene import PlacedBall, Scene
-from .solids import LABELS
 from .smoothing import smoothed
+from .solids import LABELS
 from .tracer import BALL, NOTHING, OTHER, Tracer
 
 UNLABELED = 255

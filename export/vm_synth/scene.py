@@ -270,7 +270,7 @@ class _Things:
     def _free(self, half: float) -> Floats | None:
         """A place (2,) in the picture with so much room [m] around it, or None."""
         random = self._random
-        nearest = max(self._ranges.things.distance[0], _NEAREST + half)
+        nearest = max(self._ranges.things.distance[0], _NEAREST + 2.0 * half)  # else it fills the picture
         if nearest >= self._farthest:
             return None
         for _ in range(_TRIES):
