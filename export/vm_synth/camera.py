@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vm_embedded.lens import PROJECTIONS, Lens, Rectilinear, Size
+from vm_embedded.lens import PROJECTIONS, RadialLens, Rectilinear, Size
 from vm_embedded.orientation import Orientation
 
 from .ranges import check_entries, drawn, number, share, some_of, uniform
@@ -48,7 +48,7 @@ class CameraRanges:
         return self.picture_width, self.picture_height
 
 
-def draw_lens(random: np.random.Generator, ranges: CameraRanges) -> Lens:
+def draw_lens(random: np.random.Generator, ranges: CameraRanges) -> RadialLens:
     """A lens for pictures of the configured size."""
     projection = PROJECTIONS[str(random.choice(ranges.projections))]
     width, height = ranges.size

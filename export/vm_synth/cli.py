@@ -1,26 +1,34 @@
-"""vm-synth: render training pictures."""
+"""vm-synth: render training pictures, look at them and check them."""
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
+import cv2
+
 from vm_embedded.errors import InputError, VisualMeshError
+from vm_embedded.files import check_writable, written_beside
 
 from .configuration import SceneConfiguration, documented, read_scene_configuration
-from .dataset import Plan, digest, is_done, shard_of
+from .dataset import Plan, digest, indices_in, is_done, shard_of
 from .environment import Environment, find_maps
+from .inspection import indices_of, inspect
 from .llvm import find_llvm, load_mitsuba
+from .plots import load_matplotlib, plot
+from .progress import Ticker
+from .report import as_json, complaints, tables
+from .sheet import cell, chosen, read_shown, sheet
 from .workers import Done, Job, render_all, stoppable
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
 _EPILOG = """\
-other commands:
+other commands, each with a --help of its own:
   vm-synth preview OUT    a contact sheet of a set's pictures, with masks and the balls' true outlines
   vm-synth check OUT      what a set holds, as tables and plots, and which files are missing or damaged
   vm-synth config         all entries of scene.toml with their meanings, units, limits and defaults
@@ -49,6 +57,59 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
+def preview_parser() -> argparse.ArgumentParser:
+    """The options of vm-synth preview OUT."""
+    made = argparse.ArgumentParser(
+        prog="vm-synth preview",
+        description="Draw a contact sheet of a set: each picture as it is, and below it the same picture with its "
+        "classes tinted and the ball's outline as its true place, lens and pose give it, not as it was rendered. "
+        "Small balls are shown magnified too. A set that is still being rendered can be looked at.",
+    )
+    made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
+    made.add_argument("--count", type=_positive, default=24, metavar="N", help="pictures to show; default 24")
+    made.add_argument("--columns", type=_positive, default=6, metavar="N", help="pictures in a row; default 6")
+    made.add_argument("--width", type=_positive, default=320, metavar="PX", help="width of each picture; default 320")
+    which = made.add_mutually_exclusive_group()
+    which.add_argument("--first", type=_whole, metavar="I", help="show number I and those after it; default all over")
+    which.add_argument("--seed", type=_whole, metavar="S", help="choose by chance; same seed, same choice")
+    made.add_argument("--output", type=Path, metavar="FILE", help="a .jpg or .png; default OUT/preview.jpg")
+    return made
+
+
+def check_parser() -> argparse.ArgumentParser:
+    """The options of vm-synth check OUT."""
+    made = argparse.ArgumentParser(
+        prog="vm-synth check",
+        description="Read all of a set back: how much of it is there, which files are missing or broken, and what the "
+        "pictures show. Exit status 0 if the set is complete and sound, else 1.",
+    )
+    made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
+    made.add_argument("--quick", action="store_true", help="read only lenses and truth, no images and masks")
+    made.add_argument("--shards", type=_positive, default=1, metavar="N", help="count each of N shards by itself")
+    made.add_argument("--plots", type=Path, metavar="FILE", help="histograms; .png, .svg or .pdf; needs matplotlib")
+    made.add_argument("--json", type=Path, metavar="FILE", help="all findings, and the numbers of each picture")
+    return made
+
+
+def config_parser() -> argparse.ArgumentParser:
+    """The options of vm-synth config: none."""
+    return argparse.ArgumentParser(
+        prog="vm-synth config",
+        description="Write a scene.toml with all entries, their meanings, units, limits and defaults.",
+    )
+
+
+def parsers() -> dict[str, argparse.ArgumentParser]:
+    """All parsers, by what is typed."""
+    return {each.prog: each for each in (parser(), preview_parser(), check_parser(), config_parser())}
+
+
+def _positive(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
+    return int(text)
+
+
 def _whole(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
@@ -67,9 +128,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         with stoppable():
-            if given[:1] == ["config"]:
-                print("\n".join(documented(SceneConfiguration())))
-                return EXIT_OK
+            for name, run in {"preview": _preview, "check": _check, "config": _config}.items():
+                if given[:1] == [name]:
+                    return run(parsers()[f"vm-synth {name}"].parse_args(given[1:]))
             return _render(parser().parse_args(given))
     except VisualMeshError as error:
         print(f"vm-synth: {' '.join(str(error).split())}", file=sys.stderr)
@@ -97,11 +158,23 @@ def _render(options: argparse.Namespace) -> int:
     left = [index for index in own if not is_done(options.out, index)]
     if len(left) < len(own):
         print(f"vm-synth: {len(own) - len(left)} of {len(own)} pictures are there already", file=sys.stderr)
-    ticker = Ticker(len(left))
+    ticker, memory = Ticker(len(left)), 0
+
+    def report(done: Done) -> None:
+        nonlocal memory
+        memory = max(memory, done.memory)
+        ticker.count()
+
     try:
-        render_all(Job(options.out, tuple(maps), options.seed, configuration), left, workers, ticker.count)
+        render_all(Job(options.out, tuple(maps), options.seed, configuration), left, workers, report)
     finally:
         ticker.end()
+        if ticker.done:
+            print(
+                f"vm-synth: {ticker.done} pictures in {ticker.took:.0f} s, "
+                f"{3600.0 * ticker.done / ticker.took:.0f} an hour; {memory / 2**20:.0f} MiB a worker at most",
+                file=sys.stderr,
+            )
     print(f"{options.out}: {len(own)} pictures")
     return EXIT_OK
 
@@ -121,39 +194,53 @@ def _good_maps(paths: Sequence[Path], configuration: SceneConfiguration) -> list
     return good
 
 
-class Ticker:
-    """Progress with the time left: a bar at a terminal, else a line a minute for logs."""
+def _preview(options: argparse.Namespace) -> int:
+    output = options.out / "preview.jpg" if options.output is None else options.output
+    if output.suffix.lower() not in (".jpg", ".jpeg", ".png"):
+        raise InputError(f"can't write {output}: a sheet is a .jpg or a .png")
+    if not options.out.is_dir():
+        raise InputError(f"there is no folder {options.out}")
+    check_writable(output)
+    there = indices_in(options.out)
+    cells = []
+    for index in chosen(there, options.count, options.first, options.seed):
+        try:
+            cells.append(cell(read_shown(options.out, index), options.width))
+        except InputError as error:
+            print(f"vm-synth: skipped {error}", file=sys.stderr)
+    if not cells:
+        after = "" if options.first is None else f" from number {options.first} on"
+        raise InputError(f"{options.out} has no pictures that can be shown{after}")
+    made = sheet(cells, options.columns, f"{options.out.resolve().name}: {len(cells)} of {len(there)} pictures")
+    with written_beside(output) as part:
+        part.write_bytes(cv2.imencode(output.suffix.lower(), made, [cv2.IMWRITE_JPEG_QUALITY, 92])[1].tobytes())
+    print(f"{output}: {len(cells)} pictures")
+    return EXIT_OK
 
-    def __init__(self, total: int) -> None:
-        self._total, self._done, self._memory = total, 0, 0
-        self._terminal = sys.stderr.isatty()
-        self._start = self._shown = time.monotonic()
 
-    def count(self, done: Done) -> None:
-        self._done += 1
-        self._memory = max(self._memory, done.memory)
-        now = time.monotonic()
-        if self._terminal:
-            filled = 30 * self._done // self._total
-            print(
-                f"\r[{'#' * filled}{'.' * (30 - filled)}] {self._text(now)}\x1b[K", end="", file=sys.stderr, flush=True
-            )
-        elif now - self._shown >= 60.0:
-            self._shown = now
-            print(f"vm-synth: {self._text(now)}", file=sys.stderr, flush=True)
+def _check(options: argparse.Namespace) -> int:
+    for path in (options.plots, options.json):
+        if path is not None:
+            check_writable(path)
+    if options.plots is not None:
+        load_matplotlib(options.plots)
+    ticker = Ticker(len(indices_of(options.out)[2]))
+    try:
+        found = inspect(options.out, options.quick, ticker.count)
+    finally:
+        ticker.end()
+    print(tables(found, options.shards))
+    if options.json is not None:
+        with written_beside(options.json) as part:
+            part.write_text(json.dumps(as_json(found), indent=1) + "\n", encoding="utf-8")
+    if options.plots is not None and found.facts:
+        title = f"{options.out.resolve().name}: {len(found.facts)} of {found.count} pictures"
+        plot(found.facts, found.size, title, options.plots)
+    for line in complaints(found):
+        print(f"vm-synth: {line}", file=sys.stderr)
+    return EXIT_OK if found.good else EXIT_FAILED
 
-    def _text(self, now: float) -> str:
-        rate = self._done / max(now - self._start, 1e-9)
-        left = int((self._total - self._done) / rate)
-        return f"{self._done}/{self._total}, {left // 3600}:{left // 60 % 60:02d}:{left % 60:02d} left"
 
-    def end(self) -> None:
-        if self._terminal and self._done:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
-        if self._done:
-            took = time.monotonic() - self._start
-            print(
-                f"vm-synth: {self._done} pictures in {took:.0f} s, {3600.0 * self._done / took:.0f} an hour; "
-                f"{self._memory / 2**20:.0f} MiB a worker at most",
-                file=sys.stderr,
-            )
+def _config(options: argparse.Namespace) -> int:
+    print("\n".join(documented(SceneConfiguration())))
+    return EXIT_OK

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import Field, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -78,27 +79,23 @@ class ThingRanges:
         check_entries(self)
 
 
-def _section(kind: type) -> Any:
-    return field(default_factory=kind)
-
-
 @dataclass(frozen=True)
 class SceneConfiguration:
     """All sections."""
 
-    maps: MapRanges = _section(MapRanges)
-    camera: CameraRanges = _section(CameraRanges)
-    ground: GroundRanges = _section(GroundRanges)
-    field: FieldRanges = _section(FieldRanges)
-    ball: TargetRanges = _section(TargetRanges)
-    ball_design: BallRanges = _section(BallRanges)
-    things: ThingRanges = _section(ThingRanges)
-    bodies: BodyRanges = _section(BodyRanges)
-    sensor: SensorRanges = _section(SensorRanges)
+    maps: MapRanges = dataclasses.field(default_factory=MapRanges)
+    camera: CameraRanges = dataclasses.field(default_factory=CameraRanges)
+    ground: GroundRanges = dataclasses.field(default_factory=GroundRanges)
+    field: FieldRanges = dataclasses.field(default_factory=FieldRanges)
+    ball: TargetRanges = dataclasses.field(default_factory=TargetRanges)
+    ball_design: BallRanges = dataclasses.field(default_factory=BallRanges)
+    things: ThingRanges = dataclasses.field(default_factory=ThingRanges)
+    bodies: BodyRanges = dataclasses.field(default_factory=BodyRanges)
+    sensor: SensorRanges = dataclasses.field(default_factory=SensorRanges)
 
 
 def read_scene_configuration(path: Path | None) -> SceneConfiguration:
-    """Read a scene.toml; all defaults without one. Raises InputError naming file, section, entry and what is allowed."""
+    """Read a scene.toml, or take all defaults. Raises InputError naming file, section, entry and what is allowed."""
     if path is None:
         return SceneConfiguration()
     try:

@@ -19,13 +19,14 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vm_embedded.arrays import Floats, Image
+from vm_embedded.arrays import Image
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
 from vm_embedded.lens import RadialLens
 from vm_embedded.orientation import Orientation
 
 from .configuration import CLASSES, SceneConfiguration
+from .outlines import outline, polygon_area
 from .picture import UNLABELED, Picture
 from .scene import PlacedBall, Scene
 from .sensor import developed, encoded
@@ -104,10 +105,25 @@ def read_plan(folder: Path) -> dict[str, Any]:
     """The set.json of a folder. Raises InputError."""
     path = folder / "set.json"
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        return _read_table(path)
     except OSError as error:
         raise InputError(f"{folder} holds no set: can't read {path.name}: {error.strerror or error}") from error
-    except ValueError as error:
+
+
+def read_truth(folder: Path, index: int) -> dict[str, Any]:
+    """What a picture shows, as `truth` gave it. Raises InputError."""
+    path = file_of(folder, "scene", index)
+    try:
+        return _read_table(path)
+    except OSError as error:
+        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+
+
+def _read_table(path: Path) -> dict[str, Any]:
+    """The table of a JSON file. Raises InputError if it holds none, and OSError."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is damaged: {error}") from error
     if not isinstance(found, dict):
         raise InputError(f"{path} is damaged: it holds no table")
@@ -193,7 +209,7 @@ def _placed(ball: PlacedBall) -> dict[str, Any]:
 
 
 def _ball_truth(scene: Scene, ball: PlacedBall, picture: Picture) -> dict[str, Any]:
-    pixels = outline(scene, ball)
+    pixels = outline(scene.lens, scene.orientation, ball.center, ball.radius, scene.size)
     toward = (ball.center - scene.camera) @ scene.orientation.rotation
     center = scene.lens.project((toward / np.linalg.norm(toward))[None], scene.size)[0]
     area = polygon_area(pixels)
@@ -204,28 +220,6 @@ def _ball_truth(scene: Scene, ball: PlacedBall, picture: Picture) -> dict[str, A
         "visible": float(min(picture.coverage.sum(dtype=np.float64) / max(area, 1e-9), 1.0)),
         "design": asdict(ball.design),
     }
-
-
-def outline(scene: Scene, ball: PlacedBall, corners: int = 256) -> Floats:
-    """Pixels (corners, 2) of a sphere's outline as the lens maps it; NaN where the lens does not see it."""
-    toward = (ball.center - scene.camera) @ scene.orientation.rotation
-    distance = float(np.linalg.norm(toward))
-    axis = toward / distance
-    side = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
-    side /= np.linalg.norm(side)
-    turn = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)[:, None]
-    around = np.cos(turn) * side + np.sin(turn) * np.cross(axis, side)
-    sine = min(ball.radius / distance, 1.0)
-    rays = math.sqrt(1.0 - sine * sine) * axis + sine * around
-    pixels = scene.lens.project(rays, scene.size)
-    pixels[~scene.lens.sees(rays)] = np.nan
-    return pixels
-
-
-def polygon_area(pixels: Floats) -> float:
-    """Area [px^2] of a polygon (n, 2), without its corners that are NaN."""
-    x, y = pixels[np.isfinite(pixels).all(axis=1)].T
-    return float(abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / 2.0)
 
 
 def _finite(table: dict[str, Any]) -> dict[str, Any]:

@@ -102,7 +102,7 @@ class Environment:
         height, width = picture.shape[:2]
         if width != 2 * height or height < 64:
             raise InputError(f"map {path.name}: {width} x {height} px is no 360 degree picture, twice as wide as high")
-        radiance = np.ascontiguousarray(picture[..., 2::-1])
+        radiance = np.ascontiguousarray(picture[..., 2::-1], dtype=np.float32)
         if not np.isfinite(radiance).all() or radiance.min() < 0.0:
             raise InputError(f"map {path.name}: holds numbers that are no light (negative, infinite or NaN)")
         if not np.median(radiance) > 0.0:
@@ -118,7 +118,7 @@ class Environment:
         row = np.arccos(np.clip(rays[..., 2], -1.0, 1.0)) / np.pi * height - 0.5
         map_x, map_y = column.astype(np.float32) + 2.0, np.clip(row, 0.0, height - 1.0).astype(np.float32)
         found = cv2.remap(self._wrapped, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        return found
+        return np.asarray(found, dtype=np.float32)
 
     @cached_property
     def _wrapped(self) -> Singles:
@@ -142,13 +142,15 @@ class Environment:
     @cached_property
     def irradiance(self) -> Floats:
         """Light (3,) that falls on a square metre of the plane, pi times the radiance of a white one."""
-        return self.lights[1].sum(axis=0, dtype=np.float64)
+        return np.asarray(self.lights[1].sum(axis=0, dtype=np.float64))
 
     @cached_property
-    def ground(self) -> Floats:
-        """Albedo (3,) of the floor of the photograph, its mean radiance times pi / E, at most 0.9."""
+    def ground(self) -> tuple[float, float, float]:
+        """Albedo of the floor of the photograph, its mean radiance times pi / E, at most 0.9."""
         lower = self.radiance[self.radiance.shape[0] * 5 // 8 :].reshape(-1, 3)
-        return np.clip(np.median(lower, axis=0) * np.pi / np.maximum(self.irradiance, 1e-6), 0.02, 0.9)
+        albedo = np.median(lower, axis=0) * np.pi / np.maximum(self.irradiance, 1e-6)
+        red, green, blue = np.clip(albedo, 0.02, 0.9).tolist()
+        return red, green, blue
 
     def lighting(self, size: tuple[int, int]) -> Lighting:
         """The map in the size (columns, rows) that rays are traced with, its sun taken out.

@@ -17,6 +17,7 @@ TURFS = ("blades", "felt", "natural")
 
 _TILE = 1.024  # [m], of 1024 texels
 _PATCHES = 6.0  # [m], of the tile of slow changes
+_DEVIATION = 0.32  # of the ground from its mean color
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,7 @@ def paint_ground(field: Field, points: Floats, range_: Floats, pixel: float) -> 
 
     footprint = np.where(seen, range_ * pixel, 1.0)
     grain = _grain(field.turf, field.seed % 3, points, footprint)
-    grass = np.float32(field.grass) * (1.0 + field.texture * (grain + slow))
+    grass = np.array(field.grass, dtype=np.float32) * (1.0 + field.texture * (grain + slow))
     if field.stripe:
         shade = 0.5 + np.clip(np.sin(np.pi * x / field.stripe) / _slope(np.pi * x / field.stripe), -0.5, 0.5)
         grass *= (0.88 + 0.24 * shade[..., None]).astype(np.float32)
@@ -144,31 +145,32 @@ def paint_ground(field: Field, points: Floats, range_: Floats, pixel: float) -> 
 
 
 def ground_noise(points: Floats, footprint: Floats, seed: int) -> Singles:
-    """Grain (h, w, 3) of deviation about 1 at places (h, w, 2) of the plane, as pixels of a footprint (h, w) see it."""
-    return (_grain("natural", seed % 3, points, footprint) / np.float32(0.32)).mean(axis=-1, keepdims=True)
+    """Grain (h, w, 1) of deviation about 1 at places (h, w, 2) of the plane, as pixels of a footprint (h, w) see it."""
+    grain = _grain("natural", seed % 3, points, footprint).mean(axis=-1, keepdims=True)
+    return np.asarray(grain / _DEVIATION, dtype=np.float32)
 
 
 def _slope(distance: Floats) -> Floats:
     """How much a distance (h, w) changes from pixel to pixel, the less of both sides: beyond one may be the sky."""
     change = np.hypot(_change(distance), _change(distance.T).T)
-    return np.maximum(change, 1e-9)
+    return np.asarray(np.maximum(change, 1e-9))
 
 
 def _change(distance: Floats) -> Floats:
     step = np.abs(np.diff(distance, axis=0))
-    return np.minimum(np.concatenate([step[:1], step]), np.concatenate([step, step[-1:]]))
+    return np.asarray(np.minimum(np.concatenate([step[:1], step]), np.concatenate([step, step[-1:]])))
 
 
 def _inside(distance: Floats) -> Singles:
     """Share of each pixel on the positive side of an edge, from the signed distances (h, w) of pixel centers."""
-    return np.clip(0.5 + distance / _slope(distance), 0.0, 1.0).astype(np.float32)
+    return np.asarray(np.clip(0.5 + distance / _slope(distance), 0.0, 1.0), dtype=np.float32)
 
 
 def _band(distance: Floats, width: float) -> Singles:
     """Share of each pixel that is within half a width of a curve, from signed distances (h, w)."""
     half = np.minimum(_slope(distance), 1e6) / 2.0
     over = np.minimum(distance + half, width / 2.0) - np.maximum(distance - half, -width / 2.0)
-    return (np.clip(over, 0.0, None) / (2.0 * half)).astype(np.float32)
+    return np.asarray(np.clip(over, 0.0, None) / (2.0 * half), dtype=np.float32)
 
 
 def _lines(field: Field, x: Floats, y: Floats) -> Singles:
@@ -184,13 +186,13 @@ def _lines(field: Field, x: Floats, y: Floats) -> Singles:
         np.maximum(lines, area, out=lines)
     for mark in (np.hypot(ax - half_length + field.length / 6.0, y), around):
         np.maximum(lines, _inside(line - mark), out=lines)
-    return lines
+    return np.asarray(lines)
 
 
 def _frame(ax: Floats, ay: Floats, half_length: float, half_width: float, line: float) -> Singles:
     sides = _band(ax - half_length, line) * _inside(half_width + line / 2.0 - ay)
     ends = _band(ay - half_width, line) * _inside(half_length + line / 2.0 - ax)
-    return np.maximum(sides, ends)
+    return np.asarray(np.maximum(sides, ends))
 
 
 @lru_cache(maxsize=9)
@@ -204,9 +206,10 @@ def _turf(kind: str, variant: int) -> list[Singles]:
     else:
         texels = _blades(random, n, 26000, 9.0 if kind == "blades" else 16.0)
         if kind == "natural":
-            texels = texels + 0.25 * _fractal(random, n, 12.0)[..., None] * np.float32([1.0, 0.8, 0.7])
+            patches = 0.25 * _fractal(random, n, 12.0)[..., None]
+            texels = texels + patches * np.array([1.0, 0.8, 0.7], dtype=np.float32)
     texels = texels - texels.mean(axis=(0, 1))
-    texels *= 0.32 / texels.std()
+    texels *= _DEVIATION / texels.std()
     levels = [texels.astype(np.float32)]
     while len(levels[-1]) > 1:
         levels.append(cv2.resize(levels[-1], None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA))
@@ -228,8 +231,8 @@ def _blades(random: np.random.Generator, n: int, count: int, length: float) -> S
 
 
 def _shifts(end: Floats, n: int) -> list[tuple[int, int]]:
-    over = tuple(int(v) for v in np.floor(end / n))
-    return [over, (over[0], 0), (0, over[1])]
+    x, y = (int(each) for each in np.floor(end / n))
+    return [(x, y), (x, 0), (0, y)]
 
 
 def _fractal(random: np.random.Generator, n: int, largest: float) -> Singles:
@@ -237,7 +240,7 @@ def _fractal(random: np.random.Generator, n: int, largest: float) -> Singles:
     frequency = np.hypot(np.fft.fftfreq(n)[:, None], np.fft.fftfreq(n)[None]) * n
     spectrum = np.fft.fft2(random.standard_normal((n, n)))
     noise = np.fft.ifft2(spectrum / np.maximum(frequency, largest) ** 1.6 * (frequency > 0)).real
-    return (noise / noise.std()).astype(np.float32)
+    return np.asarray(noise / noise.std(), dtype=np.float32)
 
 
 def _grain(kind: str, variant: int, points: Floats, footprint: Floats) -> Singles:
@@ -249,7 +252,7 @@ def _grain(kind: str, variant: int, points: Floats, footprint: Floats) -> Single
     n = 1024 >> level
     safe = np.where(np.isfinite(points), points, 0.0)
     place = np.floor(np.mod(safe / _TILE, 1.0) * n[..., None]).astype(np.intp) % n[..., None]
-    return table[starts[level] + place[..., 1] * n + place[..., 0]]
+    return np.asarray(table[starts[level] + place[..., 1] * n + place[..., 0]])
 
 
 @lru_cache(maxsize=9)
@@ -270,4 +273,4 @@ def _slow(seed: int, points: Floats) -> Singles:
     shift = np.random.default_rng(seed).uniform(0.0, 1.0, 2)
     place = np.mod(np.where(np.isfinite(points), points, 0.0) / _PATCHES + shift, 1.0) * len(noise)
     x, y = place[..., 0].astype(np.float32), place[..., 1].astype(np.float32)
-    return cv2.remap(noise, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
+    return np.asarray(cv2.remap(noise, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP), dtype=np.float32)

@@ -50,12 +50,12 @@ def find_llvm() -> Path:
         if not Path(named).is_file():
             raise InputError(f"DRJIT_LIBLLVM_PATH is {named}, where there is no file; {_ADVICE}")
         return Path(named)
-    found = {}
+    found: dict[int, Path] = {}
     for pattern in _PLACES:
         for path in sorted(Path("/").glob(pattern.lstrip("/"))):
-            version = _VERSION.search(path.name)
-            if version:
-                found.setdefault(int(version.group(1)), path)
+            named_version = _VERSION.search(path.name)
+            if named_version:
+                found.setdefault(int(named_version.group(1)), path)
     for version in _GOOD:
         if version in found:
             return found[version]

@@ -139,7 +139,7 @@ def _shadows(scene: Scene, rays: Floats, below: Mask, tracer: Tracer, random: np
         share, (x - offset) / step, (y - offset) / step, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
     share[~below] = 1.0
-    return share
+    return np.asarray(share, dtype=np.float32)
 
 
 def _near(scene: Scene, points: Floats) -> Mask:
@@ -265,7 +265,7 @@ def _without_grain(
         np.maximum(spread(_mean(depth, inside), 1.0)[..., 0], 1e-3),
         spread(inside.mean(axis=1, dtype=np.float32), 0.0)[..., 0],
     )
-    return found[box]
+    return np.asarray(found[box])
 
 
 def _majority(scene: Scene, what: npt.NDArray[np.int32], behind: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
@@ -277,4 +277,4 @@ def _majority(scene: Scene, what: npt.NDArray[np.int32], behind: npt.NDArray[np.
     labels[what == BALL] = CLASSES.index("ball")
     labels[what == OTHER] = CLASSES.index(scene.other_label)
     votes = np.stack([(labels == each).sum(axis=1) for each in range(len(CLASSES))], axis=1)
-    return votes.argmax(axis=1).astype(np.uint8)
+    return np.asarray(votes.argmax(axis=1), dtype=np.uint8)

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vm_embedded.arrays import Floats
-from vm_embedded.lens import Lens, Size
+from vm_embedded.arrays import Floats, Mask
+from vm_embedded.lens import RadialLens, Size
 from vm_embedded.orientation import Orientation
 
 from .balls import BallDesign, draw_design
@@ -46,10 +46,11 @@ class Scene:
 
     field: the soccer field, or None where the ball lies on the floor of the photograph. ball: the one to be found.
     other: a ball that is not, because it is of another size or off the plane; other_label says what it counts as.
-    mesh: all other things, by names, each of so many vertices as counts says. ground_albedo (3,) is what the ground throws back at them. seed: of the paths of light.
+    mesh: all other things, by names, each of so many vertices as counts says. ground_albedo (3,) is what the ground
+    throws back at them. seed: of the paths of light.
     """
 
-    lens: Lens
+    lens: RadialLens
     size: Size
     orientation: Orientation
     field: Field | None
@@ -99,14 +100,14 @@ def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environm
         names=tuple(each.name for each in things.bodies),
         counts=tuple(len(each.vertices) for each in things.bodies),
         mesh=joined(things.bodies),
-        ground_albedo=field.grass if field else tuple(float(each) for each in environment.ground),
+        ground_albedo=field.grass if field else environment.ground,
         sensor=draw_sensor(random, ranges.sensor),
         seed=int(random.integers(1 << 31)),
     )
 
 
 def _view(
-    random: np.random.Generator, ranges: SceneConfiguration, lens: Lens, radius: float, floor: float | None
+    random: np.random.Generator, ranges: SceneConfiguration, lens: RadialLens, radius: float, floor: float | None
 ) -> tuple[Orientation, Floats]:
     """A camera and a place (2,) for a ball that it sees, the ball's angular size being uniform."""
     for _ in range(_TRIES):
@@ -132,7 +133,7 @@ def _view(
     return orientation, spots[0]
 
 
-def _in_picture(lens: Lens, size: Size, rays: Floats, margin: float) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def _in_picture(lens: RadialLens, size: Size, rays: Floats, margin: float) -> Mask:
     """Which rays (n, 3) of the camera are in the picture or at most an angle `margin` [rad] beyond its edge."""
     pixels = lens.project(rays, size)
     center = np.array(size) / 2.0
@@ -143,7 +144,7 @@ def _in_picture(lens: Lens, size: Size, rays: Floats, margin: float) -> np.ndarr
         scale = np.linalg.norm(lens.project(beside, size) - pixels, axis=1)
         scale /= np.maximum(np.arccos(np.clip((beside * rays).sum(axis=1), -1.0, 1.0)), 1e-9)
         inside = (np.abs(pixels - center) <= center - 0.5 + (margin * scale)[:, None]).all(axis=1)
-    return inside & lens.sees(rays)
+    return np.asarray(inside & lens.sees(rays))
 
 
 def _field_around(random: np.random.Generator, ranges: SceneConfiguration, spot: Floats) -> Field:
@@ -168,7 +169,7 @@ class _Things:
         self,
         random: np.random.Generator,
         ranges: SceneConfiguration,
-        lens: Lens,
+        lens: RadialLens,
         orientation: Orientation,
         floor: float | None,
     ) -> None:

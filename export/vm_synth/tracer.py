@@ -86,7 +86,7 @@ class Tracer:
             }
         )
         self._parameters = mi.traverse(self._scene)
-        shapes = [drjit.reinterpret_array(mi.UInt32, mi.ShapePtr(each))[0] for each in self._scene.shapes()]
+        shapes = [_numbers(drjit.reinterpret_array(mi.UInt32, mi.ShapePtr(each)))[0] for each in self._scene.shapes()]
         self._meets = {
             int(number): {"ball": BALL, "other": OTHER, "plane": NOTHING}.get(each.id(), 0)
             for number, each in zip(shapes, self._scene.shapes(), strict=True)
@@ -153,7 +153,7 @@ class Tracer:
             shape = self._dr.reinterpret_array(self._mi.UInt32, hit.shape)
             self._dr.eval(shape, hit.prim_index)
             size = part.stop - part.start
-            shapes, triangles = shape.numpy()[:size], hit.prim_index.numpy()[:size]
+            shapes, triangles = _numbers(shape)[:size], _numbers(hit.prim_index)[:size]
             what = np.full(size, NOTHING, dtype=np.int32)
             for number, meaning in self._meets.items():
                 if meaning != NOTHING:
@@ -176,7 +176,7 @@ class Tracer:
             sampler.seed(self._dr.opaque(mi.UInt32, (seed + 7919 * number) & 0xFFFFFFFF), _BATCH)
             ray = mi.RayDifferential3f(self._ray(origin, rays[part]))
             light, _, _ = self._integrator.sample(self._scene, sampler, ray)
-            found[part] = self._dr.ravel(light).numpy().reshape(-1, 3)[: part.stop - part.start]
+            found[part] = _numbers(self._dr.ravel(light)).reshape(-1, 3)[: part.stop - part.start]
         return np.nan_to_num(found, copy=False, posinf=0.0, neginf=0.0)
 
     def surfaces(self, origin: Floats, rays: Singles) -> Surfaces:
@@ -190,9 +190,9 @@ class Tracer:
             color = met.bsdf(ray).eval_diffuse_reflectance(met, met.is_valid())
             dr.eval(color, met.n, met.t)
             size = part.stop - part.start
-            albedo[part] = dr.ravel(color).numpy().reshape(-1, 3)[:size]
-            normal[part] = dr.ravel(met.sh_frame.n).numpy().reshape(-1, 3)[:size]
-            depth[part] = met.t.numpy()[:size]
+            albedo[part] = _numbers(dr.ravel(color)).reshape(-1, 3)[:size]
+            normal[part] = _numbers(dr.ravel(met.sh_frame.n)).reshape(-1, 3)[:size]
+            depth[part] = _numbers(met.t)[:size]
         return Surfaces(albedo, normal, depth)
 
     def shadows(self, points: Floats, random: np.random.Generator) -> Singles:
@@ -218,7 +218,7 @@ class Tracer:
                 dr.eval(blocked)
                 color = self._light_colors[chosen]
                 full += color
-                lit += color * ~blocked.numpy()[:size, None]
+                lit += color * ~_numbers(blocked)[:size, None]
             result[part] = lit / np.maximum(full, 1e-9)
         return _BOUNCED + (1.0 - _BOUNCED) * result
 
@@ -254,6 +254,10 @@ def _sphere(mi: Any) -> dict[str, Any]:
             "clearcoat": 0.1,
         },
     }
+
+
+def _numbers(array: Any) -> npt.NDArray[Any]:
+    return np.asarray(array.numpy())
 
 
 def _facing(direction: Floats) -> Floats:
