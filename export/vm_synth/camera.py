@@ -26,7 +26,8 @@ class CameraRanges:
     fisheye_view: tuple[float, float] = drawn(
         80.0, 185.0, "angle from the left to the right edge, equisolid and equidistant", "deg", (5.0, 300.0)
     )
-    image_circle: float = share(0.1, "fisheyes that do not reach the corners of the picture")
+    image_circle: float = share(0.2, "fisheyes whose image is a circle with black around it")
+    circle: tuple[float, float] = drawn(0.5, 1.15, "diameter of that circle, in widths of the picture", "", (0.1, 2.0))
     off_center: tuple[float, float] = drawn(-0.02, 0.02, "optical center off the picture's, in widths", "", (-0.3, 0.3))
     distortion: tuple[float, float] = drawn(
         -0.04, 0.04, "k0 f^2, the first distortion coefficient times the focal length squared", "", (-0.2, 0.2)
@@ -63,7 +64,9 @@ def draw_lens(random: np.random.Generator, ranges: CameraRanges) -> RadialLens:
     if straight:
         fov = math.radians(170.0)
     elif random.random() < ranges.image_circle:
-        fov = view * random.uniform(0.9, 1.1)
+        diameter = uniform(random, ranges.circle)
+        focal_length *= min(diameter, 1.0)
+        fov = 2.0 * float(unit.angle(diameter * width / 2.0 / focal_length))
     else:
         # As far as the corners, and the picture's center may be off the lens's.
         corner = math.hypot(width, height) / width * 1.1

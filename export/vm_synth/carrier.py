@@ -28,10 +28,10 @@ def tripod(random: np.random.Generator, height: float) -> list[Solid]:
     plate = random.uniform(0.03, 0.06)
     parts = [
         box(plate, plate, 0.012).shifted((0.0, 0.0, top - 0.006)).painted(joint),
-        rod((0.0, 0.0, hub), (0.0, 0.0, top), 1.2 * thin).painted(metal(random)),
+        rod((0.0, 0.0, hub), (0.0, 0.0, top - 0.006), 1.2 * thin).painted(metal(random)),
         cylinder(2.5 * thin, 0.05, 12).shifted((0.0, 0.0, hub)).painted(joint),
     ]
-    if random.uniform() < 0.4:
+    if random.uniform() < 0.4 and top > 0.25:
         parts.append(rod((0.0, 0.0, top - 0.03), (-0.2, 0.04, top - 0.18), 0.008).painted(joint))
     first = random.uniform(0.0, 2.0 * np.pi)
     for k in range(3):
@@ -124,7 +124,7 @@ def stick(random: np.random.Generator, height: float) -> list[Solid]:
     long = min(random.uniform(0.5, 1.2), (top - radius) / float(np.cos(slant)) - radius)
     end = start + long * way
     parts = [rod(start, start + 0.3 * long * way, radius).painted(joint), rod(start, end, 0.7 * radius).painted(paint)]
-    parts.append(cylinder(min(2.0 * radius, 0.03), 0.02, 12).shifted(start - (0.0, 0.0, 0.01)).painted(joint))
+    parts.append(cylinder(min(2.0 * radius, 0.03), 0.02, 12).shifted(start).painted(joint))
     if random.uniform() < 0.6 and long > 0.35:
         tone = skin(random)
         for k in range(4):

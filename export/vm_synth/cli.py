@@ -213,7 +213,7 @@ def _preview(options: argparse.Namespace) -> int:
         raise InputError(f"{options.out} has no pictures that can be shown{after}")
     made = sheet(cells, options.columns, f"{options.out.resolve().name}: {len(cells)} of {len(there)} pictures")
     with written_beside(output) as part:
-        part.write_bytes(cv2.imencode(output.suffix.lower(), made, [cv2.IMWRITE_JPEG_QUALITY, 92])[1].tobytes())
+        part.write_bytes(cv2.imencode(output.suffix.lower(), made)[1].tobytes())
     print(f"{output}: {len(cells)} pictures")
     return EXIT_OK
 

@@ -110,7 +110,7 @@ def tool(random: np.random.Generator, size: float) -> list[Body]:
     """Something small and odd of a few rods, boxes and knobs: a charger, a screwdriver, a toy."""
     parts: list[Solid] = []
     for _ in range(int(random.integers(2, 6))):
-        place = random.uniform(-0.3, 0.3, 3)
+        place = random.uniform(-0.15, 0.15, 3)
         kind = random.integers(4)
         if kind == 0:
             part = rounded_box(*_two(random, 0.1, 0.5), random.uniform(0.1, 0.5), 0.04)

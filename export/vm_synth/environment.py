@@ -94,9 +94,13 @@ class Environment:
     @classmethod
     def read(cls, path: Path, ranges: MapRanges) -> Environment:
         """Read a map. Raises InputError naming the file and its fault."""
-        picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        try:
+            picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        except cv2.error:  # some builds raise where EXR is switched off
+            picture = None
         if picture is None:
-            raise InputError(f"map {path.name}: can't be read, it is damaged or not what its suffix says")
+            hint = "; many builds of OpenCV lack EXR, save it as .hdr" if path.suffix.lower() == ".exr" else ""
+            raise InputError(f"map {path.name}: can't be read, it is damaged or not what its suffix says{hint}")
         if picture.ndim != 3 or picture.shape[2] < 3 or picture.dtype != np.float32:
             raise InputError(f"map {path.name}: not a high-dynamic-range color picture")
         height, width = picture.shape[:2]

@@ -30,13 +30,15 @@ class FieldRanges:
     border: tuple[float, float] = drawn(0.3, 2.0, "carpet beyond the outer lines", "m", (0.0, 20.0))
     endless: float = share(0.25, "fields whose grass goes on to the horizon")
     turfs: tuple[str, ...] = some_of(TURFS, "kinds of ground")
-    hue: tuple[float, float] = drawn(75.0, 155.0, "hue of the grass; 120 is green", "deg", (0.0, 360.0))
-    saturation: tuple[float, float] = drawn(0.3, 0.8, "saturation of the grass", "", (0.0, 1.0))
+    hue: tuple[float, float] = drawn(60.0, 165.0, "hue of the grass; 120 is green", "deg", (0.0, 360.0))
+    saturation: tuple[float, float] = drawn(0.5, 1.0, "saturation of the grass, in linear light", "", (0.0, 1.0))
     albedo: tuple[float, float] = drawn(0.05, 0.3, "brightness of the grass", "", (0.01, 0.95))
-    odd_colors: float = share(0.1, "fields of any other color")
+    odd_colors: float = share(0.08, "fields of any other color")
     texture: tuple[float, float] = drawn(0.4, 1.3, "strength of blades and patches", "", (0.0, 2.0))
     stripes: float = share(0.2, "fields that are mown in stripes")
     paint: tuple[float, float] = drawn(0.45, 0.9, "albedo of lines", "", (0.1, 1.0))
+    cover: tuple[float, float] = drawn(0.3, 1.0, "how much of the ground paint covers; the rest shows", "", (0.0, 1.0))
+    thin: float = share(0.5, "fields whose paint does not cover fully")
     wear: tuple[float, float] = drawn(0.0, 0.6, "share of paint that is worn off", "", (0.0, 1.0))
     goal_height: tuple[float, float] = drawn(0.8, 2.0, "height of goals", "m", (0.2, 3.0))
     goal_width: tuple[float, float] = drawn(1.4, 3.0, "width of goals", "m", (0.3, 8.0))
@@ -64,6 +66,7 @@ class Field:
     texture: float
     stripe: float
     paint: float
+    cover: float
     wear: float
     seed: int
 
@@ -99,6 +102,7 @@ def draw_field(random: np.random.Generator, ranges: FieldRanges) -> Field:
         texture=uniform(random, ranges.texture),
         stripe=random.uniform(0.4, 1.5) if random.random() < ranges.stripes else 0.0,
         paint=uniform(random, ranges.paint),
+        cover=uniform(random, ranges.cover) if random.random() < ranges.thin else 1.0,
         wear=uniform(random, ranges.wear) * float(random.random() < 0.5),
         seed=int(random.integers(1 << 31)),
     )
@@ -131,7 +135,8 @@ def paint_ground(field: Field, points: Floats, range_: Floats, pixel: float) -> 
         carpet *= _inside(field.width / 2.0 + field.border - np.abs(y)) * seen
     lines = _lines(field, x, y) * seen
     slow = _slow(field.seed, points)
-    lines = lines * (1.0 - np.clip(4.0 * (field.wear - 0.5 + 5.0 * slow[..., 1]), 0.0, 0.95))
+    if field.wear:
+        lines = lines * (1.0 - np.clip(4.0 * (field.wear - 0.5 + 5.0 * slow[..., 1]), 0.0, 0.95))
 
     footprint = np.where(seen, range_ * pixel, 1.0)
     grain = _grain(field.turf, field.seed % 3, points, footprint)
@@ -140,7 +145,9 @@ def paint_ground(field: Field, points: Floats, range_: Floats, pixel: float) -> 
         shade = 0.5 + np.clip(np.sin(np.pi * x / field.stripe) / _slope(np.pi * x / field.stripe), -0.5, 0.5)
         grass *= (0.88 + 0.24 * shade[..., None]).astype(np.float32)
     paint = field.paint * (1.0 + 0.3 * field.texture * grain.mean(axis=-1, keepdims=True))
-    albedo = grass + lines[..., None] * (paint - grass)
+    # Where paint is thin the upper ends of the blades take it, the dark ground between them does not.
+    covering = np.clip(field.cover + (1.0 - field.cover) * 2.0 * grain, 0.0, 1.0)
+    albedo = grass + lines[..., None] * covering * (paint - grass)
     return np.clip(albedo, 0.01, 0.95).astype(np.float32), lines.astype(np.float32), carpet.astype(np.float32)
 
 

@@ -54,7 +54,7 @@ def find_llvm() -> Path:
     for pattern in _PLACES:
         for path in sorted(Path("/").glob(pattern.lstrip("/"))):
             named_version = _VERSION.search(path.name)
-            if named_version:
+            if named_version and path.is_file():
                 found.setdefault(int(named_version.group(1)), path)
     for version in _GOOD:
         if version in found:

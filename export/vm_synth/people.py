@@ -60,7 +60,7 @@ def person(random: np.random.Generator, height: float) -> list[Body]:
     parts += [each.turned(lean).shifted(waist) for each in (chest, neck, head, crown)]
     sleeve = shirt if random.uniform() < 0.5 else tone
     for side in (-1.0, 1.0):
-        shoulder = lean @ np.array([0.0, side * 0.13, 0.27]) + waist
+        shoulder = lean @ np.array([0.0, side * 0.125, 0.25]) + waist
         swing = random.uniform(-0.4, 0.5)
         elbow = shoulder + 0.17 * np.array([np.sin(swing), side * 0.15, -np.cos(swing)])
         bend = swing + random.uniform(0.1, 1.2)

@@ -2,7 +2,7 @@
 
 Ground and sky are computed for each pixel without noise: the sky is a look-up in the map, and on the plane under a far
 map the irradiance E is constant, so ground = albedo E / pi, times the traced share of light that gets past all things.
-Only pixels that things reach are traced: a few rays tell which, then many shade them.
+Only the pixels that things reach are traced (things.py).
 """
 
 from __future__ import annotations
@@ -14,23 +14,18 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Mask, Singles
-from vm_embedded.lens import Lens, Size
 
 from .configuration import CLASSES, GroundRanges
 from .environment import Environment
 from .field import ground_noise, paint_ground
 from .ranges import uniform
-from .scene import PlacedBall, Scene
-from .smoothing import smoothed
-from .solids import LABELS
-from .tracer import BALL, NOTHING, OTHER, Tracer
+from .scene import Scene
+from .things import pixel_angle, pixel_grid, rays_through, trace_things
+from .tracer import Tracer
 
 UNLABELED = 255
 """Where the lens sees nothing."""
 
-_LOOKS = ((0.0, 0.0), (-0.25, -0.25), (0.25, 0.25))  # where in a pixel rays look for things
-_FINE, _FINEST = 4, 8  # rays a pixel and direction that shade things, and small balls
-_SMALL = 2500  # [px]
 _SHADOW_STEP = 2  # pixels between traced shadows
 
 
@@ -48,32 +43,18 @@ def render(scene: Scene, environment: Environment, tracer: Tracer, ground: Groun
     """Render a scene; the same scene gives the same picture."""
     random = np.random.default_rng(scene.seed)
     tracer.set(scene, environment)
-    rays = _rays(scene, pixel_grid(scene.size))
+    rays = rays_through(scene, pixel_grid(scene.size))
     seen = np.isfinite(rays[..., 0])
     radiance, classes = _background(scene, environment, rays, random, ground)
     if scene.ball is not None or scene.other is not None or len(scene.mesh.triangles):
         below = seen & (rays[..., 2] < -1e-3)
         radiance *= _shadows(scene, rays, below, tracer, random)
-    coverage = np.zeros(seen.shape, dtype=np.float32)
-    busy, round_ = _busy(scene, tracer, rays)
-    _shade(scene, tracer, busy & ~round_, _FINE, True, radiance, classes, coverage)
-    _shade(scene, tracer, busy & round_, _FINEST, False, radiance, classes, coverage)
+    things = trace_things(scene, tracer, rays, 30.0 * max(float(radiance.mean()), 1e-6))
+    radiance += things.share[..., None] * (things.light - radiance)
+    classes = things.classes_before(classes)
     radiance[~seen] = 0.0
     classes[~seen] = UNLABELED
-    return Picture(radiance, classes, coverage)
-
-
-def pixel_grid(size: Size) -> Floats:
-    """Centers (h, w, 2) of all pixels."""
-    x, y = np.meshgrid(np.arange(size[0], dtype=np.float64), np.arange(size[1], dtype=np.float64))
-    return np.stack([x, y], axis=-1)
-
-
-def _rays(scene: Scene, pixels: Floats) -> Floats:
-    """Rays (..., 3) of the world through pixels (..., 2); NaN where the lens sees nothing."""
-    rays = scene.lens.unproject(pixels.reshape(-1, 2), scene.size)
-    rays[~scene.lens.sees(rays)] = np.nan
-    return (rays @ scene.orientation.rotation.T).reshape(*pixels.shape[:-1], 3)
+    return Picture(radiance, classes, things.coverage)
 
 
 def _background(
@@ -88,7 +69,7 @@ def _background(
     with np.errstate(divide="ignore"):
         distance = np.where(below, scene.orientation.height / -safe[..., 2], np.inf)
     points = np.where(below[..., None], safe[..., :2] * np.where(below, distance, 0.0)[..., None], np.inf)
-    pixel = _pixel_angle(scene.lens, scene.size)
+    pixel = pixel_angle(scene.lens, scene.size)
     if scene.field is None:
         strength = uniform(random, ground.detail)
         grain = ground_noise(points, np.where(below, distance, 1.0) * pixel, scene.seed)
@@ -112,13 +93,6 @@ def ground_light(points: Floats, seed: int) -> Singles:
         np.sin((safe @ [np.cos(a), np.sin(a)]) * (2.0 * np.pi / each) + a) for a, each in zip(turn, length, strict=True)
     ]
     return np.asarray(sum(waves) / 3.0, dtype=np.float32)
-
-
-def _pixel_angle(lens: Lens, size: Size) -> float:
-    """Angle [rad] between two pixels in the middle of the picture."""
-    middle = np.array([[size[0] / 2.0, size[1] / 2.0], [size[0] / 2.0 + 1.0, size[1] / 2.0]])
-    first, second = lens.unproject(middle, size)
-    return float(np.arccos(np.clip(first @ second, -1.0, 1.0)))
 
 
 def _shadows(scene: Scene, rays: Floats, below: Mask, tracer: Tracer, random: np.random.Generator) -> Singles:
@@ -157,124 +131,3 @@ def _near(scene: Scene, points: Floats) -> Mask:
         outside = np.maximum(np.maximum(low - points, points - high), 0.0)
         near |= (outside**2).sum(axis=1) < (6.0 * float(body[:, 2].max()) + 0.05) ** 2
     return near
-
-
-def _busy(scene: Scene, tracer: Tracer, rays: Floats) -> tuple[Mask, Mask]:
-    """Which pixels (h, w) things may reach, and which of these a small ball may."""
-    seen = np.isfinite(rays[..., 0])
-    grid = pixel_grid(scene.size)
-    met = np.zeros(seen.shape, dtype=bool)
-    for offset in _LOOKS:
-        looking = (_rays(scene, grid + offset) if any(offset) else rays).reshape(-1, 3)
-        good = np.flatnonzero(np.isfinite(looking[:, 0]))
-        met.reshape(-1)[good] |= tracer.meets(scene.camera, looking[good].astype(np.float32)) != NOTHING
-    round_ = np.zeros(seen.shape, dtype=bool)
-    for ball in (scene.ball, scene.other):
-        if ball is not None:
-            around = _around(scene, rays, ball)
-            met |= around
-            if around.sum() < _SMALL:
-                round_ |= around
-    kernel = np.ones((3, 3), np.uint8)
-    busy = cv2.dilate(met.astype(np.uint8), kernel).astype(bool)
-    return busy & seen, round_
-
-
-def _around(scene: Scene, rays: Floats, ball: PlacedBall) -> Mask:
-    """Pixels (h, w) within two pixels of a ball's outline or inside it."""
-    toward = ball.center - scene.camera
-    distance = float(np.linalg.norm(toward))
-    angle = np.arcsin(min(ball.radius / distance, 1.0)) + 2.0 * _pixel_angle(scene.lens, scene.size)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(rays @ (toward / distance) > np.cos(min(angle, np.pi)))
-
-
-def _subpixels(side: int) -> Floats:
-    """Offsets (side^2, 2) of rays in a pixel."""
-    steps = (np.arange(side) + 0.5) / side - 0.5
-    return np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-
-
-def _shade(
-    scene: Scene,
-    tracer: Tracer,
-    chosen: Mask,
-    rays_a_side: int,
-    smooth: bool,
-    radiance: Singles,
-    classes: npt.NDArray[np.uint8],
-    coverage: Singles,
-) -> None:
-    """Trace the chosen pixels (h, w) and write what they show into radiance, classes and coverage."""
-    rows, columns = np.nonzero(chosen)
-    if not len(rows):
-        return
-    offsets = _subpixels(rays_a_side)
-    pixels = np.stack([columns, rows], axis=-1)[:, None].astype(np.float64) + offsets
-    rays = _rays(scene, pixels).reshape(-1, 3)
-    rays[~np.isfinite(rays[:, 0])] = (0.0, 0.0, 1.0)
-    single = rays.astype(np.float32)
-    what = tracer.meets(scene.camera, single)
-    thing = what != NOTHING
-    count = len(offsets)
-    light = tracer.radiance(scene.camera, single, count, scene.seed + rays_a_side)
-    np.minimum(light, 30.0 * max(float(radiance.mean()), 1e-6), out=light)  # no fireflies
-    inside = thing.reshape(len(rows), count, 1)
-    share = inside.mean(axis=1, dtype=np.float32)
-    shown = _mean(light, inside)
-    if smooth:
-        shown = _without_grain(scene, tracer, single, inside, shown, rows, columns)
-    radiance[rows, columns] += share * (shown - radiance[rows, columns])
-    what = what.reshape(len(rows), count)
-    coverage[rows, columns] = (what == BALL).mean(axis=1, dtype=np.float32)
-    classes[rows, columns] = _majority(scene, what, classes[rows, columns])
-
-
-def _mean(values: Singles, inside: Mask) -> Singles:
-    """Means (n, c) over the rays of each pixel that are inside (n, k, 1), of values (n k, c)."""
-    values = values.reshape(*inside.shape[:2], -1)
-    total = np.where(inside, values, 0.0).sum(axis=1, dtype=np.float32)
-    return np.asarray(total / np.maximum(inside.sum(axis=1), 1), dtype=np.float32)
-
-
-def _without_grain(
-    scene: Scene,
-    tracer: Tracer,
-    rays: Singles,
-    inside: Mask,
-    light: Singles,
-    rows: npt.NDArray[np.intp],
-    columns: npt.NDArray[np.intp],
-) -> Singles:
-    """Light (n, 3) of the pixels at rows and columns (n,) without the grain of few rays."""
-    surfaces = tracer.surfaces(scene.camera, rays)
-    top, left = rows.min(), columns.min()
-    box = (rows - top, columns - left)
-    size = (int(box[0].max()) + 1, int(box[1].max()) + 1)
-
-    def spread(values: Singles, empty: float) -> Singles:
-        field = np.full((*size, values.shape[1]), empty, dtype=np.float32)
-        field[box] = values
-        return field
-
-    depth = np.where(np.isfinite(surfaces.depth), surfaces.depth, 1.0)
-    found = smoothed(
-        spread(light, 0.0),
-        spread(_mean(surfaces.albedo, inside), 0.0),
-        spread(_mean(surfaces.normal, inside), 0.0),
-        np.maximum(spread(_mean(depth, inside), 1.0)[..., 0], 1e-3),
-        spread(inside.mean(axis=1, dtype=np.float32), 0.0)[..., 0],
-    )
-    return np.asarray(found[box])
-
-
-def _majority(scene: Scene, what: npt.NDArray[np.int32], behind: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """The class (n,) of most rays (n, k) of each pixel, where those that meet nothing count as what is behind (n,)."""
-    of_label = np.array([CLASSES.index(label) for label in LABELS])
-    labels = np.broadcast_to(behind[:, None], what.shape).astype(np.intp)
-    mesh = what >= 0
-    labels[mesh] = of_label[scene.mesh.labels[what[mesh]]]
-    labels[what == BALL] = CLASSES.index("ball")
-    labels[what == OTHER] = CLASSES.index(scene.other_label)
-    votes = np.stack([(labels == each).sum(axis=1) for each in range(len(CLASSES))], axis=1)
-    return np.asarray(votes.argmax(axis=1), dtype=np.uint8)

@@ -31,6 +31,7 @@ _HISTOGRAMS = (
     "ball radius [px]",
     "ball visible [%]",
 )
+_UNEVEN = ("camera roll [deg]", "ball visible [%]")  # on a log scale
 _MOST = 14  # bars
 _DOT = 4000.0  # area of all dots together
 
@@ -63,12 +64,8 @@ def plot(facts: Sequence[Facts], size: Size, title: str, path: Path) -> None:
         _histogram(each, values.get(name, []), name)
     _places(axes[6], facts, size)
     _shares(axes[7], values)
-    _bars(axes[8], {f"{name}, {what}": n for what in ("ground", "lens") for name, n in kinds[what].items()}, "pictures")
-    _bars(
-        axes[9],
-        {f"{name}, {what}": n for what in ("ball", "other ball") for name, n in kinds[what].items()},
-        "pictures",
-    )
+    for each, whats in ((axes[8], ("ground", "lens")), (axes[9], ("ball", "other ball"))):
+        _bars(each, {f"{what}: {name}": n for what in whats for name, n in kinds[what].items()}, "pictures")
     _bars(axes[10], dict(kinds["ball design"].most_common(_MOST)), _titled("balls of a design", kinds["ball design"]))
     _map_use(axes[11], sorted(kinds["map"].values(), reverse=True))
     for each in axes:
@@ -81,18 +78,21 @@ def plot(facts: Sequence[Facts], size: Size, title: str, path: Path) -> None:
 
 def _histogram(axes: Axes, values: Sequence[float], name: str) -> None:
     axes.set_xlabel(name, fontsize=9)
-    axes.set_ylabel("pictures", fontsize=9)
+    axes.set_ylabel("pictures, log scale" if name in _UNEVEN else "pictures", fontsize=9)
     if not values:
         return _nothing(axes)
-    axes.hist(values, bins=40, color=_GREEN)
-    median = float(np.median(values))
+    axes.hist(values, bins=40, color=_GREEN, log=name in _UNEVEN)
+    median, (low, high) = float(np.median(values)), axes.get_xlim()
     axes.axvline(median, color=_RED, linewidth=1.0)
-    axes.text(median, 1.0, f" median {median:.3g}", color=_RED, fontsize=8, transform=axes.get_xaxis_transform())
+    side = "left" if median < (low + high) / 2.0 else "right"
+    place = axes.get_xaxis_transform()
+    axes.text(median, 1.0, f" median {median:.3g} ", color=_RED, fontsize=8, ha=side, transform=place)
 
 
 def _places(axes: Axes, facts: Sequence[Facts], size: Size) -> None:
     balls = [each.ball for each in facts if each.ball is not None]
-    axes.scatter(*np.array([each.pixel for each in balls]).reshape(-1, 2).T, s=_DOT / max(len(balls), 1), color=_GREEN)
+    x, y = np.array([each.pixel for each in balls]).reshape(-1, 2).T
+    axes.scatter(x, y, s=_DOT / max(len(balls), 1), color=_GREEN)
     axes.set_xlim(-0.5, size[0] - 0.5)
     axes.set_ylim(size[1] - 0.5, -0.5)
     axes.set_aspect("equal")

@@ -5,6 +5,7 @@ A section of the configuration is a frozen dataclass of such entries; it checks 
 
 from __future__ import annotations
 
+import sys
 from dataclasses import Field, field, fields
 from typing import Any
 
@@ -78,7 +79,8 @@ def _checked(entry: Field[Any], value: Any) -> Any:
 def _number(entry: Field[Any], value: Any) -> Any:
     low, high = entry.metadata["limits"]
     whole = isinstance(entry.default, int) and not isinstance(entry.default, bool)
-    if isinstance(value, bool) or not isinstance(value, int if whole else int | float) or not low <= value <= high:
+    fits = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
+    if not fits or not low <= value <= min(high, sys.float_info.max):
         unit = f" {entry.metadata['unit']}" if entry.metadata["unit"] else ""
         span = f"from {low:g} to {high:g}{unit}" if np.isfinite(high) else f"of at least {low:g}{unit}"
         raise InputError(f"{entry.name} must be a {'whole ' if whole else ''}number {span}, not {value!r}")

@@ -17,7 +17,8 @@ from .inspection import Facts, Inspection, shard_that_lacks, spans
 _NAMED = 20
 """Faults and runs of missing pictures that are named."""
 
-_WIDTH = 100
+_WIDTH = 100  # of lines
+_JOINED = "\xa0"  # a space that lines are not broken at
 
 
 def quantities(facts: Sequence[Facts]) -> dict[str, list[float]]:
@@ -118,9 +119,11 @@ def _category_table(found: Inspection) -> str:
             text = f"{len(counts)} used, each by {min(counts.values())} to {max(counts.values())} pictures"
             text += f"; not used: {', '.join(unused)}" if unused else ""
         else:
-            text = ", ".join(f"{kind} {n} ({100.0 * n / total:.1f} %)" for kind, n in counts.most_common())
+            items = (f"{kind} {n} ({100.0 * n / total:.1f} %)" for kind, n in counts.most_common())
+            text = ", ".join(item.replace(" ", _JOINED) for item in items)
         if total:
-            lines += wrap(text, _WIDTH, initial_indent=f"{name:<13}", subsequent_indent=13 * " ")
+            wrapped = wrap(text, _WIDTH, initial_indent=f"{name:<13}", subsequent_indent=13 * " ")
+            lines += [line.replace(_JOINED, " ") for line in wrapped]
     return "\n".join(lines)
 
 

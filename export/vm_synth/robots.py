@@ -95,7 +95,7 @@ def fallen(random: np.random.Generator, height: float) -> list[Body]:
 
 def wheeled_robot(random: np.random.Generator, height: float) -> list[Body]:
     """A robot of this height [m] on wheels: a round or square base, a tower, and marks of its team on top."""
-    width = random.uniform(0.6, 1.1)
+    width = random.uniform(0.5, 0.85)
     wheel = random.uniform(0.08, 0.14)
     cover, inner = (black, white, grey, metal)[random.integers(4)](random), black(random)
     count = int(random.integers(3, 5))
@@ -105,7 +105,7 @@ def wheeled_robot(random: np.random.Generator, height: float) -> list[Body]:
         disk = axle((0.0, 0.0, 0.0), wheel, 0.06).painted(inner)
         hub = axle((0.0, 0.0, 0.0), wheel * 0.5, 0.07).painted(metal(random))
         turn = rotation(yaw=yaw - np.pi / 2.0)
-        parts += [each.shifted((0.0, width * 0.42, wheel)).turned(turn) for each in (disk, hub)]
+        parts += [each.shifted((0.0, width * 0.47, wheel)).turned(turn) for each in (disk, hub)]
     floor, top = wheel * 0.6, random.uniform(0.3, 0.6)
     tall = top - floor
     if random.uniform() < 0.6:

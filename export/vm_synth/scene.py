@@ -89,6 +89,7 @@ def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environm
     if field is not None and random.random() < ranges.field.goals:
         things.add_goals(field)
     things.add_all(radius)
+    bodies = [each for each in things.bodies if not (_pierces(each, ball) or _pierces(each, other))]
     return Scene(
         lens=lens,
         size=ranges.camera.size,
@@ -97,9 +98,9 @@ def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environm
         ball=ball,
         other=other,
         other_label=label,
-        names=tuple(each.name for each in things.bodies),
-        counts=tuple(len(each.vertices) for each in things.bodies),
-        mesh=joined(things.bodies),
+        names=tuple(each.name for each in bodies),
+        counts=tuple(len(each.vertices) for each in bodies),
+        mesh=joined(bodies),
         ground_albedo=field.grass if field else environment.ground,
         sensor=draw_sensor(random, ranges.sensor),
         seed=int(random.integers(1 << 31)),
@@ -244,6 +245,7 @@ class _Things:
                 return None, ranges.off_plane_label
             if random.random() < 0.8:
                 self._put(stand, spot, _reach(stand))
+            self.keep_clear(spot, _reach(stand))
             return _placed(random, self._ranges, np.array([*spot, height + radius]), radius), ranges.off_plane_label
         if kind < ranges.off_plane + ranges.wrong_size:
             factor = uniform(random, ranges.larger if random.random() < 0.5 else ranges.smaller)
@@ -284,6 +286,26 @@ class _Things:
             if seen and all(np.linalg.norm(spot - other) > half + room for other, room in self._taken):
                 return spot
         return None
+
+
+def _pierces(body: Body, ball: PlacedBall | None) -> bool:
+    """Whether the surface of a body passes through a ball; touching it, as what it lies on does, is not enough."""
+    if ball is None:
+        return False
+    inner = 0.98 * ball.radius
+    if np.linalg.norm(np.maximum(np.maximum(body.low - ball.center, ball.center - body.high), 0.0)) > inner:
+        return False
+    corners = body.vertices[body.triangles] - ball.center
+    edges = np.roll(corners, -1, axis=1) - corners
+    share = -(corners * edges).sum(axis=-1) / np.maximum((edges**2).sum(axis=-1), 1e-18)
+    if np.linalg.norm(corners + np.clip(share, 0.0, 1.0)[..., None] * edges, axis=-1).min() < inner:
+        return True
+    # No edge does: a face may, where the foot of the perpendicular from the ball's center is within it.
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-18)
+    foot = (corners[:, 0] * normal).sum(axis=-1, keepdims=True) * normal
+    within = (np.cross(edges, foot[:, None] - corners) * normal[:, None]).sum(axis=-1) > 0.0
+    return bool((within.all(axis=-1) & (np.linalg.norm(foot, axis=-1) < inner)).any())
 
 
 def _reach(bodies: list[Body]) -> float:

@@ -38,7 +38,7 @@ BRIGHTEST = 64.0
 class SensorRanges:
     """Section [sensor]: what the cameras are like that take the pictures. Lengths are in pixels of the picture."""
 
-    exposure: tuple[float, float] = drawn(-1.3, 1.2, "exposure error, mostly near the middle", "EV", (-8.0, 8.0))
+    exposure: tuple[float, float] = drawn(-2.6, 0.9, "exposure error, mostly near the middle", "EV", (-8.0, 8.0))
     balance: tuple[float, float] = drawn(0.4, 1.0, "how much of the light's color is removed", "", (0.0, 1.0))
     gains: tuple[float, float] = drawn(0.93, 1.07, "error of the gains of red and blue", "", (0.1, 10.0))
     cast_share: float = share(0.2, "share of pictures that keep a color cast")

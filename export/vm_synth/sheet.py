@@ -112,7 +112,7 @@ def cell(shown: Shown, width: int) -> Image:
     size = (width, max(round(height * zoom), 1))
     how = cv2.INTER_AREA if zoom < 1.0 else cv2.INTER_LINEAR
     upper = cv2.resize(shown.image, size, interpolation=how)
-    lower = cv2.resize(tinted(shown.image, shown.mask), size, interpolation=how)
+    lower = np.asarray(cv2.resize(tinted(shown.image, shown.mask), size, interpolation=how), dtype=np.uint8)
     if shown.outline is not None:
         _draw_outline(lower, placed(shown.outline, (0.0, 0.0), zoom))
         _add_inset(lower, shown, zoom)
@@ -125,7 +125,7 @@ def cell(shown: Shown, width: int) -> Image:
 
 def placed(pixels: Floats, corner: tuple[float, float], zoom: float) -> Floats:
     """Pixels (n, 2) of a picture on its part that begins at the corner's outer edges [px], enlarged by a factor."""
-    return (pixels + 0.5 - np.array(corner)) * zoom - 0.5
+    return np.asarray((pixels + 0.5 - np.array(corner)) * zoom - 0.5)
 
 
 def _draw_outline(canvas: Image, pixels: Floats) -> None:
@@ -153,7 +153,9 @@ def _add_inset(canvas: Image, shown: Shown, zoom: float) -> None:
     scale = side / span
     shift = [0.5 * scale - 0.5 - corner[0] * scale, 0.5 * scale - 0.5 - corner[1] * scale]
     matrix = np.array([[scale, 0.0, shift[0]], [0.0, scale, shift[1]]])
-    inset = cv2.warpAffine(shown.image, matrix, (side, side), flags=cv2.INTER_NEAREST, borderValue=_PAPER)
+    inset = np.asarray(
+        cv2.warpAffine(shown.image, matrix, (side, side), flags=cv2.INTER_NEAREST, borderValue=_PAPER), dtype=np.uint8
+    )
     _draw_outline(inset, placed(shown.outline, corner, scale))
     inset[[0, -1]] = inset[:, [0, -1]] = _INK
     left = 0 if middle[0] * zoom > width / 2.0 else width - side
