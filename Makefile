@@ -3,12 +3,15 @@ PYTHON ?= python3
 BIN := .venv/bin
 PIP := $(BIN)/pip install --disable-pip-version-check --quiet --constraint deploy/constraints.txt
 DEMO := tests/fixtures/demo
+OUT ?= data/train
+COUNT ?= 8000
+SEED ?= 1
 
-.PHONY: help setup demo test lint bench fixtures docs clean
+.PHONY: help setup demo test lint bench bench-synth data fixtures docs clean
 .DELETE_ON_ERROR:
 
 help: ## what can be made
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 setup: .venv/dev ## everything for developing: runtime, torch, tests
 
@@ -27,6 +30,13 @@ lint: .venv/dev ## style and types
 bench: .venv/bench ## measure against the plain graph and the peers; write results.json and docs/performance.md (10 minutes)
 	$(BIN)/python -m benchmarks.run
 	$(BIN)/python -m benchmarks.report
+
+data: .venv/synth ## render a training set: make data HDRI=folder-of-maps [OUT=data/train] [COUNT=8000] [SEED=1]
+	@test -n "$(HDRI)" || { echo 'make data needs HDRI=folder-of-maps'; exit 1; }
+	$(BIN)/vm-synth $(OUT) --count $(COUNT) --hdri $(HDRI) --seed $(SEED) --config export/vm_synth/polyhaven.toml
+
+bench-synth: .venv/synth ## measure vm-synth: make bench-synth HDRI=folder-of-maps (8 minutes)
+	$(BIN)/python -m benchmarks.synth $(HDRI)
 
 fixtures: .venv/dev ## draw the demo's frames and train its network again (about 20 minutes)
 	$(BIN)/python -m tests.fixtures.make_demo
@@ -54,3 +64,7 @@ clean: ## remove what was made
 .venv/bench: .venv/made pyproject.toml deploy/constraints.txt
 	$(PIP) --editable '.[dev,bench]'
 	@touch $@ .venv/dev .venv/runtime
+
+.venv/synth: .venv/made pyproject.toml deploy/constraints.txt
+	$(PIP) --editable '.[synth]'
+	@touch $@ .venv/runtime

@@ -11,6 +11,7 @@ from pathlib import Path
 from vm_embedded import bench_cli as bench
 from vm_embedded import cli as detect
 from vm_export import cli as export
+from vm_synth import cli as synth
 
 PAGE = Path(__file__).parent / "command-line.md"
 
@@ -20,7 +21,7 @@ def page() -> str:
     parts = [
         "# Command line\n\nMade from the programs' own help texts; every program also prints them with `--help`.\n"
     ]
-    for parser in (detect.parser(), bench.parser(), export.parser()):
+    for parser in (detect.parser(), bench.parser(), export.parser(), *synth.parsers().values()):
         parts.append(f"## {parser.prog}\n\n{parser.description}\n")
         for group in parser._action_groups:
             rows = [_row(action) for action in group._group_actions if not isinstance(action, argparse._HelpAction)]
@@ -28,7 +29,8 @@ def page() -> str:
                 note = f" ({group.description})" if group.description else ""
                 title = (group.title or "").capitalize()
                 parts.append(f"**{title}**{note}\n\n| option | meaning |\n| --- | --- |\n" + "\n".join(rows) + "\n")
-        parts.append(f"{parser.epilog}\n")
+        if parser.epilog:
+            parts.append(f"{parser.epilog}\n")
     return "\n".join(parts)
 
 

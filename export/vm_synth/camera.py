@@ -57,21 +57,21 @@ def draw_lens(random: np.random.Generator, ranges: CameraRanges) -> RadialLens:
     view = math.radians(uniform(random, ranges.rectilinear_view if straight else ranges.fisheye_view))
     unit = projection(focal_length=1.0, fov=math.pi * 0.9)
     focal_length = width / 2.0 / float(unit.radius(view / 2.0))
-    distortion = (0.0, 0.0)
-    if random.random() < ranges.distorted:
-        distortion = (uniform(random, ranges.distortion) / focal_length**2, 0.0)
+    strength = uniform(random, ranges.distortion) if random.random() < ranges.distorted else 0.0
     center = (uniform(random, ranges.off_center) * width, uniform(random, ranges.off_center) * width)
     if straight:
         fov = math.radians(170.0)
     elif random.random() < ranges.image_circle:
         diameter = uniform(random, ranges.circle)
         focal_length *= min(diameter, 1.0)
-        fov = 2.0 * float(unit.angle(diameter * width / 2.0 / focal_length))
+        rim = min(diameter * width / 2.0 / focal_length, float(unit.radius(math.pi)))
+        fov = 2.0 * float(unit.angle(rim))
     else:
         # As far as the corners, and the picture's center may be off the lens's.
         corner = math.hypot(width, height) / width * 1.1
         reach = float(unit.angle(min(corner * width / 2.0 / focal_length, float(unit.radius(math.radians(170.0))))))
         fov = 2.0 * reach
+    distortion = (strength / focal_length**2, 0.0)
     return projection(focal_length=focal_length, fov=min(fov, 2.0 * math.pi), center=center, distortion=distortion)
 
 

@@ -126,17 +126,18 @@ def _shard(text: str) -> tuple[int, int]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-synth and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    commands = {"preview": _preview, "check": _check, "config": _config}
+    command = given[0] if given[:1] and given[0] in commands else None
     try:
         with stoppable():
-            for name, run in {"preview": _preview, "check": _check, "config": _config}.items():
-                if given[:1] == [name]:
-                    return run(parsers()[f"vm-synth {name}"].parse_args(given[1:]))
+            if command is not None:
+                return commands[command](parsers()[f"vm-synth {command}"].parse_args(given[1:]))
             return _render(parser().parse_args(given))
     except VisualMeshError as error:
         print(f"vm-synth: {' '.join(str(error).split())}", file=sys.stderr)
         return EXIT_FAILED
     except KeyboardInterrupt:
-        print("vm-synth: stopped; the same command goes on from here", file=sys.stderr)
+        print("vm-synth: stopped" + "; the same command goes on from here" * (command is None), file=sys.stderr)
         return EXIT_INTERRUPTED
 
 

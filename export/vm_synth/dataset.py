@@ -189,6 +189,7 @@ def truth(index: int, map_name: str, scene: Scene, picture: Picture) -> dict[str
         "height": scene.orientation.height,
         "pitch": scene.orientation.pitch,
         "roll": scene.orientation.roll,
+        "ball_radius": scene.ball_radius,
         "ball": None if scene.ball is None else _ball_truth(scene, scene.ball, picture),
         "other_ball": None
         if scene.other is None
@@ -209,7 +210,7 @@ def _placed(ball: PlacedBall) -> dict[str, Any]:
 
 
 def _ball_truth(scene: Scene, ball: PlacedBall, picture: Picture) -> dict[str, Any]:
-    pixels = outline(scene.lens, scene.orientation, ball.center, ball.radius, scene.size)
+    pixels = outline(scene.lens, scene.orientation, ball.center, ball.radius, scene.size, unseen=True)
     toward = (ball.center - scene.camera) @ scene.orientation.rotation
     center = scene.lens.project((toward / np.linalg.norm(toward))[None], scene.size)[0]
     area = polygon_area(pixels)

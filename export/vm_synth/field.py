@@ -76,9 +76,9 @@ class Field:
         c, s = math.cos(self.heading), math.sin(self.heading)
         return np.array([[c, -s], [s, c]])
 
-    def on_carpet(self, spot: Floats) -> bool:
-        """Whether a place (2,) of the world is on the carpet."""
-        x, y = np.abs((spot - np.array(self.middle)) @ self.rotation)
+    def on_carpet(self, spot: Floats, margin: float = 0.0) -> bool:
+        """Whether a place (2,) of the world is on the carpet, at least a margin [m] from its edge."""
+        x, y = np.abs((spot - np.array(self.middle)) @ self.rotation) + margin
         return bool(x < self.length / 2.0 + self.border and y < self.width / 2.0 + self.border)
 
 

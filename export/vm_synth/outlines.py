@@ -12,10 +12,17 @@ from vm_embedded.orientation import Orientation
 
 
 def outline(
-    lens: Lens, orientation: Orientation, center: Floats, radius: float, size: Size, corners: int = 256
+    lens: Lens,
+    orientation: Orientation,
+    center: Floats,
+    radius: float,
+    size: Size,
+    corners: int = 256,
+    unseen: bool = False,
 ) -> Floats:
     """Pixels (corners, 2) of the outline of a sphere around center (3,) [m], as the lens maps it to a picture of this
-    size; NaN where the lens does not see it. The camera stands over the world's origin."""
+    size; NaN where the lens does not see it, unless `unseen` asks for that part too. The camera stands over the
+    world's origin."""
     toward = (center - np.array([0.0, 0.0, orientation.height])) @ orientation.rotation
     distance = float(np.linalg.norm(toward))
     axis = toward / distance
@@ -26,7 +33,8 @@ def outline(
     sine = min(radius / distance, 1.0)
     rays = math.sqrt(1.0 - sine * sine) * axis + sine * around
     pixels = lens.project(rays, size)
-    pixels[~lens.sees(rays)] = np.nan
+    if not unseen:
+        pixels[~lens.sees(rays)] = np.nan
     return pixels
 
 

@@ -14,7 +14,8 @@ from vm_embedded.arrays import Floats, Mask
 from vm_embedded.lens import RadialLens, Size
 from vm_embedded.orientation import Orientation
 
-from .balls import BallDesign, draw_design
+from .ball_design import BallDesign
+from .balls import draw_design
 from .bodies import draw_carrier, draw_clutter, draw_distractor, draw_furniture, draw_person, draw_robot
 from .camera import draw_lens, draw_orientation
 from .clutter import pedestal
@@ -44,7 +45,8 @@ class PlacedBall:
 class Scene:
     """Everything that one picture shows.
 
-    field: the soccer field, or None where the ball lies on the floor of the photograph. ball: the one to be found.
+    field: the soccer field, or None where the ball lies on the floor of the photograph. ball: the one to be found,
+    or None where there is none of the radius that balls have here.
     other: a ball that is not, because it is of another size or off the plane; other_label says what it counts as.
     mesh: all other things, by names, each of so many vertices as counts says. ground_albedo (3,) is what the ground
     throws back at them. seed: of the paths of light.
@@ -54,6 +56,7 @@ class Scene:
     size: Size
     orientation: Orientation
     field: Field | None
+    ball_radius: float
     ball: PlacedBall | None
     other: PlacedBall | None
     other_label: str
@@ -77,10 +80,10 @@ def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environm
     radius = uniform(random, ranges.ball.radius)
     missing = random.random() < ranges.ball.missing
     orientation, spot = _view(random, ranges, lens, radius, environment.floor if catcher else None)
-    field = None if catcher else _field_around(random, ranges, spot)
+    field = None if catcher else _field_around(random, ranges, spot, radius)
 
     ball = None if missing else _placed(random, ranges, np.array([*spot, radius]), radius)
-    things = _Things(random, ranges, lens, orientation, environment.floor if catcher else None)
+    things = _Things(random, ranges, lens, orientation, field, environment.floor if catcher else None)
     if ball is not None:
         things.keep_clear(spot, radius)
         if random.random() < ranges.ball.hidden:
@@ -95,6 +98,7 @@ def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environm
         size=ranges.camera.size,
         orientation=orientation,
         field=field,
+        ball_radius=radius,
         ball=ball,
         other=other,
         other_label=label,
@@ -148,11 +152,11 @@ def _in_picture(lens: RadialLens, size: Size, rays: Floats, margin: float) -> Ma
     return np.asarray(inside & lens.sees(rays))
 
 
-def _field_around(random: np.random.Generator, ranges: SceneConfiguration, spot: Floats) -> Field:
+def _field_around(random: np.random.Generator, ranges: SceneConfiguration, spot: Floats, radius: float) -> Field:
     """A field under the camera, and under the ball's place if it is large enough."""
     for _ in range(_TRIES):
         field = draw_field(random, ranges.field)
-        if field.on_carpet(spot):
+        if field.on_carpet(spot, 2.0 * radius):
             break
     return field
 
@@ -172,6 +176,7 @@ class _Things:
         ranges: SceneConfiguration,
         lens: RadialLens,
         orientation: Orientation,
+        field: Field | None,
         floor: float | None,
     ) -> None:
         self.bodies: list[Body] = []
@@ -179,6 +184,7 @@ class _Things:
         self._ranges = ranges
         self._lens = lens
         self._orientation = orientation
+        self._field = field
         self._farthest = ranges.things.distance[1]
         if floor is not None:
             self._farthest = min(self._farthest, orientation.height / math.tan(floor))
@@ -280,6 +286,8 @@ class _Things:
             distance = log_uniform(random, (nearest, self._farthest))
             heading = random.uniform(-math.pi, math.pi)
             spot = distance * np.array([math.cos(heading), math.sin(heading)])
+            if self._field is not None and not self._field.on_carpet(spot, min(half, 0.3)):
+                continue
             ray = np.array([*spot, min(half, 0.3) - self._orientation.height])
             ray = (ray / np.linalg.norm(ray)) @ self._orientation.rotation
             seen = _in_picture(self._lens, self._ranges.camera.size, ray[None], half / (2.0 * distance))[0]

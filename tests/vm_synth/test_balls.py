@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from vm_embedded.errors import InputError
-from vm_synth.balls import KINDS, BallDesign, BallRanges, draw_design, paint, white_share
+from vm_synth.ball_design import BallDesign
+from vm_synth.ball_patterns import KINDS
+from vm_synth.balls import BallRanges, draw_design, paint, white_share
 
 HEIGHT = 64
 

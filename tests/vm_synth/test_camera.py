@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.vm_embedded.strategies import reals, seeds
+from tests.vm_embedded.strategies import rays_at, reals, seeds
 from vm_embedded.lens import PROJECTIONS, Equisolid, Rectilinear
 from vm_synth.camera import CameraRanges, draw_lens, draw_orientation
 
@@ -80,18 +80,33 @@ def test_a_lens_reaches_the_corners_unless_it_has_an_image_circle(seed):
     assert lens.sees(rays).all() or lens.limit >= math.radians(85.0)
 
 
-@given(seeds)
-def test_an_image_circle_ends_near_the_left_and_right_edge(seed):
-    ranges = replace(STRAIGHT, image_circle=1.0, projections=("equisolid", "equidistant"))
+@given(st.sampled_from(["equisolid", "equidistant"]), reals(0.2, 1.5), reals(80.0, 200.0), seeds)
+def test_an_image_circle_has_the_drawn_diameter(name, diameter, view, seed):
+    """A circle that fits into the picture shows what was drawn; a larger one is cut by the edges, as without it."""
+    ranges = replace(
+        STRAIGHT, image_circle=1.0, circle=(diameter, diameter), projections=(name,), fisheye_view=(view, view)
+    )
     lens = lens_of(seed, ranges)
-    left, _ = edges(lens, ranges.size)
-    assert 0.899 <= lens.limit / math.acos(left[0]) <= 1.101
-    assert not lens.sees(lens.unproject(np.array([[0.0, 0.0]]), ranges.size)).any()
+    rim = lens.project(rays_at(np.full(8, lens.limit), np.arange(8.0)), ranges.size)
+    radius = np.linalg.norm(rim - np.array(ranges.size) / 2.0, axis=1)
+    whole = lens.limit > math.radians(179.9)
+    assert whole or radius == pytest.approx(0.5 * diameter * ranges.picture_width, rel=1e-6)
+    if diameter <= 1.0:
+        assert lens.limit == pytest.approx(math.radians(view / 2.0), rel=1e-9)
+    else:
+        left, _ = edges(lens, ranges.size)
+        assert math.acos(left[0]) == pytest.approx(math.radians(view / 2.0), rel=1e-9)
 
 
-@given(seeds)
-def test_center_and_distortion_stay_in_their_ranges(seed):
-    ranges = CameraRanges(distorted=1.0, off_center=(0.01, 0.03), distortion=(-0.03, -0.02))
+@given(reals(80.0, 300.0), reals(0.1, 2.0), seeds)
+def test_every_allowed_circle_is_a_lens(view, diameter, seed):
+    ranges = CameraRanges(image_circle=1.0, circle=(diameter, diameter), fisheye_view=(view, view))
+    assert 0.0 < lens_of(seed, ranges).limit <= math.pi
+
+
+@given(reals(0.0, 1.0), seeds)
+def test_center_and_distortion_stay_in_their_ranges(circles, seed):
+    ranges = CameraRanges(image_circle=circles, distorted=1.0, off_center=(0.01, 0.03), distortion=(-0.03, -0.02))
     lens = lens_of(seed, ranges)
     assert all(0.01 * ranges.picture_width <= each <= 0.03 * ranges.picture_width for each in lens.center)
     assert -0.03 - 1e-12 <= lens.distortion[0] * lens.focal_length**2 <= -0.02 + 1e-12

@@ -110,7 +110,8 @@ UNITS = {
     "m": "camera.height ball.radius ball.distance ball.off_plane_height things.distance field.length field.line_width "
     "field.border field.goal_height field.goal_width bodies.clutter_size bodies.shoe_length bodies.furniture_size "
     "bodies.robot_height bodies.person_height bodies.distractor_radius",
-    "deg": "camera.rectilinear_view camera.fisheye_view camera.pitch camera.steep_pitch camera.roll field.hue maps.floors",
+    "deg": "camera.rectilinear_view camera.fisheye_view camera.pitch camera.steep_pitch camera.roll field.hue "
+    "maps.floors",
     "px": "camera.picture_width camera.picture_height sensor.defocus sensor.motion sensor.fringe",
 }
 

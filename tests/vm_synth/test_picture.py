@@ -40,6 +40,7 @@ def scene(lens, pitch=0.6, roll=0.1, height=0.8, spot=None, radius=0.1, bodies=(
         size=SIZE,
         orientation=orientation,
         field=None,
+        ball_radius=radius,
         ball=PlacedBall(np.array([*spot, radius]), radius, np.eye(3), design),
         other=None,
         other_label="environment",

@@ -1,0 +1,58 @@
+"""How fast vm-synth renders, and with how much memory: `make bench-synth HDRI=...`.
+
+Renders the same small set with one worker and with two, each in a fresh folder, and writes benchmarks/synth.json and
+the table of docs/synth.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from vm_embedded.bench import machine
+
+RESULTS = Path(__file__).with_name("synth.json")
+PAGE = Path(__file__).parents[1] / "docs" / "synth.md"
+CONFIG = Path(__file__).parents[1] / "export" / "vm_synth" / "polyhaven.toml"
+SUMMARY = re.compile(r"(\d+) pictures in (\d+) s, (\d+) an hour; (\d+) MiB a worker at most")
+
+
+def rendered(hdri: Path, count: int, workers: int) -> dict[str, int]:
+    """Pictures, seconds, pictures an hour and MiB of the largest worker."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "vm_synth", folder, "--count", str(count), "--workers", str(workers)]
+        command += ["--hdri", str(hdri), "--seed", "2", "--config", str(CONFIG)]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+    found = SUMMARY.search(done.stderr)
+    assert found, done.stderr
+    return dict(zip(("pictures", "seconds", "an_hour", "mib_a_worker"), map(int, found.groups()), strict=True))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("hdri", type=Path, help="folder of maps")
+    parser.add_argument("--count", type=int, default=200, help="pictures of 640 x 512; default 200")
+    options = parser.parse_args()
+    runs = {str(workers): rendered(options.hdri, options.count, workers) for workers in (1, 2)}
+    RESULTS.write_text(json.dumps({"machine": machine(), "runs": runs}, indent=1) + "\n")
+    rows = [
+        f"| {workers} | {run['pictures']} | {run['an_hour']} | {run['mib_a_worker']} |" for workers, run in runs.items()
+    ]
+    heads = "| workers | pictures | pictures an hour | MiB a worker, at most |\n| ---: | ---: | ---: | ---: |\n"
+    text = PAGE.read_text()
+    filled = re.sub(
+        r"(<!-- throughput -->\n).*?(\n<!-- end -->)",
+        lambda part: part[1] + heads + "\n".join(rows) + part[2],
+        text,
+        flags=re.DOTALL,
+    )
+    PAGE.write_text(filled)
+
+
+if __name__ == "__main__":
+    main()
