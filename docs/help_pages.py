@@ -1,6 +1,7 @@
-"""Writes docs/command-line.md from the parsers, so that page and program can't drift apart.
+"""Writes docs/command-line.md from the parsers, and docs/scene.toml from the ranges of vm-synth, so that they and the
+programs can't drift apart.
 
-python docs/help_pages.py writes the page; a test checks that it is what this would write.
+python docs/help_pages.py writes both; a test checks that they are what this would write.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ from vm_embedded import bench_cli as bench
 from vm_embedded import cli as detect
 from vm_export import cli as export
 from vm_synth import cli as synth
+from vm_synth.configuration import SceneConfiguration, documented
 
 PAGE = Path(__file__).parent / "command-line.md"
+SCENE = Path(__file__).parent / "scene.toml"
 
 
 def page() -> str:
@@ -34,6 +37,11 @@ def page() -> str:
     return "\n".join(parts)
 
 
+def scene() -> str:
+    """All entries of a scene.toml with their meanings and defaults."""
+    return "\n".join(documented(SceneConfiguration()))
+
+
 def _row(action: argparse.Action) -> str:
     names = ", ".join(f"`{name}`" for name in action.option_strings) or f"`{action.dest}`"
     if action.choices:
@@ -45,3 +53,4 @@ def _row(action: argparse.Action) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(page())
+    SCENE.write_text(scene())

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError, VisualMeshError, unknown
-from .lens import Lens, projection_named
+from .lens import Lens, RadialLens, projection_named
 from .lens_opencv import BrownLens, FisheyeLens
 from .orientation import Orientation
 from .yaml_reader import read_yaml
@@ -62,7 +62,7 @@ def read_lens_file(path: str | Path) -> LensFile:
         raise InputError(f"lens file {path}: {error}") from error
 
 
-def lens_from_table(table: Mapping[str, Any]) -> Lens:
+def lens_from_table(table: Mapping[str, Any]) -> RadialLens:
     """A lens from projection, focal_length [px], fov [rad] and, where they matter, center, distortion and size [px].
 
     Raises InputError naming an unknown or missing key.

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from vm_embedded.lens import PROJECTIONS, RadialLens, Rectilinear, Size
+from vm_embedded.lens_file import lens_from_table
 from vm_embedded.orientation import Orientation
 
 from .ranges import check_entries, drawn, number, share, some_of, uniform
@@ -40,8 +43,18 @@ class CameraRanges:
     roll: tuple[float, float] = drawn(-10.0, 10.0, "lean to the right", "deg", (-180.0, 180.0))
     tumbled: float = share(0.04, "pictures with any roll")
 
+    lens: Mapping[str, Any] = field(
+        default_factory=dict,
+        metadata={
+            "help": "one lens for all pictures instead of those drawn: a table with projection, focal_length [px], fov "
+            "[rad] and where they matter center, distortion and size, as in vm.toml"
+        },
+    )
+
     def __post_init__(self) -> None:
         check_entries(self)
+        if self.lens:
+            lens_from_table(self.lens).for_image(self.size)
 
     @property
     def size(self) -> Size:
@@ -51,6 +64,8 @@ class CameraRanges:
 
 def draw_lens(random: np.random.Generator, ranges: CameraRanges) -> RadialLens:
     """A lens for pictures of the configured size."""
+    if ranges.lens:
+        return lens_from_table(ranges.lens).for_image(ranges.size)
     projection = PROJECTIONS[str(random.choice(ranges.projections))]
     width, height = ranges.size
     straight = projection is Rectilinear

@@ -71,13 +71,13 @@ def test_a_drawn_view_is_in_its_range(seed):
 
 @given(seeds)
 def test_a_lens_reaches_the_corners_unless_it_has_an_image_circle(seed):
-    """With a center off the middle and with distortion, too."""
-    ranges = CameraRanges(image_circle=0.0)
+    """With a center off the middle, too; strong distortion may leave some corners black."""
+    ranges = CameraRanges(image_circle=0.0, distorted=0.0)
     lens = lens_of(seed, ranges)
     width, height = ranges.size
     corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
     rays = lens.unproject(corners, ranges.size)
-    assert lens.sees(rays).all() or lens.limit >= math.radians(85.0)
+    assert lens.sees(rays).all()
 
 
 @given(st.sampled_from(["equisolid", "equidistant"]), reals(0.2, 1.5), reals(80.0, 200.0), seeds)

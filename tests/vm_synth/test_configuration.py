@@ -50,12 +50,20 @@ def between(entry):
     return st.integers(low, high) if whole(entry) else st.floats(low, high)
 
 
+LENSES = st.fixed_dictionaries(
+    {"projection": st.just("equisolid"), "focal_length": st.floats(50.0, 1000.0), "fov": st.floats(0.5, 3.0)},
+    optional={"center": st.lists(st.floats(-50.0, 50.0), min_size=2, max_size=2)},
+)
+
+
 def values_of(entry):
     metadata = entry.metadata
     if entry.name == "held_out":
         return st.lists(st.text(st.characters(exclude_categories=["Cs"]), max_size=8), max_size=3).map(tuple)
     if entry.name == "floors":
         return st.dictionaries(st.text(st.characters(exclude_categories=["Cs"]), max_size=8), st.floats(1.0, 80.0))
+    if entry.name == "lens":
+        return st.just({}) | LENSES
     if metadata["kind"] == "range":
         return st.tuples(between(entry), between(entry)).map(lambda ends: tuple(float(each) for each in sorted(ends)))
     if metadata["kind"] == "number":

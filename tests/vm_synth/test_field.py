@@ -144,7 +144,7 @@ LENSES = {
 @pytest.mark.parametrize("pitch", [-10.0, 0.0, 7.0, 20.0, 40.0])
 @pytest.mark.parametrize("roll", [0.0, 0.2])
 def test_nothing_is_painted_in_the_sky_or_beyond_the_carpet(lens, pitch, roll):
-    """Up to the pixels at the horizon, beyond which lies the sky; but for the picture's border, where how large pixels are
+    """Up to the pixels at the horizon, beyond which lies the sky; but for the border, where how large pixels are
     is known from one side only."""
     points, distance, pixel = view(lens, pitch, roll)
     its = field(middle=(1.0, 0.5), heading=0.3)
@@ -202,6 +202,7 @@ looks = st.fixed_dictionaries(
 
 
 @given(looks, reals(-10.0, 60.0), reals(0.05, 3.0))
+@settings(max_examples=20)
 def test_all_looks_are_albedos_and_shares(changes, pitch, height):
     albedo, lines, carpet = paint_ground(field(**changes), *view(LENSES["fisheye"], pitch, height=height))
     assert albedo.shape == (SIZE[1], SIZE[0], 3)

@@ -59,7 +59,7 @@ def test_grain_shrinks_and_the_light_of_a_flat_patch_stays(seed, brightness):
     found = smoothed(*flat(light))
     assert found.shape == light.shape
     assert found.dtype == np.float32
-    assert found[INNER].var() <= light[INNER].var() / 5.0
+    assert found[INNER].var() <= light[INNER].var() / 20.0
     assert found.mean() == pytest.approx(light.mean(), rel=0.01)
 
 
