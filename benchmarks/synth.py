@@ -44,14 +44,9 @@ def main() -> None:
         f"| {workers} | {run['pictures']} | {run['an_hour']} | {run['mib_a_worker']} |" for workers, run in runs.items()
     ]
     heads = "| workers | pictures | pictures an hour | MiB a worker, at most |\n| ---: | ---: | ---: | ---: |\n"
-    text = PAGE.read_text()
-    filled = re.sub(
-        r"(<!-- throughput -->\n).*?(\n<!-- end -->)",
-        lambda part: part[1] + heads + "\n".join(rows) + part[2],
-        text,
-        flags=re.DOTALL,
-    )
-    PAGE.write_text(filled)
+    table = heads + "\n".join(rows) + "\n"
+    before, after = PAGE.read_text().split("<!-- throughput -->\n")
+    PAGE.write_text(before + "<!-- throughput -->\n" + table + after[after.index("<!-- end -->") :])
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from vm_embedded.files import check_writable, written_beside
 
 from .configuration import SceneConfiguration, documented, read_scene_configuration
 from .dataset import Plan, digest, indices_in, is_done, shard_of
-from .environment import Environment, find_maps
+from .environment import Environment, absent, find_maps
 from .inspection import indices_of, inspect
 from .llvm import find_llvm, load_mitsuba
 from .plots import load_matplotlib, plot
@@ -147,7 +147,11 @@ def _render(options: argparse.Namespace) -> int:
         raise InputError("--workers and --count must be at least 1")
     configuration = read_scene_configuration(options.config)
     find_llvm()
-    maps = _good_maps(find_maps(options.hdri, configuration.maps, options.held_out), configuration)
+    chosen_maps = find_maps(options.hdri, configuration.maps, options.held_out)
+    absentees = absent(options.hdri, configuration.maps)
+    if absentees:
+        print(f"vm-synth: held out, but not in {options.hdri}: {', '.join(absentees)}", file=sys.stderr)
+    maps = _good_maps(chosen_maps, configuration)
     load_mitsuba()
     try:
         options.out.mkdir(parents=True, exist_ok=True)

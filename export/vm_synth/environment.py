@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Singles
-from vm_embedded.errors import InputError, unknown
+from vm_embedded.errors import InputError
 
 SUFFIXES = (".hdr", ".exr", ".pfm")
 
@@ -55,21 +55,27 @@ class MapRanges:
 
 
 def find_maps(folder: Path, ranges: MapRanges, held_out: bool) -> list[Path]:
-    """The maps of a folder that are to be rendered, by name. Raises InputError if there is none, or for a name in the
-    configuration that looks like a slip."""
+    """The maps of a folder that are to be rendered, by name. Raises InputError if there is none."""
     if not folder.is_dir():
         raise InputError(f"there is no folder of maps {folder}")
-    found = {path.stem: path for path in sorted(folder.iterdir()) if path.suffix.lower() in SUFFIXES}
+    found: dict[str, Path] = {}
+    for path in sorted(folder.iterdir()):
+        if path.suffix.lower() in SUFFIXES:
+            if path.stem in found:
+                raise InputError(f"maps {found[path.stem].name} and {path.name} of {folder} have one name; rename one")
+            found[path.stem] = path
     if not found:
         raise InputError(f"no maps ({', '.join(SUFFIXES)}) in {folder}")
-    if held_out:
-        for name in ranges.held_out:
-            if name not in found:
-                raise InputError(unknown("held-out map", name, found))
     chosen = [path for name, path in found.items() if (name in ranges.held_out) == held_out]
     if not chosen:
         raise InputError(f"no map of {folder} is left: {'none is' if held_out else 'all are'} held out")
     return chosen
+
+
+def absent(folder: Path, ranges: MapRanges) -> list[str]:
+    """Names that are held out but are no maps of the folder: maps of other folders, or slips."""
+    found = {path.stem for path in folder.iterdir() if path.suffix.lower() in SUFFIXES}
+    return [name for name in ranges.held_out if name not in found]
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,10 @@ from vm_embedded.errors import VisualMeshError
 
 from .configuration import SceneConfiguration
 from .dataset import write_picture
+from .drawing import draw_scene
 from .environment import Environment
 from .picture import render
-from .scene import Scene, draw_scene
+from .scene import Scene
 from .tracer import Tracer
 
 

@@ -6,10 +6,10 @@ import numpy as np
 from vm_synth.camera import CameraRanges
 from vm_synth.configuration import CLASSES, GroundRanges, SceneConfiguration, TargetRanges, ThingRanges
 from vm_synth.dataset import Plan, write_picture
+from vm_synth.drawing import draw_scene
 from vm_synth.environment import Environment
 from vm_synth.outlines import outline
 from vm_synth.picture import UNLABELED, Picture
-from vm_synth.scene import draw_scene
 
 SIZE = (96, 64)
 

@@ -9,9 +9,9 @@ import pytest
 from vm_synth.bodies import LABELS
 from vm_synth.camera import CameraRanges
 from vm_synth.configuration import SceneConfiguration, TargetRanges, ThingRanges
+from vm_synth.drawing import draw_scene
 from vm_synth.environment import Environment
 from vm_synth.field import FieldRanges
-from vm_synth.scene import draw_scene
 
 DEFAULT = SceneConfiguration()
 NOTHING = ThingRanges(robots=(0, 0), clutter=(0, 0), round_things=(0, 0), furniture=(0, 0), people=(0, 0), carrier=0.0)
