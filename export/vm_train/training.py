@@ -8,7 +8,7 @@ gradients are averaged over the selected points of all parts.
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -70,28 +70,43 @@ class Step:
     points: int
 
 
-def order(recipe: Recipe, count: int, epoch: int) -> Iterator[np.ndarray]:
-    """Positions of the pictures of each batch of an epoch; the last batch may be smaller."""
-    shuffled = np.random.default_rng([recipe.seed, 1, epoch]).permutation(count)
-    for start in range(0, count, recipe.batch):
-        yield shuffled[start : start + recipe.batch]
+@dataclass(frozen=True)
+class Item:
+    """A picture to be loaded: its position in the set, and the epoch, which seeds its augmentation."""
+
+    position: int
+    epoch: int
+
+
+def plan(recipe: Recipe, count: int) -> Iterator[list[Item]]:
+    """The batches of all steps of a training on `count` pictures; an epoch's last batch may be smaller."""
+    for epoch in range(recipe.epochs):
+        shuffled = np.random.default_rng([recipe.seed, 1, epoch]).permutation(count)
+        for start in range(0, count, recipe.batch):
+            yield [Item(int(each), epoch) for each in shuffled[start : start + recipe.batch]]
+
+
+Loader = Callable[[list[list[Item]]], Iterable[list[Graph]]]
+"""Gives the graphs of batches, in order; see loading.py."""
 
 
 class Training:
-    """A network while it is trained on `count` pictures, of which `graph(position, epoch)` gives one."""
+    """A network while it is trained on `count` pictures.
+
+    errors: for selection hard, how wrong earlier networks were at each point of a picture, by its position.
+    """
 
     def __init__(
         self,
         network: Network,
         recipe: Recipe,
         count: int,
-        graph: Callable[[int, int], Graph],
         errors: Callable[[int], np.ndarray] | None = None,
     ) -> None:
         if count < 1:
             raise InputError("there are no pictures to train on")
         self.network, self.recipe = network, recipe
-        self._count, self._graph, self._errors = count, graph, errors
+        self._count, self._errors = count, errors
         self.steps_an_epoch = -(-count // recipe.batch)
         self.total = recipe.epochs * self.steps_an_epoch
         options = {} if recipe.optimizer == "sgd" else {"weight_decay": recipe.decay}
@@ -103,42 +118,33 @@ class Training:
             self._schedule = torch.optim.lr_scheduler.ConstantLR(self._optimizer, factor=1.0, total_iters=0)
         self.done = 0
 
-    def run(self, until: int | None = None) -> Iterator[Step]:
+    def run(self, loader: Loader, until: int | None = None) -> Iterator[Step]:
         """Do the steps that are left, or those before `until`, and report each."""
-        stop = self.total if until is None else min(until, self.total)
-        while self.done < stop:
-            epoch, first = divmod(self.done, self.steps_an_epoch)
-            for positions in list(order(self.recipe, self._count, epoch))[first:]:
-                if self.done >= stop:
-                    return
-                yield self._step(positions, epoch)
-
-    def _step(self, positions: np.ndarray, epoch: int) -> Step:
         rank, size = (distributed.get_rank(), distributed.get_world_size()) if distributed.is_initialized() else (0, 1)
-        own = positions[rank::size]
-        chosen_by = [np.random.default_rng([self.recipe.seed, 2, epoch, int(each)]) for each in own]
-        loss, points = torch.zeros(()), 0
-        if len(own):
-            loss, points = self._loss([self._graph(int(each), epoch) for each in own], own, chosen_by[0])
+        batches = list(plan(self.recipe, self._count))[self.done : until]
+        own = [batch[rank::size] for batch in batches]
+        for items, graphs in zip(own, loader(own), strict=True):
+            yield self._step(items, graphs)
+
+    def _step(self, items: list[Item], graphs: list[Graph]) -> Step:
+        loss, points = self._loss(items, graphs) if graphs else (torch.zeros(()), 0)
         self._optimizer.zero_grad()
-        everyone = _sum_over_processes(torch.tensor(float(points)))
+        everyone = _sum_over_processes(torch.tensor(float(points))).clamp(min=1.0)
         if points:
-            (loss / everyone.clamp(min=1.0)).backward()  # type: ignore[no-untyped-call]
+            (loss / everyone).backward()  # type: ignore[no-untyped-call]
         _sum_gradients(self.network)
         if self.recipe.clip:
             nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.clip)
         self._optimizer.step()
         self._schedule.step()
         self.done += 1
-        whole = _sum_over_processes(loss.detach()) / everyone.clamp(min=1.0)
-        return Step(self.done, float(whole), int(everyone))
+        return Step(self.done, float(_sum_over_processes(loss.detach()) / everyone), int(everyone))
 
-    def _loss(
-        self, graphs: Sequence[Graph], positions: np.ndarray, random: np.random.Generator
-    ) -> tuple[torch.Tensor, int]:
+    def _loss(self, items: list[Item], graphs: list[Graph]) -> tuple[torch.Tensor, int]:
         """The summed loss of the selected points of some pictures, and their number."""
         graph, _ = together(graphs)
-        errors = None if self._errors is None else np.concatenate([self._errors(int(each)) for each in positions])
+        errors = None if self._errors is None else np.concatenate([self._errors(each.position) for each in items])
+        random = np.random.default_rng([self.recipe.seed, 2, items[0].epoch, items[0].position])
         chosen = selected(self.recipe.selection, graph.labels, self.network.shape.classes, errors, random)
         logits = self.network.logits(torch.from_numpy(graph.points), torch.from_numpy(graph.neighbors))
         wanted = torch.from_numpy(np.flatnonzero(chosen))

@@ -10,7 +10,9 @@ from vm_embedded.lens import Equisolid
 from vm_embedded.manifest import Manifest, ObjectClass
 from vm_synth.dataset import lens_text
 from vm_train.graphs import graph_of
+from vm_train.loading import Graphs, loaded
 from vm_train.pictures import UNLABELED, Classes, check_pictures, find_pictures, read_picture
+from vm_train.training import Item
 
 CLASSES = Classes({"ball": ((255, 0, 0),), "field": ((0, 255, 0), (255, 255, 255)), "environment": ((0, 0, 0),)})
 MANIFEST = Manifest(
@@ -132,3 +134,15 @@ def test_a_graph_shows_the_picture_at_the_meshs_pixels(folder):
     red = graph.points[:-1][graph.labels == 0].mean(axis=0)
     assert red[0] > 0.8 > 0.3 > max(red[1:])
     assert (graph.distances < 6.5).all()
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_batches_come_in_order_whoever_loads_them(workers, folder):
+    pictures = find_pictures(folder)
+    graphs = Graphs(pictures, CLASSES, MANIFEST)
+    batches = [[Item(1, 0), Item(0, 0)], [Item(1, 1)]]
+    found = list(loaded(graphs, batches, workers))
+    assert [len(batch) for batch in found] == [2, 1]
+    alone = graph_of(read_picture(pictures[1], CLASSES), MANIFEST)
+    assert (found[0][0].points == alone.points).all()
+    assert (found[1][0].labels == alone.labels).all()

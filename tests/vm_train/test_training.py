@@ -14,7 +14,7 @@ from vm_train.training import Recipe, Training
 COUNT = 6
 
 
-def graph(position, epoch=0):
+def graph(position):
     """Forty points in a row, linked to those beside them; bright ones are of class 1."""
     random = np.random.default_rng([position, 17])
     n = 40
@@ -28,10 +28,14 @@ def graph(position, epoch=0):
     return Graph(points, neighbors, labels, np.linspace(0.0, 10.0, n))
 
 
-def training(recipe=None, graph=graph):
+def load(batches):
+    return ([graph(each.position) for each in items] for items in batches)
+
+
+def training(recipe=None):
     torch.manual_seed(3)
     network = Network(NetworkShape.uniform(depth=3, width=4, classes=2))
-    return Training(network, recipe or Recipe(epochs=3, batch=2, seed=5), COUNT, graph)
+    return Training(network, recipe or Recipe(epochs=3, batch=2, seed=5), COUNT)
 
 
 def weights(made):
@@ -56,7 +60,7 @@ def test_graphs_together_answer_as_they_do_alone():
 
 
 def test_it_learns():
-    steps = list(training(Recipe(epochs=60, batch=3, rate=0.02)).run())
+    steps = list(training(Recipe(epochs=60, batch=3, rate=0.02)).run(load))
     assert len(steps) == 120
     assert np.mean([each.loss for each in steps[-6:]]) < 0.3 * np.mean([each.loss for each in steps[:6]])
 
@@ -67,14 +71,14 @@ def test_it_learns():
 @pytest.mark.parametrize("stop", [1, 3, 4])
 def test_what_is_interrupted_ends_with_the_same_weights(recipe, stop, tmp_path):
     whole = training(recipe)
-    losses = [each.loss for each in whole.run()]
+    losses = [each.loss for each in whole.run(load)]
 
     first = training(recipe)
-    before = [each.loss for each in first.run(until=stop)]
+    before = [each.loss for each in first.run(load, until=stop)]
     first.save(tmp_path / "state.pt")
     second = training(recipe)
     second.load(tmp_path / "state.pt")
-    after = [each.loss for each in second.run()]
+    after = [each.loss for each in second.run(load)]
     assert before + after == losses
     assert same(weights(second), weights(whole))
 
@@ -83,7 +87,7 @@ def test_the_same_seed_gives_the_same_weights_and_another_one_others():
     runs = []
     for seed in (1, 1, 2):
         made = training(Recipe(epochs=2, batch=2, seed=seed))
-        list(made.run())
+        list(made.run(load))
         runs.append(weights(made))
     assert same(runs[0], runs[1])
     assert not same(runs[0], runs[2])
@@ -99,7 +103,7 @@ def _part(rank, size, folder):
     """One of `size` processes that train together."""
     torch.distributed.init_process_group("gloo", init_method=f"file://{folder}/meet", rank=rank, world_size=size)
     made = training(Recipe(epochs=2, batch=4, selection="all"))
-    losses = [each.loss for each in made.run()]
+    losses = [each.loss for each in made.run(load)]
     torch.save({"losses": losses, "network": weights(made)}, Path(folder) / f"rank{rank}.pt")
     torch.distributed.destroy_process_group()
 
@@ -107,7 +111,7 @@ def _part(rank, size, folder):
 @pytest.mark.slow
 def test_two_processes_train_as_one(tmp_path):
     alone = training(Recipe(epochs=2, batch=4, selection="all"))
-    losses = [each.loss for each in alone.run()]
+    losses = [each.loss for each in alone.run(load)]
     torch.multiprocessing.spawn(_part, args=(2, str(tmp_path)), nprocs=2)
     parts = [torch.load(tmp_path / f"rank{rank}.pt") for rank in range(2)]
     assert same(parts[0]["network"], parts[1]["network"])
