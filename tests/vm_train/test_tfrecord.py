@@ -26,12 +26,6 @@ from vm_train.tfrecord import (
 )
 from vm_train.tfrecord_import import import_records, parser, run
 
-GOAT = (
-    b"\nR\n\x11\n\x08feature0\x12\x05\x1a\x03\n\x01\x00\n\x11\n\x08feature1\x12\x05\x1a\x03\n\x01\x04"
-    b"\n\x14\n\x08feature2\x12\x08\n\x06\n\x04goat\n\x14\n\x08feature3\x12\x08\x12\x06\n\x04[\xd3|?"
-)
-"""The serialized example of TensorFlow's own tutorial on TFRecord."""
-
 FEATURES = st.one_of(
     st.lists(st.binary(max_size=300), max_size=4).map(lambda values: BytesList(tuple(values))),
     st.lists(st.floats(width=32, allow_nan=False), max_size=20).map(lambda values: FloatList(tuple(values))),
@@ -212,15 +206,22 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
 # Examples.
 
 
-def test_the_example_of_the_tutorial_is_read_and_written():
-    example = parse_example(GOAT)
-    assert example == {
-        "feature0": Int64List((0,)),
-        "feature1": Int64List((4,)),
-        "feature2": BytesList((b"goat",)),
-        "feature3": FloatList((float(np.float32(0.9876)),)),
+def test_an_example_built_by_hand_is_read_and_written():
+    """Each part is a tag, a length and what it holds; numbers of a list are packed."""
+
+    def part(tag, content):
+        return bytes([tag, len(content)]) + content
+
+    lists = {
+        b"count": part(0x1A, part(0x0A, b"\x07")),
+        b"ratio": part(0x12, part(0x0A, struct.pack("<f", 0.5))),
+        b"word": part(0x0A, part(0x0A, b"abc")),
     }
-    assert example_bytes(example) == GOAT
+    entries = [part(0x0A, part(0x0A, name) + part(0x12, feature)) for name, feature in lists.items()]
+    payload = part(0x0A, b"".join(entries))
+    example = parse_example(payload)
+    assert example == {"count": Int64List((7,)), "ratio": FloatList((0.5,)), "word": BytesList((b"abc",))}
+    assert example_bytes(example) == payload
 
 
 @given(EXAMPLES)
