@@ -26,6 +26,24 @@ from vm_train.tfrecord import (
 )
 from vm_train.tfrecord_import import import_records, parser, run
 
+
+def part(tag, content):
+    """A part of a message: its tag, its length and what it holds."""
+    return bytes([tag, len(content)]) + content
+
+
+def entry(name, feature):
+    return part(0x0A, part(0x0A, name) + part(0x12, feature))
+
+
+BUILT = part(
+    0x0A,
+    entry(b"count", part(0x1A, part(0x0A, b"\x07")))
+    + entry(b"ratio", part(0x12, part(0x0A, struct.pack("<f", 0.5))))
+    + entry(b"word", part(0x0A, part(0x0A, b"abc"))),
+)
+"""A serialized example of a number, a fraction and a text."""
+
 FEATURES = st.one_of(
     st.lists(st.binary(max_size=300), max_size=4).map(lambda values: BytesList(tuple(values))),
     st.lists(st.floats(width=32, allow_nan=False), max_size=20).map(lambda values: FloatList(tuple(values))),
@@ -207,21 +225,9 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
 
 
 def test_an_example_built_by_hand_is_read_and_written():
-    """Each part is a tag, a length and what it holds; numbers of a list are packed."""
-
-    def part(tag, content):
-        return bytes([tag, len(content)]) + content
-
-    lists = {
-        b"count": part(0x1A, part(0x0A, b"\x07")),
-        b"ratio": part(0x12, part(0x0A, struct.pack("<f", 0.5))),
-        b"word": part(0x0A, part(0x0A, b"abc")),
-    }
-    entries = [part(0x0A, part(0x0A, name) + part(0x12, feature)) for name, feature in lists.items()]
-    payload = part(0x0A, b"".join(entries))
-    example = parse_example(payload)
+    example = parse_example(BUILT)
     assert example == {"count": Int64List((7,)), "ratio": FloatList((0.5,)), "word": BytesList((b"abc",))}
-    assert example_bytes(example) == payload
+    assert example_bytes(example) == BUILT
 
 
 @given(EXAMPLES)
@@ -297,7 +303,7 @@ def test_a_list_partly_packed_is_read_in_order():
 
 def test_fields_of_later_versions_are_passed_over():
     later = b"\x78\x96\x01" + b"\x7a\x02hi" + b"\x7d\0\0\0\0" + b"\x79" + bytes(8)
-    assert parse_example(later + GOAT + later) == parse_example(GOAT)
+    assert parse_example(later + BUILT + later) == parse_example(BUILT)
 
 
 @given(EXAMPLES, EXAMPLES)
@@ -324,16 +330,16 @@ def test_any_bytes_are_an_example_or_a_named_fault(data):
     assert fault is None or "not an Example: " in fault
 
 
-@given(st.integers(0, len(GOAT) - 1), st.integers(0, 255))
+@given(st.integers(0, len(BUILT) - 1), st.integers(0, 255))
 def test_an_example_with_any_wrong_byte_is_an_example_or_a_named_fault(place, value):
-    fault = fault_of(GOAT[:place] + bytes([value]) + GOAT[place + 1 :])
+    fault = fault_of(BUILT[:place] + bytes([value]) + BUILT[place + 1 :])
     assert fault is None or "not an Example: " in fault
 
 
 def test_a_record_that_is_no_example_is_named_with_file_and_number(tmp_path):
-    write_records(tmp_path / "file", [GOAT, b"\x0b"])
+    write_records(tmp_path / "file", [BUILT, b"\x0b"])
     first, second = read_records(tmp_path / "file")
-    assert first.example() == first.example(checked=False) == parse_example(GOAT)
+    assert first.example() == first.example(checked=False) == parse_example(BUILT)
     with pytest.raises(InputError, match="file: record 1: not an Example: wire type 3"):
         second.example()
 
