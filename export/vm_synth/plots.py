@@ -81,7 +81,9 @@ def _histogram(axes: Axes, values: Sequence[float], name: str) -> None:
     axes.set_ylabel("pictures, log scale" if name in _UNEVEN else "pictures", fontsize=9)
     if not values:
         return _nothing(axes)
-    axes.hist(values, bins=40, color=_GREEN, log=name in _UNEVEN)
+    # A few balls at the rim of a rectilinear lens are endless; they stand in the last column.
+    shown = np.minimum(values, np.quantile(values, 0.995) if name == "ball radius [px]" else np.inf)
+    axes.hist(shown, bins=40, color=_GREEN, log=name in _UNEVEN)
     median, (low, high) = float(np.median(values)), axes.get_xlim()
     axes.axvline(median, color=_RED, linewidth=1.0)
     side = "left" if median < (low + high) / 2.0 else "right"
