@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .errors import InputError
@@ -33,7 +33,8 @@ def written_beside(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise InputError(f"can't write {path}: {error.strerror or error}") from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # on a disk that can't be written there is none, or it stays
+            part.unlink(missing_ok=True)
 
 
 def check_writable(path: Path) -> None:

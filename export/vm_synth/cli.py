@@ -153,6 +153,8 @@ def _render(options: argparse.Namespace) -> int:
         print(f"vm-synth: held out, but not in {options.hdri}: {', '.join(absentees)}", file=sys.stderr)
     maps = _good_maps(chosen_maps, configuration)
     load_mitsuba()
+    if configuration.ground.photographed and not any(path.stem in configuration.maps.floors for path in maps):
+        print("vm-synth: no map has an entry in [maps.floors], so all pictures are on fields", file=sys.stderr)
     try:
         options.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -54,8 +54,9 @@ def file_of(folder: Path, part: str, index: int) -> Path:
 
 
 def is_done(folder: Path, index: int) -> bool:
-    """Whether a picture is complete."""
-    return file_of(folder, "scene", index).is_file()
+    """Whether a picture is complete: all its parts are there, none of them empty."""
+    paths = (file_of(folder, part, index) for part in PARTS)
+    return all(path.is_file() and path.stat().st_size > 0 for path in paths)
 
 
 def indices_in(folder: Path) -> list[int]:
@@ -97,6 +98,11 @@ class Plan:
                     )
             if found.get("count", 0) >= self.count:
                 return
+        elif strangers := sorted(each for part, suffix in PARTS.items() for each in folder.glob(f"{part}*{suffix}")):
+            raise InputError(
+                f"{folder} holds {strangers[0].name} and no set.json, so it is no set of vm-synth: pictures would be "
+                "lost or mixed; write to another folder"
+            )
         with written_beside(path) as part:
             part.write_text(self.as_json(), encoding="utf-8")
 

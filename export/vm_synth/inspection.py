@@ -23,6 +23,7 @@ from vm_embedded.sources import read_image
 from .configuration import CLASSES
 from .dataset import COLORS, FORMAT, PARTS, file_of, indices_in, read_plan, read_truth
 
+_SAME_POSE = 1e-6  # [m], [rad]
 _STEP = 2  # pixels of a mask between those that are counted
 
 
@@ -155,6 +156,12 @@ def _facts(folder: Path, maps: Any, size: Size | None, index: int) -> Facts:
         if truth["map"] not in maps:
             raise InputError(f"{file_of(folder, 'scene', index)}: map {truth['map']} is none of this set's")
         ball, other = truth["ball"], truth["other_ball"]
+        pose = lens.orientation
+        apart = np.abs(np.array([truth[name] - getattr(pose, name) for name in ("height", "pitch", "roll")]))
+        if apart.max() > _SAME_POSE:
+            raise InputError(
+                f"{lens_path} has another pose than {file_of(folder, 'scene', index)}: files were mixed up"
+            )
         return Facts(
             index=index,
             map=str(truth["map"]),
@@ -199,6 +206,12 @@ def _shares(folder: Path, size: Size, index: int) -> dict[str, float]:
             raise InputError(f"{path} has {found[0]} x {found[1]} px, not {size[0]} x {size[1]}")
         if (image.shape[2] if image.ndim == 3 else 1) != channels:
             raise InputError(f"{path} has not the {channels} channels of a file of its kind")
+    ball = (images["mask"] == (*COLORS["ball"][::-1], 255)).all(axis=-1)
+    if (ball & (images["coverage"] == 0)).any():
+        path = file_of(folder, "mask", index)
+        raise InputError(
+            f"{path} shows a ball where {file_of(folder, 'coverage', index)} has none: files were mixed up"
+        )
     return class_shares(images["mask"][::_STEP, ::_STEP], file_of(folder, "mask", index))
 
 

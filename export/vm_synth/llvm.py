@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 import re
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
@@ -27,17 +30,34 @@ def load_mitsuba() -> ModuleType:
     """The module mitsuba, on one processor core. Raises InputError naming what is missing and how to get it."""
     library = find_llvm()
     os.environ["DRJIT_LIBLLVM_PATH"] = str(library)
-    try:
-        import drjit
-        import mitsuba
-    except ImportError as error:
-        raise InputError("rendering needs Mitsuba 3: pip install 'vm-embedded[synth]'") from error
+    with _interrupted_afterwards():
+        try:
+            import drjit
+            import mitsuba
+        except ImportError as error:
+            raise InputError("rendering needs Mitsuba 3: pip install 'vm-embedded[synth]'") from error
     try:
         mitsuba.set_variant(VARIANT)
     except ImportError as error:
         raise InputError(f"Mitsuba can't use {library}; {_ADVICE}") from error
     drjit.set_thread_count(1)
     return mitsuba
+
+
+@contextmanager
+def _interrupted_afterwards() -> Iterator[None]:
+    """Ctrl-C waits until the end: an import that is torn apart tells of other faults."""
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    seen: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, frame: seen.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if seen:
+        raise KeyboardInterrupt
 
 
 _ADVICE = "install LLVM 19 (Debian, Ubuntu: apt install libllvm19) or set DRJIT_LIBLLVM_PATH to its libLLVM.so"

@@ -54,8 +54,15 @@ def run(folder, arguments, **options):
 
 
 def started(command):
-    """A process that leads its own group."""
-    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment_of(), start_new_session=True)
+    """A process that leads its own group, and that Ctrl-C reaches even if these tests run in the background."""
+    return subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment_of(),
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
 
 
 def contents(folder):
@@ -174,3 +181,21 @@ def test_another_set_is_not_mixed_in(tmp_path, small, whole):
     assert done.returncode == 1
     assert "seed is 3, not 4" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["set.json"]
+
+
+def test_a_folder_of_other_pictures_is_left_alone(tmp_path, small, whole):
+    (tmp_path / "image0000001.jpg").write_bytes(b"mine")
+    done = run(tmp_path, small)
+    assert done.returncode == 1
+    assert "image0000001.jpg and no set.json" in done.stderr
+    assert contents(tmp_path) == {"image0000001.jpg": b"mine"}
+
+
+def test_pictures_that_lost_a_file_are_rendered_again(tmp_path, small, whole):
+    for name, content in whole.items():
+        (tmp_path / name).write_bytes(content)
+    (tmp_path / "mask0000002.png").unlink()
+    (tmp_path / "image0000004.jpg").write_bytes(b"")
+    done = run(tmp_path, [*small, "--workers", "1"])
+    assert "4 of 6 pictures are there already" in done.stderr
+    assert contents(tmp_path) == whole

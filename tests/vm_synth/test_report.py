@@ -36,6 +36,15 @@ def cut(path):
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
 
+def swapped_with(number):
+    """Another picture's file in the place of this one."""
+
+    def damage(path):
+        path.write_bytes(Path(str(path).replace("0000002", f"000000{number}")).read_bytes())
+
+    return damage
+
+
 def truth_with(**entries):
     def damage(path):
         path.write_text(json.dumps({**json.loads(path.read_text()), **entries}))
@@ -51,6 +60,7 @@ DAMAGES = {
         lambda path: cv2.imwrite(str(path), np.zeros((64, 90, 3), np.uint8)),
         "image0000002.jpg has 90 x 64 px, not 96 x 64",
     ),
+    "lens of another picture": ("lens", swapped_with(3), "lens0000002.yaml has another pose than scene0000002.json"),
     "image gone": ("image", lambda path: path.unlink(), "image0000002.jpg is missing"),
     "mask gone": ("mask", lambda path: path.unlink(), "mask0000002.png is missing"),
     "mask cut": ("mask", cut, "mask0000002.png is cut short"),
