@@ -13,7 +13,8 @@ from vm_embedded import bench_cli as bench
 from vm_embedded import cli as detect
 from vm_export import cli as export
 from vm_synth import cli as synth
-from vm_synth.configuration import SceneConfiguration, documented
+from vm_synth.configuration import SceneConfiguration
+from vm_synth.sections import documented
 
 PAGE = Path(__file__).parent / "command-line.md"
 SCENE = Path(__file__).parent / "scene.toml"

@@ -75,6 +75,10 @@ def _run(options: argparse.Namespace) -> int:
     if options.to_yaml and options.layout:
         raise InputError("--layout is for ONNX files, and --to-yaml writes none")
     checkpoint = _load(options.model, _overrides(options))
+    if checkpoint.grid.kind != "visual":
+        raise InputError(
+            f"{options.model} was trained on a {checkpoint.grid.kind} mesh, which the runtime does not have"
+        )
     manifest = checkpoint.manifest
     classes = ", ".join(f"{each.name} ({each.kind})" for each in manifest.classes)
     print(f"{options.model}: {len(checkpoint.network.shape.layers)} layers, {manifest.mesh}, {manifest.shape}")

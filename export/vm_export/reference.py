@@ -59,7 +59,7 @@ class Overrides:
         """A checkpoint with these entries in its manifest."""
         given = {each.name: getattr(self, each.name) for each in fields(self)}
         changed = {name: value for name, value in given.items() if value is not None}
-        return Checkpoint(checkpoint.network, replace(checkpoint.manifest, **changed))
+        return replace(checkpoint, manifest=replace(checkpoint.manifest, **changed))
 
 
 def named_class(name: str, kind: str | None = None) -> ObjectClass:

@@ -14,7 +14,7 @@ import cv2
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable, written_beside
 
-from .configuration import SceneConfiguration, documented, read_scene_configuration
+from .configuration import SceneConfiguration
 from .dataset import Plan, digest, indices_in, is_done, shard_of
 from .environment import Environment, absent, find_maps
 from .inspection import indices_of, inspect
@@ -22,6 +22,7 @@ from .llvm import find_llvm, load_mitsuba
 from .plots import load_matplotlib, plot
 from .progress import Ticker
 from .report import as_json, complaints, tables
+from .sections import documented, read_sections
 from .sheet import cell, chosen, read_shown, sheet
 from .workers import Done, Job, render_all, stoppable
 
@@ -145,7 +146,7 @@ def _render(options: argparse.Namespace) -> int:
     workers = len(os.sched_getaffinity(0)) if options.workers is None else options.workers
     if workers < 1 or options.count < 1:
         raise InputError("--workers and --count must be at least 1")
-    configuration = read_scene_configuration(options.config)
+    configuration = read_sections(SceneConfiguration, options.config)
     find_llvm()
     chosen_maps = find_maps(options.hdri, configuration.maps, options.held_out)
     absentees = absent(options.hdri, configuration.maps)

@@ -3,14 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import json
-import tomllib
-from collections.abc import Iterator, Mapping
-from dataclasses import Field, dataclass, fields
-from pathlib import Path
-from typing import Any
-
-from vm_embedded.errors import InputError, VisualMeshError, unknown
+from dataclasses import dataclass
 
 from .balls import BallRanges
 from .bodies import BodyRanges
@@ -93,77 +86,3 @@ class SceneConfiguration:
     things: ThingRanges = dataclasses.field(default_factory=ThingRanges)
     bodies: BodyRanges = dataclasses.field(default_factory=BodyRanges)
     sensor: SensorRanges = dataclasses.field(default_factory=SensorRanges)
-
-
-def read_scene_configuration(path: Path | None) -> SceneConfiguration:
-    """Read a scene.toml, or take all defaults. Raises InputError naming file, section, entry and what is allowed."""
-    if path is None:
-        return SceneConfiguration()
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"can't read configuration {path}: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"configuration {path}: {error}") from error
-    try:
-        return _configuration(table)
-    except VisualMeshError as error:
-        raise InputError(f"configuration {path}: {error}") from error
-
-
-def _configuration(table: Mapping[str, Any]) -> SceneConfiguration:
-    kinds = {each.name: each.default_factory for each in fields(SceneConfiguration)}
-    sections = {}
-    for name, entries in table.items():
-        if name not in kinds:
-            raise InputError(unknown("section", name, kinds))
-        if not isinstance(entries, Mapping):
-            raise InputError(f"{name} must be a section, [{name}], not {entries!r}")
-        kind: Any = kinds[name]
-        known = [each.name for each in fields(kind)]
-        for key in entries:
-            if key not in known:
-                raise InputError(unknown(f"entry in [{name}]", key, known))
-        try:
-            sections[name] = kind(**entries)
-        except InputError as error:
-            raise InputError(f"[{name}] {error}") from error
-    return SceneConfiguration(**sections)
-
-
-def documented(configuration: SceneConfiguration) -> Iterator[str]:
-    """Lines of a scene.toml with every entry, its meaning, unit and limits."""
-    for section in fields(configuration):
-        values = getattr(configuration, section.name)
-        yield f"[{section.name}]"
-        for entry in fields(values):
-            yield from _entry(entry, getattr(values, entry.name))
-        yield ""
-
-
-def _entry(entry: Field[Any], value: Any) -> Iterator[str]:
-    unit = f" [{entry.metadata['unit']}]" if entry.metadata.get("unit") else ""
-    yield f"# {entry.metadata['help']}{unit}{_limits(entry)}"
-    yield f"{entry.name} = {_toml(value)}"
-
-
-def _limits(entry: Field[Any]) -> str:
-    if "allowed" in entry.metadata:
-        return f"; of {', '.join(entry.metadata['allowed'])}"
-    low, high = entry.metadata.get("limits", (None, None))
-    if low is None:
-        return ""
-    return f"; {low:g} to {high:g}" if high != float("inf") else f"; at least {low:g}"
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, Mapping):
-        pairs = ", ".join(f"{_toml(name)} = {_toml(each)}" for name, each in value.items())
-        return f"{{ {pairs} }}" if pairs else "{}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_toml(each) for each in value) + "]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return short if float(short := f"{value:g}") == value else repr(value)

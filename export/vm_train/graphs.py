@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,11 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Indices, Singles
+from vm_embedded.lens import Lens, Size
+from vm_embedded.lens_file import LensFile
 from vm_embedded.manifest import Manifest
 from vm_embedded.mesh import Mesh, ring_mesh
-from vm_embedded.projection import project
+from vm_embedded.projection import Projection, project
 from vm_embedded.sampling import sample
+from vm_export.checkpoint import VISUAL, Grid
 
+from .hexagonal import ROW, HexagonalMesh, hexagonal_mesh, seen_hexagonal_mesh
 from .pictures import Labels, Picture
 
 OFF_SCREEN = -1.0
@@ -38,24 +43,64 @@ class Graph:
         return len(self.labels)
 
 
-def graph_of(picture: Picture, manifest: Manifest) -> Graph:
-    """What a network with this manifest sees of a picture. Raises GeometryError if the camera is too low for a mesh."""
-    orientation = picture.lens.orientation
+def seen_points(lens: LensFile, size: Size, manifest: Manifest, grid: Grid = VISUAL) -> Projection[Mesh]:
+    """The points that a network gets of a picture: on screen all of them, rays in the observation-plane frame.
+
+    The lens file has an orientation. Raises GeometryError if the camera is too low for a mesh, and InputError if the
+    lens does not fit the picture or sees none of it.
+    """
+    orientation = lens.orientation
     assert orientation is not None  # read_picture has seen to it
+    fitted = lens.lens.for_image(size)
+    mesh = ring_mesh(
+        manifest.mesh_shape, orientation.height, manifest.intersections, manifest.max_distance, manifest.mesh
+    )
+    if grid.kind == "visual":
+        return project(mesh, orientation.level, fitted, size).visible
+    if grid.equal_at:
+        flat = _equal_hexagonal_mesh(fitted, size, manifest, orientation.height, grid.equal_at)
+    else:
+        count = np.count_nonzero(project(mesh, orientation.level, fitted, size).on_screen)
+        flat = seen_hexagonal_mesh(fitted, size, max(int(count), 1))
+    rays = np.asarray(fitted.unproject(flat.pixels, size) @ orientation.level.T)
+    return Projection(Mesh(rays, flat.neighbors), flat.pixels, np.ones(len(flat), dtype=bool))
+
+
+def _equal_hexagonal_mesh(lens: Lens, size: Size, manifest: Manifest, height: float, distance: float) -> HexagonalMesh:
+    """A mesh with as many points on an object at a distance [m] as the Visual Mesh has.
+
+    The Visual Mesh has k^2 points on the square around an object. The object's size in the picture is taken as on the
+    lens's axis.
+    """
+    radius = manifest.radius
+    away = math.hypot(distance, height - manifest.mesh_shape.center_height)
+    step = 1e-4  # [rad]
+    axis = np.array([[1.0, 0.0, 0.0], [1.0, step, 0.0], [1.0, 0.0, step]])
+    middle, left, up = lens.project(axis / np.linalg.norm(axis, axis=1, keepdims=True), size)
+    scale = math.sqrt(abs(float(np.linalg.det(np.stack([left - middle, up - middle]))))) / step  # [px/rad]
+    cell = (2.0 * radius / away * scale / manifest.intersections) ** 2  # [px^2] for each point
+    spacing = math.sqrt(cell / ROW)
+    count = max(round((size[0] - 1.0) * (size[1] - 1.0) / (spacing**2 * ROW)), 1)
+    mesh = hexagonal_mesh(size, count)
+    return mesh.part(np.flatnonzero(mesh.on_screen(lens, size)))
+
+
+def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> Graph:
+    """What a network with this manifest sees of a picture. Raises GeometryError or InputError as seen_points does."""
     height, width = picture.labels.shape
-    mesh = ring_mesh(manifest.mesh_shape, orientation.height, manifest.intersections, manifest.max_distance)
-    lens = picture.lens.lens.for_image((width, height))
-    shown = project(mesh, orientation.level, lens, (width, height)).visible
+    shown = seen_points(picture.lens, (width, height), manifest, grid)
     points = np.full((len(shown) + 1, 3), OFF_SCREEN, dtype=np.float32)
     sample(picture.image, shown.pixels, "bgr", "exact", out=points[:-1])
     x, y = np.rint(shown.pixels).astype(np.intp).T
-    return Graph(points, shown.graph.neighbors, picture.labels[y, x], _distances(shown.graph, orientation.height))
+    assert picture.lens.orientation is not None
+    distances = plane_distances(shown.graph.rays, picture.lens.orientation.height)
+    return Graph(points, shown.graph.neighbors, picture.labels[y, x], distances)
 
 
-def _distances(mesh: Mesh, height: float) -> Floats:
-    """Where the rays (n, 3) of a mesh meet the plane [m]; infinite above the horizon."""
-    across, down = np.hypot(mesh.rays[:, 0], mesh.rays[:, 1]), -mesh.rays[:, 2]
-    with np.errstate(divide="ignore"):
+def plane_distances(rays: Floats, height: float) -> Floats:
+    """Distance from the camera's foot to where rays (n, 3) meet the plane (n,) [m]; infinite above the horizon."""
+    across, down = np.hypot(rays[:, 0], rays[:, 1]), -rays[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(down > 0.0, height * across / down, np.inf))
 
 

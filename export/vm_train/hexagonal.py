@@ -16,7 +16,7 @@ from vm_embedded.arrays import Floats, Indices, Mask, frozen
 from vm_embedded.errors import InputError
 from vm_embedded.lens import Lens, Size
 
-_ROW = math.sqrt(3.0) / 2.0
+ROW = math.sqrt(3.0) / 2.0
 """Distance of two rows, in spacings of the points within a row."""
 
 _STEPS = ((0, 2), (-1, 1), (-1, -1), (0, -2), (1, -1), (1, 1))
@@ -70,7 +70,7 @@ def hexagonal_mesh(size: Size, count: int) -> HexagonalMesh:
     row, half = np.stack([row, half])[:, (row + half) % 2 == 0]
     pixels = np.empty((len(row), 2))
     pixels[:, 0] = (width - (halves - 1) * spacing / 2.0) / 2.0 + half * (spacing / 2.0)
-    pixels[:, 1] = (height - (rows - 1) * spacing * _ROW) / 2.0 + row * (spacing * _ROW)
+    pixels[:, 1] = (height - (rows - 1) * spacing * ROW) / 2.0 + row * (spacing * ROW)
 
     places = np.full((rows + 2, halves + 4), len(row), dtype=np.int32)
     places[row + 1, half + 2] = np.arange(len(row), dtype=np.int32)
@@ -105,11 +105,11 @@ def _lattice(width: float, height: float, count: int) -> tuple[int, int, float]:
     Neither a further row nor a further column would find room. Of all such meshes whose spacing is near the right one,
     it is that with the number of points nearest to `count`.
     """
-    ideal = math.sqrt(width * height / (_ROW * count))
-    rows, halves = np.meshgrid(_around(height / (ideal * _ROW)), _around(2.0 * width / ideal))
-    low = np.maximum(2.0 * width / (halves + 1), height / ((rows + 1) * _ROW))
+    ideal = math.sqrt(width * height / (ROW * count))
+    rows, halves = np.meshgrid(_around(height / (ideal * ROW)), _around(2.0 * width / ideal))
+    low = np.maximum(2.0 * width / (halves + 1), height / ((rows + 1) * ROW))
     with np.errstate(divide="ignore"):
-        high = np.minimum(2.0 * width / (halves - 1), height / ((rows - 1) * _ROW))
+        high = np.minimum(2.0 * width / (halves - 1), height / ((rows - 1) * ROW))
     high = high * (1.0 - 1e-9)  # the last row and column stay short of the border
     spacing = np.clip(ideal, low, high)
     off = np.abs((rows * halves + 1) // 2 - count) + 0.1 * np.abs(np.log(spacing / ideal))

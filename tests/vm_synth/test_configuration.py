@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 import vm_synth
 from vm_embedded.errors import InputError
-from vm_synth.configuration import CLASSES, SceneConfiguration, documented, read_scene_configuration
+from vm_synth.configuration import CLASSES, SceneConfiguration
 from vm_synth.environment import MapRanges
 from vm_synth.ranges import check_entries, drawn, log_uniform, number, one_of, share, some_of, uniform
+from vm_synth.sections import documented, read_sections
 from vm_synth.solids import LABELS
 
 DEFAULT = SceneConfiguration()
@@ -85,16 +86,16 @@ def configurations(draw):
 
 
 def test_the_documented_defaults_are_read_as_the_defaults(write):
-    assert read_scene_configuration(write("\n".join(documented(DEFAULT)))) == DEFAULT
-    assert read_scene_configuration(None) == DEFAULT
-    assert read_scene_configuration(write("")) == DEFAULT
+    assert read_sections(SceneConfiguration, write("\n".join(documented(DEFAULT)))) == DEFAULT
+    assert read_sections(SceneConfiguration, None) == DEFAULT
+    assert read_sections(SceneConfiguration, write("")) == DEFAULT
 
 
 @given(configurations())
 @settings(max_examples=30)
 def test_a_documented_configuration_is_read_as_it_was(write, configuration):
     """To the last digit, whatever the maps are called."""
-    assert read_scene_configuration(write("\n".join(documented(configuration)))) == configuration
+    assert read_sections(SceneConfiguration, write("\n".join(documented(configuration)))) == configuration
 
 
 def test_every_entry_is_documented_by_a_line_of_its_own():
@@ -151,7 +152,7 @@ def test_what_things_count_as_are_classes():
 
 def test_the_shipped_configuration_is_readable_and_says_only_what_is_known_of_maps():
     path = Path(vm_synth.__file__).parent / "polyhaven.toml"
-    found = read_scene_configuration(path)
+    found = read_sections(SceneConfiguration, path)
     assert found.maps.held_out
     assert found.maps.floors
     assert found == SceneConfiguration(maps=found.maps)
@@ -162,7 +163,7 @@ def test_the_shipped_configuration_is_readable_and_says_only_what_is_known_of_ma
 def test_a_range_is_taken_anywhere_within_its_limits(write, data):
     section, entry = data.draw(st.sampled_from(RANGES)).values
     low, high = data.draw(values_of(entry))
-    found = read_scene_configuration(write(f"[{section}]\n{entry.name} = [{low!r}, {high!r}]\n"))
+    found = read_sections(SceneConfiguration, write(f"[{section}]\n{entry.name} = [{low!r}, {high!r}]\n"))
     assert getattr(getattr(found, section), entry.name) == (low, high)
 
 
@@ -170,7 +171,7 @@ def refused(write, section, name, value):
     """The message with which a value of an entry is refused, after the name of file and section."""
     path = write(f"[{section}]\n{name} = {value}\n")
     with pytest.raises(InputError) as caught:
-        read_scene_configuration(path)
+        read_sections(SceneConfiguration, path)
     message = str(caught.value)
     start = f"configuration {path}: [{section}] "
     assert message.startswith(start)
@@ -236,25 +237,25 @@ MESSAGES = {
 @pytest.mark.parametrize(("text", "says"), MESSAGES.values(), ids=MESSAGES)
 def test_what_is_wrong_is_said(write, text, says):
     with pytest.raises(InputError, match=rf"configuration .*scene\.toml: .*{says}"):
-        read_scene_configuration(write(text))
+        read_sections(SceneConfiguration, write(text))
 
 
 def test_what_is_no_file_is_named(tmp_path):
     with pytest.raises(InputError, match=r"none\.toml: No such file"):
-        read_scene_configuration(tmp_path / "none.toml")
+        read_sections(SceneConfiguration, tmp_path / "none.toml")
     with pytest.raises(InputError, match=re.escape(tmp_path.name)):
-        read_scene_configuration(tmp_path)
+        read_sections(SceneConfiguration, tmp_path)
 
 
 def test_a_binary_file_is_refused(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_bytes(bytes(range(256)))
     with pytest.raises(InputError, match=r"scene\.toml"):
-        read_scene_configuration(path)
+        read_sections(SceneConfiguration, path)
 
 
 def test_floors_and_held_out_maps_are_read(write):
-    found = read_scene_configuration(write('[maps]\nheld_out = ["a"]\n[maps.floors]\nb = 7\n"c d.1" = 7.5\n'))
+    found = read_sections(SceneConfiguration, write('[maps]\nheld_out = ["a"]\n[maps.floors]\nb = 7\n"c d.1" = 7.5\n'))
     assert found.maps == MapRanges(held_out=("a",), floors={"b": 7, "c d.1": 7.5})
 
 

@@ -1,0 +1,92 @@
+"""Configurations: TOML files of sections, each a dataclass of the entries of ranges.py."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import Field, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from vm_embedded.errors import InputError, VisualMeshError, unknown
+
+Configuration = TypeVar("Configuration")
+
+
+def read_sections(kind: type[Configuration], path: Path | None) -> Configuration:
+    """Read a configuration, a dataclass of sections, from a TOML file, or take all defaults.
+
+    Raises InputError naming file, section, entry and what is allowed.
+    """
+    if path is None:
+        return kind()
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"can't read configuration {path}: {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"configuration {path}: {error}") from error
+    try:
+        read: Configuration = _configuration(kind, table)
+        return read
+    except VisualMeshError as error:
+        raise InputError(f"configuration {path}: {error}") from error
+
+
+def _configuration(kind: Any, table: Mapping[str, Any]) -> Any:
+    kinds = {each.name: each.default_factory for each in fields(kind)}
+    sections = {}
+    for name, entries in table.items():
+        if name not in kinds:
+            raise InputError(unknown("section", name, kinds))
+        if not isinstance(entries, Mapping):
+            raise InputError(f"{name} must be a section, [{name}], not {entries!r}")
+        section: Any = kinds[name]
+        known = [each.name for each in fields(section)]
+        for key in entries:
+            if key not in known:
+                raise InputError(unknown(f"entry in [{name}]", key, known))
+        try:
+            sections[name] = section(**entries)
+        except InputError as error:
+            raise InputError(f"[{name}] {error}") from error
+    return kind(**sections)
+
+
+def documented(configuration: Any) -> Iterator[str]:
+    """Lines of a TOML file with every entry, its meaning, unit and limits."""
+    for section in fields(configuration):
+        values = getattr(configuration, section.name)
+        yield f"[{section.name}]"
+        for entry in fields(values):
+            yield from _entry(entry, getattr(values, entry.name))
+        yield ""
+
+
+def _entry(entry: Field[Any], value: Any) -> Iterator[str]:
+    unit = f" [{entry.metadata['unit']}]" if entry.metadata.get("unit") else ""
+    yield f"# {entry.metadata['help']}{unit}{_limits(entry)}"
+    yield f"{entry.name} = {_toml(value)}"
+
+
+def _limits(entry: Field[Any]) -> str:
+    if "allowed" in entry.metadata:
+        return f"; of {', '.join(entry.metadata['allowed'])}"
+    low, high = entry.metadata.get("limits", (None, None))
+    if low is None:
+        return ""
+    return f"; {low:g} to {high:g}" if high != float("inf") else f"; at least {low:g}"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, Mapping):
+        pairs = ", ".join(f"{_toml(name)} = {_toml(each)}" for name, each in value.items())
+        return f"{{ {pairs} }}" if pairs else "{}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml(each) for each in value) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return short if float(short := f"{value:g}") == value else repr(value)
