@@ -56,7 +56,7 @@ class HexagonalMesh:
 
 
 def hexagonal_mesh(size: Size, count: int) -> HexagonalMesh:
-    """A mesh over the whole picture, as near to `count` points as a regular one comes: within 1 % from 1,000 on.
+    """A mesh over the whole picture, as near to `count` points as a regular one comes: within 1 % from 1,200 on.
 
     All points lie on screen in the sense of projection.project: the four pixels around each are in the picture.
     Raises InputError for fewer than one point or a picture of less than 2 x 2 px.
