@@ -104,9 +104,7 @@ def test_shards_join_to_the_same_set(tmp_path, small, whole):
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_what_is_stopped_goes_on_with_the_same_command(how, tmp_path, small, whole):
     arguments = [*COMMAND, str(tmp_path), *small, "--workers", "1"]
-    process = subprocess.Popen(
-        arguments, stderr=subprocess.PIPE, text=True, env=environment_of(), start_new_session=True
-    )
+    process = started(arguments)
     wait_for_picture(tmp_path, process)
     process.send_signal(how)
     error = process.communicate(timeout=60)[1]
