@@ -21,6 +21,9 @@ import numpy.typing as npt
 from vm_embedded.arrays import Floats
 from vm_embedded.errors import InputError, ModelError, unknown
 
+from .distance_bins import DISTANCE_EDGES, bins_of, checked_edges
+from .rates import Counts, PrecisionRecall, Rates, ratio, shares, without_nan
+
 BINS = 2048
 
 PROBABILITY_EDGES: Floats = 0.5 + 0.5 * np.sin(np.pi * (np.arange(BINS + 1) / BINS - 0.5))
@@ -29,34 +32,6 @@ PROBABILITY_EDGES: Floats = 0.5 + 0.5 * np.sin(np.pi * (np.arange(BINS + 1) / BI
 Trained networks answer near 0 and 1, and there the ranks are to be kept: the bins at the ends are 6e-7 wide, the widest
 in the middle 8e-4. Bins include their lower edge, the last one also its upper.
 """
-
-DISTANCE_EDGES: Floats = np.linspace(0.0, 10.0, 21)
-"""Edges of distance bins [m], as far as the paper's figures go."""
-
-Counts = npt.NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class PrecisionRecall:
-    """Precision and recall (m,) of what is at or above thresholds (m,), falling; without thresholds that add nothing.
-    positives: what there is to be found; if it is 0, recall is NaN."""
-
-    thresholds: Floats
-    precision: Floats
-    recall: Floats
-    positives: int
-
-    @property
-    def average_precision(self) -> float:
-        """Area under the curve as Pascal VOC takes it since 2010; NaN if there is nothing to be found.
-
-        The precision at a recall is the highest that is reached at that recall or above, so the curve falls in steps,
-        and the area is the sum over all its steps. COCO takes the mean of the same steps at 101 recalls.
-        """
-        if self.positives == 0:
-            return math.nan
-        highest = np.maximum.accumulate(self.precision[::-1])[::-1]
-        return float(np.diff(self.recall, prepend=0.0) @ highest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,31 +54,11 @@ class Roc:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(Rates):
     """Numbers of points of a class that were taken for it (hits) or not (missed), and of all others that were taken
     for it (false) or not (rejected)."""
 
-    hits: int
-    false: int
-    missed: int
     rejected: int
-
-    @property
-    def precision(self) -> float:
-        """Share of what was reported that is right; NaN if nothing was."""
-        return ratio(self.hits, self.hits + self.false)
-
-    @property
-    def recall(self) -> float:
-        """Share of the class that was reported; NaN if it is empty."""
-        return ratio(self.hits, self.hits + self.missed)
-
-    @property
-    def f1(self) -> float:
-        """Harmonic mean of precision and recall, 0 without a hit; NaN if the class is empty."""
-        if not self._positives:
-            return math.nan
-        return ratio(2 * self.hits, 2 * self.hits + self.false + self.missed)
 
     @property
     def mcc(self) -> float:
@@ -256,32 +211,3 @@ def _rows(counts: Counts, distance_bin: int | None) -> Counts:
     if distance_bin is None:
         return np.asarray(counts.sum(axis=0))
     return np.asarray(counts[range(len(counts) - 1)[distance_bin]])
-
-
-def checked_edges(edges: Floats) -> Floats:
-    """A copy of the edges (D + 1,). Raises InputError unless they are two or more rising numbers."""
-    copy = np.array(edges, dtype=np.float64)
-    if copy.ndim != 1 or len(copy) < 2 or not np.isfinite(copy).all() or not (np.diff(copy) > 0.0).all():
-        raise InputError(f"edges of distances must be two or more rising numbers [m], not {np.asarray(edges).tolist()}")
-    return copy
-
-
-def bins_of(distances: Floats, edges: Floats) -> npt.NDArray[np.intp]:
-    """Bins (n,) of distances (n,) between edges (D + 1,), counted from 0; D for those in none, as NaN."""
-    bins = np.searchsorted(edges, distances, side="right") - 1
-    return np.where(bins < 0, len(edges) - 1, bins)
-
-
-def ratio(part: float, whole: float) -> float:
-    """part / whole, NaN if there is no whole."""
-    return part / whole if whole else math.nan
-
-
-def shares(parts: Counts, whole: int) -> Floats:
-    """parts (m,) / whole, NaN if there is no whole."""
-    return parts / whole if whole else np.full(len(parts), np.nan)
-
-
-def without_nan(values: dict[str, float]) -> dict[str, float | None]:
-    """The same with None for NaN, which JSON does not have."""
-    return {name: None if math.isnan(value) else value for name, value in values.items()}

@@ -10,7 +10,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError, ModelError
-from vm_train.point_scores import BINS, PROBABILITY_EDGES, Outcome, PointScores, bins_of
+from vm_train.distance_bins import bins_of
+from vm_train.point_scores import BINS, PROBABILITY_EDGES, Outcome, PointScores
 
 CLASSES = ("ball", "line", "field")
 EDGES = np.array([0.0, 1.0, 2.0, 5.0])
