@@ -5,15 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Mask, Number, frozen
 from vm_embedded.errors import InputError
-from vm_embedded.files import written_beside
 from vm_embedded.lens import Equisolid, Lens, Size
 from vm_embedded.mesh import Mesh, ring_mesh
 from vm_embedded.orientation import Orientation
@@ -32,10 +29,6 @@ BEARINGS: Floats = frozen(math.radians(25.0) * (2.0 * (np.arange(64) * (math.sqr
 """Where the balls lie [rad], 0 ahead of the camera: spread evenly, but in step with no ring."""
 
 _MAX_DISTANCE = 20.0  # of a mesh [m], the reference's
-_LEAST = 0.5  # number of points or rings that is drawn
-_COLORS = {3: "#1b9e77", 4: "#d95f02", 5: "#7570b3"}
-_STYLES = {"visual": "-", "hexagonal": "--", "early": ":"}
-_NAMES = {"visual": "Visual Mesh", "hexagonal": "hexagonal mesh", "early": "Visual Mesh, early widths"}
 
 
 @dataclass(frozen=True)
@@ -176,54 +169,6 @@ def points_over_distance(
             mesh = _rings_on_screen(camera, EarlySphere(ball.radius), k)
             curves.append(_ring_curve("early", mesh, camera, ball, k, seen))
     return curves
-
-
-def plot_points_over_distance(curves: Sequence[Curve], path: Path, title: str = "") -> None:
-    """Draw curves to a .png or .svg file. Raises InputError if matplotlib is missing or the file can't be written."""
-    if path.suffix.lower() not in (".png", ".svg"):
-        raise InputError(f"can't plot to {path}: its suffix must be .png or .svg")
-    try:
-        import matplotlib
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise InputError("plots need matplotlib: pip install 'matplotlib>=3.8,<4'") from error
-    from matplotlib.lines import Line2D
-
-    figure = Figure(figsize=(11.0, 5.4), layout="constrained")
-    points, rings = figure.subplots(1, 2)
-    for curve in curves:
-        look: dict[str, Any] = {"color": _color(curve), "linestyle": _STYLES[curve.mesh], "linewidth": 1.2}
-        points.plot(curve.distances, curve.mean, **look)
-        if curve.mesh != "early":  # its rings are ours, and its range would hide the others'
-            rings.plot(curve.distances, curve.rings, **look)
-            low = np.maximum(curve.low, _LEAST)
-            points.fill_between(curve.distances, low, curve.high, color=_color(curve), alpha=0.13, linewidth=0)
-    points.set_ylabel("points on the ball: mean, and range over bearings")
-    rings.set_ylabel("rings or rows across the ball, mean over bearings")
-    for axes, ticks in ((points, (1, 2, 5, 10, 20, 50, 100, 200, 500)), (rings, (1, 2, 3, 4, 5, 6, 8, 10, 15, 20))):
-        axes.set_yscale("log")
-        axes.set_yticks(ticks, labels=[str(tick) for tick in ticks])
-        axes.minorticks_off()
-        axes.set_xlabel("distance of the ball [m]")
-        axes.set_xlim(left=0.0)
-        axes.set_ylim(bottom=_LEAST)
-        axes.grid(alpha=0.25)
-        axes.spines[["top", "right"]].set_visible(False)
-    present = {curve.mesh: None for curve in curves}
-    styles: list[dict[str, Any]] = [{"linestyle": _STYLES[mesh], "label": _NAMES[mesh]} for mesh in present]
-    keys = [Line2D([], [], color="black", **style) for style in styles]
-    colors = {f"k = {curve.intersections:g}": _color(curve) for curve in curves}
-    keys += [Line2D([], [], color=color, linewidth=4.0, label=name) for name, color in colors.items()]
-    figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), fontsize=9, frameon=False)
-    figure.suptitle(title, fontsize=10)
-    kind = path.suffix[1:].lower()
-    # Neither date nor random names, so that the same curves give the same file.
-    with matplotlib.rc_context({"svg.hashsalt": "vm_train"}), written_beside(path) as part:
-        figure.savefig(part, dpi=110, format=kind, metadata={"Date": None} if kind == "svg" else None)
-
-
-def _color(curve: Curve) -> str:
-    return _COLORS.get(round(curve.intersections), "#444444")
 
 
 def _inclinations(ball: Sphere, height: float, distance: float) -> tuple[float, float]:

@@ -22,7 +22,8 @@ from .rates import PrecisionRecall, Rates, ratio, shares, without_nan
 class Errors:
     """Of found objects that are right: their number, and errors [m] of distance and of place on the plane.
 
-    distance_*: of absolute errors. bias: median of signed ones, above 0 if found too far. relative_*: of absolute
+    distance_*: of absolute errors. bias, low, high: median, 10 and 90 % quantiles of signed ones, above 0 if found too far.
+    relative_*: of absolute
     errors over the true distance. place_*: from the true point on the plane to the found one. NaN if there is none.
     """
 
@@ -30,6 +31,8 @@ class Errors:
     distance_median: float
     distance_p90: float
     bias: float
+    low: float
+    high: float
     relative_median: float
     relative_p90: float
     place_median: float
@@ -91,6 +94,8 @@ class ObjectRanking:
             distance_median=_quantile(absolute, 0.5),
             distance_p90=_quantile(absolute, 0.9),
             bias=_quantile(signed, 0.5),
+            low=_quantile(signed, 0.1),
+            high=_quantile(signed, 0.9),
             relative_median=_quantile(relative, 0.5),
             relative_p90=_quantile(relative, 0.9),
             place_median=_quantile(place, 0.5),

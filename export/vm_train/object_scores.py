@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -36,6 +36,8 @@ OVERLAPS = (0.5, 0.75)
 
 MIN_VISIBLE = 0.25
 
+AnyFound = TypeVar("AnyFound", bound=Found)
+
 
 @dataclass(frozen=True)
 class _Find:
@@ -46,6 +48,14 @@ class _Find:
     true_distance: float
     found_distance: float
     place_error: float
+
+
+@dataclass(frozen=True, eq=False)
+class Mistakes(Generic[AnyFound]):
+    """True objects of a picture that nobody found, and found ones that are false, most confident first."""
+
+    missed: tuple[TrueObject, ...]
+    false: tuple[AnyFound, ...]
 
 
 class ObjectScores:
@@ -76,23 +86,31 @@ class ObjectScores:
         self._truths: list[float] = []
         self._finds: dict[float, list[_Find]] = {each: [] for each in self.overlaps}
 
-    def add(self, truths: Sequence[TrueObject], found: Sequence[Found]) -> None:
-        """Count a picture: its true objects, with masks of the same size, and what was found in it."""
+    def add(self, truths: Sequence[TrueObject], found: Sequence[AnyFound]) -> Mistakes[AnyFound]:
+        """Count a picture: its true objects, with masks of the same size, and what was found in it.
+
+        Returns what is wrong at the first of the overlaps.
+        """
         counted = [each for each in truths if not self._ignores(each)]
         ignored = [each for each in truths if self._ignores(each)]
         common = common_areas(counted + ignored, found)
         overlap = common.of_union[:, : len(counted)]
         excuse = common.of_lesser[:, len(counted) :].max(axis=1, initial=0.0)
         order = np.argsort([-each.confidence for each in found], kind="stable")
+        mistakes: list[Mistakes[AnyFound]] = []
         for threshold, finds in self._finds.items():
+            missed, false = dict(enumerate(counted)), []
             for number, choice in zip(order, chosen(overlap[order], threshold), strict=True):
                 if choice is not None:
-                    finds.append(_find(found[number], counted[choice]))
+                    finds.append(_find(found[number], missed.pop(choice)))
                 elif excuse[number] < threshold:
                     finds.append(_find(found[number], None))
+                    false.append(found[number])
+            mistakes.append(Mistakes(tuple(missed.values()), tuple(false)))
         self._truths.extend(_distance(each.position) for each in counted)
         self.ignored += len(ignored)
         self.pictures += 1
+        return mistakes[0]
 
     def _ignores(self, truth: TrueObject) -> bool:
         return truth.visible < self.min_visible or truth.radius < self.min_radius

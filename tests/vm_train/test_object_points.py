@@ -10,6 +10,7 @@ from vm_embedded.lens import Equisolid
 from vm_embedded.mesh import ring_mesh
 from vm_embedded.orientation import Orientation
 from vm_embedded.shapes import Sphere
+from vm_train.figures import new_figure, save_figure
 from vm_train.object_points import (
     BEARINGS,
     PAPER_BALL,
@@ -17,11 +18,11 @@ from vm_train.object_points import (
     Camera,
     EarlySphere,
     centers,
-    plot_points_over_distance,
     points_on_ball,
     points_over_distance,
     rings_across,
 )
+from vm_train.object_points_plot import points_figure
 
 from ..vm_embedded.strategies import reals
 
@@ -130,12 +131,12 @@ def test_the_same_curves_give_the_same_plot(tmp_path, suffix):
     pytest.importorskip("matplotlib")
     curves = points_over_distance(SMALL, PAPER_BALL, (3,), np.linspace(0.0, 10.0, 5), early=True)
     one, other = tmp_path / f"one{suffix}", tmp_path / f"other{suffix}"
-    plot_points_over_distance(curves, one, "a title")
-    plot_points_over_distance(curves, other, "a title")
+    for path in (one, other):
+        save_figure(points_figure(curves, "a title"), path)
     assert one.read_bytes() == other.read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([one.name, other.name])
 
 
 def test_a_plot_of_another_kind_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"\.png or \.svg"):
-        plot_points_over_distance([], tmp_path / "plot.txt")
+        save_figure(new_figure(1.0, 1.0), tmp_path / "plot.txt")

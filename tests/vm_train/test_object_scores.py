@@ -10,11 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.vm_train.test_overlaps import circle
 from vm_embedded.arrays import Floats
 from vm_embedded.errors import InputError
 from vm_train.object_scores import ObjectScores
 from vm_train.overlaps import TrueObject, coverage
+
+from .test_overlaps import circle
 
 WIDTH, HEIGHT = 48, 32
 EDGES = np.array([0.0, 2.0, 4.0])
@@ -165,7 +166,8 @@ def test_errors_are_those_of_the_right_ones_that_are_confident_enough(shown, lea
         true, found = np.array(right).T
         assert errors.distance_median == pytest.approx(np.median(np.abs(found - true)))
         assert errors.distance_p90 == pytest.approx(np.percentile(np.abs(found - true), 90))
-        assert errors.bias == pytest.approx(np.median(found - true))
+        signed = [errors.low, errors.bias, errors.high]
+        assert signed == pytest.approx(np.percentile(found - true, [10, 50, 90]).tolist())
         assert errors.relative_median == pytest.approx(np.median(np.abs(found - true) / true))
         assert errors.place_p90 == pytest.approx(np.percentile(np.hypot(found, true), 90))  # one ahead, one at the left
 
@@ -204,6 +206,12 @@ def test_the_second_detection_of_an_object_is_false():
     ball = Square(5, 5, 8)
     outcome = scored([([ball], [ball, Square(5, 6, 8, 1.0, 0.9)])]).ranking(0.5).at()
     assert (outcome.hits, outcome.false, outcome.missed) == (1, 1, 0)
+
+
+def test_what_is_wrong_in_a_picture_is_told():
+    missed, ball, twice = Square(20, 5, 8).true(), Square(5, 5, 8), Square(5, 6, 8, 1.0, 0.9).found()
+    mistakes = ObjectScores(EDGES).add([ball.true(), missed], [ball.found(), twice])
+    assert (mistakes.missed, mistakes.false) == ((missed,), (twice,))
 
 
 def test_the_more_confident_chooses_first_even_if_another_fits_better():

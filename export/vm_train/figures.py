@@ -1,0 +1,42 @@
+"""Figures of matplotlib as files; the same figure gives the same file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vm_embedded.errors import InputError
+from vm_embedded.files import written_beside
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SUFFIXES = (".png", ".svg")
+
+_DOTS = 110  # for each inch of a .png
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure [inch]. Raises InputError if matplotlib is missing."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise InputError("plots need matplotlib: pip install 'matplotlib>=3.8,<4'") from error
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def check_figure_path(path: Path) -> None:
+    """Raise InputError unless a figure's file is a .png or .svg."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"can't plot to {path}: its suffix must be {' or '.join(SUFFIXES)}")
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure to a .png or .svg. Raises InputError for another suffix or if it can't be written."""
+    import matplotlib
+
+    check_figure_path(path)
+    kind = path.suffix[1:].lower()
+    # Neither date nor random names, so that the same figure gives the same file.
+    with matplotlib.rc_context({"svg.hashsalt": "vm_train"}), written_beside(path) as part:
+        figure.savefig(part, dpi=_DOTS, format=kind, metadata={"Date": None} if kind == "svg" else None)
