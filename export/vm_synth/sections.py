@@ -1,4 +1,7 @@
-"""Configurations: TOML files of sections, each a dataclass of the entries of ranges.py."""
+"""Configurations: TOML files of sections, each a dataclass of the entries of ranges.py.
+
+A section of another kind says in its field's metadata how it is `read` from its table, and has a method `documented`.
+"""
 
 from __future__ import annotations
 
@@ -14,41 +17,50 @@ from vm_embedded.errors import InputError, VisualMeshError, unknown
 Configuration = TypeVar("Configuration")
 
 
-def read_sections(kind: type[Configuration], path: Path | None) -> Configuration:
+def read_sections(
+    kind: type[Configuration], path: Path | None, overrides: Mapping[str, Mapping[str, Any]] | None = None
+) -> Configuration:
     """Read a configuration, a dataclass of sections, from a TOML file, or take all defaults.
 
-    Raises InputError naming file, section, entry and what is allowed.
+    overrides: entries by section that count instead of the file's. Raises InputError naming file, section, entry and
+    what is allowed.
     """
-    if path is None:
-        return kind()
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"can't read configuration {path}: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"configuration {path}: {error}") from error
+    table = _table(path) if path else {}
+    for name, entries in (overrides or {}).items():
+        table[name] = {**table.get(name, {}), **entries}
     try:
         read: Configuration = _configuration(kind, table)
         return read
     except VisualMeshError as error:
+        raise InputError(f"configuration {path}: {error}" if path else f"configuration: {error}") from error
+
+
+def _table(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"can't read configuration {path}: {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"configuration {path}: {error}") from error
 
 
 def _configuration(kind: Any, table: Mapping[str, Any]) -> Any:
-    kinds = {each.name: each.default_factory for each in fields(kind)}
+    known_sections = {each.name: each for each in fields(kind)}
     sections = {}
     for name, entries in table.items():
-        if name not in kinds:
-            raise InputError(unknown("section", name, kinds))
+        if name not in known_sections:
+            raise InputError(unknown("section", name, known_sections))
         if not isinstance(entries, Mapping):
             raise InputError(f"{name} must be a section, [{name}], not {entries!r}")
-        section: Any = kinds[name]
-        known = [each.name for each in fields(section)]
-        for key in entries:
-            if key not in known:
-                raise InputError(unknown(f"entry in [{name}]", key, known))
+        section: Any = known_sections[name]
+        read = section.metadata.get("read")
+        if read is None:
+            known = [each.name for each in fields(section.default_factory)]
+            for key in entries:
+                if key not in known:
+                    raise InputError(unknown(f"entry in [{name}]", key, known))
         try:
-            sections[name] = section(**entries)
+            sections[name] = read(entries) if read else section.default_factory(**entries)
         except InputError as error:
             raise InputError(f"[{name}] {error}") from error
     return kind(**sections)
@@ -59,8 +71,11 @@ def documented(configuration: Any) -> Iterator[str]:
     for section in fields(configuration):
         values = getattr(configuration, section.name)
         yield f"[{section.name}]"
-        for entry in fields(values):
-            yield from _entry(entry, getattr(values, entry.name))
+        if "read" in section.metadata:
+            yield from values.documented()
+        else:
+            for entry in fields(values):
+                yield from _entry(entry, getattr(values, entry.name))
         yield ""
 
 

@@ -2,36 +2,129 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import json
+import signal
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
+import cv2
+import numpy as np
 from torch.utils.data import DataLoader, Dataset
 
+from vm_embedded.errors import GeometryError, InputError, VisualMeshError
 from vm_embedded.manifest import Manifest
+from vm_export.checkpoint import Grid
 
-from .graphs import Graph, graph_of
-from .pictures import Classes, PictureFiles, read_picture
-from .training import Item
+from .augmentation import Augmentation, blurred, moved, recolored
+from .graphs import OFF_SCREEN, Graph, graph_of
+from .pictures import Classes, PictureFiles
+from .schedule import Batch, Item
+from .unpacked import Unpacked, read
+
+
+@dataclass(frozen=True)
+class View:
+    """What makes a picture a graph: classes of the masks, the network's mesh and grid, and augmentation.
+
+    own_radius: the mesh is made for the radius of each picture's own ball, as its sceneX.json has it.
+    """
+
+    classes: Classes
+    manifest: Manifest
+    grid: Grid = field(default_factory=Grid)
+    augmentation: Augmentation = field(default_factory=Augmentation)
+    own_radius: bool = False
+
+    def manifest_for(self, files: PictureFiles) -> Manifest:
+        """The manifest with the radius of a picture's own ball, if asked for. Raises InputError."""
+        return replace(self.manifest, radius=ball_radius(files)) if self.own_radius else self.manifest
+
+
+def ball_radius(files: PictureFiles) -> float:
+    """Radius of balls in a picture of vm-synth [m], also if it shows none. Raises InputError."""
+    path = files.image.with_name(f"scene{files.number}.json")
+    try:
+        return float(json.loads(path.read_text(encoding="utf-8"))["ball_radius"])
+    except OSError as error:
+        raise InputError(f"{path.name}: can't be read, but says the ball's radius ({error.strerror or error})") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path.name}: does not say the ball's radius, ball_radius") from error
 
 
 class Graphs(Dataset[Graph]):
     """The graphs of pictures, by Item. Raises InputError for a picture that can't be read."""
 
-    def __init__(self, pictures: Sequence[PictureFiles], classes: Classes, manifest: Manifest) -> None:
-        self._pictures, self._classes, self._manifest = list(pictures), classes, manifest
+    def __init__(self, pictures: Sequence[PictureFiles], view: View, unpacked: Unpacked | None = None) -> None:
+        self._pictures, self._view, self._unpacked = list(pictures), view, unpacked
 
     def __len__(self) -> int:
         return len(self._pictures)
 
     def __getitem__(self, item: Item) -> Graph:
-        return graph_of(read_picture(self._pictures[item.position], self._classes), self._manifest)
+        view = self._view
+        files = self._pictures[item.position]
+        picture = read(files, view.classes, self._unpacked)
+        manifest = view.manifest_for(files)
+        try:
+            if item.seed is None:
+                return graph_of(picture, manifest, view.grid)
+            random = np.random.default_rng(item.seed)
+            picture = blurred(moved(picture, view.augmentation, random), view.augmentation, random)
+            graph = graph_of(picture, manifest, view.grid)
+        except GeometryError:  # so low a camera sees no points
+            return _empty(view.manifest.neighbors)
+        graph.points[:-1] = recolored(graph.points[:-1], view.augmentation, random)
+        return graph
 
 
-def loaded(graphs: Graphs, batches: list[list[Item]], workers: int) -> Iterable[list[Graph]]:
-    """The graphs of batches, in their order, whatever the number of worker processes (0: none)."""
-    return DataLoader(
-        graphs,
-        batch_sampler=batches,
+def _empty(neighbors: int) -> Graph:
+    return Graph(
+        np.full((1, 3), OFF_SCREEN, dtype=np.float32),
+        np.zeros((1, neighbors), dtype=np.int32),
+        np.empty(0, dtype=np.int8),
+        np.empty(0),
+    )
+
+
+def loaded(graphs: Graphs, batches: Sequence[Batch], workers: int) -> Iterator[list[Graph]]:
+    """The graphs of batches, in their order, whatever the number of worker processes (0: none).
+
+    Raises what reading raised, and InputError if a worker was killed.
+    """
+    loader: DataLoader[Graph | VisualMeshError] = DataLoader(
+        _Faults(graphs),
+        batch_sampler=[list(each.items) for each in batches],
         num_workers=workers,
         collate_fn=list,
+        worker_init_fn=_begin,
+        prefetch_factor=4 if workers else None,
         multiprocessing_context="spawn" if workers else None,
     )
+    try:
+        for found in loader:
+            for each in found:
+                if isinstance(each, VisualMeshError):
+                    raise each
+            yield found
+    except RuntimeError as error:
+        if "DataLoader worker" not in str(error):
+            raise
+        raise InputError("a worker that read pictures was killed (out of memory?); vm-train resume goes on") from error
+
+
+class _Faults(Dataset["Graph | VisualMeshError"]):
+    """Graphs, or why there is none: an error that a worker raises would come with its traceback for a message."""
+
+    def __init__(self, graphs: Graphs) -> None:
+        self._graphs = graphs
+
+    def __getitem__(self, item: Item) -> Graph | VisualMeshError:
+        try:
+            return self._graphs[item]
+        except VisualMeshError as error:
+            return error
+
+
+def _begin(worker: int) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the training decides
+    cv2.setNumThreads(1)

@@ -1,7 +1,10 @@
 """Which points of a batch give gradients.
 
 The paper balances classes by selecting, not by weighing: weighed networks overfitted on the field. Its second and third
-rounds select points by how wrong the network of the round before was on them.
+rounds select points by how wrong the networks of the rounds before were on them.
+
+Every point has a chance, and a number is drawn for each. So a class is as often selected as any other over the whole
+set, not within each batch: there the rarest class may have a single point, or none.
 """
 
 from __future__ import annotations
@@ -9,47 +12,46 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from vm_embedded.arrays import Mask, Singles
-from vm_embedded.errors import InputError, unknown
+from vm_embedded.arrays import Floats, Mask, Singles
 
 from .pictures import Labels
 
 RULES = ("all", "balanced", "hard")
-"""all: every labeled point. balanced: as many of each class as of the rarest. hard: balanced, by probability."""
+"""all: every labeled point. balanced: as many of each class as of the rarest. hard: the same, and the points of a class
+by how wrong earlier networks were on them."""
 
 FLOOR = 0.05
-"""Probability of selecting a point that no network was wrong about (the paper's 5 % baseline)."""
+"""Weight of a point that no network was wrong about (the paper's 5 % baseline)."""
 
 
-def selected(rule: str, labels: Labels, classes: int, errors: Singles | None, random: np.random.Generator) -> Mask:
-    """Points (n,) that are selected from labels (n,), -1 for unlabeled.
+def class_shares(rule: str, counts: npt.NDArray[np.int64]) -> Floats:
+    """Share (C,) of each class's points that is selected, from its number of points in the set (C,)."""
+    if rule == "all" or not counts.any():
+        return np.ones(len(counts))
+    return np.asarray(counts[counts > 0].min() / np.maximum(counts, 1)).clip(max=1.0)
 
-    errors (n,): for rule hard the summed errors of the rounds before, 0 to their number, at each point; the chance of a
-    point within its class is this plus FLOOR. Classes without points in the batch are left out. Raises InputError for
-    an unknown rule, or if rule hard has no errors.
+
+def hardness(errors: Singles) -> Floats:
+    """Weights (n,) of points in the choice within their class, from the summed errors (n,) of the rounds before."""
+    return np.minimum(errors.astype(np.float64), 1.0) + FLOOR
+
+
+def class_totals(labels: Labels, weights: Floats, classes: int) -> Floats:
+    """Sums of weights (n,), and numbers, of the points of each class: (2, C). They add up over parts of a batch."""
+    own = labels[labels >= 0]
+    sums = np.bincount(own, weights[labels >= 0], minlength=classes)
+    return np.stack([sums, np.bincount(own, minlength=classes).astype(np.float64)])
+
+
+def selected(labels: Labels, shares: Floats, draws: Floats, weights: Floats | None = None) -> Mask:
+    """Points (n,) that are selected from labels (n,), -1 for unlabeled, by draws (n,) from 0 to 1.
+
+    shares (C,): chance of a point of each class. weights (n,): factors of these chances, of mean 1 in each class.
     """
-    labeled = labels >= 0
-    if rule == "all":
-        return labeled
-    if rule not in RULES:
-        raise InputError(unknown("selection", rule, RULES))
-    if rule == "hard" and errors is None:
-        raise InputError("selection hard needs the errors of a network that was trained before")
-    counts = np.bincount(labels[labeled], minlength=classes)
-    if not counts.any():
-        return labeled
-    each = int(counts[counts > 0].min())
-    chosen = np.zeros(len(labels), dtype=bool)
-    for number in np.flatnonzero(counts):
-        members = np.flatnonzero(labels == number)
-        chance = None if errors is None or rule != "hard" else _chance(errors[members])
-        chosen[random.choice(members, each, replace=False, p=chance)] = True
-    return chosen
-
-
-def _chance(errors: Singles) -> npt.NDArray[np.float64]:
-    weights = np.minimum(errors.astype(np.float64), 1.0) + FLOOR
-    return np.asarray(weights / weights.sum())
+    chance = shares[labels]
+    if weights is not None:
+        chance = chance * weights
+    return (labels >= 0) & (draws < chance)
 
 
 def errors_of(probabilities: Singles, labels: Labels) -> Singles:

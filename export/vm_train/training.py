@@ -1,14 +1,14 @@
-"""Training: batches in, checkpoints out, the same weights whether it was interrupted or not.
+"""Training a network: batches in, weights out, the same weights whether it was interrupted or not.
 
-What a step does depends on nothing but the seed, its number and the weights before it, so a run goes on from its last
-state as if it had never stopped. With several processes (torch.distributed) each takes its part of every batch, and
-gradients are averaged over the selected points of all parts.
+What a step does depends on nothing but the seed, its number and the weights before it, so a training goes on from its
+last state as if it had never stopped. With several processes (torch.distributed) each takes its part of every batch,
+and gradients are averaged over the selected points of all parts.
 """
 
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,170 +17,170 @@ import numpy as np
 import torch
 from torch import distributed, nn
 
-from vm_embedded.errors import InputError, one_line, unknown
+from vm_embedded.arrays import Floats, Singles
+from vm_embedded.errors import InputError, one_line
 from vm_embedded.files import written_beside
 from vm_export.network import Network
 
 from .graphs import Graph, together
-from .selection import selected
+from .recipe import Recipe
+from .schedule import Item
+from .selection import class_totals, errors_of, hardness, selected
 
-OPTIMIZERS: dict[str, Callable[..., torch.optim.Optimizer]] = {
-    "adamw": torch.optim.AdamW,
-    "adam": torch.optim.Adam,
-    "sgd": torch.optim.SGD,
-}
-LOSSES = ("cross_entropy", "focal")
-SCHEDULES = ("one_cycle", "constant")
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """How a network is trained. rate: the highest learning rate. gamma: of the focal loss. Raises InputError."""
-
-    epochs: int = 20
-    batch: int = 8
-    rate: float = 8e-3
-    optimizer: str = "adamw"
-    schedule: str = "one_cycle"
-    decay: float = 1e-4
-    clip: float = 1.0
-    loss: str = "cross_entropy"
-    gamma: float = 2.0
-    selection: str = "balanced"
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for what, value, allowed in (
-            ("optimizer", self.optimizer, OPTIMIZERS),
-            ("schedule", self.schedule, SCHEDULES),
-            ("loss", self.loss, LOSSES),
-        ):
-            if value not in allowed:
-                raise InputError(unknown(what, value, allowed))
-        if min(self.epochs, self.batch) < 1 or not self.rate > 0.0:
-            raise InputError("epochs and batch must be at least 1, and the rate above 0")
+_OPTIMIZERS: dict[str, Any] = {"adamw": torch.optim.AdamW, "adam": torch.optim.Adam, "sgd": torch.optim.SGD}
 
 
 @dataclass(frozen=True)
 class Step:
-    """What one step did: its number, the loss, and how many points gave it."""
+    """What one step did: its number, the mean loss of the points that gave gradients, how many, and the rate."""
 
     number: int
     loss: float
     points: int
-
-
-@dataclass(frozen=True)
-class Item:
-    """A picture to be loaded: its position in the set, and the epoch, which seeds its augmentation."""
-
-    position: int
-    epoch: int
-
-
-def plan(recipe: Recipe, count: int) -> Iterator[list[Item]]:
-    """The batches of all steps of a training on `count` pictures; an epoch's last batch may be smaller."""
-    for epoch in range(recipe.epochs):
-        shuffled = np.random.default_rng([recipe.seed, 1, epoch]).permutation(count)
-        for start in range(0, count, recipe.batch):
-            yield [Item(int(each), epoch) for each in shuffled[start : start + recipe.batch]]
-
-
-Loader = Callable[[list[list[Item]]], Iterable[list[Graph]]]
-"""Gives the graphs of batches, in order; see loading.py."""
+    rate: float
 
 
 class Training:
-    """A network while it is trained on `count` pictures.
+    """A network while it is trained for `total` steps.
 
-    errors: for selection hard, how wrong earlier networks were at each point of a picture, by its position.
+    shares (C,): chance of each class's points to give gradients. graders: networks of earlier rounds; points that they
+    were wrong about are selected rather than others of their class. device: where torch computes, "cpu" or "cuda".
     """
 
     def __init__(
         self,
         network: Network,
         recipe: Recipe,
-        count: int,
-        errors: Callable[[int], np.ndarray] | None = None,
+        total: int,
+        shares: Floats,
+        graders: Sequence[Network] = (),
+        device: str = "cpu",
     ) -> None:
-        if count < 1:
-            raise InputError("there are no pictures to train on")
-        self.network, self.recipe = network, recipe
-        self._count, self._errors = count, errors
-        self.steps_an_epoch = -(-count // recipe.batch)
-        self.total = recipe.epochs * self.steps_an_epoch
-        options = {} if recipe.optimizer == "sgd" else {"weight_decay": recipe.decay}
-        self._optimizer = OPTIMIZERS[recipe.optimizer](network.parameters(), lr=recipe.rate, **options)
+        self.network = network.to(device).train()
+        self.recipe, self.total, self.done = recipe, total, 0
+        self._shares, self._device = shares, device
+        self._graders = [each.to(device).eval() for each in graders]
+        options = {"momentum": 0.9} if recipe.optimizer == "sgd" else {}
+        self._optimizer: torch.optim.Optimizer = _OPTIMIZERS[recipe.optimizer](
+            network.parameters(), lr=recipe.rate, weight_decay=recipe.decay, **options
+        )
         self._schedule: torch.optim.lr_scheduler.LRScheduler
         if recipe.schedule == "one_cycle":
-            self._schedule = torch.optim.lr_scheduler.OneCycleLR(self._optimizer, recipe.rate, total_steps=self.total)
+            self._schedule = torch.optim.lr_scheduler.OneCycleLR(self._optimizer, recipe.rate, total_steps=total)
         else:
             self._schedule = torch.optim.lr_scheduler.ConstantLR(self._optimizer, factor=1.0, total_iters=0)
-        self.done = 0
 
-    def run(self, loader: Loader, until: int | None = None) -> Iterator[Step]:
-        """Do the steps that are left, or those before `until`, and report each."""
-        rank, size = (distributed.get_rank(), distributed.get_world_size()) if distributed.is_initialized() else (0, 1)
-        batches = list(plan(self.recipe, self._count))[self.done : until]
-        own = [batch[rank::size] for batch in batches]
-        for items, graphs in zip(own, loader(own), strict=True):
-            yield self._step(items, graphs)
+    def set_rate(self, rate: float) -> None:
+        """The learning rate of the next step, where the schedule is constant."""
+        for group in self._optimizer.param_groups:
+            group["lr"] = rate
 
-    def _step(self, items: list[Item], graphs: list[Graph]) -> Step:
-        loss, points = self._loss(items, graphs) if graphs else (torch.zeros(()), 0)
+    def step(self, items: Sequence[Item], graphs: Sequence[Graph]) -> Step:
+        """Learn from the graphs of this process's part of a batch."""
+        rate = float(self._optimizer.param_groups[0]["lr"])
+        loss, points = self._loss(items, graphs)
         self._optimizer.zero_grad()
-        everyone = _sum_over_processes(torch.tensor(float(points))).clamp(min=1.0)
+        everyone = summed(torch.tensor(float(points))).clamp(min=1.0)
         if points:
-            (loss / everyone).backward()  # type: ignore[no-untyped-call]
+            (loss / everyone.item()).backward()  # type: ignore[no-untyped-call]
         _sum_gradients(self.network)
         if self.recipe.clip:
             nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.clip)
         self._optimizer.step()
         self._schedule.step()
         self.done += 1
-        return Step(self.done, float(_sum_over_processes(loss.detach()) / everyone), int(everyone))
+        total = summed(loss.detach().cpu())
+        return Step(self.done, float(total / everyone), int(everyone), rate)
 
-    def _loss(self, items: list[Item], graphs: list[Graph]) -> tuple[torch.Tensor, int]:
+    def _loss(self, items: Sequence[Item], graphs: Sequence[Graph]) -> tuple[torch.Tensor, int]:
         """The summed loss of the selected points of some pictures, and their number."""
+        classes = self.network.shape.classes
+        if not graphs:  # of a small batch other processes have all; they wait for the totals
+            if self._graders:
+                summed(torch.zeros((2, classes), dtype=torch.float64))
+            return torch.zeros(()), 0
         graph, _ = together(graphs)
-        errors = None if self._errors is None else np.concatenate([self._errors(each.position) for each in items])
-        random = np.random.default_rng([self.recipe.seed, 2, items[0].epoch, items[0].position])
-        chosen = selected(self.recipe.selection, graph.labels, self.network.shape.classes, errors, random)
-        logits = self.network.logits(torch.from_numpy(graph.points), torch.from_numpy(graph.neighbors))
-        wanted = torch.from_numpy(np.flatnonzero(chosen))
-        labels = torch.from_numpy(graph.labels[chosen].astype(np.int64))
-        single = nn.functional.cross_entropy(logits[wanted], labels, reduction="none")
+        points = torch.from_numpy(graph.points).to(self._device)
+        neighbors = torch.from_numpy(graph.neighbors).to(self._device)
+        draws = [
+            np.random.default_rng([2, *(item.seed or ())]).random(len(each))
+            for item, each in zip(items, graphs, strict=True)
+        ]
+        weights = self._weights(points, neighbors, graph) if self._graders else None
+        chosen = selected(graph.labels, self._shares, np.concatenate(draws), weights)
+        with torch.autocast(self._device, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
+            logits = self.network.logits(points, neighbors)
+        wanted = torch.from_numpy(np.flatnonzero(chosen)).to(self._device)
+        labels = torch.from_numpy(graph.labels[chosen].astype(np.int64)).to(self._device)
+        single = nn.functional.cross_entropy(logits[wanted].float(), labels, reduction="none")
         if self.recipe.loss == "focal":
             single = (1.0 - torch.exp(-single)) ** self.recipe.gamma * single
         return single.sum(), len(wanted)
 
-    def save(self, path: Path) -> None:
-        """Write all that going on needs. Raises InputError if it can't be written."""
+    @torch.no_grad()
+    def _weights(self, points: torch.Tensor, neighbors: torch.Tensor, graph: Graph) -> Floats:
+        """How much rather than others of their class the points (n,) are selected: 1 in the mean of each class."""
+        errors = np.zeros(len(graph), dtype=np.float32)
+        for grader in self._graders:
+            errors += errors_of(grader(points, neighbors)[:-1].cpu().numpy(), graph.labels)
+        weights = hardness(errors)
+        sums, counts = summed(torch.from_numpy(class_totals(graph.labels, weights, len(self._shares)))).numpy()
+        means = np.divide(sums, counts, out=np.ones_like(sums), where=counts > 0)
+        return np.asarray(weights / means[graph.labels])
+
+    @torch.no_grad()
+    def probabilities(self, graph: Graph) -> Singles:
+        """The network's answers (n, C)."""
+        points, neighbors = torch.from_numpy(graph.points), torch.from_numpy(graph.neighbors)
+        answers: Singles = self.network(points.to(self._device), neighbors.to(self._device))[:-1].cpu().numpy()
+        return answers
+
+    def save(self, path: Path, more: Mapping[str, Any]) -> None:
+        """Write all that going on needs, and `more` plain values. Raises InputError if it can't be written."""
         state = {
             "done": self.done,
             "network": self.network.state_dict(),
             "optimizer": self._optimizer.state_dict(),
             "schedule": self._schedule.state_dict(),
+            "more": dict(more),
         }
         with written_beside(path) as part:
             torch.save(state, part)
 
-    def load(self, path: Path) -> None:
-        """Go on from what `save` wrote. Raises InputError."""
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Go on from a state that `read_state` read. Raises InputError if it is of another training."""
         try:
-            state: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
             self.network.load_state_dict(state["network"])
             self._optimizer.load_state_dict(state["optimizer"])
             self._schedule.load_state_dict(state["schedule"])
             self.done = int(state["done"])
-        except (OSError, RuntimeError, KeyError, ValueError, EOFError, pickle.UnpicklingError) as error:
-            raise InputError(f"can't go on from {path}: {one_line(error)}") from error
+        except (RuntimeError, KeyError, ValueError, TypeError) as error:
+            raise InputError(f"the state is of another training: {one_line(error)}") from error
 
 
-def _sum_over_processes(value: torch.Tensor) -> torch.Tensor:
-    if distributed.is_initialized():
-        distributed.all_reduce(value)
-    return value
+def read_state(path: Path) -> dict[str, Any]:
+    """What `Training.save` wrote; nothing in it is executed. Raises InputError."""
+    try:
+        state = torch.load(path, map_location="cpu", weights_only=True)
+    except (OSError, RuntimeError, KeyError, ValueError, EOFError, pickle.UnpicklingError) as error:
+        raise InputError(f"can't go on from {path}: {one_line(error)}") from error
+    if not isinstance(state, dict) or not isinstance(state.get("more"), dict):
+        raise InputError(f"can't go on from {path}: it is no state of a training")
+    return state
+
+
+def summed(value: torch.Tensor) -> torch.Tensor:
+    """The sum over all processes, as every one of them gets it."""
+    if not distributed.is_initialized():
+        return value
+    total = value.to(_meeting_place())
+    distributed.all_reduce(total)
+    return total.cpu()
+
+
+def _meeting_place() -> str:
+    """Device of tensors that processes exchange: nccl has only GPUs."""
+    return "cuda" if distributed.get_backend() == "nccl" else "cpu"
 
 
 def _sum_gradients(network: nn.Module) -> None:

@@ -1,0 +1,270 @@
+"""vm-train: train a network, go on with it, and look at what it is trained on."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import signal
+import sys
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vm_embedded.errors import InputError, VisualMeshError
+from vm_embedded.files import check_writable
+from vm_synth.progress import Ticker
+from vm_synth.sections import documented, read_sections
+
+from . import check as checking
+from . import shards, tfrecord_import
+from .configuration import TrainConfiguration
+from .options import parsers
+from .pictures import PictureFiles, find_pictures
+from .split import Split, split_by_lists, split_by_seed
+
+if TYPE_CHECKING:
+    from .hardware import Hardware
+    from .job import Job
+
+EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run vm-train and return its exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    commands: dict[str, Callable[[argparse.Namespace], int]] = {
+        "resume": _resume,
+        "check": _check,
+        "preview": _preview,
+        "rate": _rate,
+        "config": _config,
+        "import": tfrecord_import.run,
+        "shards": shards.run_shards,
+    }
+    command = given[0] if given[:1] and given[0] in commands else None
+    prog = "vm-train" if command is None else f"vm-train {command}"
+    options = parsers()[prog].parse_args(given if command is None else given[1:])
+    try:
+        with _terminated_as_interrupted():
+            return _train(options) if command is None else commands[command](options)
+    except VisualMeshError as error:
+        print(f"vm-train: {' '.join(str(error).split())}", file=sys.stderr)
+        return EXIT_FAILED
+    except KeyboardInterrupt:
+        print("vm-train: stopped", file=sys.stderr)
+        return EXIT_INTERRUPTED
+
+
+@contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """SIGTERM interrupts like Ctrl-C, so that schedulers can end a training at any time."""
+
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def _on_request() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C or SIGTERM asked to stop; the step in work is finished. A second one stops at once."""
+    asked: list[int] = []
+
+    def ask(number: int, frame: object) -> None:
+        asked.append(number)
+        if len(asked) > 1:
+            raise KeyboardInterrupt
+
+    before = {each: signal.signal(each, ask) for each in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(asked)
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
+
+
+def _configuration(options: argparse.Namespace) -> TrainConfiguration:
+    return read_sections(TrainConfiguration, options.config, _overrides(options.set))
+
+
+def _overrides(given: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Sections of entries from SECTION.ENTRY=VALUE; a value is as in TOML, or a plain word."""
+    sections: dict[str, dict[str, Any]] = {}
+    for each in given:
+        path, equals, text = each.partition("=")
+        section, dot, entry = path.strip().partition(".")
+        if not (equals and dot and entry):
+            raise InputError(f"--set {each!r} is not like training.epochs=5")
+        try:
+            value = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            value = text.strip()
+        sections.setdefault(section, {})[entry] = value
+    return sections
+
+
+def _train(options: argparse.Namespace) -> int:
+    from .hardware import hardware
+
+    configuration = _configuration(options)
+    with hardware(options.device, options.workers, options.threads) as here:
+        # One process prepares; the others wait for what came of it.
+        fault = here.shared(_fault_of(lambda: _begin(options, configuration, here)) if here.leads else None)
+        if fault is not None:
+            raise InputError(fault)
+        return _go_on(options.output, here)
+
+
+def _fault_of(work: Callable[[], object]) -> str | None:
+    try:
+        work()
+    except VisualMeshError as error:
+        return str(error)
+    return None
+
+
+def _begin(options: argparse.Namespace, configuration: TrainConfiguration, here: Hardware) -> Job:
+    """Check all pictures, and write down a new training."""
+    from .job import Job
+
+    if (options.output / "run.json").exists():
+        raise InputError(f"{options.output} holds a training already: vm-train resume {options.output}")
+    good = _good_pictures(options.data, configuration, here, options.strict)
+    split = _split(options, configuration, good)
+    parts = f"{len(split.training)} for training, {len(split.validation)} for validation, {len(split.test)} for test"
+    print(f"{options.data}: {len(good)} pictures: {parts}")
+    unpacked = None if options.no_unpacked else options.unpacked or options.output / "unpacked"
+    return Job.begin(options.output, options.data, configuration, split, unpacked)
+
+
+def _good_pictures(
+    data: Path, configuration: TrainConfiguration, here: Hardware, strict: bool
+) -> list[PictureFiles]:
+    pictures = find_pictures(data)
+    ticker = Ticker(len(pictures), "vm-train")
+    try:
+        found = checking.check(pictures, configuration.classes.seen_as(), here.workers + 1, ticker.count)
+    finally:
+        ticker.end()
+    for line in checking.complaints(found):
+        print(f"vm-train: {line}", file=sys.stderr)
+    if strict and checking.complaints(found):
+        raise InputError("the pictures are at fault, as said above, and --strict allows none")
+    if not found.good:
+        raise InputError(f"no picture of {data} can be used")
+    return list(found.good)
+
+
+def _split(options: argparse.Namespace, configuration: TrainConfiguration, good: Sequence[PictureFiles]) -> Split:
+    numbers = [each.number for each in good]
+    if options.training or options.validation or options.test:
+        return split_by_lists(numbers, options.training, options.validation, options.test)
+    data = configuration.data
+    return split_by_seed(numbers, data.validation, data.test, data.split_seed)
+
+
+def _resume(options: argparse.Namespace) -> int:
+    from .hardware import hardware
+
+    with hardware(options.device, options.workers, options.threads) as here:
+        return _go_on(options.run, here)
+
+
+def _go_on(folder: Path, here: Hardware) -> int:
+    from .job import Job
+    from .run import train
+
+    job = Job.read(folder)
+    with _on_request() as stopped:
+        done = train(job, here, stopped)
+    if not here.leads:
+        return EXIT_OK if done.finished else EXIT_INTERRUPTED
+    speed = f"{done.pictures / max(done.seconds, 1e-9):.0f} pictures/s"
+    if not done.finished:
+        print(f"vm-train: stopped; vm-train resume {folder} goes on", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    if job.unpacked is not None and job.unpacked.parent.resolve() == folder.resolve():
+        shutil.rmtree(job.unpacked, ignore_errors=True)
+    best = done.progress.best_ever
+    print(f"{job.model_path}: average precision {best:.3f} on the validation, {speed}" * (done.pictures > 0), end="")
+    print("" if done.pictures else f"{job.model_path}: the training was finished already")
+    print(f"next: vm-evaluate {job.model_path} {job.data} --list {folder / 'pictures.json'} --part test -o report")
+    print(f"      vm-export {job.model_path}")
+    return EXIT_OK
+
+
+def _check(options: argparse.Namespace) -> int:
+    return checking.run_check(options, read_sections(TrainConfiguration, options.config).classes.seen_as())
+
+
+def _preview(options: argparse.Namespace) -> int:
+    from vm_synth.sheet import chosen
+
+    from .loading import View
+    from .pictures import read_picture
+    from .preview import sheet, write_sheet
+
+    configuration = _configuration(options)
+    check_writable(options.output)
+    pictures = find_pictures(options.data)
+    classes = configuration.classes.seen_as()
+    own = configuration.mesh.radius_of == "scene"
+    view = View(classes, configuration.manifest, configuration.grid, configuration.augmentation, own)
+    picked = [pictures[each] for each in chosen(range(len(pictures)), options.count, None, options.seed)]
+    shown = [read_picture(each, classes) for each in picked]
+    made = sheet(
+        shown,
+        [view.manifest_for(each) for each in picked],
+        configuration.grid,
+        configuration.augmentation,
+        options.seed,
+        options.versions,
+        options.width,
+    )
+    write_sheet(options.output, made)
+    print(f"{options.output}: {len(shown)} pictures, {options.versions} versions of each")
+    return EXIT_OK
+
+
+def _rate(options: argparse.Namespace) -> int:
+    from tempfile import TemporaryDirectory
+
+    import torch
+
+    from vm_export.network import Network
+
+    from .hardware import hardware
+    from .job import Job
+    from .rate_finder import plot_rates, search
+
+    configuration = _configuration(options)
+    if options.plot is not None:
+        check_writable(options.plot)
+    with hardware(options.device, options.workers, options.threads) as here, TemporaryDirectory() as folder:
+        good = _good_pictures(options.data, configuration, here, strict=False)
+        split = Split(tuple(each.number for each in good), (), ())
+        job = Job.begin(Path(folder) / "run", options.data, configuration, split, None)
+        torch.manual_seed(configuration.training.seed)
+        found = search(job, here, Network(configuration.network_shape), options.steps)
+    for position in range(0, len(found.rates), max(len(found.rates) // 12, 1)):
+        print(f"rate {found.rates[position]:.1e}  loss {found.losses[position]:.4f}")
+    print(f"proposed: training.rate = {found.proposed:.2g}")
+    if options.plot is not None:
+        plot_rates(found, options.plot)
+    return EXIT_OK
+
+
+def _config(options: argparse.Namespace) -> int:
+    print("\n".join(documented(TrainConfiguration())))
+    return EXIT_OK
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,78 @@
+"""What a training runs on: device, processes that torchrun started, worker processes that read pictures."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import torch
+from torch import distributed
+
+from vm_embedded.errors import InputError
+
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """One process's share. device: as torch names it. rank of size processes. workers: that read its pictures."""
+
+    device: str
+    rank: int
+    size: int
+    workers: int
+
+    @property
+    def leads(self) -> bool:
+        """Whether this process writes the files."""
+        return self.rank == 0
+
+    def shared(self, value: Value) -> Value:
+        """The leading process's value, in all of them."""
+        if self.size == 1:
+            return value
+        box = [value]
+        distributed.broadcast_object_list(box, src=0)
+        return box[0]
+
+    def gathered(self, value: Value) -> list[Value]:
+        """Every process's value, in all of them."""
+        if self.size == 1:
+            return [value]
+        box: list[Any] = [None] * self.size
+        distributed.all_gather_object(box, value)
+        return box
+
+
+@contextmanager
+def hardware(device: str, workers: int | None, threads: int | None) -> Iterator[Hardware]:
+    """The hardware that is there: the processes of torchrun, if it started this one, meet here.
+
+    device: auto, cpu or cuda. workers, threads: None for as many as the processor has cores for. Raises InputError if there is
+    no such device.
+    """
+    size, rank = int(os.environ.get("WORLD_SIZE", "1")), int(os.environ.get("RANK", "0"))
+    local, locals_ = int(os.environ.get("LOCAL_RANK", "0")), int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
+    if device == "cuda" and not torch.cuda.is_available():
+        raise InputError("torch finds no GPU here; take --device cpu")
+    gpu = device != "cpu" and torch.cuda.is_available()
+    if gpu and local >= torch.cuda.device_count():
+        raise InputError(f"{locals_} processes, but {torch.cuda.device_count()} GPUs: start one process for each GPU")
+    cores = max(len(os.sched_getaffinity(0)) // locals_, 1)
+    if workers is None:
+        workers = max(cores - 1, 1) if gpu else max(cores // 2, 1)
+    torch.set_num_threads(threads or (1 if gpu else max(cores - workers, 1)))
+    # Sums whose order may change from run to run would make a resumed training another one.
+    torch.use_deterministic_algorithms(True, warn_only=True)
+    if gpu:
+        torch.cuda.set_device(local)
+    if size > 1:
+        distributed.init_process_group("nccl" if gpu else "gloo")
+    try:
+        yield Hardware(f"cuda:{local}" if gpu else "cpu", rank, size, workers)
+    finally:
+        if size > 1:
+            distributed.destroy_process_group()

@@ -1,0 +1,158 @@
+"""The folder of a training: everything that is needed to do it, and what came of it.
+
+train.toml: the configuration. pictures.json: which pictures are for what. run.json: the data, and the classes' numbers
+of points. state.pt: how far it is. log.jsonl and tensorboard: what happened. round1.pt, ...: the best network of each
+round. model.pt: the best of all, for vm-evaluate and vm-export.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from vm_embedded import __version__
+from vm_embedded.errors import InputError
+from vm_embedded.files import written_beside
+from vm_synth.sections import documented, read_sections
+
+from .configuration import TrainConfiguration
+from .loading import Graphs, View
+from .pictures import PictureFiles, find_pictures
+from .schedule import Item
+from .split import Split, load, save
+from .unpacked import Unpacked
+
+_COUNTED = 300  # pictures of which classes are counted
+
+_FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is to be done. data: the pictures' folder. counts (C,): points of each class in some training pictures.
+
+    unpacked: where decoded pictures are kept, or None.
+    """
+
+    folder: Path
+    data: Path
+    configuration: TrainConfiguration
+    split: Split
+    counts: npt.NDArray[np.int64]
+    unpacked: Path | None
+
+    @classmethod
+    def begin(
+        cls, folder: Path, data: Path, configuration: TrainConfiguration, split: Split, unpacked: Path | None
+    ) -> Job:
+        """Write down a new training. Raises InputError, also if its folder holds one already."""
+        if (folder / "run.json").exists():
+            raise InputError(f"{folder} holds a training already: vm-train resume {folder}, or another folder")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
+        none = np.zeros(len(configuration.classes.colors), dtype=np.int64)
+        job = cls(folder, data.resolve(), configuration, split, none, unpacked)
+        graphs = job.graphs(split.training)
+        chosen = np.unique(np.linspace(0, len(split.training) - 1, _COUNTED).astype(int))
+        counts = none + sum(_counts(graphs, int(each), len(none)) for each in chosen)
+        if not counts.any():
+            raise InputError("no training picture has a labeled point: do the lens files fit the pictures?")
+        job = cls(folder, data.resolve(), configuration, split, counts, unpacked)
+        save(folder / "pictures.json", split)
+        _write(folder / "train.toml", "\n".join(documented(configuration)))
+        content = {
+            "format": _FORMAT,
+            "version": __version__,
+            "data": str(job.data),
+            "unpacked": None if unpacked is None else str(unpacked.resolve()),
+            "points": dict(zip(configuration.classes.colors, counts.tolist(), strict=True)),
+        }
+        _write(folder / "run.json", json.dumps(content, indent=1) + "\n")
+        return job
+
+    @classmethod
+    def read(cls, folder: Path) -> Job:
+        """A training that was begun. Raises InputError."""
+        path = folder / "run.json"
+        try:
+            content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            if content["format"] != _FORMAT:
+                raise InputError(f"{path} is of another release: begin the training again")
+            counts = np.array(list(content["points"].values()), dtype=np.int64)
+            data, kept = Path(content["data"]), content["unpacked"]
+        except OSError as error:
+            raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise InputError(f"{path} is damaged: {error}") from error
+        configuration = read_sections(TrainConfiguration, folder / "train.toml")
+        if len(counts) != len(configuration.classes.colors):
+            raise InputError(f"{folder / 'train.toml'} has other classes than {path}")
+        unpacked = None if kept is None else Path(kept)
+        return cls(folder, data, configuration, load(folder / "pictures.json"), counts, unpacked)
+
+    def graphs(self, numbers: Sequence[str]) -> Graphs:
+        """The graphs of some pictures. Raises InputError if one is not there any more."""
+        found = {each.number: each for each in find_pictures(self.data)}
+        missing = [number for number in numbers if number not in found]
+        if missing:
+            raise InputError(f"{len(missing)} pictures of the training are not in {self.data}, as {missing[0]}")
+        pictures: list[PictureFiles] = [found[number] for number in numbers]
+        mesh = self.configuration.mesh
+        view = View(
+            self.configuration.classes.seen_as(),
+            self.configuration.manifest,
+            self.configuration.grid,
+            self.configuration.augmentation,
+            mesh.radius_of == "scene",
+        )
+        return Graphs(pictures, view, None if self.unpacked is None else Unpacked(self.unpacked))
+
+    def round_path(self, training_round: int) -> Path:
+        """The best network of a round, counted from 1."""
+        return self.folder / f"round{training_round}.pt"
+
+    @property
+    def state_path(self) -> Path:
+        """How far the training is."""
+        return self.folder / "state.pt"
+
+    @property
+    def model_path(self) -> Path:
+        """The best network."""
+        return self.folder / "model.pt"
+
+    def provenance(self) -> dict[str, str]:
+        """Where a network of this training comes from, for its manifest."""
+        recipe, split = self.configuration.training, self.split
+        used = hashlib.sha256(json.dumps([split.training, split.validation]).encode()).hexdigest()
+        return {
+            "made_by": f"vm-train {__version__}",
+            "data": self.data.name,
+            "training_pictures": str(len(split.training)),
+            "validation_pictures": str(len(split.validation)),
+            "pictures_sha256": used,
+            "configuration_sha256": hashlib.sha256("\n".join(documented(self.configuration)).encode()).hexdigest(),
+            "selection": recipe.selection,
+            "loss": recipe.loss,
+            "epochs": str(recipe.epochs),
+            "seed": str(recipe.seed),
+        }
+
+
+def _counts(graphs: Graphs, position: int, classes: int) -> npt.NDArray[np.int64]:
+    labels = graphs[Item(position)].labels
+    return np.bincount(labels[labels >= 0], minlength=classes)
+
+
+def _write(path: Path, text: str) -> None:
+    with written_beside(path) as part:
+        part.write_text(text, encoding="utf-8")

@@ -1,0 +1,88 @@
+"""What a training writes down while it runs: a line of JSON for each step and validation, and TensorBoard's files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from vm_embedded.errors import InputError
+from vm_embedded.files import written_beside
+
+
+class Log:
+    """log.jsonl and tensorboard/ in a folder. Records have a round and a step; scalars are shown in TensorBoard.
+
+    A training that goes on from an earlier state forgets what came after it. Of several processes one writes. Raises
+    InputError.
+    """
+
+    def __init__(self, folder: Path, training_round: int, step: int, writes: bool = True) -> None:
+        self._writes = writes
+        if not writes:
+            return
+        from torch.utils.tensorboard import SummaryWriter
+
+        self._path = folder / "log.jsonl"
+        if self._path.exists():
+            _cut(self._path, training_round, step)
+        self._round = training_round
+        try:
+            self._file = self._path.open("a", encoding="utf-8")
+            self._board = SummaryWriter(  # type: ignore[no-untyped-call]
+                str(folder / "tensorboard" / f"round{training_round}"), purge_step=step + 1
+            )
+        except OSError as error:
+            raise InputError(f"can't write {self._path}: {error.strerror or error}") from error
+
+    def write(self, step: int, record: dict[str, Any]) -> None:
+        """Add a record of plain values."""
+        if not self._writes:
+            return
+        try:
+            self._file.write(json.dumps({"round": self._round, "step": step} | record) + "\n")
+            self._file.flush()
+        except OSError as error:
+            raise InputError(f"can't write {self._path}: {error.strerror or error}") from error
+        for name, value in _scalars(record):
+            self._board.add_scalar(name, value, step)  # type: ignore[no-untyped-call]
+
+    def __enter__(self) -> Log:
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        if self._writes:
+            self._file.close()
+            self._board.close()  # type: ignore[no-untyped-call]
+
+
+def _scalars(record: dict[str, Any], above: str = "") -> list[tuple[str, float]]:
+    """All numbers of a record, by their path."""
+    found = []
+    for name, value in record.items():
+        if isinstance(value, dict):
+            found += _scalars(value, f"{above}{name}/")
+        elif isinstance(value, int | float):
+            found.append((above + name, float(value)))
+    return found
+
+
+def _cut(path: Path, training_round: int, step: int) -> None:
+    """Leave out what came after a step, and a last line that was not finished."""
+    kept = [
+        line
+        for line, record in read_log(path)
+        if (record["round"], record["step"]) <= (training_round, step)
+    ]
+    with written_beside(path) as part:
+        part.write_text("".join(kept), encoding="utf-8")
+
+
+def read_log(path: Path) -> list[tuple[str, dict[str, Any]]]:
+    """Whole lines of a log and their records. Raises InputError."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+        return [(line, json.loads(line)) for line in lines if line.endswith("\n")]
+    except (OSError, ValueError) as error:
+        raise InputError(f"can't read {path}: {error}") from error

@@ -1,0 +1,51 @@
+"""How a network is trained: section [training] of train.toml."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vm_synth.ranges import check_entries, number, one_of
+
+from .selection import RULES
+
+OPTIMIZERS = ("adamw", "adam", "sgd")
+SCHEDULES = ("one_cycle", "constant")
+LOSSES = ("cross_entropy", "focal")
+PRECISIONS = ("full", "mixed")
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Section [training]. Raises InputError."""
+
+    epochs: int = number(20, "how often each picture is looked at, in each round", "", (1, 1e6))
+    batch: int = number(8, "pictures in a step, over all processes", "", (1, 1e5))
+    rate: float = number(0.01, "highest learning rate; vm-train rate looks for it", "", (1e-9, 1e3))
+    optimizer: str = one_of(OPTIMIZERS, "adamw", "how weights follow their gradients; sgd has momentum 0.9")
+    schedule: str = one_of(SCHEDULES, "one_cycle", "how the rate changes: up and down once, or not at all")
+    decay: float = number(1e-4, "weight decay", "", (0.0, 1.0))
+    clip: float = number(1.0, "largest norm of a step's gradient; 0 for any", "", (0.0, 1e9))
+    loss: str = one_of(LOSSES, "cross_entropy", "focal weighs points that the network is sure of less")
+    gamma: float = number(2.0, "exponent of the focal loss", "", (0.0, 20.0))
+    selection: str = one_of(
+        RULES,
+        "hard",
+        "points that give gradients: all; balanced, as many of each class; or hard, balanced and those that the "
+        "networks of earlier rounds were wrong about",
+    )
+    rounds: int = number(3, "networks trained one after the other, if selection is hard", "", (2, 10))
+    patience: int = number(0, "epochs without a better validation after which a round ends; 0 for none", "", (0, 1e6))
+    precision: str = one_of(PRECISIONS, "full", "mixed computes in bfloat16 where that is safe: faster on a GPU")
+    seed: int = number(0, "of weights, order, selection and augmentation", "", (0, 2**31))
+
+    def __post_init__(self) -> None:
+        check_entries(self)
+
+    @property
+    def trainings(self) -> int:
+        """Networks that are trained one after the other."""
+        return self.rounds if self.selection == "hard" else 1
+
+    def selection_of(self, training_round: int) -> str:
+        """Rule of a round, counted from 1: of the first no earlier network knows what is hard."""
+        return "balanced" if self.selection == "hard" and training_round == 1 else self.selection

@@ -1,0 +1,182 @@
+"""The rounds of a training: networks one after the other, each chosen by its validation, all of it resumable."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import asdict, dataclass, replace
+from time import perf_counter
+
+import numpy as np
+import torch
+
+from vm_export.checkpoint import Checkpoint
+from vm_export.network import Network
+from vm_synth.progress import Ticker
+
+from .hardware import Hardware
+from .job import Job
+from .loading import loaded
+from .log import Log
+from .point_scores import PointScores
+from .schedule import Batch, schedule
+from .selection import class_shares
+from .training import Training, read_state, summed
+
+_SAVED = 30.0  # seconds between states
+
+
+@dataclass
+class Progress:
+    """How far a training is beside its weights.
+
+    round: counted from 1. finished: whether the round is. validated: epochs of it that are. best: score of its best
+    network, and best_epoch, counted from 1, where it was reached. best_ever: of all rounds.
+    """
+
+    round: int = 1
+    finished: bool = False
+    validated: int = 0
+    best: float = -1.0
+    best_epoch: int = 0
+    best_ever: float = -1.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a call of `train` came to. finished: or stopped on request."""
+
+    finished: bool
+    progress: Progress
+    pictures: int
+    seconds: float
+
+
+def train(job: Job, hardware: Hardware, stopped: Callable[[], bool]) -> Outcome:
+    """Do all that is left of a training, or as much as there is until `stopped` says so. Raises InputError.
+
+    The final weights are the same however often it was stopped or killed.
+    """
+    began = perf_counter()
+    progress = Progress()
+    if job.state_path.exists():
+        progress = Progress(**read_state(job.state_path)["more"])
+    pictures = 0
+    while True:
+        if progress.finished:
+            if progress.round == job.configuration.training.trainings:
+                return Outcome(True, progress, pictures, perf_counter() - began)
+            progress = Progress(round=progress.round + 1, best_ever=progress.best_ever)
+        pictures += _train_round(job, hardware, progress, stopped)
+        if not progress.finished:
+            return Outcome(False, progress, pictures, perf_counter() - began)
+
+
+def _train_round(job: Job, hardware: Hardware, progress: Progress, stopped: Callable[[], bool]) -> int:
+    """Do what is left of a round, and return the number of pictures that were looked at."""
+    training, batches = _prepared(job, hardware, progress)
+    recipe = job.configuration.training
+    own = [each.part(hardware.rank, hardware.size) for each in batches]
+    graphs = job.graphs((*job.split.training, *job.split.validation))
+    scores = PointScores(tuple(job.configuration.classes.colors))
+    ticker = Ticker(batches[-1].step if batches else 0, "vm-train", training.done)
+    pictures, saved = 0, perf_counter()
+
+    def save() -> None:
+        if hardware.leads:
+            training.save(job.state_path, asdict(progress))
+
+    with Log(job.folder, progress.round, training.done, hardware.leads) as log, closing(
+        loaded(graphs, own, hardware.workers)
+    ) as loader:
+        for batch, whole, found in zip(own, batches, loader, strict=True):
+            pictures += len(whole.items)
+            if batch.validates:
+                for each in found:
+                    scores.add(training.probabilities(each), each.labels, each.distances)
+                if batch.last:
+                    _validated(job, hardware, progress, training, log, scores)
+                    scores = PointScores(tuple(job.configuration.classes.colors))
+                    if recipe.patience and progress.validated - progress.best_epoch >= recipe.patience:
+                        break
+                    save()
+            else:
+                step = training.step(batch.items, found)
+                log.write(step.number, {"loss": step.loss, "points": step.points, "rate": step.rate})
+                ticker.count()
+                if batch.last or perf_counter() - saved > _SAVED:
+                    save()
+                    saved = perf_counter()
+            if summed(torch.tensor(float(stopped()))) > 0.0:
+                if not batch.validates:
+                    save()
+                ticker.end()
+                return pictures
+    ticker.end()
+    progress.finished = True
+    save()
+    return pictures
+
+
+def _prepared(job: Job, hardware: Hardware, progress: Progress) -> tuple[Training, list[Batch]]:
+    """A round's training as far as it is, and the batches that are left."""
+    recipe, split = job.configuration.training, job.split
+    torch.manual_seed(int(np.random.default_rng([recipe.seed, progress.round]).integers(2**31)))
+    network = Network(job.configuration.network_shape)
+    rule = recipe.selection_of(progress.round)
+    graders = [Checkpoint.load(job.round_path(each)).network for each in range(1, progress.round)]
+    seed = (recipe.seed, progress.round)
+    batches = list(schedule(seed, recipe.epochs, recipe.batch, len(split.training), len(split.validation)))
+    training = Training(
+        network, recipe, batches[-1].step, class_shares(rule, job.counts), graders, hardware.device
+    )
+    if job.state_path.exists():
+        state = read_state(job.state_path)
+        if state["more"]["round"] == progress.round:
+            training.load(state)
+    left = [
+        each
+        for each in batches
+        if (each.epoch >= progress.validated if each.validates else each.step > training.done)
+    ]
+    return training, left
+
+
+def _validated(
+    job: Job, hardware: Hardware, progress: Progress, training: Training, log: Log, own: PointScores
+) -> None:
+    """Score a network, and keep it if it is the best so far."""
+    first, *others = hardware.gathered(own)
+    scores = sum(others, start=first)
+    precisions = {name: scores.ranking(name).precision_recall.average_precision for name in scores.classes}
+    score = _score(job, precisions)
+    progress.validated += 1
+    known = {name: value for name, value in precisions.items() if not math.isnan(value)}
+    log.write(training.done, {"epoch": progress.validated, "score": score, "average_precision": known})
+    if score <= progress.best:
+        return
+    progress.best, progress.best_epoch = score, progress.validated
+    if not hardware.leads:
+        progress.best_ever = max(progress.best_ever, score)
+        return
+    provenance = job.provenance() | {
+        "round": str(progress.round),
+        "epoch": str(progress.validated),
+        "validation_average_precision": f"{score:.4f}",
+        "torch": torch.__version__,
+    }
+    manifest = replace(job.configuration.manifest, provenance=provenance)
+    checkpoint = Checkpoint(training.network, manifest, job.configuration.grid)
+    checkpoint.save(job.round_path(progress.round))
+    if score > progress.best_ever:
+        checkpoint.save(job.model_path)
+        progress.best_ever = score
+
+
+def _score(job: Job, precisions: dict[str, float]) -> float:
+    """Mean average precision of the objects, or of all classes if none is an object; those that occur."""
+    kinds = job.configuration.classes.kinds
+    objects = [name for name, kind in kinds.items() if kind == "object"] or list(kinds)
+    values = [precisions[name] for name in objects if not math.isnan(precisions[name])]
+    return float(np.mean(values)) if values else 0.0

@@ -1,0 +1,64 @@
+"""What a training looks at, and when: nothing but the seed and the numbers of pictures decide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+_VALIDATED = 8  # pictures at once
+
+
+@dataclass(frozen=True)
+class Item:
+    """A picture to be loaded: its position in the set, and the seed of its augmentation; None for none."""
+
+    position: int
+    seed: tuple[int, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Pictures of one step of training, or of a part of the validation after an epoch.
+
+    step: number of steps that are done after it, or that were done before the validation. last: of its epoch's
+    training, or of its validation.
+    """
+
+    epoch: int
+    step: int
+    items: tuple[Item, ...]
+    validates: bool
+    last: bool
+
+    def part(self, rank: int, size: int) -> Batch:
+        """What one of `size` processes has to do of it."""
+        return Batch(self.epoch, self.step, self.items[rank::size], self.validates, self.last)
+
+
+def steps_an_epoch(training: int, batch: int) -> int:
+    """Steps in which `training` pictures are looked at once."""
+    return -(-training // batch)
+
+
+def schedule(
+    seed: tuple[int, ...], epochs: int, batch: int, training: int, validation: int
+) -> Iterator[Batch]:
+    """All batches of a training: in each epoch all pictures, shuffled, then all of the validation.
+
+    Positions from 0 are those of the training pictures, and from `training` on those of the validation.
+    """
+    step = 0
+    for epoch in range(epochs):
+        shuffled = np.random.default_rng([*seed, 1, epoch]).permutation(training)
+        starts = range(0, training, batch)
+        for start in starts:
+            step += 1
+            chosen = (int(each) for each in shuffled[start : start + batch])
+            items = tuple(Item(each, (*seed, 3, epoch, each)) for each in chosen)
+            yield Batch(epoch, step, items, validates=False, last=start == starts[-1])
+        for start in range(0, validation, _VALIDATED):
+            chosen = range(training + start, training + min(start + _VALIDATED, validation))
+            last = start + _VALIDATED >= validation
+            yield Batch(epoch, step, tuple(Item(each) for each in chosen), validates=True, last=last)
