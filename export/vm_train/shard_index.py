@@ -1,0 +1,87 @@
+"""Where pictures are in tar shards, so that each can be read by itself without unpacking."""
+
+from __future__ import annotations
+
+import tarfile
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from vm_embedded.errors import InputError, one_line
+
+from .picture_files import IMAGES, PictureFiles, Place
+
+PARTS_BY_SUFFIX = {**dict.fromkeys(IMAGES, "image"), ".mask.png": "mask", ".lens.yaml": "lens"}
+"""What files of a shard are; other suffixes are passed over."""
+
+
+def key_and_part(name: str) -> tuple[str, str | None]:
+    """The number that a shard's file belongs to, up to the first dot of its name, and which part it is, if any."""
+    number, dot, rest = name.rpartition("/")[2].partition(".")
+    return number, PARTS_BY_SUFFIX.get((dot + rest).lower())
+
+
+def find_shards(where: Path) -> list[Path]:
+    """Shards by name: all of a folder, or those of a pattern such as DIR/pictures-*.tar. Raises InputError for none."""
+    found = where.glob("*.tar") if where.is_dir() else where.parent.glob(where.name)
+    shards = sorted(path for path in found if path.is_file())
+    if not shards:
+        raise InputError(f"there are no shards {where / '*.tar' if where.is_dir() else where}")
+    return shards
+
+
+def open_shards(where: Path) -> list[PictureFiles]:
+    """All pictures of a folder's shards, or of a pattern's, by number.
+
+    Only headers are read. Raises InputError if a shard is damaged, or two pictures have one number.
+    """
+    pictures: dict[str, PictureFiles] = {}
+    for shard in find_shards(where):
+        for entry in _entries(shard):
+            picture = entry.files(shard)
+            other = pictures.setdefault(picture.number, picture)
+            if other is not picture:
+                raise InputError(f"picture {picture.number} is both in {other.shard} and in {shard}")
+    if not pictures:
+        raise InputError(f"the shards {where} hold no pictures: images are named X.jpg or X.png")
+    return [picture for _, picture in sorted(pictures.items())]
+
+
+@dataclass
+class _Entry:
+    """What a shard holds of one picture: names and places of its parts."""
+
+    number: str
+    parts: dict[str, tuple[str, Place]] = field(default_factory=dict)
+
+    def files(self, shard: Path) -> PictureFiles:
+        usual = {"image": ".jpg", "mask": ".mask.png", "lens": ".lens.yaml"}
+        names = {part: self.parts[part][0] if part in self.parts else self.number + usual[part] for part in usual}
+        image, mask, lens = (shard / name for name in names.values())
+        places = tuple((part, place) for part, (_, place) in self.parts.items())
+        return PictureFiles(self.number, image, mask, lens, shard, places)
+
+
+def _entries(shard: Path) -> Iterator[_Entry]:
+    """Pictures of a shard with an image. Raises InputError naming the shard and where it is damaged."""
+    entries: dict[str, _Entry] = {}
+    after = "its begin"
+    try:
+        with tarfile.open(shard, "r:") as tar:
+            for member in tar:
+                number, part = key_and_part(member.name)
+                if member.isfile() and part is not None:
+                    entry = entries.setdefault(number, _Entry(number))
+                    if part in entry.parts:
+                        raise InputError(f"{shard} has two files for the {part} of picture {number}")
+                    entry.parts[part] = member.name, Place(member.offset_data, member.size)
+                after = member.name
+            end = tar.offset
+        # tarfile takes the end of a cut file for that of the archive.
+        with shard.open("rb") as file:
+            file.seek(end)
+            if file.read(512) != bytes(512):
+                raise InputError(f"{shard} is cut short or damaged after {after}, at byte {end}")
+    except (tarfile.TarError, OSError, EOFError) as error:
+        raise InputError(f"{shard} is cut short or damaged after {after}: {one_line(error)}") from error
+    yield from (entry for entry in entries.values() if "image" in entry.parts)

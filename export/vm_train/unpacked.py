@@ -1,0 +1,121 @@
+"""Decoded pictures on disk: a training looks at each many times, and decoding takes longer than all the rest.
+
+A file holds a header, the lens file's text, the image (h, w, 3) uint8 and the labels (h, w) int8, all raw. It is mapped
+into memory, so that only what a mesh looks at is read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import mmap
+import shutil
+import struct
+from contextlib import suppress
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+
+from vm_embedded.errors import InputError
+from vm_embedded.files import written_beside
+
+from .picture_files import PARTS, PictureFiles
+from .pictures import Classes, Picture, parse_lens, read_picture
+
+_HEADER = struct.Struct("<8s32sIIII")  # magic, what it was made from, width, height, bytes of the lens, zero
+_MAGIC = b"vmtrain1"
+_KEPT_FREE = 1 << 30  # bytes that a training needs for its own files
+
+
+def size_of(count: int, width: int, height: int) -> int:
+    """Room that decoded pictures of a size [px] take on disk [bytes]."""
+    return count * (4 * width * height + 4096)
+
+
+class Unpacked:
+    """A folder of decoded pictures of one set. Entries that are stale or damaged count as absent.
+
+    Raises InputError if the folder can't be made.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._full_mark.unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError(f"can't use folder {folder}: {error.strerror or error}") from error
+        self._full = False
+
+    @property
+    def full(self) -> bool:
+        """Whether any process on this folder has found no room for a picture; from then on no more are put there."""
+        return self._full or self._full_mark.exists()
+
+    def get(self, files: PictureFiles, classes: Classes) -> Picture | None:
+        """A picture, read-only, if it is there as its files are now and with the labels of these classes."""
+        try:
+            source = _source(files, classes)
+            with self._path(files).open("rb") as file:
+                content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+            magic, found, width, height, text, _ = _HEADER.unpack_from(content)
+            start, pixels = _HEADER.size + text, width * height
+            if magic != _MAGIC or found != source or len(content) != start + 4 * pixels:
+                return None
+            lens = parse_lens(content[_HEADER.size : start].decode("utf-8"), files.lens.name)
+        except (OSError, ValueError, struct.error, InputError):
+            return None
+        image = np.frombuffer(content, np.uint8, 3 * pixels, start).reshape(height, width, 3)
+        labels = np.frombuffer(content, np.int8, pixels, start + 3 * pixels).reshape(height, width)
+        return Picture(image, labels, lens)
+
+    def put(self, files: PictureFiles, classes: Classes, picture: Picture) -> None:
+        """Keep a picture; without effect if it can't be written."""
+        height, width = picture.labels.shape
+        try:
+            if shutil.disk_usage(self.folder).free < size_of(1, width, height) + _KEPT_FREE:
+                raise OSError
+            text = files.read("lens")
+            header = _HEADER.pack(_MAGIC, _source(files, classes), width, height, len(text), 0)
+            # Opened with x: where two processes put the same picture, neither writes into the other's file.
+            with written_beside(self._path(files)) as part, part.open("xb") as file:
+                for each in (header, text, np.ascontiguousarray(picture.image), np.ascontiguousarray(picture.labels)):
+                    file.write(each)
+        except (OSError, InputError) as error:
+            cause = error.__cause__ if isinstance(error, InputError) else error
+            if not isinstance(cause, FileExistsError | FileNotFoundError):
+                self._full = True
+                with suppress(OSError):
+                    self._full_mark.touch()
+
+    @property
+    def _full_mark(self) -> Path:
+        """An empty file tells worker processes, and the one that reports, that one of them found no room."""
+        return self.folder / "full"
+
+    def _path(self, files: PictureFiles) -> Path:
+        return self.folder / f"{quote(files.number, safe='')}.raw"
+
+
+def read(files: PictureFiles, classes: Classes, unpacked: Unpacked | None) -> Picture:
+    """A picture from where it is unpacked, or from its files and then put there. Raises PictureFault."""
+    if unpacked is None:
+        return read_picture(files, classes)
+    picture = unpacked.get(files, classes)
+    if picture is None:
+        picture = read_picture(files, classes)
+        if not unpacked.full:
+            unpacked.put(files, classes, picture)
+    return picture
+
+
+def _source(files: PictureFiles, classes: Classes) -> bytes:
+    """Digest of what a picture is made from: sizes and times of its files, and the colors of classes."""
+    if files.shard is None:
+        stats = [files.path(part).stat() for part in PARTS]
+        places: tuple[object, ...] = ()
+    else:
+        stats, places = [files.shard.stat()], files.places
+    content = [[each.st_size, each.st_mtime_ns] for each in stats], places, list(classes.colors.items())
+    return hashlib.sha256(json.dumps(content).encode()).digest()
