@@ -35,7 +35,7 @@ class Augmentation:
     tilt: float = number(1.0, "error of the camera's roll, and of its pitch", "deg", (0.0, 20.0))
     focal_length: float = number(0.01, "error of the focal length, as a share of it", "", (0.0, 0.2))
     center: float = number(0.005, "error of the optical center, across and down, in image widths", "", (0.0, 0.1))
-    brightness: float = number(0.25, "factor of all colors, above 1 or below", "", (0.0, 4.0))
+    brightness: float = number(0.2, "factor of all colors, above 1 or below", "", (0.0, 4.0))
     contrast: float = number(0.2, "factor of the difference to mid gray, above 1 or below", "", (0.0, 4.0))
     saturation: float = number(0.3, "factor of the difference to gray as bright, above 1 or below", "", (0.0, 4.0))
     hue: float = number(6.0, "turn of all hues, either way", "deg", (0.0, 180.0))
