@@ -84,7 +84,7 @@ def _listed(path: Path, numbers: Sequence[str], known: set[str]) -> tuple[str, .
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError) as error:
         raise InputError(f"can't read list {path}: {getattr(error, 'strerror', None) or error}") from error
-    found = {}
+    found: dict[str, None] = {}
     for line, text in enumerate(lines, start=1):
         name = text.partition("#")[0].strip()
         if name:

@@ -80,7 +80,7 @@ class Unpacked:
             header = _HEADER.pack(_MAGIC, _source(files, classes), width, height, len(text), 0)
             # Opened with x: where two processes put the same picture, neither writes into the other's file.
             with written_beside(self._path(files)) as part, part.open("xb") as file:
-                for each in (header, text, np.ascontiguousarray(picture.image), np.ascontiguousarray(picture.labels)):
+                for each in (header, text, picture.image.tobytes(), picture.labels.tobytes()):
                     file.write(each)
         except (OSError, InputError) as error:
             cause = error.__cause__ if isinstance(error, InputError) else error

@@ -1,0 +1,202 @@
+"""Reading all pictures before a training: what they show, and every fault instead of the first."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context, parent_process
+from threading import Thread
+
+import cv2
+import numpy as np
+
+from vm_embedded.errors import VisualMeshError, unknown
+from vm_embedded.lens import Lens, RadialLens, Size
+from vm_embedded.lens_file import LensFile
+from vm_embedded.lens_opencv import CalibratedLens
+
+from .picture_files import PictureFault, PictureFiles
+from .pictures import Classes, Labels, read_picture
+
+_CHUNK = 16  # pictures that a worker gets at once
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a good picture shows.
+
+    size: width and height [px]. lens: kind; focal_length [px] and fov [rad]. height [m], pitch and roll [rad] of the
+    camera. pixels: of each class; unlabeled: of none. distances [m]: of the things that are connected pixels of an
+    object class, from the camera's foot to where the ray through their middle meets the plane; infinite if it doesn't.
+    """
+
+    number: str
+    size: Size
+    lens: str
+    focal_length: float
+    fov: float
+    height: float
+    pitch: float
+    roll: float
+    pixels: tuple[int, ...]
+    unlabeled: int
+    distances: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A picture that can't be used: its number, kind of the fault as PictureFault has it, and what it is."""
+
+    number: str
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Check:
+    """What came of reading pictures: the good ones with their facts, and the others' faults, all by number."""
+
+    classes: tuple[str, ...]
+    good: tuple[PictureFiles, ...]
+    facts: tuple[Facts, ...]
+    faults: tuple[Fault, ...]
+
+    @property
+    def count(self) -> int:
+        """Pictures that were read."""
+        return len(self.facts) + len(self.faults)
+
+    @property
+    def pixels(self) -> dict[str, int]:
+        """Pixels of each class."""
+        return {name: sum(each.pixels[index] for each in self.facts) for index, name in enumerate(self.classes)}
+
+    @property
+    def shown(self) -> dict[str, int]:
+        """Pictures that show each class."""
+        return {name: sum(each.pixels[index] > 0 for each in self.facts) for index, name in enumerate(self.classes)}
+
+    @property
+    def absent(self) -> list[str]:
+        """Classes that no good picture shows."""
+        return [name for name, count in self.shown.items() if not count] if self.facts else []
+
+    @property
+    def sizes(self) -> Counter[Size]:
+        """Pictures of each size [px]."""
+        return Counter(each.size for each in self.facts)
+
+    @property
+    def lenses(self) -> Counter[str]:
+        """Pictures of each kind of lens."""
+        return Counter(each.lens for each in self.facts)
+
+
+def check(
+    pictures: Sequence[PictureFiles],
+    classes: Classes,
+    workers: int,
+    report: Callable[[], None],
+    objects: Sequence[str] = (),
+) -> Check:
+    """Read all pictures with so many processes, 1 for none but this one, and report each.
+
+    objects: classes whose distances are measured. Raises InputError for a class that is none, and VisualMeshError if a
+    worker was killed.
+    """
+    positions = [_position(name, classes) for name in objects]
+    good, facts, faults = [], [], []
+    for files, found in zip(pictures, _found(pictures, classes, positions, workers), strict=True):
+        if isinstance(found, Fault):
+            faults.append(found)
+        else:
+            good.append(files)
+            facts.append(found)
+        report()
+    return Check(classes.names, tuple(good), tuple(facts), tuple(faults))
+
+
+def _position(name: str, classes: Classes) -> int:
+    if name not in classes.names:
+        raise VisualMeshError(unknown("class", name, classes.names))
+    return classes.names.index(name)
+
+
+def _found(
+    pictures: Sequence[PictureFiles], classes: Classes, objects: Sequence[int], workers: int
+) -> Iterator[Facts | Fault]:
+    inspected = partial(_inspected, classes=classes, objects=objects)
+    if workers < 2 or len(pictures) <= _CHUNK:
+        yield from map(inspected, pictures)
+        return
+    chunks = -(-len(pictures) // _CHUNK)
+    pool = ProcessPoolExecutor(min(workers, chunks), get_context("spawn"), _start)
+    try:
+        yield from pool.map(inspected, pictures, chunksize=_CHUNK)
+    except BrokenProcessPool as error:
+        raise VisualMeshError("a worker that read pictures was killed (out of memory?)") from error
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _start() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+    cv2.setNumThreads(1)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that started it is killed, which else it would outlive."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _inspected(files: PictureFiles, classes: Classes, objects: Sequence[int]) -> Facts | Fault:
+    try:
+        picture = read_picture(files, classes)
+    except PictureFault as error:
+        return Fault(files.number, error.kind, " ".join(str(error).split()))
+    orientation, (height, width) = picture.lens.orientation, picture.labels.shape
+    assert orientation is not None  # read_picture has seen to it
+    pixels = [int(np.count_nonzero(picture.labels == index)) for index in range(len(classes.names))]
+    distances = [_distances(picture.labels == index, picture.lens) for index in objects if pixels[index]]
+    return Facts(
+        files.number,
+        (width, height),
+        type(picture.lens.lens).__name__.lower().removesuffix("lens"),
+        _focal_length(picture.lens.lens),
+        picture.lens.lens.fov,
+        orientation.height,
+        orientation.pitch,
+        orientation.roll,
+        tuple(pixels),
+        width * height - sum(pixels),
+        tuple(each for some in distances for each in some),
+    )
+
+
+def _focal_length(lens: Lens) -> float:
+    if isinstance(lens, RadialLens):
+        return lens.focal_length
+    assert isinstance(lens, CalibratedLens)
+    return lens.focal_lengths[0]
+
+
+def _distances(here: Labels, lens: LensFile) -> list[float]:
+    """Distances [m] of what is connected where a mask (h, w) is not 0."""
+    assert lens.orientation is not None
+    size = (here.shape[1], here.shape[0])
+    _, _, _, centers = cv2.connectedComponentsWithStats(here.view(np.uint8))
+    rays = lens.lens.for_image(size).unproject(centers[1:].astype(np.float64), size) @ lens.orientation.level.T
+    across, down = np.hypot(rays[:, 0], rays[:, 1]), -rays[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = np.where(down > 0.0, lens.orientation.height * across / down, np.inf)
+    return [float(each) for each in found]
