@@ -57,7 +57,7 @@ def split_by_seed(numbers: Sequence[str], validation: float, test: float, seed: 
 
 def _draw(seed: int, number: str) -> float:
     """A number from 0 to 1 that looks drawn by chance."""
-    digest = hashlib.sha256(f"{seed}:{number}".encode()).digest()
+    digest = hashlib.sha256(f"{seed}:{number}".encode("utf-8", "surrogateescape")).digest()
     return int.from_bytes(digest[:8], "big") / _DRAWS
 
 
