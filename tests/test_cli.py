@@ -374,7 +374,7 @@ def test_progress_is_shown_on_a_terminal_and_nowhere_else(folder):
 
 def test_package_data_and_scripts_are_declared():
     project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
-    assert set(project["scripts"]) == {"vm-detect", "vm-export", "vm-bench", "vm-synth", "vm-train"}
+    assert set(project["scripts"]) == {"vm-detect", "vm-export", "vm-bench", "vm-synth", "vm-train", "vm-evaluate"}
     assert [each.split(">")[0] for each in project["dependencies"]] == [
         "numpy",
         "onnxruntime",

@@ -29,7 +29,8 @@ from vm_embedded.sampling import sample
 from vm_embedded.session import Session
 from vm_embedded.settings import Settings
 from vm_embedded.shapes import shape_named
-from vm_export.checkpoint import VISUAL, Checkpoint, Grid
+from vm_export.checkpoint import Checkpoint
+from vm_export.grid import VISUAL, Grid
 
 from .graphs import OFF_SCREEN, plane_distances, seen_points
 from .pictures import Picture

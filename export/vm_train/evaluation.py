@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vm_embedded.arrays import Image
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.manifest import Manifest
 
@@ -18,26 +17,12 @@ from .answers import Answer, Subject
 from .object_scores import ObjectScores
 from .object_truth import SceneTruth, read_scene, true_objects
 from .oddities import Oddities, oddities
-from .pictures import Classes, Labels, Picture, PictureFiles, read_picture
+from .picture_files import PictureFault
+from .pictures import Classes, Picture, PictureFiles, read_picture
 from .point_scores import PointScores
 
 RADII = ("all", "scene")
 """Which radius mesh and fit have. all: the network's. scene: that of each picture's own balls, as vm-synth knows it."""
-
-
-class StrangeColorError(InputError):
-    """A mask has a color that none of the network's classes has."""
-
-
-@dataclass(frozen=True)
-class Palette(Classes):
-    """Classes whose strange colors are told apart from other faults of a picture."""
-
-    def labels(self, mask: Image) -> Labels:
-        try:
-            return super().labels(mask)
-        except InputError as error:
-            raise StrangeColorError(str(error)) from error
 
 
 @dataclass(frozen=True)
@@ -103,7 +88,7 @@ class Evaluation:
             if name in self.objects:
                 found = [each for each in answer.found if each.class_name == name]
                 mistakes = self.objects[name].add(truths, found)
-                self.oddities += oddities(files.image, name, truths, found, mistakes)
+                self.oddities += oddities(files, name, truths, found, mistakes)
         if scene is not None:
             self.radii.append(scene.ball_radius)
         orientation = picture.lens.orientation
@@ -111,11 +96,11 @@ class Evaluation:
         self.views.append(View(files, orientation.height, orientation.pitch))
 
 
-def evaluated(subject: Subject, pictures: Sequence[PictureFiles], classes: Palette, rules: Rules) -> Evaluation:
+def evaluated(subject: Subject, pictures: Sequence[PictureFiles], classes: Classes, rules: Rules) -> Evaluation:
     """What comes of these pictures; those that can't be used are named in `faults`.
 
-    Raises StrangeColorError, and ModelError for answers that are no probabilities; with `strict` also InputError and
-    GeometryError for a picture that can't be used.
+    Raises InputError for a mask with a color of no class, with `strict` for every picture that can't be used, and
+    ModelError for answers that are no probabilities.
     """
     result = Evaluation.of_nothing(subject, rules)
     for files in pictures:
@@ -123,9 +108,8 @@ def evaluated(subject: Subject, pictures: Sequence[PictureFiles], classes: Palet
             picture, scene = _read(files, classes, rules)
             answer = subject.answer(picture, scene.ball_radius if scene and rules.radius_of == "scene" else None)
         except (InputError, GeometryError) as error:
-            if isinstance(error.__cause__, StrangeColorError):
-                raise StrangeColorError(f"{files.mask}: {error.__cause__}") from error
-            if rules.strict:
+            # A color without a class is in many masks, and leaving them out would flatter the network.
+            if rules.strict or (isinstance(error, PictureFault) and error.kind == "color"):
                 raise InputError(f"{files.image}: {error}") from error
             result.faults[str(files.image)] = str(error)
         else:
@@ -133,7 +117,7 @@ def evaluated(subject: Subject, pictures: Sequence[PictureFiles], classes: Palet
     return result
 
 
-def _read(files: PictureFiles, classes: Palette, rules: Rules) -> tuple[Picture, SceneTruth | None]:
+def _read(files: PictureFiles, classes: Classes, rules: Rules) -> tuple[Picture, SceneTruth | None]:
     picture = read_picture(files, classes)
     scene = read_scene(files.image.with_name(f"scene{files.number}.json"))
     if scene is None and rules.radius_of == "scene":

@@ -60,11 +60,9 @@ def _point_curves(evaluation: Evaluation) -> Iterable[dict[str, object]]:
     for name in evaluation.points.classes:
         ranking = evaluation.points.ranking(name)
         curve, false = ranking.precision_recall, ranking.roc.false_positive_rate[1:]
-        for row in zip(curve.thresholds, curve.precision, curve.recall, false, strict=True):
-            values = dict(
-                zip(("threshold", "precision", "recall", "false_positive_rate"), map(_short, row), strict=True)
-            )
-            yield {"class": name, **values}
+        for threshold, *rates in zip(curve.thresholds, curve.precision, curve.recall, false, strict=True):
+            values = dict(zip(("precision", "recall", "false_positive_rate"), map(_short, rates), strict=True))
+            yield {"class": name, "threshold": _short(threshold), **values}
 
 
 def _confusion_rows(evaluation: Evaluation) -> Iterable[dict[str, object]]:

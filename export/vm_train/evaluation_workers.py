@@ -17,8 +17,8 @@ from vm_embedded.errors import VisualMeshError
 from vm_embedded.settings import Settings
 
 from .answers import Subject, load_subject
-from .evaluation import Evaluation, Palette, Rules, evaluated
-from .pictures import PictureFiles
+from .evaluation import Evaluation, Rules, evaluated
+from .pictures import Classes, PictureFiles
 
 _CHUNK = 32
 """Pictures that a worker evaluates at once: adding up costs about as much as one of them."""
@@ -31,7 +31,7 @@ class Job:
     model: Path
     settings: Settings
     as_robot: bool
-    classes: Palette
+    classes: Classes
     rules: Rules
 
     def subject(self) -> Subject:
@@ -40,19 +40,19 @@ class Job:
 
 
 def evaluate(
-    job: Job, subject: Subject, pictures: Sequence[PictureFiles], workers: int, report: Callable[[int], None]
+    job: Job, subject: Subject, pictures: Sequence[PictureFiles], workers: int, report: Callable[[], None]
 ) -> Evaluation:
-    """What comes of all pictures, with so many processes, 1 for none but this one; report how many are done.
+    """What comes of all pictures, with so many processes, 1 for none but this one; report each that is done.
 
     Raises what `evaluated` does, and VisualMeshError if a worker was killed.
     """
     size = min(_CHUNK, max(-(-len(pictures) // workers), 1))
     chunks = [pictures[start : start + size] for start in range(0, len(pictures), size)]
-    result, done = Evaluation.of_nothing(subject, job.rules), 0
+    result = Evaluation.of_nothing(subject, job.rules)
     for part, chunk in zip(_parts(job, subject, chunks, workers), chunks, strict=True):
         result += part
-        done += len(chunk)
-        report(done)
+        for _ in chunk:
+            report()
     return result
 
 

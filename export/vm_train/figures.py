@@ -21,7 +21,7 @@ def new_figure(width: float, height: float) -> Figure:
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise InputError("plots need matplotlib: pip install 'matplotlib>=3.8,<4'") from error
+        raise InputError("plots need matplotlib: pip install 'vm-embedded[train]'") from error
     return Figure(figsize=(width, height), layout="constrained")
 
 

@@ -22,9 +22,9 @@ from .rates import PrecisionRecall, Rates, ratio, shares, without_nan
 class Errors:
     """Of found objects that are right: their number, and errors [m] of distance and of place on the plane.
 
-    distance_*: of absolute errors. bias, low, high: median, 10 and 90 % quantiles of signed ones, above 0 if found too far.
-    relative_*: of absolute
-    errors over the true distance. place_*: from the true point on the plane to the found one. NaN if there is none.
+    distance_*: of absolute errors. bias, low, high: median, 10 and 90 % quantiles of signed ones, above 0 if found too
+    far. relative_*: of absolute errors over the true distance. place_*: from the true point on the plane to the found
+    one. NaN if there is none.
     """
 
     count: int

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -14,6 +13,7 @@ from vm_embedded.detections import Detection
 
 from .object_scores import Mistakes
 from .overlaps import TrueObject
+from .pictures import PictureFiles
 
 MOST = 12
 """How many pictures of each kind are kept."""
@@ -27,7 +27,7 @@ class Oddity:
     radius [px]: of that one. true, found: outlines (m, 2) [px] of all objects of the class.
     """
 
-    image: Path
+    files: PictureFiles
     class_name: str
     rank: float
     center: Floats
@@ -49,7 +49,7 @@ class Oddities:
 
 
 def oddities(
-    image: Path,
+    files: PictureFiles,
     class_name: str,
     truths: Sequence[TrueObject],
     found: Sequence[Detection],
@@ -66,16 +66,16 @@ def oddities(
         rows, columns = np.nonzero(largest.mask)
         center = np.array([columns.mean(), rows.mean()]) if len(rows) else np.zeros(2)
         shown = float(np.sqrt(largest.mask.sum(dtype=np.float64) / np.pi))  # of an endless outline little may show
-        missed.append(Oddity(image, class_name, shown, center, shown, true_outlines, found_outlines))
+        missed.append(Oddity(files, class_name, shown, center, shown, true_outlines, found_outlines))
     if mistakes.false:
         worst = mistakes.false[0]
         rank, center = worst.confidence, worst.center
-        false.append(Oddity(image, class_name, rank, center, worst.radius, true_outlines, found_outlines))
+        false.append(Oddity(files, class_name, rank, center, worst.radius, true_outlines, found_outlines))
     return Oddities(tuple(missed), tuple(false))
 
 
 def _worst(all_of_them: Sequence[Oddity]) -> tuple[Oddity, ...]:
-    return tuple(sorted(all_of_them, key=lambda each: (-each.rank, str(each.image)))[:MOST])
+    return tuple(sorted(all_of_them, key=lambda each: (-each.rank, str(each.files.image)))[:MOST])
 
 
 def _outlines(mask: Mask | Singles) -> list[Floats]:
