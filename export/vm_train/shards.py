@@ -35,7 +35,7 @@ def shards_parser() -> argparse.ArgumentParser:
     """The options of vm-train shards DATA OUT."""
     made = argparse.ArgumentParser(
         prog="vm-train shards",
-        description="Write a folder of pictures as tar files that vm-train reads as they are, and that can be streamed, "
+        description="Write a folder of pictures as tar files that vm-train reads as they are, and that can stream, "
         "in webdataset's form. A run that was stopped goes on with the same command.",
     )
     made.add_argument("data", type=Path, metavar="DATA", help="folder of imageX.jpg or .png, maskX.png, lensX.yaml")
