@@ -1,7 +1,7 @@
-"""Writes docs/command-line.md from the parsers, and docs/scene.toml from the ranges of vm-synth, so that they and the
-programs can't drift apart.
+"""Writes docs/command-line.md from the parsers, and docs/scene.toml and docs/train.toml from the entries of
+configurations, so that they and the programs can't drift apart.
 
-python docs/help_pages.py writes both; a test checks that they are what this would write.
+python docs/help_pages.py writes them; a test checks that they are what this would write.
 """
 
 from __future__ import annotations
@@ -15,9 +15,13 @@ from vm_export import cli as export
 from vm_synth import cli as synth
 from vm_synth.configuration import SceneConfiguration
 from vm_synth.sections import documented
+from vm_train import evaluate_cli as evaluate
+from vm_train import options as train
+from vm_train.configuration import TrainConfiguration
 
 PAGE = Path(__file__).parent / "command-line.md"
 SCENE = Path(__file__).parent / "scene.toml"
+TRAIN = Path(__file__).parent / "train.toml"
 
 
 def page() -> str:
@@ -25,7 +29,7 @@ def page() -> str:
     parts = [
         "# Command line\n\nMade from the programs' own help texts; every program also prints them with `--help`.\n"
     ]
-    for parser in (detect.parser(), bench.parser(), export.parser(), *synth.parsers().values()):
+    for parser in (detect.parser(), bench.parser(), export.parser(), *synth.parsers().values(), *train.parsers().values(), *evaluate.parsers().values()):
         parts.append(f"## {parser.prog}\n\n{parser.description}\n")
         for group in parser._action_groups:
             rows = [_row(action) for action in group._group_actions if not isinstance(action, argparse._HelpAction)]
@@ -43,6 +47,11 @@ def scene() -> str:
     return "\n".join(documented(SceneConfiguration()))
 
 
+def training() -> str:
+    """All entries of a train.toml with their meanings and defaults."""
+    return "\n".join(documented(TrainConfiguration()))
+
+
 def _row(action: argparse.Action) -> str:
     names = ", ".join(f"`{name}`" for name in action.option_strings) or f"`{action.dest}`"
     if action.choices:
@@ -55,3 +64,4 @@ def _row(action: argparse.Action) -> str:
 if __name__ == "__main__":
     PAGE.write_text(page())
     SCENE.write_text(scene())
+    TRAIN.write_text(training())

@@ -3,45 +3,21 @@
 from __future__ import annotations
 
 import json
-import math
 import pickle
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import torch
 
-from vm_embedded.errors import InputError, ModelError, one_line, unknown
+from vm_embedded.errors import InputError, ModelError, one_line
 from vm_embedded.files import written_beside
 from vm_embedded.manifest import Manifest
 
-from .network import Network, NetworkShape
+from .grid import VISUAL, Grid
+from .network import Network
+from .network_shape import NetworkShape
 
 _FORMAT = "vm-embedded checkpoint 2"
-
-GRIDS = ("visual", "hexagonal")
-
-
-@dataclass(frozen=True)
-class Grid:
-    """Which points of a picture a network was trained on.
-
-    kind: visual, the mesh of the manifest, or hexagonal, the paper's baseline: a regular mesh in the picture, which the
-    runtime does not have. equal_at: distance at which a hexagonal mesh has as many points on an object as the Visual
-    Mesh [m]; 0 for as many in the whole picture. Raises InputError.
-    """
-
-    kind: str = "visual"
-    equal_at: float = 0.0
-
-    def __post_init__(self) -> None:
-        if self.kind not in GRIDS:
-            raise InputError(unknown("grid", self.kind, GRIDS))
-        if not 0.0 <= self.equal_at < math.inf:
-            raise InputError(f"equal_at must be a distance of at least 0 m, not {self.equal_at!r}")
-
-
-VISUAL = Grid()
-
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:

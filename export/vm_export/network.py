@@ -2,96 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
-
 import torch
 from torch import nn
 
-from vm_embedded.errors import InputError, unknown
+from .network_shape import Layer, NetworkShape
 
-ACTIVATIONS: dict[str, type[nn.Module]] = {"selu": nn.SELU, "relu": nn.ReLU, "elu": nn.ELU, "tanh": nn.Tanh}
-HEADS = ("softmax", "sigmoid")
-KINDS = ("convolution", "separable", "dense")
-
-
-@dataclass(frozen=True)
-class Layer:
-    """One layer: its kind (one of KINDS), its width, and its activation (of the last one: a head)."""
-
-    kind: str
-    width: int
-    activation: str
-
-    def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise InputError(unknown("kind of layer", self.kind, KINDS))
-        if self.activation not in (*ACTIVATIONS, *HEADS):
-            raise InputError(unknown("activation", self.activation, (*ACTIVATIONS, *HEADS)))
-        if self.width < 1:
-            raise InputError(f"a layer's width must be at least 1, not {self.width}")
-
-
-@dataclass(frozen=True)
-class NetworkShape:
-    """Layers of a network for points with three colors and `neighbors` neighbors each.
-
-    Raises InputError if the first layer is dense, or a head stands anywhere but at the end.
-    """
-
-    layers: tuple[Layer, ...]
-    neighbors: int = 6
-
-    def __post_init__(self) -> None:
-        if not self.layers or self.layers[0].kind == "dense":
-            raise InputError("a network begins with a convolution")
-        heads = [layer.activation in HEADS for layer in self.layers]
-        if not heads[-1] or any(heads[:-1]):
-            raise InputError(f"a network ends with one of {', '.join(HEADS)}, and has it nowhere else")
-
-    @classmethod
-    def uniform(
-        cls,
-        depth: int,
-        width: int,
-        classes: int,
-        activation: str = "selu",
-        head: str = "softmax",
-        kind: str = "convolution",
-        neighbors: int = 6,
-    ) -> NetworkShape:
-        """`depth` convolutions, all but the last one of `width`: the paper's networks."""
-        inner = (Layer(kind, width, activation),) * (depth - 1)
-        return cls((*inner, Layer(kind, classes, head)), neighbors)
-
-    @property
-    def classes(self) -> int:
-        """Number of outputs."""
-        return self.layers[-1].width
-
-    @property
-    def operations(self) -> int:
-        """Multiplications and additions for each point, activations not counted."""
-        total, inputs = 0, 3
-        for layer in self.layers:
-            places = 1 if layer.kind == "dense" else self.neighbors + 1
-            mixed = places * inputs * layer.width if layer.kind == "convolution" else inputs * layer.width
-            total += 2 * (mixed + (places * inputs if layer.kind == "separable" else 0))
-            inputs = layer.width
-        return total
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values for a checkpoint."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> NetworkShape:
-        """Inverse of `as_dict`. Raises InputError."""
-        try:
-            return cls(tuple(Layer(**layer) for layer in data["layers"]), int(data["neighbors"]))
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"network description can't be read: {error}") from error
+_ACTIVATIONS: dict[str, type[nn.Module]] = {"selu": nn.SELU, "relu": nn.ReLU, "elu": nn.ELU, "tanh": nn.Tanh}
 
 
 class GraphConvolution(nn.Module):
@@ -153,7 +69,7 @@ class Network(nn.Module):
         self.layers = nn.ModuleList(
             _make(layer, inputs, shape.neighbors) for layer, inputs in zip(shape.layers, widths, strict=False)
         )
-        self.activations = nn.ModuleList(ACTIVATIONS[layer.activation]() for layer in shape.layers[:-1])
+        self.activations = nn.ModuleList(_ACTIVATIONS[layer.activation]() for layer in shape.layers[:-1])
         for module in self.modules():
             if isinstance(module, nn.Linear):  # what SELU needs to keep its variance (LeCun)
                 nn.init.normal_(module.weight, std=module.in_features**-0.5)

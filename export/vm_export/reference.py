@@ -24,7 +24,8 @@ from vm_embedded.manifest import Manifest, ObjectClass
 from vm_embedded.mesh import RING_NEIGHBORS
 
 from .checkpoint import Checkpoint
-from .network import Dense, GraphConvolution, Layer, Network, NetworkShape, SeparableConvolution
+from .network import Dense, GraphConvolution, Network, SeparableConvolution
+from .network_shape import Layer, NetworkShape
 
 DEFAULT_CLASSES = ("ball", "goal", "line", "field", "environment")
 """The order of the authors' own networks, for files without a class_map and five outputs."""

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import os
 import shutil
 import signal
 import sys
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -207,7 +206,6 @@ def _check(options: argparse.Namespace) -> int:
 def _preview(options: argparse.Namespace) -> int:
     from vm_synth.sheet import chosen
 
-    from .loading import View
     from .pictures import read_picture
     from .preview import sheet, write_sheet
 
@@ -215,13 +213,11 @@ def _preview(options: argparse.Namespace) -> int:
     check_writable(options.output)
     pictures = find_pictures(options.data)
     classes = configuration.classes.seen_as()
-    own = configuration.mesh.radius_of == "scene"
-    view = View(classes, configuration.manifest, configuration.grid, configuration.augmentation, own)
     picked = [pictures[each] for each in chosen(range(len(pictures)), options.count, None, options.seed)]
     shown = [read_picture(each, classes) for each in picked]
     made = sheet(
         shown,
-        [view.manifest_for(each) for each in picked],
+        configuration.manifest,
         configuration.grid,
         configuration.augmentation,
         options.seed,

@@ -11,8 +11,8 @@ from vm_embedded.errors import InputError
 from vm_embedded.manifest import KINDS, Manifest, ObjectClass
 from vm_embedded.mesh import RING_NEIGHBORS
 from vm_embedded.shapes import SHAPES
-from vm_export.checkpoint import GRIDS, Grid
-from vm_export.network import ACTIVATIONS, NetworkShape
+from vm_export.grid import GRIDS, Grid
+from vm_export.network_shape import ACTIVATIONS, NetworkShape
 from vm_synth.dataset import COLORS
 from vm_synth.ranges import check_entries, number, one_of, share
 

@@ -16,7 +16,7 @@ from vm_embedded.manifest import Manifest
 from vm_embedded.mesh import Mesh, ring_mesh
 from vm_embedded.projection import Projection, project
 from vm_embedded.sampling import sample
-from vm_export.checkpoint import VISUAL, Grid
+from vm_export.grid import VISUAL, Grid
 
 from .hexagonal import ROW, HexagonalMesh, hexagonal_mesh, seen_hexagonal_mesh
 from .pictures import Labels, Picture

@@ -13,7 +13,7 @@ from torch.utils.data import DataLoader, Dataset
 
 from vm_embedded.errors import GeometryError, InputError, VisualMeshError
 from vm_embedded.manifest import Manifest
-from vm_export.checkpoint import Grid
+from vm_export.grid import Grid
 
 from .augmentation import Augmentation, blurred, moved, recolored
 from .graphs import OFF_SCREEN, Graph, graph_of
@@ -55,15 +55,15 @@ class Graphs(Dataset[Graph]):
     """The graphs of pictures, by Item. Raises InputError for a picture that can't be read."""
 
     def __init__(self, pictures: Sequence[PictureFiles], view: View, unpacked: Unpacked | None = None) -> None:
-        self._pictures, self._view, self._unpacked = list(pictures), view, unpacked
+        self.pictures, self.view, self.unpacked = tuple(pictures), view, unpacked
 
     def __len__(self) -> int:
-        return len(self._pictures)
+        return len(self.pictures)
 
     def __getitem__(self, item: Item) -> Graph:
-        view = self._view
-        files = self._pictures[item.position]
-        picture = read(files, view.classes, self._unpacked)
+        view = self.view
+        files = self.pictures[item.position]
+        picture = read(files, view.classes, self.unpacked)
         manifest = view.manifest_for(files)
         try:
             if item.seed is None:

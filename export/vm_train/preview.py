@@ -16,7 +16,7 @@ from vm_embedded.arrays import Image, Singles
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
 from vm_embedded.manifest import Manifest
-from vm_export.checkpoint import Grid
+from vm_export.grid import Grid
 
 from .augmentation import Augmentation, Tone, blurred, moved, recolored, softened, told_otherwise, toned
 from .pictures import Picture

@@ -20,7 +20,8 @@ from vm_embedded.projection import project
 from vm_embedded.session import Session
 from vm_embedded.settings import Settings
 from vm_embedded.shapes import Circle, Sphere
-from vm_export.network import ACTIVATIONS, Layer, Network, NetworkShape
+from vm_export.network import Network
+from vm_export.network_shape import ACTIVATIONS, Layer, NetworkShape
 from vm_export.onnx_graph import build
 
 from .strategies import SIZE, random_direction, reals, rotation, seeds

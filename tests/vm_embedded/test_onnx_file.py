@@ -93,7 +93,8 @@ def test_other_metadata_does_not_matter(write):
 
 def test_a_model_of_the_exporter_is_read(write):
     torch = pytest.importorskip("torch")
-    from vm_export.network import Network, NetworkShape
+    from vm_export.network import Network
+    from vm_export.network_shape import NetworkShape
     from vm_export.onnx_graph import build
 
     torch.manual_seed(0)

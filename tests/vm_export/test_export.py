@@ -23,7 +23,8 @@ from vm_embedded.session import Session
 from vm_embedded.settings import Settings as RuntimeSettings
 from vm_export import onnx_graph
 from vm_export.checkpoint import Checkpoint
-from vm_export.network import ACTIVATIONS, HEADS, GraphConvolution, Layer, Network, NetworkShape
+from vm_export.network import GraphConvolution, Network
+from vm_export.network_shape import ACTIVATIONS, HEADS, Layer, NetworkShape
 from vm_export.reference import Overrides, read_reference, write_reference
 
 COMMAND = Path(sys.executable).parent / "vm-export"

@@ -12,7 +12,8 @@ from vm_embedded.mesh import ring_mesh
 from vm_embedded.orientation import Orientation
 from vm_embedded.projection import project
 from vm_embedded.shapes import Sphere
-from vm_export.network import Network, NetworkShape
+from vm_export.network import Network
+from vm_export.network_shape import NetworkShape
 from vm_train.hexagonal import hexagonal_mesh, seen_hexagonal_mesh
 
 SIZE = (640, 480)

@@ -11,7 +11,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.lens import Equisolid
 from vm_embedded.lens_file import LensFile
 from vm_embedded.manifest import Manifest, ObjectClass
-from vm_export.checkpoint import Grid
+from vm_export.grid import Grid
 from vm_train.augmentation import OFF, Augmentation
 from vm_train.pictures import Picture
 from vm_train.preview import sheet, write_sheet

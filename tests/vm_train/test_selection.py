@@ -5,44 +5,60 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.errors import InputError
-from vm_train.selection import FLOOR, errors_of, selected
+from vm_train.selection import FLOOR, class_shares, class_totals, errors_of, hardness, selected
 
+counts = st.lists(st.integers(0, 10**9), min_size=2, max_size=8).map(np.array)
 labelings = st.lists(st.integers(-1, 3), min_size=1, max_size=200).map(lambda each: np.array(each, dtype=np.int8))
 
 
+@given(counts)
+def test_balanced_shares_give_every_class_as_many_points_as_the_rarest_has(counts):
+    shares = class_shares("balanced", counts)
+    assert ((shares >= 0.0) & (shares <= 1.0)).all()
+    if counts.any():
+        assert (shares * counts)[counts > 0] == pytest.approx(counts[counts > 0].min())
+    assert (class_shares("all", counts) == 1.0).all()
+    assert (class_shares("hard", counts) == shares).all()
+
+
 @given(labelings, st.integers(0, 99))
-def test_balanced_selects_as_many_of_each_class_as_of_the_rarest(labels, seed):
-    chosen = selected("balanced", labels, 4, None, np.random.default_rng(seed))
-    present = [number for number in range(4) if (labels == number).any()]
-    rarest = min((np.count_nonzero(labels == number) for number in present), default=0)
-    assert not chosen[labels < 0].any()
-    assert [np.count_nonzero(chosen & (labels == number)) for number in present] == [rarest] * len(present)
+def test_all_that_is_labeled_can_be_selected_and_nothing_else(labels, seed):
+    draws = np.random.default_rng(seed).random(len(labels))
+    assert (selected(labels, np.ones(4), draws) == (labels >= 0)).all()
+    assert not selected(labels, np.zeros(4), draws).any()
+
+
+def test_a_class_is_selected_by_its_share():
+    labels = np.repeat(np.array([0, 1, -1], dtype=np.int8), 20000)
+    chosen = selected(labels, np.array([0.3, 0.02]), np.random.default_rng(2).random(len(labels)))
+    assert np.bincount(labels[chosen], minlength=2) / 20000 == pytest.approx([0.3, 0.02], abs=0.01)
+
+
+def test_hard_points_are_selected_by_their_error_and_the_floor_and_as_many_as_without():
+    labels = np.zeros(10000, dtype=np.int8)
+    errors = np.zeros(len(labels), dtype=np.float32)
+    errors[:1000] = 1.0
+    weights = hardness(errors)
+    sums, numbers = class_totals(labels, weights, 1)
+    draws = np.random.default_rng(1).random((50, len(labels)))
+    chosen = np.array([selected(labels, np.array([0.05]), each, weights / (sums / numbers)) for each in draws])
+    expected = 1000 * (1.0 + FLOOR) / (1000 * (1.0 + FLOOR) + 9000 * FLOOR)
+    assert chosen[:, :1000].sum() / chosen.sum() == pytest.approx(expected, abs=0.02)
+    assert chosen.mean() == pytest.approx(0.05, rel=0.02)
+
+
+def test_errors_of_several_networks_add_up_to_at_most_a_whole():
+    assert hardness(np.array([0.0, 0.4, 1.7], dtype=np.float32)) == pytest.approx([FLOOR, 0.4 + FLOOR, 1.0 + FLOOR])
 
 
 @given(labelings)
-def test_all_selects_all_that_is_labeled(labels):
-    assert (selected("all", labels, 4, None, np.random.default_rng(0)) == (labels >= 0)).all()
-
-
-def test_hard_selects_points_in_proportion_to_their_error_and_the_floor():
-    labels = np.array([0] * 10 + [1] * 1000, dtype=np.int8)
-    errors = np.zeros(len(labels), dtype=np.float32)
-    errors[10:110] = 1.0
-    random = np.random.default_rng(1)
-    hits = sum(int(selected("hard", labels, 2, errors, random)[10:110].sum()) for _ in range(400))
-    expected = 100 * (1.0 + FLOOR) / (100 * (1.0 + FLOOR) + 900 * FLOOR)
-    assert hits / 4000 == pytest.approx(expected, abs=0.05)
+def test_totals_of_parts_add_up(labels):
+    weights = np.linspace(0.1, 1.0, len(labels))
+    half = len(labels) // 2
+    parts = class_totals(labels[:half], weights[:half], 4) + class_totals(labels[half:], weights[half:], 4)
+    assert parts == pytest.approx(class_totals(labels, weights, 4))
 
 
 def test_errors_are_one_minus_the_probability_of_the_truth():
     probabilities = np.array([[0.9, 0.1], [0.3, 0.7], [0.5, 0.5]], dtype=np.float32)
     assert errors_of(probabilities, np.array([0, 0, -1], dtype=np.int8)) == pytest.approx([0.1, 0.7, 0.0])
-
-
-def test_hard_without_errors_and_unknown_rules_are_refused():
-    labels = np.array([0, 1], dtype=np.int8)
-    with pytest.raises(InputError, match="trained before"):
-        selected("hard", labels, 2, None, np.random.default_rng(0))
-    with pytest.raises(InputError, match="did you mean 'balanced'"):
-        selected("balance", labels, 2, None, np.random.default_rng(0))

@@ -7,11 +7,20 @@ import pytest
 import torch
 
 from vm_embedded.errors import InputError
-from vm_export.network import Network, NetworkShape
+from vm_export.network import Network
+from vm_export.network_shape import NetworkShape
 from vm_train.graphs import Graph, together
-from vm_train.training import Recipe, Training
+from vm_train.recipe import Recipe
+from vm_train.schedule import schedule
+from vm_train.training import Training, read_state
 
 COUNT = 6
+SHARES = np.array([0.7, 1.0])
+RECIPES = {
+    "adamw": Recipe(epochs=3, batch=4),
+    "sgd": Recipe(epochs=3, batch=2, optimizer="sgd", schedule="constant", loss="focal"),
+    "mixed": Recipe(epochs=3, batch=4, precision="mixed", clip=0.0),
+}
 
 
 def graph(position):
@@ -28,14 +37,27 @@ def graph(position):
     return Graph(points, neighbors, labels, np.linspace(0.0, 10.0, n))
 
 
-def load(batches):
-    return ([graph(each.position) for each in items] for items in batches)
+def network(seed=3):
+    torch.manual_seed(seed)
+    return Network(NetworkShape.uniform(depth=3, width=4, classes=2))
 
 
-def training(recipe=None):
-    torch.manual_seed(3)
-    network = Network(NetworkShape.uniform(depth=3, width=4, classes=2))
-    return Training(network, recipe or Recipe(epochs=3, batch=2, seed=5), COUNT)
+def batches_of(recipe):
+    return list(schedule((recipe.seed, 1), recipe.epochs, recipe.batch, COUNT, 0))
+
+
+def training(recipe=None, graders=()):
+    recipe = recipe or Recipe(epochs=3, batch=2, seed=5)
+    return Training(network(), recipe, len(batches_of(recipe)), SHARES, graders)
+
+
+def run(made, until=None, rank=0, size=1):
+    """Losses of the steps that are left, or of those before `until`."""
+    losses = []
+    for batch in batches_of(made.recipe)[made.done : until]:
+        own = batch.part(rank, size)
+        losses.append(made.step(own.items, [graph(each.position) for each in own.items]).loss)
+    return losses
 
 
 def weights(made):
@@ -47,39 +69,38 @@ def same(first, second):
 
 
 def test_graphs_together_answer_as_they_do_alone():
-    network = Network(NetworkShape.uniform(depth=3, width=4, classes=2))
+    made = network()
     graphs = [graph(each) for each in range(3)]
     joined, starts = together(graphs)
     assert starts.tolist() == [0, 40, 80, 120]
-    whole = network(torch.from_numpy(joined.points), torch.from_numpy(joined.neighbors))
+    whole = made(torch.from_numpy(joined.points), torch.from_numpy(joined.neighbors))
     for each, start in zip(graphs, starts, strict=False):
-        alone = network(torch.from_numpy(each.points), torch.from_numpy(each.neighbors))
+        alone = made(torch.from_numpy(each.points), torch.from_numpy(each.neighbors))
         assert torch.allclose(whole[start : start + len(each)], alone[:-1], atol=1e-6)
         assert torch.allclose(whole[-1], alone[-1], atol=1e-6)
     assert joined.labels.tolist() == np.concatenate([each.labels for each in graphs]).tolist()
 
 
 def test_it_learns():
-    steps = list(training(Recipe(epochs=60, batch=3, rate=0.02)).run(load))
-    assert len(steps) == 120
-    assert np.mean([each.loss for each in steps[-6:]]) < 0.3 * np.mean([each.loss for each in steps[:6]])
+    losses = run(training(Recipe(epochs=60, batch=3, rate=0.02)))
+    assert len(losses) == 120
+    assert np.mean(losses[-6:]) < 0.3 * np.mean(losses[:6])
 
 
-@pytest.mark.parametrize(
-    "recipe", [Recipe(epochs=3, batch=4), Recipe(epochs=3, batch=2, optimizer="sgd", schedule="constant", loss="focal")]
-)
+@pytest.mark.parametrize("recipe", RECIPES.values(), ids=RECIPES)
 @pytest.mark.parametrize("stop", [1, 3, 4])
 def test_what_is_interrupted_ends_with_the_same_weights(recipe, stop, tmp_path):
     whole = training(recipe)
-    losses = [each.loss for each in whole.run(load)]
+    losses = run(whole)
 
     first = training(recipe)
-    before = [each.loss for each in first.run(load, until=stop)]
-    first.save(tmp_path / "state.pt")
+    before = run(first, until=stop)
+    first.save(tmp_path / "state.pt", {"round": 1})
     second = training(recipe)
-    second.load(tmp_path / "state.pt")
-    after = [each.loss for each in second.run(load)]
-    assert before + after == losses
+    state = read_state(tmp_path / "state.pt")
+    assert state["more"] == {"round": 1}
+    second.load(state)
+    assert before + run(second) == losses
     assert same(weights(second), weights(whole))
 
 
@@ -87,32 +108,58 @@ def test_the_same_seed_gives_the_same_weights_and_another_one_others():
     runs = []
     for seed in (1, 1, 2):
         made = training(Recipe(epochs=2, batch=2, seed=seed))
-        list(made.run(load))
+        run(made)
         runs.append(weights(made))
     assert same(runs[0], runs[1])
     assert not same(runs[0], runs[2])
 
 
-def test_a_damaged_state_is_refused(tmp_path):
-    (tmp_path / "state.pt").write_bytes(b"no state")
+def test_graders_change_which_points_are_selected_but_hardly_how_many():
+    recipe = Recipe(epochs=40, batch=2)
+    first, second = training(recipe), training(recipe, graders=[network(8), network(9)])
+    run(first), run(second)
+    assert not same(weights(first), weights(second))
+
+
+def test_a_batch_without_points_changes_no_weights():
+    made = training()
+    before = weights(made)
+    empty = Graph(np.full((1, 3), -1.0, np.float32), np.zeros((1, 6), np.int32), np.empty(0, np.int8), np.empty(0))
+    step = made.step(batches_of(made.recipe)[0].items[:1], [empty])
+    assert (step.loss, made.done) == (0.0, 1)
+    assert same(weights(made), before)
+
+
+@pytest.mark.parametrize("content", [b"no state", b""])
+def test_a_damaged_state_is_refused(content, tmp_path):
+    (tmp_path / "state.pt").write_bytes(content)
     with pytest.raises(InputError, match="can't go on"):
-        training().load(tmp_path / "state.pt")
+        read_state(tmp_path / "state.pt")
 
 
-def _part(rank, size, folder):
+def test_a_state_of_another_network_is_refused(tmp_path):
+    training().save(tmp_path / "state.pt", {})
+    other = Training(Network(NetworkShape.uniform(depth=2, width=4, classes=2)), Recipe(), 5, SHARES)
+    with pytest.raises(InputError, match="another training"):
+        other.load(read_state(tmp_path / "state.pt"))
+
+
+def _part(rank, size, folder, hard):
     """One of `size` processes that train together."""
+    torch.set_num_threads(1)
     torch.distributed.init_process_group("gloo", init_method=f"file://{folder}/meet", rank=rank, world_size=size)
-    made = training(Recipe(epochs=2, batch=4, selection="all"))
-    losses = [each.loss for each in made.run(load)]
+    made = training(Recipe(epochs=2, batch=4), [network(8)] if hard else ())
+    losses = run(made, rank=rank, size=size)
     torch.save({"losses": losses, "network": weights(made)}, Path(folder) / f"rank{rank}.pt")
     torch.distributed.destroy_process_group()
 
 
 @pytest.mark.slow
-def test_two_processes_train_as_one(tmp_path):
-    alone = training(Recipe(epochs=2, batch=4, selection="all"))
-    losses = [each.loss for each in alone.run(load)]
-    torch.multiprocessing.spawn(_part, args=(2, str(tmp_path)), nprocs=2)
+@pytest.mark.parametrize("hard", [False, True])
+def test_two_processes_train_as_one(hard, tmp_path):
+    alone = training(Recipe(epochs=2, batch=4), [network(8)] if hard else ())
+    losses = run(alone)
+    torch.multiprocessing.spawn(_part, args=(2, str(tmp_path), hard), nprocs=2)
     parts = [torch.load(tmp_path / f"rank{rank}.pt") for rank in range(2)]
     assert same(parts[0]["network"], parts[1]["network"])
     assert parts[0]["losses"] == pytest.approx(losses, rel=1e-4)

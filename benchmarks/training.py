@@ -1,0 +1,128 @@
+"""How fast vm-train is, and what limits it: `make bench-train DATA=...`.
+
+Each part is timed by itself on one pinned core; then whole trainings with one process that reads and one that learns.
+Writes benchmarks/training.json and the table of docs/training.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+import cv2
+import numpy as np
+import torch
+
+from vm_embedded.bench import machine
+from vm_export.network import Network
+from vm_synth.sections import read_sections
+from vm_train.augmentation import OFF
+from vm_train.configuration import TrainConfiguration
+from vm_train.hardware import Hardware
+from vm_train.job import Job
+from vm_train.loading import Graphs
+from vm_train.pictures import find_pictures
+from vm_train.run import train
+from vm_train.schedule import Item
+from vm_train.split import Split
+from vm_train.training import Training
+
+RESULTS = Path(__file__).with_name("training.json")
+PAGE = Path(__file__).parents[1] / "docs" / "training.md"
+NETWORKS = {"5 x 4": (5, 4), "9 x 8": (9, 8)}
+BATCH = 8
+
+
+def configuration(depth: int, width: int) -> TrainConfiguration:
+    """Two looks at each picture, all points, so that nothing but the work counts."""
+    entries = {
+        "network": {"depth": depth, "width": width},
+        "training": {"epochs": 2, "batch": BATCH, "selection": "balanced"},
+    }
+    return read_sections(TrainConfiguration, None, entries)
+
+
+def per_second(call: Callable[[int], object], count: int) -> float:
+    """Calls a second, by the median of all."""
+    times = []
+    for number in range(count):
+        started = perf_counter()
+        call(number)
+        times.append(perf_counter() - started)
+    return round(1.0 / float(np.median(times)), 1)
+
+
+def parts(data: Path, numbers: tuple[str, ...], folder: Path) -> dict[str, float]:
+    """Pictures a second on one core."""
+    made = configuration(5, 4)
+    job = Job.begin(folder / "parts", data, made, Split(numbers, numbers[:1], ()), folder / "unpacked")
+    kept = job.graphs(numbers)
+    plain = Graphs(list(kept.pictures), kept.view, None)
+    still = Graphs(list(kept.pictures), replace(kept.view, augmentation=OFF), kept.unpacked)
+    for each in range(len(numbers)):
+        kept[Item(each)]
+    found = {
+        "decode, mesh and sample": per_second(lambda each: plain[Item(each)], len(numbers)),
+        "unpacked, mesh and sample": per_second(lambda each: still[Item(each)], len(numbers)),
+        "unpacked and augmented": per_second(lambda each: kept[Item(each, (0, each))], len(numbers)),
+    }
+    graphs = [kept[Item(each)] for each in range(len(numbers))]
+    for name, (depth, width) in NETWORKS.items():
+        recipe = configuration(depth, width).training
+        torch.manual_seed(0)
+        network = Network(configuration(depth, width).network_shape)
+        training = Training(network, recipe, 10**6, np.full(network.shape.classes, 0.1))
+        batches = [graphs[start : start + BATCH] for start in range(0, len(graphs) - BATCH + 1, BATCH)]
+
+        def step(number: int, training: Training = training, batches: list = batches) -> None:
+            batch = batches[number % len(batches)]
+            training.step([Item(each, (number, each)) for each in range(len(batch))], batch)
+
+        found[f"learn, {name}"] = round(BATCH * per_second(step, 2 * len(batches)), 1)
+    found["points"] = round(float(np.mean([len(each) for each in graphs])), 1)
+    return found
+
+
+def whole(data: Path, numbers: tuple[str, ...], folder: Path, workers: int) -> dict[str, float]:
+    """Pictures a second of trainings whose pictures are unpacked already, start and validation included."""
+    found = {}
+    for name, (depth, width) in NETWORKS.items():
+        split = Split(numbers, numbers[:8], ())
+        made = configuration(depth, width)
+        job = Job.begin(folder / f"{depth}x{width}", data, made, split, folder / "unpacked")
+        done = train(job, Hardware("cpu", 0, 1, workers), lambda: False)
+        found[name] = round(done.pictures / done.seconds, 1)
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("data", type=Path, help="folder of pictures, as vm-synth makes them")
+    parser.add_argument("--count", type=int, default=800, help="pictures of whole trainings; default 800")
+    options = parser.parse_args()
+    numbers = tuple(each.number for each in find_pictures(options.data)[: options.count])
+    cores = sorted(os.sched_getaffinity(0))
+    cv2.setNumThreads(1)
+    torch.set_num_threads(1)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        os.sched_setaffinity(0, cores[:1])
+        alone = parts(options.data, numbers[:160], folder)
+        os.sched_setaffinity(0, cores)
+        together = whole(options.data, numbers, folder, workers=1)
+    RESULTS.write_text(json.dumps({"machine": machine(), "one core": alone, "two cores": together}, indent=1) + "\n")
+    rows = [f"| {name} | {value:.0f} |" for name, value in alone.items() if name != "points"]
+    rows += [f"| whole training, {name}, one core reads and one learns | {value:.0f} |" for name, value in together.items()]
+    table = "| | pictures/s |\n| --- | ---: |\n" + "\n".join(rows) + "\n"
+    before, after = PAGE.read_text().split("<!-- throughput -->\n")
+    PAGE.write_text(before + "<!-- throughput -->\n" + table + after[after.index("<!-- end -->") :])
+
+
+if __name__ == "__main__":
+    main()

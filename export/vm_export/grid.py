@@ -1,0 +1,32 @@
+"""Which points of a picture a network was trained on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from vm_embedded.errors import InputError, unknown
+
+GRIDS = ("visual", "hexagonal")
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Which points of a picture a network was trained on.
+
+    kind: visual, the mesh of the manifest, or hexagonal, the paper's baseline: a regular mesh in the picture, which the
+    runtime does not have. equal_at: distance at which a hexagonal mesh has as many points on an object as the Visual
+    Mesh [m]; 0 for as many in the whole picture. Raises InputError.
+    """
+
+    kind: str = "visual"
+    equal_at: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in GRIDS:
+            raise InputError(unknown("grid", self.kind, GRIDS))
+        if not 0.0 <= self.equal_at < math.inf:
+            raise InputError(f"equal_at must be a distance of at least 0 m, not {self.equal_at!r}")
+
+
+VISUAL = Grid()
