@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -29,11 +29,13 @@ from vm_embedded.sampling import sample
 from vm_embedded.session import Session
 from vm_embedded.settings import Settings
 from vm_embedded.shapes import shape_named
-from vm_export.checkpoint import Checkpoint
 from vm_export.grid import VISUAL, Grid
 
 from .graphs import OFF_SCREEN, plane_distances, seen_points
 from .pictures import Picture
+
+if TYPE_CHECKING:
+    from vm_export.checkpoint import Checkpoint
 
 Network = Callable[[Mesh, Singles], Singles]
 """Probabilities (n, C) of a mesh's points from their colors (n, 3)."""
@@ -130,6 +132,8 @@ def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subj
         raise InputError(f"{path}: a model is a checkpoint (.pt) or a model file (.onnx)")
     if as_robot:
         raise InputError(f"{path}: a robot has no checkpoints; write a model file with vm-export first")
+    from vm_export.checkpoint import Checkpoint  # torch takes a second to load, and model files do without it
+
     checkpoint = Checkpoint.load(path)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     return Exact(checkpoint.manifest, checkpoint.grid, digest, settings, _of_checkpoint(checkpoint))

@@ -152,8 +152,7 @@ def _evaluate(options: argparse.Namespace) -> int:
         raise InputError("no picture could be evaluated")
     about = _about(options, settings, subject, job.classes.colors)
     about["notes"] = _notes(options, subject, result)
-    radius = subject.manifest.object_radius
-    figure, about["camera"] = points_on_object(result.views, job.classes, radius, subject.grid)
+    figure, about["camera"] = points_on_object(result.views, job.classes, subject.manifest, subject.grid)
     scores = write_evaluation(options.output, result, about, settings.threshold, figure)
     print(lines(scores))
     for note in about["notes"]:

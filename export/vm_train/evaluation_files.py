@@ -71,13 +71,14 @@ def write_evaluation(
 
 
 def points_on_object(views: Sequence[View], classes: Classes, radius: float, grid: Grid) -> tuple[Figure | None, str]:
-    """The paper's figure for a ball of that radius [m] and the data's median camera, and which one that is.
+    """The paper's figure for a network's ball and the data's median camera, and which one that is.
 
-    That camera is the one of the picture nearest to the medians of height and pitch. If it shows no such ball, there is
-    no figure, but why.
+    That camera is the one of the picture nearest to the medians of height and pitch; there is one picture or more. If
+    it shows no such ball, there is no figure, but why.
     """
-    if not views:
-        return None, "No picture could be read."
+    if manifest.shape != "sphere":
+        return None, f"The figure is of balls, and the network's objects are of shape {manifest.shape}."
+    radius = manifest.object_radius
     values = np.array([(each.height, each.pitch) for each in views])
     spread = np.maximum(values.std(axis=0), 1e-9)
     nearest = np.linalg.norm((values - np.median(values, axis=0)) / spread, axis=1).argmin()

@@ -15,7 +15,8 @@ CAPTIONS = {
     "detector's settings end: what it rejects has no confidence.",
     "objects_over_distance": "Objects by distance, at the detector's settings. Bins with fewer than 10 true objects "
     "are left out.",
-    "distance_error": "Distance on the plane of objects that were found rightly at the lower IoU.",
+    "distance_error": "Distance on the plane of objects that were found rightly at the lower IoU. Bins with "
+    "fewer than 10 of them are left out.",
     "points_curves": "Points of each class against all others.",
     "points_over_distance": "Points by distance, at the threshold.",
     "confusion": "Which class the points of a class were taken for, by the highest probability.",
@@ -32,7 +33,7 @@ p.note { background: #fff6dd; border-left: 4px solid #e0b030; padding: 0.5em 0.8
 .card b { display: block; font-size: 1.45em } .card span { color: #666; font-size: 0.87em }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 0.92em }
 th, td { padding: 0.2em 0.75em; text-align: right; border-bottom: 1px solid #e8e8e8 }
-th:first-child, td:first-child { text-align: left } th { color: #555; font-weight: 600 }
+th:first-child, td:first-child, .facts td { text-align: left } th { color: #555; font-weight: 600 }
 figure { margin: 1.2em 0 } figure img { max-width: 100% } figcaption { color: #555; font-size: 0.9em }
 .strip { display: flex; flex-wrap: wrap; gap: 0.8em } .strip figure { margin: 0 }
 .true { color: #1f9a33 } .found { color: #c22bc2 }
@@ -59,7 +60,7 @@ def page(scores: Scores, plots: Mapping[str, bytes], strips: Mapping[str, Sequen
     parts += [_plot(name, plots, about) for name in ("points_curves", "points_over_distance", "confusion")]
     if "points_on_object" in plots:
         parts.append("<h2>What the meshes see of an object</h2>" + _plot("points_on_object", plots, about))
-    parts.append("<h2>How this was made</h2>" + _table(("", ""), _facts(scores)))
+    parts.append("<h2>How this was made</h2>" + _facts(scores))
     title = escape(f"vm-evaluate: {about['model']['file']}")
     head = f'<meta charset="utf-8"><title>{title}</title><style>{_STYLE}</style>'
     return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(parts) + "\n</body></html>\n"
@@ -140,14 +141,23 @@ def _point_table(points: Scores) -> tuple[Sequence[str], list[Sequence[str]]]:
     return ["class", "points", "precision", "recall", "F1", "MCC", "informed.", "marked.", "AP", "ROC area"], rows
 
 
-def _facts(scores: Scores) -> list[Sequence[str]]:
+def _facts(scores: Scores) -> str:
     about = scores["about"]
-    flat: dict[str, Any] = {"made by": about["made_by"]}
+    facts: dict[str, Any] = {"made by": about["made_by"]}
     for section in ("model", "data", "rules", "settings"):
-        flat |= {f"{section}: {key}": value for key, value in about[section].items()}
-    flat["pictures with sceneX.json"] = scores["pictures_with_scenes"]
-    flat |= {f"skipped {path}": fault for path, fault in scores["skipped"].items()}
-    return [(key, ", ".join(map(str, each)) if isinstance(each, list) else str(each)) for key, each in flat.items()]
+        facts |= {f"{section}: {key.replace('_', ' ')}": value for key, value in about[section].items()}
+    facts["pictures with sceneX.json"] = scores["pictures_with_scenes"]
+    facts |= {f"skipped {path}": fault for path, fault in scores["skipped"].items()}
+    rows = (f"<tr><td>{escape(key)}</td><td>{escape(_said(value))}</td></tr>" for key, value in facts.items())
+    return f'<table class="facts">{"".join(rows)}</table>'
+
+
+def _said(value: object) -> str:
+    if isinstance(value, list):
+        return ", ".join(map(str, value))
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "-" if value is None else str(value)
 
 
 def _plot(name: str, plots: Mapping[str, bytes], about: Scores) -> str:

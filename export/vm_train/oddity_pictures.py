@@ -29,11 +29,11 @@ def drawn(oddity: Oddity) -> Image:
     height, width = image.shape[:2]
     scale = _HEIGHT / height
     whole = np.array([[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5]])
-    reach = min(max(_AROUND * oddity.radius, _LEAST), max(height, width) / 2.0)
+    reach = min(max(_AROUND * oddity.radius, _LEAST), min(height, width) / 2.0)
     zoom = _HEIGHT / (2.0 * reach)
-    # The place is in the picture, but may be at its border or, of what is cut off, beyond.
-    x, y = np.clip(oddity.center, 0.0, (width - 1.0, height - 1.0)).tolist()
-    near = np.array([[zoom, 0.0, _HEIGHT / 2.0 - zoom * x], [0.0, zoom, _HEIGHT / 2.0 - zoom * y]])
+    # What is shown enlarged is part of the picture, also where the place is at its border or beyond.
+    x, y = np.clip(oddity.center, reach - 0.5, (width - reach - 0.5, height - reach - 0.5)).tolist()
+    near = np.array([[zoom, 0.0, _HEIGHT / 2.0 - 0.5 - zoom * x], [0.0, zoom, _HEIGHT / 2.0 - 0.5 - zoom * y]])
     small = cv2.resize(image, (round(width * scale), _HEIGHT), interpolation=cv2.INTER_AREA)
     close = cv2.warpAffine(image, near, (_HEIGHT, _HEIGHT), flags=cv2.INTER_LINEAR)
     gap = np.full((_HEIGHT, 3, 3), 255, dtype=np.uint8)
