@@ -108,8 +108,10 @@ def evaluated(subject: Subject, pictures: Sequence[PictureFiles], classes: Class
             picture, scene = _read(files, classes, rules)
             answer = subject.answer(picture, scene.ball_radius if scene and rules.radius_of == "scene" else None)
         except (InputError, GeometryError) as error:
-            # A color without a class is in many masks, and leaving them out would flatter the network.
-            if rules.strict or (isinstance(error, PictureFault) and error.kind == "color"):
+            if isinstance(error, PictureFault) and error.kind == "color":
+                # Such colors are in many masks, and to leave these out would make another set of it.
+                raise InputError(f"{files.mask}: {error}; --color CLASS=R,G,B gives a color to a class") from error
+            if rules.strict:
                 raise InputError(f"{files.image}: {error}") from error
             result.faults[str(files.image)] = str(error)
         else:

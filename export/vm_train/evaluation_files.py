@@ -12,6 +12,7 @@ import numpy as np
 
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.files import written_beside
+from vm_embedded.manifest import Manifest
 from vm_embedded.shapes import Sphere
 from vm_export.grid import Grid
 
@@ -34,7 +35,7 @@ _PLOTS = (
     *("points_curves", "points_over_distance", "confusion", "points_on_object"),
     *("objects_curves", "objects_over_distance", "distance_error"),
 )
-_DISTANCES = np.linspace(0.0, 10.0, 101)  # [m]
+_DISTANCES = np.linspace(0.0, 10.0, 51)  # [m]
 _QUALITY = 85  # of small pictures
 
 
@@ -70,7 +71,9 @@ def write_evaluation(
     return scores
 
 
-def points_on_object(views: Sequence[View], classes: Classes, radius: float, grid: Grid) -> tuple[Figure | None, str]:
+def points_on_object(
+    views: Sequence[View], classes: Classes, manifest: Manifest, grid: Grid
+) -> tuple[Figure | None, str]:
     """The paper's figure for a network's ball and the data's median camera, and which one that is.
 
     That camera is the one of the picture nearest to the medians of height and pitch; there is one picture or more. If
