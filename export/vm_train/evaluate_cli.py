@@ -151,7 +151,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     if not result.views:
         raise InputError("no picture could be evaluated")
     about = _about(options, settings, subject, job.classes.colors)
-    about["notes"] = _notes(options, subject, result)
+    about["notes"] = _notes(options, settings, subject, result)
     figure, about["camera"] = points_on_object(result.views, job.classes, subject.manifest, subject.grid)
     scores = write_evaluation(options.output, result, about, settings.threshold, figure)
     print(lines(scores))
@@ -210,19 +210,20 @@ def _about(options: argparse.Namespace, settings: Settings, subject: Subject, co
     }
 
 
-def _notes(options: argparse.Namespace, subject: Subject, result: Evaluation) -> list[str]:
+def _notes(options: argparse.Namespace, settings: Settings, subject: Subject, result: Evaluation) -> list[str]:
     """What a reader of the scores should know."""
     notes = []
     if subject.grid.kind != "visual":
         notes.append(
             f"A network of a {subject.grid.kind} grid has scores of points only: objects are found in the Visual Mesh."
         )
-    radius = subject.manifest.object_radius
-    off = [each for each in result.radii if abs(each - radius) > 0.02 * radius]
-    if off and options.radius_of == "all":
+    radius = settings.object_radius or subject.manifest.object_radius
+    if options.radius_of == "all" and any(abs(each - radius) > 0.02 * radius for each in result.radii):
+        low, high = min(result.radii), max(result.radii)
+        found = f"radii from {low:.3f} to {high:.3f} m" if high > low else f"a radius of {low:.3f} m"
         notes.append(
-            f"Balls in these pictures have radii from {min(result.radii):.3f} to {max(result.radii):.3f} m; mesh and "
-            f"fit are for {radius:g} m. --radius-of scene gives each picture those of its own ball."
+            f"Balls in these pictures have {found}, and the fit is for {radius:g} m. --radius-of scene gives each picture "
+            "mesh and fit for its own ball."
         )
     if options.radius_of == "scene":
         notes.append("Mesh and fit are for the radius of each picture's own ball.")

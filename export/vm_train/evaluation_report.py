@@ -80,8 +80,9 @@ _KEY = '<p>Outlines: <b class="true">true</b>, <b class="found">found</b>.</p>'
 
 
 def _subject(scores: Scores) -> str:
-    skipped = f", {len(scores['skipped'])} skipped" if scores["skipped"] else ""
-    return f"{scores['pictures']} pictures of {', '.join(scores['about']['data']['folders'])}{skipped}"
+    count, skipped = scores["pictures"], len(scores["skipped"])
+    folders = ", ".join(scores["about"]["data"]["folders"])
+    return f"{count} picture{'s' * (count != 1)} of {folders}" + (f", {skipped} skipped" if skipped else "")
 
 
 def _ignored(by_overlap: Scores) -> str:

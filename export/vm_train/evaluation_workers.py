@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -11,10 +10,9 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
-import cv2
-
 from vm_embedded.errors import VisualMeshError
 from vm_embedded.settings import Settings
+from vm_synth.worker_process import begin
 
 from .answers import Subject, load_subject
 from .evaluation import Evaluation, Rules, evaluated
@@ -78,8 +76,7 @@ _worker: tuple[Job, Subject] | None = None
 
 def _start(job: Job) -> None:
     global _worker
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
-    cv2.setNumThreads(1)
+    begin()
     _worker = (job, job.subject())
 
 

@@ -130,35 +130,41 @@ def numbers_in(folder, *numbers):
     return path
 
 
-def test_as_a_robot_with_its_configuration_unless_an_option_says_otherwise(data, tmp_path):
-    (tmp_path / "vm.toml").write_text('[detector]\nthreshold = 0.6\nmin_inside = 0.6\nformat = "rgb"\n')
-    given = [str(MODEL), str(data), "-o", str(tmp_path / "out"), "--config", str(tmp_path / "vm.toml"), "--as-robot"]
-    assert main([*given, "--min-inside", "0.5", "--workers", "1"]) == 0
-    scores = json.loads((tmp_path / "out" / "scores.json").read_text())
-    settings = scores["about"]["settings"]
-    assert (settings["threshold"], settings["min_inside"], settings["format"]) == (0.6, 0.5, "bgr")
-    assert scores["about"]["rules"]["as_robot"] is True
-    assert scores["points"]["ball"]["all"]["threshold"] == 0.6
-    assert "--radius-of scene" in scores["about"]["notes"][0]  # balls of 0.07 m, and the network's are larger
-
-
-def test_bad_pictures_are_named_and_skipped_or_end_it_and_strange_colors_come_with_advice(capsys, tmp_path):
+@pytest.fixture
+def bad(tmp_path):
+    """A set with a picture without mask, a damaged one, and one with a color of no class."""
     folder = draw_set(tmp_path / "set", 3)
     (folder / "mask0000.png").unlink()
     (folder / "image0001.jpg").write_bytes(b"nothing")
     mask = cv2.imread(str(folder / "mask0002.png"), cv2.IMREAD_UNCHANGED)
     mask[:5, :5] = (255, 0, 0, 255)
     cv2.imwrite(str(folder / "mask0002.png"), mask)
+    return folder
+
+
+def test_strange_colors_come_with_advice_and_a_strict_run_ends_at_the_first_bad_picture(capsys, bad, tmp_path):
     out = ("-o", tmp_path / "out", "--workers", 1)
-    said = complaint(capsys, MODEL, folder, *out)
+    said = complaint(capsys, MODEL, bad, *out)
     assert "mask0002.png" in said
     assert "[0, 0, 255]" in said
     assert "--color" in said
-    done = run(MODEL, folder, *out, "--color", "environment=0,0,255")
-    assert done.stderr.count("skipped") == 2
+    assert "mask0000.png" in complaint(capsys, MODEL, bad, *out, "--strict")
+
+
+def test_bad_pictures_are_skipped_and_a_robot_s_configuration_counts_unless_an_option_says_otherwise(bad, tmp_path):
+    (tmp_path / "vm.toml").write_text('[detector]\nthreshold = 0.6\nmin_inside = 0.6\nformat = "rgb"\n')
+    robot = ("--as-robot", "--config", tmp_path / "vm.toml", "--min-inside", 0.5)
+    done = run(MODEL, bad, "-o", tmp_path / "out", *robot, "--color", "environment=0,0,255")
+    assert done.stderr.count("vm-evaluate: skipped") == 2
     assert "mask0000.png: is missing" in done.stderr
+    assert "1 picture of" in done.stdout
     assert "2 skipped" in done.stdout
-    assert "mask0000.png" in complaint(capsys, MODEL, folder, *out, "--strict")
+    scores = json.loads((tmp_path / "out" / "scores.json").read_text())
+    settings = scores["about"]["settings"]
+    assert (settings["threshold"], settings["min_inside"], settings["format"]) == (0.6, 0.5, "bgr")
+    assert scores["about"]["rules"]["as_robot"] is True
+    assert scores["points"]["ball"]["all"]["threshold"] == 0.6
+    assert "--radius-of scene" in scores["about"]["notes"][0]  # balls of 0.07 m, and the network's are larger
 
 
 def test_what_can_t_be_used_is_named_in_one_line(capsys, data, tmp_path):
