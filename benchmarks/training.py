@@ -118,7 +118,7 @@ def main() -> None:
         together = whole(options.data, numbers, folder, workers=1)
     RESULTS.write_text(json.dumps({"machine": machine(), "one core": alone, "two cores": together}, indent=1) + "\n")
     rows = [f"| {name} | {value:.0f} |" for name, value in alone.items() if name != "points"]
-    rows += [f"| whole training, {name}, one core reads and one learns | {value:.0f} |" for name, value in together.items()]
+    rows += [f"| training, {name}, one core reads, one learns | {value:.0f} |" for name, value in together.items()]
     table = "| | pictures/s |\n| --- | ---: |\n" + "\n".join(rows) + "\n"
     before, after = PAGE.read_text().split("<!-- throughput -->\n")
     PAGE.write_text(before + "<!-- throughput -->\n" + table + after[after.index("<!-- end -->") :])

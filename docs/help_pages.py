@@ -29,7 +29,9 @@ def page() -> str:
     parts = [
         "# Command line\n\nMade from the programs' own help texts; every program also prints them with `--help`.\n"
     ]
-    for parser in (detect.parser(), bench.parser(), export.parser(), *synth.parsers().values(), *train.parsers().values(), *evaluate.parsers().values()):
+    robot = (detect.parser(), bench.parser(), export.parser())
+    workstation = (each for program in (synth, train, evaluate) for each in program.parsers().values())
+    for parser in (*robot, *workstation):
         parts.append(f"## {parser.prog}\n\n{parser.description}\n")
         for group in parser._action_groups:
             rows = [_row(action) for action in group._group_actions if not isinstance(action, argparse._HelpAction)]

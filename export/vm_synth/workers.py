@@ -11,11 +11,9 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context
 from pathlib import Path
-from threading import Thread
 
-import cv2
 import numpy as np
 
 from vm_embedded.errors import VisualMeshError
@@ -27,6 +25,7 @@ from .environment import Environment
 from .picture import render
 from .scene import Scene
 from .tracer import Tracer
+from .worker_process import begin
 
 
 class WorkerLost(VisualMeshError):
@@ -107,19 +106,8 @@ _worker: tuple[Job, Tracer] | None = None
 
 def _start(job: Job) -> None:
     global _worker
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    cv2.setNumThreads(1)
-    Thread(target=_end_with_parent, daemon=True).start()
+    begin()
     _worker = (job, Tracer())
-
-
-def _end_with_parent() -> None:
-    """End this process when the one that started it is killed, which else it would outlive."""
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _render_one(index: int) -> Done:

@@ -113,7 +113,7 @@ class MeshSettings:
     intersections: float = number(4.0, "rings that cross an object, the paper's k", "", (0.1, 100.0))
     model: str = one_of(tuple(RING_NEIGHBORS), "ring6", "which points are neighbors")
     max_distance: float = number(10.0, "how far out the mesh reaches", "m", (0.1, 1e4))
-    grid: str = one_of(GRIDS, "visual", "visual: the Visual Mesh; hexagonal: the paper's baseline, which can't be exported")
+    grid: str = one_of(GRIDS, "visual", "the Visual Mesh, or the paper's baseline, which can't be exported")
     equal_at: float = number(
         0.0,
         "distance at which a hexagonal grid has as many points on an object as the Visual Mesh; 0: as many in all",

@@ -51,8 +51,8 @@ class Hardware:
 def hardware(device: str, workers: int | None, threads: int | None) -> Iterator[Hardware]:
     """The hardware that is there: the processes of torchrun, if it started this one, meet here.
 
-    device: auto, cpu or cuda. workers, threads: None for as many as the processor has cores for. Raises InputError if there is
-    no such device.
+    device: auto, cpu or cuda. workers, threads: None for as many as the processor has cores for. Raises InputError if
+    there is no such device.
     """
     size, rank = int(os.environ.get("WORLD_SIZE", "1")), int(os.environ.get("RANK", "0"))
     local, locals_ = int(os.environ.get("LOCAL_RANK", "0")), int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
@@ -60,7 +60,7 @@ def hardware(device: str, workers: int | None, threads: int | None) -> Iterator[
         raise InputError("torch finds no GPU here; take --device cpu")
     gpu = device != "cpu" and torch.cuda.is_available()
     if gpu and local >= torch.cuda.device_count():
-        raise InputError(f"{locals_} processes, but {torch.cuda.device_count()} GPUs: start one process for each GPU")
+        raise InputError(f"{locals_} processes, but {torch.cuda.device_count()} GPUs: start one for each")
     cores = max(len(os.sched_getaffinity(0)) // locals_, 1)
     if workers is None:
         workers = max(cores - 1, 1) if gpu else max(cores // 2, 1)

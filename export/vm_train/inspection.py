@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import signal
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context, parent_process
-from threading import Thread
+from multiprocessing import get_context
 
 import cv2
 import numpy as np
@@ -20,6 +17,7 @@ from vm_embedded.errors import VisualMeshError, unknown
 from vm_embedded.lens import Lens, RadialLens, Size
 from vm_embedded.lens_file import LensFile
 from vm_embedded.lens_opencv import CalibratedLens
+from vm_synth.worker_process import begin
 
 from .picture_files import PictureFault, PictureFiles
 from .pictures import Classes, Labels, read_picture
@@ -136,27 +134,13 @@ def _found(
         yield from map(inspected, pictures)
         return
     chunks = -(-len(pictures) // _CHUNK)
-    pool = ProcessPoolExecutor(min(workers, chunks), get_context("spawn"), _start)
+    pool = ProcessPoolExecutor(min(workers, chunks), get_context("spawn"), begin)
     try:
         yield from pool.map(inspected, pictures, chunksize=_CHUNK)
     except BrokenProcessPool as error:
         raise VisualMeshError("a worker that read pictures was killed (out of memory?)") from error
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _start() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
-    cv2.setNumThreads(1)
-    Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """End this process when the one that started it is killed, which else it would outlive."""
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 def _inspected(files: PictureFiles, classes: Classes, objects: Sequence[int]) -> Facts | Fault:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 
-import cv2
 import numpy as np
 from torch.utils.data import DataLoader, Dataset
 
 from vm_embedded.errors import GeometryError, InputError, VisualMeshError
 from vm_embedded.manifest import Manifest
 from vm_export.grid import Grid
+from vm_synth.worker_process import begin
 
 from .augmentation import Augmentation, blurred, moved, recolored
 from .graphs import OFF_SCREEN, Graph, graph_of
@@ -46,7 +45,7 @@ def ball_radius(files: PictureFiles) -> float:
     try:
         return float(json.loads(path.read_text(encoding="utf-8"))["ball_radius"])
     except OSError as error:
-        raise InputError(f"{path.name}: can't be read, but says the ball's radius ({error.strerror or error})") from error
+        raise InputError(f"{path.name}: says the ball's radius, but {error.strerror or error}") from error
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path.name}: does not say the ball's radius, ball_radius") from error
 
@@ -86,7 +85,7 @@ def _empty(neighbors: int) -> Graph:
     )
 
 
-def loaded(graphs: Graphs, batches: Sequence[Batch], workers: int) -> Iterator[list[Graph]]:
+def loaded(graphs: Graphs, batches: Sequence[Batch], workers: int) -> Generator[list[Graph]]:
     """The graphs of batches, in their order, whatever the number of worker processes (0: none).
 
     Raises what reading raised, and InputError if a worker was killed.
@@ -126,5 +125,4 @@ class _Faults(Dataset["Graph | VisualMeshError"]):
 
 
 def _begin(worker: int) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the training decides
-    cv2.setNumThreads(1)
+    begin()

@@ -30,9 +30,7 @@ class Log:
         self._round = training_round
         try:
             self._file = self._path.open("a", encoding="utf-8")
-            self._board = SummaryWriter(  # type: ignore[no-untyped-call]
-                str(folder / "tensorboard" / f"round{training_round}"), purge_step=step + 1
-            )
+            self._board = SummaryWriter(str(folder / "tensorboard" / f"round{training_round}"), purge_step=step + 1)
         except OSError as error:
             raise InputError(f"can't write {self._path}: {error.strerror or error}") from error
 
@@ -46,7 +44,7 @@ class Log:
         except OSError as error:
             raise InputError(f"can't write {self._path}: {error.strerror or error}") from error
         for name, value in _scalars(record):
-            self._board.add_scalar(name, value, step)  # type: ignore[no-untyped-call]
+            self._board.add_scalar(name, value, step)
 
     def __enter__(self) -> Log:
         return self
@@ -54,7 +52,7 @@ class Log:
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
         if self._writes:
             self._file.close()
-            self._board.close()  # type: ignore[no-untyped-call]
+            self._board.close()
 
 
 def _scalars(record: dict[str, Any], above: str = "") -> list[tuple[str, float]]:
@@ -70,11 +68,7 @@ def _scalars(record: dict[str, Any], above: str = "") -> list[tuple[str, float]]
 
 def _cut(path: Path, training_round: int, step: int) -> None:
     """Leave out what came after a step, and a last line that was not finished."""
-    kept = [
-        line
-        for line, record in read_log(path)
-        if (record["round"], record["step"]) <= (training_round, step)
-    ]
+    kept = [line for line, record in read_log(path) if (record["round"], record["step"]) <= (training_round, step)]
     with written_beside(path) as part:
         part.write_text("".join(kept), encoding="utf-8")
 

@@ -48,8 +48,8 @@ def parser() -> argparse.ArgumentParser:
         "--unpacked",
         type=Path,
         metavar="DIR",
-        help="where decoded pictures are kept, 1.3 MB for 640 x 512 px, so that each is decoded once; several trainings "
-        "may share it; default RUN/unpacked, which is removed at the end",
+        help="where decoded pictures are kept (1.3 MB for 640 x 512 px), so that each is decoded once; trainings may "
+        "share it; default RUN/unpacked, which is removed at the end",
     )
     kept.add_argument("--no-unpacked", action="store_true", help="decode pictures each time; for slow or small disks")
     _add_hardware(made)
@@ -71,8 +71,8 @@ def preview_parser() -> argparse.ArgumentParser:
     """The options of vm-train preview."""
     made = argparse.ArgumentParser(
         prog="vm-train preview",
-        description="Draw a sheet: pictures with the points of the mesh in the colors of their classes, as they are and "
-        "augmented, and below what each kind of augmentation does by itself.",
+        description="Draw a sheet: pictures with the points of the mesh in the colors of their classes, as they are "
+        "and augmented, and below what each kind of augmentation does by itself.",
     )
     _add_data(made)
     _add_configuration(made)
@@ -138,8 +138,10 @@ def _add_configuration(made: argparse.ArgumentParser) -> None:
 
 def _add_hardware(made: argparse.ArgumentParser) -> None:
     group = made.add_argument_group("hardware")
-    group.add_argument("--device", choices=DEVICES, default="auto", help="where to compute; default a GPU if there is")
-    group.add_argument("--workers", type=_whole, metavar="N", help="processes that read pictures; default half the cores")
+    group.add_argument(
+        "--device", choices=DEVICES, default="auto", help="default a GPU, if there is one"
+    )
+    group.add_argument("--workers", type=_whole, metavar="N", help="processes that read; default half the cores")
     group.add_argument("--threads", type=_positive, metavar="N", help="threads that compute; default the other cores")
 
 

@@ -42,9 +42,7 @@ def steps_an_epoch(training: int, batch: int) -> int:
     return -(-training // batch)
 
 
-def schedule(
-    seed: tuple[int, ...], epochs: int, batch: int, training: int, validation: int
-) -> Iterator[Batch]:
+def schedule(seed: tuple[int, ...], epochs: int, batch: int, training: int, validation: int) -> Iterator[Batch]:
     """All batches of a training: in each epoch all pictures, shuffled, then all of the validation.
 
     Positions from 0 are those of the training pictures, and from `training` on those of the validation.
@@ -55,10 +53,10 @@ def schedule(
         starts = range(0, training, batch)
         for start in starts:
             step += 1
-            chosen = (int(each) for each in shuffled[start : start + batch])
+            chosen = shuffled[start : start + batch].tolist()
             items = tuple(Item(each, (*seed, 3, epoch, each)) for each in chosen)
             yield Batch(epoch, step, items, validates=False, last=start == starts[-1])
         for start in range(0, validation, _VALIDATED):
-            chosen = range(training + start, training + min(start + _VALIDATED, validation))
-            last = start + _VALIDATED >= validation
-            yield Batch(epoch, step, tuple(Item(each) for each in chosen), validates=True, last=last)
+            end = min(start + _VALIDATED, validation)
+            items = tuple(Item(each) for each in range(training + start, training + end))
+            yield Batch(epoch, step, items, validates=True, last=end == validation)

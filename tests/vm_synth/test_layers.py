@@ -15,18 +15,8 @@ PACKAGE = Path(vm_synth.__file__).parent
 MODULES = sorted(path for path in PACKAGE.glob("*.py") if path.stem != "__init__")
 
 LAYERS = [
-    {
-        "ranges",
-        "sections",
-        "paints",
-        "environment",
-        "smoothing",
-        "llvm",
-        "outlines",
-        "progress",
-        "ball_sphere",
-        "ball_design",
-    },
+    {"ranges", "sections", "llvm", "progress", "worker_process"},
+    {"paints", "environment", "smoothing", "outlines", "ball_sphere", "ball_design"},
     {"solids", "camera", "field", "sensor", "ball_prints"},
     {"primitives", "ball_patterns"},
     {"people", "clutter", "distractors", "goals", "robots", "balls"},

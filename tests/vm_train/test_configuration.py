@@ -53,7 +53,8 @@ def test_classes_come_in_their_order_with_their_colors(write):
         ("[classes]\nball = { kind = 'object', colors = [[1, 2, 256]] }\n", "from 0 to 255"),
         ("[classes]\nball = { kind = 'object', colors = [[1, 2, 3]] }\n", "at least two classes"),
         (
-            "[classes]\nball = { kind = 'object', colors = [[1, 2, 3]] }\nline = { kind = 'area', colors = [[1, 2, 3]] }\n",
+            "[classes]\nball = { kind = 'object', colors = [[1, 2, 3]] }\n"
+            "line = { kind = 'area', colors = [[1, 2, 3]] }\n",
             "share the color",
         ),
     ],

@@ -1,0 +1,26 @@
+"""What a worker process of the workstation's programs does first."""
+
+from __future__ import annotations
+
+import os
+import signal
+from multiprocessing import parent_process
+from threading import Thread
+
+import cv2
+
+
+def begin() -> None:
+    """Leave signals to the parent, keep to one core, and end with the parent, however it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    cv2.setNumThreads(1)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that started it is killed, which else it would outlive."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
