@@ -222,8 +222,8 @@ def _notes(options: argparse.Namespace, settings: Settings, subject: Subject, re
         low, high = min(result.radii), max(result.radii)
         found = f"radii from {low:.3f} to {high:.3f} m" if high > low else f"a radius of {low:.3f} m"
         notes.append(
-            f"Balls in these pictures have {found}, and the fit is for {radius:g} m. --radius-of scene gives each picture "
-            "mesh and fit for its own ball."
+            f"Balls in these pictures have {found}, and the fit is for {radius:g} m. --radius-of scene gives each "
+            "picture mesh and fit for its own ball."
         )
     if options.radius_of == "scene":
         notes.append("Mesh and fit are for the radius of each picture's own ball.")
