@@ -172,6 +172,7 @@ def distance_errors(objects: dict[str, ObjectScores]) -> Figure:
         bias, low, high, median, p90 = np.where(known, np.array(columns, dtype=np.float64).T, np.nan)
         signed.plot(middles, bias, color=color, marker=".", linewidth=1.3, label=f"{name}: median")
         signed.fill_between(middles, low, high, color=color, alpha=0.18, linewidth=0, label="10 to 90 %")
+        signed.vlines(middles, low, high, color=color, alpha=0.4, linewidth=1.0)  # a bin alone has no band
         relative.plot(middles, 100.0 * median, color=color, marker=".", linewidth=1.3, label=f"{name}: median")
         relative.plot(middles, 100.0 * p90, color=color, linestyle="--", linewidth=1.2, label=f"{name}: 90 %")
     for axes, label in ((signed, "found minus true distance [m]"), (relative, "absolute error [% of the distance]")):
