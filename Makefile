@@ -6,8 +6,9 @@ DEMO := tests/fixtures/demo
 OUT ?= data/train
 COUNT ?= 8000
 SEED ?= 1
+COMPARED ?= build/compare
 
-.PHONY: help setup demo test lint bench bench-synth data fixtures docs clean
+.PHONY: help setup demo test lint bench bench-synth bench-train compare data fixtures docs clean
 .DELETE_ON_ERROR:
 
 help: ## what can be made
@@ -37,6 +38,13 @@ data: .venv/synth ## render a training set: make data HDRI=folder-of-maps [OUT=d
 
 bench-synth: .venv/synth ## measure vm-synth: make bench-synth HDRI=folder-of-maps (8 minutes)
 	$(BIN)/python -m benchmarks.synth $(HDRI)
+
+bench-train: .venv/dev ## measure vm-train: make bench-train DATA=folder-of-pictures (5 minutes)
+	$(BIN)/python -m benchmarks.training $(DATA)
+
+compare: .venv/dev ## compare selections and meshes: make compare DATA=set HELD_OUT=set-of-other-maps [COMPARED=build/compare] (an hour)
+	$(BIN)/python -m benchmarks.comparison $(DATA) $(HELD_OUT) $(COMPARED)
+	$(BIN)/python -m benchmarks.comparison_report
 
 fixtures: .venv/dev ## draw the demo's frames and train its network again (about 20 minutes)
 	$(BIN)/python -m tests.fixtures.make_demo

@@ -10,13 +10,14 @@ DOCS = Path(__file__).parents[1] / "docs"
 PAGES = [DOCS.parent / "README.md", DOCS.parent / "CHANGELOG.md", *sorted(DOCS.glob("*.md"))]
 
 
-def test_command_line_and_scene_pages_are_what_the_programs_say(monkeypatch):
+def test_command_line_and_configuration_pages_are_what_the_programs_say(monkeypatch):
     monkeypatch.syspath_prepend(str(DOCS))
     import help_pages
 
     sys.modules.pop("help_pages")
     assert help_pages.PAGE.read_text() == help_pages.page(), "run: make docs"
     assert help_pages.SCENE.read_text() == help_pages.scene(), "run: make docs"
+    assert help_pages.TRAIN.read_text() == help_pages.training(), "run: make docs"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

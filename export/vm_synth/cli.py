@@ -24,7 +24,8 @@ from .progress import Ticker
 from .report import as_json, complaints, tables
 from .sections import documented, read_sections
 from .sheet import cell, chosen, read_shown, sheet
-from .workers import Done, Job, render_all, stoppable
+from .stopping import stoppable
+from .workers import Done, Job, render_all
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 

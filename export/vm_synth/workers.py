@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import os
 import resource
-import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import get_context
@@ -79,20 +77,6 @@ def render_all(job: Job, indices: Sequence[int], workers: int, report: Callable[
             raise WorkerLost("a worker was killed (out of memory?); all finished pictures are kept") from error
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
-
-
-@contextmanager
-def stoppable() -> Iterator[None]:
-    """SIGTERM interrupts like Ctrl-C, so that schedulers can end a run at any time."""
-
-    def interrupt(number: int, frame: object) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _one_core_each() -> None:

@@ -14,6 +14,7 @@ import vm_embedded
 from vm_embedded.configuration import read_configuration
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.settings import Settings
+from vm_synth.stopping import stoppable
 
 from .evaluate_options import parser as parser
 from .evaluate_options import parsers as parsers
@@ -30,9 +31,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-evaluate and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        if given[:1] == ["points"]:
-            return _points(points_parser().parse_args(given[1:]))
-        return _evaluate(parser().parse_args(given))
+        with stoppable():
+            if given[:1] == ["points"]:
+                return _points(points_parser().parse_args(given[1:]))
+            return _evaluate(parser().parse_args(given))
     except ImportError as error:
         missing = error.name or str(error)
         print(f"vm-evaluate: {missing} is not installed; run: pip install 'vm-embedded[train]'", file=sys.stderr)
