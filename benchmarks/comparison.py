@@ -78,7 +78,24 @@ def scored(model: Path, data: Path, out: Path, numbers: Path | None) -> dict[str
         command = [sys.executable, "-m", "vm_train.evaluate_cli", str(model), str(data), "-o", str(out)]
         command += ["--radius-of", "scene", *(() if numbers is None else ("--list", str(numbers), "--part", "test"))]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    found: dict[str, Any] = json.loads((out / "scores.json").read_text())
+    return _kept(json.loads((out / "scores.json").read_text()))
+
+
+_POINTS = ("points", "average_precision", "roc_auc", "precision", "recall", "f1", "mcc")
+_OBJECTS = ("truths", "hits", "false", "average_precision", "precision", "recall", "false_per_picture")
+
+
+def _kept(scores: dict[str, Any]) -> dict[str, Any]:
+    """Scores that are compared: of each class over all distances, of the ball's points and objects in each bin."""
+    points, ball = scores["points"], scores.get("objects", {}).get("ball", {})
+    found: dict[str, Any] = {
+        "classes": {name: {key: bins["all"][key] for key in _POINTS} for name, bins in points.items()},
+        "points": {name: {key: each[key] for key in _POINTS} for name, each in points["ball"].items()},
+    }
+    for overlap in ("iou_0.5", "iou_0.75"):
+        if overlap in ball:
+            found[overlap] = {name: {key: each[key] for key in _OBJECTS} for name, each in ball[overlap].items()}
+            found[overlap]["all"]["distance_error"] = ball[overlap]["all"]["errors"]["distance_median"]
     return found
 
 
