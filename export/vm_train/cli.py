@@ -16,6 +16,7 @@ from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable
 from vm_synth.progress import Ticker
 from vm_synth.sections import documented, read_sections
+from vm_synth.stopping import stoppable
 
 from . import check as checking
 from . import shards, tfrecord_import
@@ -47,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     prog = "vm-train" if command is None else f"vm-train {command}"
     options = parsers()[prog].parse_args(given if command is None else given[1:])
     try:
-        with _terminated_as_interrupted():
+        with stoppable():
             return _train(options) if command is None else commands[command](options)
     except VisualMeshError as error:
         print(f"vm-train: {' '.join(str(error).split())}", file=sys.stderr)
@@ -55,20 +56,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("vm-train: stopped", file=sys.stderr)
         return EXIT_INTERRUPTED
-
-
-@contextmanager
-def _terminated_as_interrupted() -> Iterator[None]:
-    """SIGTERM interrupts like Ctrl-C, so that schedulers can end a training at any time."""
-
-    def interrupt(number: int, frame: object) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 @contextmanager
@@ -143,9 +130,7 @@ def _begin(options: argparse.Namespace, configuration: TrainConfiguration, here:
     return Job.begin(options.output, options.data, configuration, split, unpacked)
 
 
-def _good_pictures(
-    data: Path, configuration: TrainConfiguration, here: Hardware, strict: bool
-) -> list[PictureFiles]:
+def _good_pictures(data: Path, configuration: TrainConfiguration, here: Hardware, strict: bool) -> list[PictureFiles]:
     pictures = find_pictures(data)
     ticker = Ticker(len(pictures), "vm-train")
     try:
@@ -200,7 +185,9 @@ def _go_on(folder: Path, here: Hardware) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    return checking.run_check(options, read_sections(TrainConfiguration, options.config).classes.seen_as())
+    classes = read_sections(TrainConfiguration, options.config).classes
+    objects = [name for name, kind in classes.kinds.items() if kind == "object"]
+    return checking.run_check(options, classes.seen_as(), objects)
 
 
 def _preview(options: argparse.Namespace) -> int:

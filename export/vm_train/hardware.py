@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import timedelta
 from typing import Any, TypeVar
 
 import torch
@@ -14,6 +15,9 @@ from torch import distributed
 from vm_embedded.errors import InputError
 
 Value = TypeVar("Value")
+
+_PATIENCE = timedelta(days=1)
+"""For processes that wait while one checks all pictures."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ def hardware(device: str, workers: int | None, threads: int | None) -> Iterator[
     if gpu:
         torch.cuda.set_device(local)
     if size > 1:
-        distributed.init_process_group("nccl" if gpu else "gloo")
+        distributed.init_process_group("nccl" if gpu else "gloo", timeout=_PATIENCE)
     try:
         yield Hardware(f"cuda:{local}" if gpu else "cpu", rank, size, workers)
     finally:

@@ -116,6 +116,7 @@ def _train_round(job: Job, hardware: Hardware, progress: Progress, stopped: Call
     ticker.end()
     progress.finished = True
     save()
+    hardware.shared(None)  # the next round reads what the leading process has written by now
     return pictures
 
 
@@ -157,8 +158,8 @@ def _validated(
     if score <= progress.best:
         return
     progress.best, progress.best_epoch = score, progress.validated
+    best_ever, progress.best_ever = progress.best_ever, max(progress.best_ever, score)
     if not hardware.leads:
-        progress.best_ever = max(progress.best_ever, score)
         return
     provenance = job.provenance() | {
         "round": str(progress.round),
@@ -169,9 +170,8 @@ def _validated(
     manifest = replace(job.configuration.manifest, provenance=provenance)
     checkpoint = Checkpoint(training.network, manifest, job.configuration.grid)
     checkpoint.save(job.round_path(progress.round))
-    if score > progress.best_ever:
+    if score > best_ever:
         checkpoint.save(job.model_path)
-        progress.best_ever = score
 
 
 def _score(job: Job, precisions: dict[str, float]) -> float:
