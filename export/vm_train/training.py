@@ -108,7 +108,7 @@ class Training:
         ]
         weights = self._weights(points, neighbors, graph) if self._graders else None
         chosen = selected(graph.labels, self._shares, np.concatenate(draws), weights)
-        with torch.autocast(self._device, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
+        with torch.autocast(torch.device(self._device).type, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
             logits = self.network.logits(points, neighbors)
         wanted = torch.from_numpy(np.flatnonzero(chosen)).to(self._device)
         labels = torch.from_numpy(graph.labels[chosen].astype(np.int64)).to(self._device)
