@@ -33,6 +33,7 @@ p.note { background: #fff6dd; border-left: 4px solid #e0b030; padding: 0.5em 0.8
 .card b { display: block; font-size: 1.45em } .card span { color: #666; font-size: 0.87em }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 0.92em }
 th, td { padding: 0.2em 0.75em; text-align: right; border-bottom: 1px solid #e8e8e8 }
+td { white-space: nowrap } .facts td { white-space: normal; overflow-wrap: anywhere }
 th:first-child, td:first-child, .facts td { text-align: left } th { color: #555; font-weight: 600 }
 figure { margin: 1.2em 0 } figure img { max-width: 100% } figcaption { color: #555; font-size: 0.9em }
 .strip { display: flex; flex-wrap: wrap; gap: 0.8em } .strip figure { margin: 0 }
