@@ -9,6 +9,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ from .configuration import TrainConfiguration
 from .options import parsers
 from .pictures import PictureFiles, find_pictures
 from .split import Split, split_by_lists, split_by_seed
+from .stream_options import source_of
 
 if TYPE_CHECKING:
     from .hardware import Hardware
@@ -122,12 +124,18 @@ def _begin(options: argparse.Namespace, configuration: TrainConfiguration, here:
 
     if (options.output / "run.json").exists():
         raise InputError(f"{options.output} holds a training already: vm-train resume {options.output}")
+    source = source_of(options, configuration, here)
     good = _good_pictures(options.data, configuration, here, options.strict)
-    split = _split(options, configuration, good)
-    parts = f"{len(split.training)} for training, {len(split.validation)} for validation, {len(split.test)} for test"
+    if source is None:
+        split = _split(options, configuration, good)
+        training = str(len(split.training))
+    else:
+        split = Split((), tuple(each.number for each in good))
+        training = f"{source.epoch} an epoch of {len(source.shards)} shards"
+    parts = f"{training} for training, {len(split.validation)} for validation, {len(split.test)} for test"
     print(f"{options.data}: {len(good)} pictures: {parts}")
     unpacked = None if options.no_unpacked else options.unpacked or options.output / "unpacked"
-    return Job.begin(options.output, options.data, configuration, split, unpacked)
+    return Job.begin(options.output, options.data, configuration, split, unpacked, source)
 
 
 def _good_pictures(data: Path, configuration: TrainConfiguration, here: Hardware, strict: bool) -> list[PictureFiles]:
@@ -166,6 +174,10 @@ def _go_on(folder: Path, here: Hardware) -> int:
     from .run import train
 
     job = Job.read(folder)
+    if job.source is not None and job.source.workers != here.workers:
+        here = replace(here, workers=job.source.workers)
+        if here.leads:
+            print(f"vm-train: {here.workers} workers read the stream, as run.json says", file=sys.stderr)
     with _on_request() as stopped:
         done = train(job, here, stopped)
     if not here.leads:
@@ -179,8 +191,9 @@ def _go_on(folder: Path, here: Hardware) -> int:
     best = done.progress.best_ever
     print(f"{job.model_path}: average precision {best:.3f} on the validation, {speed}" * (done.pictures > 0), end="")
     print("" if done.pictures else f"{job.model_path}: the training was finished already")
-    print(f"next: vm-evaluate {job.model_path} {job.data} --list {folder / 'pictures.json'} --part test -o report")
-    print(f"      vm-export {job.model_path}")
+    if job.split.test:
+        print(f"next: vm-evaluate {job.model_path} {job.data} --list {folder / 'pictures.json'} --part test -o report")
+    print(f"next: vm-export {job.model_path}")
     return EXIT_OK
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,9 @@ from vm_synth.sections import documented, read_sections
 from .configuration import TrainConfiguration
 from .loading import Graphs, View
 from .pictures import PictureFiles, find_pictures
-from .schedule import Item
+from .schedule import Batch, Item, schedule
 from .split import Split, load, save
+from .streamed import Source, StreamedGraphs, StreamedItem, in_lanes
 from .unpacked import Unpacked
 
 _COUNTED = 300  # pictures of which classes are counted
@@ -38,7 +39,8 @@ _FORMAT = 1
 class Job:
     """What is to be done. data: the pictures' folder. counts (C,): points of each class in some training pictures.
 
-    unpacked: where decoded pictures are kept, or None.
+    unpacked: where decoded pictures are kept, or None. source: where training pictures are streamed from, or None if
+    they are in the folder.
     """
 
     folder: Path
@@ -47,10 +49,17 @@ class Job:
     split: Split
     counts: npt.NDArray[np.int64]
     unpacked: Path | None
+    source: Source | None = None
 
     @classmethod
     def begin(
-        cls, folder: Path, data: Path, configuration: TrainConfiguration, split: Split, unpacked: Path | None
+        cls,
+        folder: Path,
+        data: Path,
+        configuration: TrainConfiguration,
+        split: Split,
+        unpacked: Path | None,
+        source: Source | None = None,
     ) -> Job:
         """Write down a new training. Raises InputError, also if its folder holds one already."""
         if (folder / "run.json").exists():
@@ -60,13 +69,11 @@ class Job:
         except OSError as error:
             raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
         none = np.zeros(len(configuration.classes.colors), dtype=np.int64)
-        job = cls(folder, data.resolve(), configuration, split, none, unpacked)
-        graphs = job.graphs(split.training)
-        chosen = np.unique(np.linspace(0, len(split.training) - 1, _COUNTED).astype(int))
-        counts = none + sum(_counts(graphs, int(each), len(none)) for each in chosen)
+        job = cls(folder, data.resolve(), configuration, split, none, unpacked, source)
+        counts = job._counted()
         if not counts.any():
             raise InputError("no training picture has a labeled point: do the lens files fit the pictures?")
-        job = cls(folder, data.resolve(), configuration, split, counts, unpacked)
+        job = replace(job, counts=counts)
         save(folder / "pictures.json", split)
         _write(folder / "train.toml", "\n".join(documented(configuration)))
         content = {
@@ -74,6 +81,7 @@ class Job:
             "version": __version__,
             "data": str(job.data),
             "unpacked": None if unpacked is None else str(unpacked.resolve()),
+            "source": None if source is None else asdict(source),
             "points": dict(zip(configuration.classes.colors, counts.tolist(), strict=True)),
         }
         _write(folder / "run.json", json.dumps(content, indent=1) + "\n")
@@ -88,7 +96,8 @@ class Job:
             if content["format"] != _FORMAT:
                 raise InputError(f"{path} is of another release: begin the training again")
             counts = np.array(list(content["points"].values()), dtype=np.int64)
-            data, kept = Path(content["data"]), content["unpacked"]
+            data, kept, origin = Path(content["data"]), content["unpacked"], content.get("source")
+            source = None if origin is None else Source(**origin | {"shards": tuple(origin["shards"])})
         except OSError as error:
             raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
         except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -97,7 +106,39 @@ class Job:
         if len(counts) != len(configuration.classes.colors):
             raise InputError(f"{folder / 'train.toml'} has other classes than {path}")
         unpacked = None if kept is None else Path(kept)
-        return cls(folder, data, configuration, load(folder / "pictures.json"), counts, unpacked)
+        return cls(folder, data, configuration, load(folder / "pictures.json"), counts, unpacked, source)
+
+    @property
+    def epoch(self) -> int:
+        """Training pictures in an epoch."""
+        return len(self.split.training) if self.source is None else self.source.epoch
+
+    def batches(self, training_round: int) -> Iterator[Batch]:
+        """All batches of a round, counted from 1."""
+        recipe = self.configuration.training
+        seed = (recipe.seed, training_round)
+        batches = schedule(seed, recipe.epochs, recipe.batch, self.epoch, len(self.split.validation))
+        return batches if self.source is None else in_lanes(batches, seed, self.source)
+
+    def scheduled(self) -> Graphs | StreamedGraphs:
+        """The graphs of what is in batches. Raises InputError if a picture of the folder is not there any more."""
+        graphs = self.graphs((*self.split.training, *self.split.validation))
+        return graphs if self.source is None else StreamedGraphs(self.source, graphs)
+
+    def _counted(self) -> npt.NDArray[np.int64]:
+        """Points (C,) of each class in some training pictures as they are, of a stream in the first ones of a lane."""
+        number = min(_COUNTED, self.epoch)
+        if self.source is None:
+            items = [Item(int(each)) for each in np.linspace(0, self.epoch - 1, number)]
+        else:
+            order = (self.configuration.training.seed, 0)
+            items = [StreamedItem(0, None, order, 0, place) for place in range(number)]
+        graphs = self.scheduled()
+        counts = np.zeros_like(self.counts)
+        for item in items:
+            labels = graphs[item].labels
+            counts += np.bincount(labels[labels >= 0], minlength=len(counts))
+        return counts
 
     def graphs(self, numbers: Sequence[str]) -> Graphs:
         """The graphs of some pictures. Raises InputError if one is not there any more."""
@@ -133,11 +174,12 @@ class Job:
     def provenance(self) -> dict[str, str]:
         """Where a network of this training comes from, for its manifest."""
         recipe, split = self.configuration.training, self.split
-        used = hashlib.sha256(json.dumps([split.training, split.validation]).encode()).hexdigest()
+        training = split.training if self.source is None else self.source.shards
+        used = hashlib.sha256(json.dumps([training, split.validation]).encode()).hexdigest()
         return {
             "made_by": f"vm-train {__version__}",
             "data": self.data.name,
-            "training_pictures": str(len(split.training)),
+            "training_pictures": str(self.epoch) if self.source is None else f"{self.epoch} an epoch, streamed",
             "validation_pictures": str(len(split.validation)),
             "pictures_sha256": used,
             "configuration_sha256": hashlib.sha256("\n".join(documented(self.configuration)).encode()).hexdigest(),
@@ -146,11 +188,6 @@ class Job:
             "epochs": str(recipe.epochs),
             "seed": str(recipe.seed),
         }
-
-
-def _counts(graphs: Graphs, position: int, classes: int) -> npt.NDArray[np.int64]:
-    labels = graphs[Item(position)].labels
-    return np.bincount(labels[labels >= 0], minlength=classes)
 
 
 def _write(path: Path, text: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from vm_synth.worker_process import begin
 
 from .augmentation import Augmentation, blurred, moved, recolored
 from .graphs import OFF_SCREEN, Graph, graph_of
-from .pictures import Classes, PictureFiles
+from .pictures import Classes, Picture, PictureFiles
 from .schedule import Batch, Item
 from .unpacked import Unpacked, read
 
@@ -37,6 +37,19 @@ class View:
     def manifest_for(self, files: PictureFiles) -> Manifest:
         """The manifest with the radius of a picture's own ball, if asked for. Raises InputError."""
         return replace(self.manifest, radius=ball_radius(files)) if self.own_radius else self.manifest
+
+    def graph(self, picture: Picture, manifest: Manifest, seed: tuple[int, ...] | None) -> Graph:
+        """What a network with a manifest sees of a picture, augmented with a seed. Raises InputError."""
+        try:
+            if seed is None:
+                return graph_of(picture, manifest, self.grid)
+            random = np.random.default_rng(seed)
+            picture = blurred(moved(picture, self.augmentation, random), self.augmentation, random)
+            graph = graph_of(picture, manifest, self.grid)
+        except GeometryError:  # so low a camera sees no points
+            return empty(manifest.neighbors)
+        graph.points[:-1] = recolored(graph.points[:-1], self.augmentation, random)
+        return graph
 
 
 def ball_radius(files: PictureFiles) -> float:
@@ -60,23 +73,13 @@ class Graphs(Dataset[Graph]):
         return len(self.pictures)
 
     def __getitem__(self, item: Item) -> Graph:
-        view = self.view
         files = self.pictures[item.position]
-        picture = read(files, view.classes, self.unpacked)
-        manifest = view.manifest_for(files)
-        try:
-            if item.seed is None:
-                return graph_of(picture, manifest, view.grid)
-            random = np.random.default_rng(item.seed)
-            picture = blurred(moved(picture, view.augmentation, random), view.augmentation, random)
-            graph = graph_of(picture, manifest, view.grid)
-        except GeometryError:  # so low a camera sees no points
-            return _empty(view.manifest.neighbors)
-        graph.points[:-1] = recolored(graph.points[:-1], view.augmentation, random)
-        return graph
+        picture = read(files, self.view.classes, self.unpacked)
+        return self.view.graph(picture, self.view.manifest_for(files), item.seed)
 
 
-def _empty(neighbors: int) -> Graph:
+def empty(neighbors: int) -> Graph:
+    """A graph without points."""
     return Graph(
         np.full((1, 3), OFF_SCREEN, dtype=np.float32),
         np.zeros((1, neighbors), dtype=np.int32),
@@ -85,43 +88,46 @@ def _empty(neighbors: int) -> Graph:
     )
 
 
-def loaded(graphs: Graphs, batches: Sequence[Batch], workers: int) -> Generator[list[Graph]]:
+def loaded(graphs: Dataset[Graph], batches: Iterable[Batch], workers: int) -> Generator[list[Graph]]:
     """The graphs of batches, in their order, whatever the number of worker processes (0: none).
 
     Raises what reading raised, and InputError if a worker was killed.
     """
-    loader: DataLoader[Graph | VisualMeshError] = DataLoader(
+    loader: DataLoader[list[Graph] | VisualMeshError] = DataLoader(
         _Faults(graphs),
-        batch_sampler=[list(each.items) for each in batches],
+        batch_sampler=(list(each.items) for each in batches),
         num_workers=workers,
-        collate_fn=list,
+        collate_fn=_as_they_are,
         worker_init_fn=_begin,
         prefetch_factor=4 if workers else None,
         multiprocessing_context="spawn" if workers else None,
     )
     try:
         for found in loader:
-            for each in found:
-                if isinstance(each, VisualMeshError):
-                    raise each
+            if isinstance(found, VisualMeshError):
+                raise found
             yield found
     except RuntimeError as error:
         if "DataLoader worker" not in str(error):
             raise
-        raise InputError("a worker that read pictures was killed (out of memory?); vm-train resume goes on") from error
+        raise InputError("a worker that read pictures was killed (out of memory?)") from error
 
 
-class _Faults(Dataset["Graph | VisualMeshError"]):
+class _Faults(Dataset["list[Graph] | VisualMeshError"]):
     """Graphs, or why there is none: an error that a worker raises would come with its traceback for a message."""
 
-    def __init__(self, graphs: Graphs) -> None:
+    def __init__(self, graphs: Dataset[Graph]) -> None:
         self._graphs = graphs
 
-    def __getitem__(self, item: Item) -> Graph | VisualMeshError:
+    def __getitems__(self, items: Sequence[Item]) -> list[Graph] | VisualMeshError:
         try:
-            return self._graphs[item]
+            return [self._graphs[item] for item in items]
         except VisualMeshError as error:
             return error
+
+
+def _as_they_are(found: list[Graph] | VisualMeshError) -> list[Graph] | VisualMeshError:
+    return found
 
 
 def _begin(worker: int) -> None:

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from . import check, shards, tfrecord_import
+from .stream_options import add_stream
 
 DEVICES = ("auto", "cpu", "cuda")
 
@@ -38,6 +39,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="folder of the training; new")
     _add_configuration(made)
     made.add_argument("--strict", action="store_true", help="don't begin if any picture is at fault; default: skip it")
+    add_stream(made)
     lists = made.add_argument_group(
         "lists of pictures", "A number or image name on each line; default: chosen as [data] of train.toml says."
     )
@@ -138,9 +140,7 @@ def _add_configuration(made: argparse.ArgumentParser) -> None:
 
 def _add_hardware(made: argparse.ArgumentParser) -> None:
     group = made.add_argument_group("hardware")
-    group.add_argument(
-        "--device", choices=DEVICES, default="auto", help="default a GPU, if there is one"
-    )
+    group.add_argument("--device", choices=DEVICES, default="auto", help="default a GPU, if there is one")
     group.add_argument("--workers", type=_whole, metavar="N", help="processes that read; default half the cores")
     group.add_argument("--threads", type=_positive, metavar="N", help="threads that compute; default the other cores")
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, replace
+from itertools import tee
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 import torch
 
+from vm_embedded.errors import InputError
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
 from vm_synth.progress import Ticker
@@ -20,7 +23,7 @@ from .job import Job
 from .loading import loaded
 from .log import Log
 from .point_scores import PointScores
-from .schedule import Batch, schedule
+from .schedule import Batch, steps_an_epoch
 from .selection import class_shares
 from .training import Training, read_state, summed
 
@@ -75,22 +78,26 @@ def train(job: Job, hardware: Hardware, stopped: Callable[[], bool]) -> Outcome:
 
 def _train_round(job: Job, hardware: Hardware, progress: Progress, stopped: Callable[[], bool]) -> int:
     """Do what is left of a round, and return the number of pictures that were looked at."""
-    training, batches = _prepared(job, hardware, progress)
+    training = _prepared(job, hardware, progress)
     recipe = job.configuration.training
-    own = [each.part(hardware.rank, hardware.size) for each in batches]
-    graphs = job.graphs((*job.split.training, *job.split.validation))
+    # The loader is some batches ahead of the training; a list of all would not fit into memory for large sets.
+    batches, ahead = tee(_left(job, progress.round, training.done, progress.validated))
+    own = (each.part(hardware.rank, hardware.size) for each in ahead)
     scores = PointScores(tuple(job.configuration.classes.colors))
-    ticker = Ticker(batches[-1].step if batches else 0, "vm-train", training.done)
+    ticker = Ticker(training.total, "vm-train", training.done)
     pictures, saved = 0, perf_counter()
 
     def save() -> None:
         if hardware.leads:
             training.save(job.state_path, asdict(progress))
 
-    with Log(job.folder, progress.round, training.done, hardware.leads) as log, closing(
-        loaded(graphs, own, hardware.workers)
-    ) as loader:
-        for batch, whole, found in zip(own, batches, loader, strict=True):
+    with (
+        Log(job.folder, progress.round, training.done, hardware.leads) as log,
+        _resumable(job.folder, save),
+        closing(loaded(job.scheduled(), own, hardware.workers)) as loader,
+    ):
+        for whole, found in zip(batches, loader, strict=True):
+            batch = whole.part(hardware.rank, hardware.size)
             pictures += len(whole.items)
             if batch.validates:
                 for each in found:
@@ -120,28 +127,37 @@ def _train_round(job: Job, hardware: Hardware, progress: Progress, stopped: Call
     return pictures
 
 
-def _prepared(job: Job, hardware: Hardware, progress: Progress) -> tuple[Training, list[Batch]]:
-    """A round's training as far as it is, and the batches that are left."""
-    recipe, split = job.configuration.training, job.split
+def _prepared(job: Job, hardware: Hardware, progress: Progress) -> Training:
+    """A round's training as far as it is."""
+    recipe = job.configuration.training
     torch.manual_seed(int(np.random.default_rng([recipe.seed, progress.round]).integers(2**31)))
     network = Network(job.configuration.network_shape)
     rule = recipe.selection_of(progress.round)
     graders = [Checkpoint.load(job.round_path(each)).network for each in range(1, progress.round)]
-    seed = (recipe.seed, progress.round)
-    batches = list(schedule(seed, recipe.epochs, recipe.batch, len(split.training), len(split.validation)))
-    training = Training(
-        network, recipe, batches[-1].step, class_shares(rule, job.counts), graders, hardware.device
-    )
+    total = recipe.epochs * steps_an_epoch(job.epoch, recipe.batch)
+    training = Training(network, recipe, total, class_shares(rule, job.counts), graders, hardware.device)
     if job.state_path.exists():
         state = read_state(job.state_path)
         if state["more"]["round"] == progress.round:
             training.load(state)
-    left = [
-        each
-        for each in batches
-        if (each.epoch >= progress.validated if each.validates else each.step > training.done)
-    ]
-    return training, left
+    return training
+
+
+def _left(job: Job, training_round: int, done: int, validated: int) -> Iterator[Batch]:
+    """Batches of a round that are left after so many steps and validated epochs."""
+    for batch in job.batches(training_round):
+        if batch.epoch >= validated if batch.validates else batch.step > done:
+            yield batch
+
+
+@contextmanager
+def _resumable(folder: Path, save: Callable[[], None]) -> Iterator[None]:
+    """Save the state when a picture or shard ends the training, and say how it goes on."""
+    try:
+        yield
+    except InputError as error:
+        save()
+        raise InputError(f"{error}; vm-train resume {folder} goes on") from error
 
 
 def _validated(

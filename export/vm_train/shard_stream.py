@@ -8,9 +8,10 @@ import subprocess
 import sys
 import tarfile
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from http.client import HTTPException
+from itertools import groupby
 from pathlib import Path
 from typing import IO
 from urllib.request import urlopen
@@ -19,7 +20,7 @@ import numpy as np
 
 from vm_embedded.errors import InputError, one_line
 
-from .picture_files import PARTS, RawPicture
+from .picture_files import PARTS, PictureFault, RawPicture
 from .shard_index import key_and_part
 
 _BUFFER = 256
@@ -30,16 +31,24 @@ _PATIENCE_AT_END = 5.0  # for a command to end after its last byte [s]
 
 
 def stream(
-    shards: Iterable[str | Path], seed: tuple[int, ...] | None = None, buffer: int = _BUFFER
+    shards: Iterable[str | Path],
+    seed: tuple[int, ...] | None = None,
+    buffer: int = _BUFFER,
+    report: Callable[[PictureFault], None] | None = None,
 ) -> Iterator[RawPicture]:
     """All pictures of shards, one shard after the other: names of files, "-" for standard input, "pipe:" and a command
     of the shell, or http and https addresses. A shard may be gzipped.
 
-    With a seed they come shuffled: each is drawn from the next `buffer` that are there. Raises InputError naming the
-    shard, and the picture after which it is damaged or cut short.
+    With a seed they come shuffled: each is drawn from the next `buffer` that are there. A picture that lacks a part is
+    reported and left out, or raised. Raises InputError naming the shard, and the picture and byte after which it is
+    damaged or cut short.
     """
-    pictures = (picture for shard in shards for picture in _pictures(str(shard)))
+    pictures = (picture for shard in shards for picture in _pictures(str(shard), report or _raise))
     return pictures if seed is None else _shuffled(pictures, seed, buffer)
+
+
+def _raise(fault: PictureFault) -> None:
+    raise fault
 
 
 def _shuffled(pictures: Iterator[RawPicture], seed: tuple[int, ...], buffer: int) -> Iterator[RawPicture]:
@@ -59,47 +68,53 @@ def _drawn(waiting: list[RawPicture], random: np.random.Generator) -> RawPicture
     return waiting.pop()
 
 
-def _pictures(shard: str) -> Iterator[RawPicture]:
-    after = "its begin"
-    number, parts = "", dict[str, bytes]()
+def _pictures(shard: str, report: Callable[[PictureFault], None]) -> Iterator[RawPicture]:
+    after, source = "its begin", _Counted(io.BytesIO())
     try:
-        with _opened(shard) as source:
-            for key, part, content in _files(source):
-                if key != number:
-                    if parts:
-                        yield _picture(shard, number, parts)
-                        after = f"picture {number}"
-                    number, parts = key, {}
-                if part in parts:
-                    raise InputError(f"{shard} has two files for the {part} of picture {number}")
-                parts[part] = content
-        if parts:
-            yield _picture(shard, number, parts)
-    except (tarfile.TarError, OSError, EOFError, zlib.error, HTTPException, UnicodeDecodeError) as error:
-        raise InputError(f"{shard}: can't be read on after {after}: {one_line(error)}") from error
+        with _opened(shard) as opened:
+            source = _Counted(opened)
+            for number, files in groupby(_files(source), lambda each: each[0]):
+                parts = [(part, content) for _, part, content in files]
+                try:
+                    picture = _picture(shard, number, parts)
+                except PictureFault as fault:
+                    report(fault)
+                else:
+                    yield picture
+                after = f"picture {number}"
+    except (tarfile.TarError, OSError, EOFError, zlib.error, HTTPException) as error:
+        place = f"after {after}, at byte {source.count}"
+        raise InputError(f"{shard}: can't be read on {place}: {one_line(error)}") from error
 
 
-def _picture(shard: str, number: str, parts: dict[str, bytes]) -> RawPicture:
-    missing = [part for part in PARTS if part not in parts]
+def _picture(shard: str, number: str, parts: Sequence[tuple[str, bytes]]) -> RawPicture:
+    """A picture of parts with their names. Raises PictureFault if it has not one of each."""
+    found = dict(parts)
+    missing = [part for part in PARTS if part not in found]
     if missing:
-        raise InputError(f"{shard}: picture {number} lacks its {' and '.join(missing)}, or its files are not in a row")
-    return RawPicture(number, parts["image"], parts["mask"], parts["lens"].decode("utf-8"))
+        lacks = f"lacks its {' and '.join(missing)}, or its files are not in a row"
+        raise PictureFault(f"{shard}: picture {number} {lacks}", "missing")
+    if len(parts) > len(found):
+        raise PictureFault(f"{shard} has two files for one part of picture {number}")
+    try:
+        return RawPicture(number, found["image"], found["mask"], found["lens"].decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise PictureFault(f"{shard}: the lens file of picture {number} is no text", "lens") from error
 
 
-def _files(source: IO[bytes]) -> Iterator[tuple[str, str, bytes]]:
+def _files(source: _Counted) -> Iterator[tuple[str, str, bytes]]:
     """Number, part and content of a tar's files."""
-    counted = _Counted(source)
-    with tarfile.open(fileobj=counted, mode="r|") as tar:
+    with tarfile.open(fileobj=source, mode="r|") as tar:
         for member in tar:
             number, part = key_and_part(member.name)
             content = tar.extractfile(member) if member.isfile() and part is not None else None
             if content is not None and part is not None:
                 yield number, part, content.read()
     # tarfile takes the end of a cut stream for that of the archive, whose last 512 bytes are 0.
-    while counted.read(1 << 16):
+    while source.read(1 << 16):
         pass
-    if counted.last != bytes(512):
-        raise tarfile.ReadError(f"it is cut short or damaged, at byte {counted.count}")
+    if source.last != bytes(512):
+        raise tarfile.ReadError("it is cut short or damaged")
 
 
 class _Counted(io.RawIOBase):

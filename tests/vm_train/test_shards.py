@@ -155,7 +155,7 @@ def test_the_place_of_a_cut_is_told(shards):
     shards[0].write_bytes(shards[0].read_bytes()[:place])
     with pytest.raises(InputError, match=f"after 001.jpg, at byte {place}"):
         open_shards(shards[0])
-    with pytest.raises(InputError, match=f"after picture 000: .*at byte {place}"):
+    with pytest.raises(InputError, match=f"after picture 000, at byte {place}: it is cut short"):
         list(stream(shards))
 
 
@@ -233,6 +233,16 @@ def test_pictures_without_all_parts_are_named(tmp_path, pictures):
     path = tar_of(tmp_path / "a.tar", [("0.jpg", image), ("1.jpg", image)])
     with pytest.raises(InputError, match="picture 0 lacks its mask and lens"):
         list(stream([path]))
-    path = tar_of(tmp_path / "a.tar", [("0.jpg", image), ("0.png", image)])
-    with pytest.raises(InputError, match="two files for the image of picture 0"):
-        list(stream([path]))
+    files = [("0.jpg", image), ("0.mask.png", image), ("0.lens.yaml", b"\xff")]
+    with pytest.raises(PictureFault, match="two files for one part of picture 0"):
+        list(stream([tar_of(tmp_path / "a.tar", [*files, ("0.png", image)])]))
+    with pytest.raises(PictureFault, match="lens file of picture 0 is no text"):
+        list(stream([tar_of(tmp_path / "a.tar", files)]))
+
+
+def test_pictures_without_all_parts_are_left_out_where_faults_are_reported(shards, pictures, tmp_path):
+    faulty = tar_of(tmp_path / "faulty.tar", [("x.jpg", b""), ("y.mask.png", b"")])
+    faults = []
+    found = list(stream([faulty, shards[0]], report=faults.append))
+    assert [each.number for each in found] == NUMBERS[:3]
+    assert [each.kind for each in faults] == ["missing", "missing"]
