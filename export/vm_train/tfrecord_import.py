@@ -28,7 +28,8 @@ from vm_embedded.progress import Progress
 from vm_synth.dataset import lens_text
 
 from .pictures import IMAGES
-from .tfrecord import BytesList, Example, FloatList, read_records
+from .tfexample import BytesList, Example, FloatList
+from .tfrecord import read_records
 
 FORMAT = 1
 """Of import.json."""

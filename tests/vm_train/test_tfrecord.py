@@ -13,17 +13,10 @@ from hypothesis import strategies as st
 from vm_embedded import Orientation, read_lens_file
 from vm_embedded.errors import InputError
 from vm_embedded.lens import Equisolid, Rectilinear
+from vm_train.crc32c import crc32c
 from vm_train.pictures import find_pictures
-from vm_train.tfrecord import (
-    BytesList,
-    FloatList,
-    Int64List,
-    crc32c,
-    example_bytes,
-    parse_example,
-    read_records,
-    write_records,
-)
+from vm_train.tfexample import BytesList, FloatList, Int64List, example_bytes, parse_example
+from vm_train.tfrecord import read_records, write_records
 from vm_train.tfrecord_import import import_records, parser, run
 
 

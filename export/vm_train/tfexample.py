@@ -1,0 +1,208 @@
+"""Examples, the payloads of TFRecord files, read and written without TensorFlow or protobuf.
+
+An Example is a protobuf message that maps names to lists of bytes, floats or whole numbers.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from vm_embedded.errors import InputError
+
+
+@dataclass(frozen=True)
+class BytesList:
+    """Values of a feature that is bytes."""
+
+    values: tuple[bytes, ...]
+
+
+@dataclass(frozen=True)
+class FloatList:
+    """Values of a feature that is float; the file keeps 32 bits of each."""
+
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Int64List:
+    """Values of a feature that is int64."""
+
+    values: tuple[int, ...]
+
+
+Feature = BytesList | FloatList | Int64List
+Example = Mapping[str, Feature]
+
+
+_VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
+"""Wire types of protobuf."""
+
+
+def parse_example(payload: bytes) -> Example:
+    """The features of an Example by name; those that have no list are left out.
+
+    As protobuf has it, lists of numbers may be packed or not, fields that are not known are passed over, and a message
+    in parts is the sum of its parts. Raises InputError if the payload is no Example.
+    """
+    example: dict[str, Feature] = {}
+    for entry in _inner(_joined(_inner(memoryview(payload), 1)), 1):
+        name = _text(_joined(_inner(entry, 1)[-1:]))
+        try:
+            feature = _feature(_joined(_inner(entry, 2)))
+        except InputError as error:
+            raise InputError(f"{name!r}: {error}") from error
+        if feature is not None:
+            example[name] = feature
+    return example
+
+
+def _feature(message: memoryview) -> Feature | None:
+    lists = [_inner(message, number) for number in (1, 2, 3)]
+    if sum(bool(each) for each in lists) > 1:
+        raise _no_example("a feature has lists of several kinds")
+    texts, floats, integers = (_joined(each) for each in lists)
+    if lists[0]:
+        return BytesList(tuple(bytes(each) for each in _inner(texts, 1)))
+    if lists[1]:
+        return FloatList(_floats(floats))
+    if lists[2]:
+        return Int64List(_integers(integers))
+    return None
+
+
+def _floats(message: memoryview) -> tuple[float, ...]:
+    parts = []
+    for number, wire, value in _fields(message):
+        if number == 1:
+            if not isinstance(value, memoryview) or wire == _FIXED64 or len(value) % 4:
+                raise _no_example("a list of floats holds something else")
+            parts.append(value)
+    return tuple(np.frombuffer(b"".join(parts), dtype="<f4").tolist())
+
+
+def _integers(message: memoryview) -> tuple[int, ...]:
+    values: list[int] = []
+    for number, wire, value in _fields(message):
+        if number != 1:
+            continue
+        if isinstance(value, int):
+            values.append(value)
+        elif wire == _BYTES:
+            at = 0
+            while at < len(value):
+                each, at = _varint(value, at)
+                values.append(each)
+        else:
+            raise _no_example("a list of whole numbers holds something else")
+    return tuple(each - 2**64 if each >= 2**63 else each for each in values)
+
+
+def _inner(message: memoryview, wanted: int) -> list[memoryview]:
+    """All values of a field that is bytes, text or a message."""
+    found = []
+    for number, wire, value in _fields(message):
+        if number == wanted:
+            if wire != _BYTES or isinstance(value, int):
+                raise _no_example(f"field {number} has wire type {wire}")
+            found.append(value)
+    return found
+
+
+def _joined(parts: list[memoryview]) -> memoryview:
+    """A message from its parts: protobuf's sum of messages is their bytes one after the other."""
+    return parts[0] if len(parts) == 1 else memoryview(b"".join(parts))
+
+
+def _text(value: memoryview) -> str:
+    try:
+        return str(value, "utf-8")
+    except UnicodeDecodeError as error:
+        raise _no_example("the name of a feature is not text") from error
+
+
+def _fields(message: memoryview) -> Iterator[tuple[int, int, int | memoryview]]:
+    """Number, wire type and value of each field: a number if the wire type is _VARINT, else its bytes."""
+    at = 0
+    while at < len(message):
+        tag, at = _varint(message, at)
+        number, wire = tag >> 3, tag & 7
+        if not 1 <= number < 2**29:
+            raise _no_example(f"there is no field {number}")
+        if wire == _VARINT:
+            value, at = _varint(message, at)
+            yield number, wire, value
+            continue
+        if wire == _BYTES:
+            size, at = _varint(message, at)
+        elif wire in (_FIXED32, _FIXED64):
+            size = 4 if wire == _FIXED32 else 8
+        else:
+            raise _no_example(f"wire type {wire} is not used")
+        if size > len(message) - at:
+            raise _no_example("it breaks off")
+        yield number, wire, message[at : at + size]
+        at += size
+
+
+def _varint(message: memoryview, at: int) -> tuple[int, int]:
+    """The number below 2^64 that begins at `at`, and where the next thing begins."""
+    value = 0
+    for shift in range(0, 70, 7):
+        if at >= len(message):
+            raise _no_example("it breaks off")
+        byte = message[at]
+        at += 1
+        value |= (byte & 127) << shift
+        if byte < 128:
+            break
+    else:
+        raise _no_example("a number is too long")
+    if value >= 2**64:
+        raise _no_example("a number is too large")
+    return value, at
+
+
+def _no_example(what: str) -> InputError:
+    return InputError(f"not an Example: {what}")
+
+
+def example_bytes(example: Example) -> bytes:
+    """The payload of an Example, as protobuf writes it, with the features in the order of the mapping.
+
+    Raises OverflowError for a number that the list can't hold.
+    """
+    entries = (
+        _field(1, _field(1, name.encode()) + _field(2, _feature_bytes(feature))) for name, feature in example.items()
+    )
+    return _field(1, b"".join(entries))
+
+
+def _feature_bytes(feature: Feature) -> bytes:
+    match feature:
+        case BytesList(texts):
+            return _field(1, b"".join(_field(1, each) for each in texts))
+        case FloatList(floats):
+            return _field(2, _field(1, struct.pack(f"<{len(floats)}f", *floats)) if floats else b"")
+        case Int64List(integers):
+            packed = b"".join(
+                _varint_bytes(int.from_bytes(each.to_bytes(8, "little", signed=True), "little")) for each in integers
+            )
+            return _field(3, _field(1, packed) if integers else b"")
+
+
+def _field(number: int, value: bytes) -> bytes:
+    return _varint_bytes(number << 3 | _BYTES) + _varint_bytes(len(value)) + value
+
+
+def _varint_bytes(value: int) -> bytes:
+    out = bytearray()
+    while value > 127:
+        out.append(value & 127 | 128)
+        value >>= 7
+    out.append(value)
+    return bytes(out)
