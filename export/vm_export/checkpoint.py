@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import pickle
 from dataclasses import asdict, dataclass, replace
@@ -18,6 +19,7 @@ from .network import Network
 from .network_shape import NetworkShape
 
 _FORMAT = "vm-embedded checkpoint 2"
+
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
@@ -43,8 +45,10 @@ class Checkpoint:
             "manifest": json.loads(replace(self.manifest, self_test=None).as_json()),
             "state": self.network.state_dict(),
         }
+        file = io.BytesIO()  # on a full disk torch would fail in its own way
+        torch.save(content, file)
         with written_beside(Path(path)) as part:
-            torch.save(content, part)
+            part.write_bytes(file.getbuffer())
 
     @classmethod
     def load(cls, path: str | Path) -> Checkpoint:

@@ -23,7 +23,7 @@ from .environment import Environment
 from .picture import render
 from .scene import Scene
 from .tracer import Tracer
-from .worker_process import begin
+from .worker_process import begin, shielded
 
 
 class WorkerLost(VisualMeshError):
@@ -66,7 +66,8 @@ def render_all(job: Job, indices: Sequence[int], workers: int, report: Callable[
         min(workers, max(len(indices), 1)), mp_context=get_context("spawn"), initializer=_start, initargs=(job,)
     ) as pool:
         waiting = iter(indices)
-        running: set[Future[Done]] = {pool.submit(_render_one, index) for index in islice(waiting, 2 * workers)}
+        with shielded():
+            running: set[Future[Done]] = {pool.submit(_render_one, index) for index in islice(waiting, 2 * workers)}
         try:
             while running:
                 finished, running = wait(running, return_when=FIRST_COMPLETED)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shutil
 import signal
 import sys
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,6 +31,9 @@ from .stream_options import source_of
 if TYPE_CHECKING:
     from .hardware import Hardware
     from .job import Job
+
+_FEW = 10.0
+"""Points of a picture that give gradients; with fewer a training is told to be slow."""
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
@@ -53,22 +57,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with stoppable():
             return _train(options) if command is None else commands[command](options)
     except VisualMeshError as error:
-        print(f"vm-train: {' '.join(str(error).split())}", file=sys.stderr)
+        if _speaks():
+            print(f"vm-train: {' '.join(str(error).split())}", file=sys.stderr)
         return EXIT_FAILED
     except KeyboardInterrupt:
-        print("vm-train: stopped", file=sys.stderr)
-        return EXIT_INTERRUPTED
+        if _speaks():
+            print("vm-train: stopped", file=sys.stderr)
+        sys.stdout.flush()
+        os._exit(EXIT_INTERRUPTED)  # the workers end with this process, which else might wait for them in vain
+
+
+def _speaks() -> bool:
+    """Whether this is the process that reports, of those that torchrun started."""
+    return os.environ.get("RANK", "0") == "0"
 
 
 @contextmanager
 def _on_request() -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C or SIGTERM asked to stop; the step in work is finished. A second one stops at once."""
+    """Whether Ctrl-C or SIGTERM asked to stop; the step in work is finished. The same one again stops at once."""
     asked: list[int] = []
 
     def ask(number: int, frame: object) -> None:
-        asked.append(number)
-        if len(asked) > 1:
+        if number in asked:  # torchrun sends one after the other
             raise KeyboardInterrupt
+        asked.append(number)
 
     before = {each: signal.signal(each, ask) for each in (signal.SIGINT, signal.SIGTERM)}
     try:
@@ -120,10 +132,9 @@ def _fault_of(work: Callable[[], object]) -> str | None:
 
 def _begin(options: argparse.Namespace, configuration: TrainConfiguration, here: Hardware) -> Job:
     """Check all pictures, and write down a new training."""
-    from .job import Job
+    from .job import Job, check_new
 
-    if (options.output / "run.json").exists():
-        raise InputError(f"{options.output} holds a training already: vm-train resume {options.output}")
+    check_new(options.output)
     source = source_of(options, configuration, here)
     good = _good_pictures(options.data, configuration, here, options.strict)
     if source is None:
@@ -135,7 +146,14 @@ def _begin(options: argparse.Namespace, configuration: TrainConfiguration, here:
     parts = f"{training} for training, {len(split.validation)} for validation, {len(split.test)} for test"
     print(f"{options.data}: {len(good)} pictures: {parts}")
     unpacked = None if options.no_unpacked else options.unpacked or options.output / "unpacked"
-    return Job.begin(options.output, options.data, configuration, split, unpacked, source)
+    job = Job.begin(options.output, options.data, configuration, split, unpacked, source)
+    if job.points_a_picture < _FEW:
+        print(
+            f"vm-train: only {job.points_a_picture:.1f} points of a picture give gradients, as many of each class "
+            "as the rarest object has; training.selection=all takes all",
+            file=sys.stderr,
+        )
+    return job
 
 
 def _good_pictures(data: Path, configuration: TrainConfiguration, here: Hardware, strict: bool) -> list[PictureFiles]:
@@ -166,19 +184,21 @@ def _resume(options: argparse.Namespace) -> int:
     from .hardware import hardware
 
     with hardware(options.device, options.workers, options.threads) as here:
-        return _go_on(options.run, here)
+        return _go_on(options.run, here, options.data)
 
 
-def _go_on(folder: Path, here: Hardware) -> int:
-    from .job import Job
+def _go_on(folder: Path, here: Hardware, moved_to: Path | None = None) -> int:
+    from .job import Job, in_work
     from .run import train
 
     job = Job.read(folder)
+    if moved_to is not None:
+        job = replace(job, data=moved_to.resolve())
     if job.source is not None and job.source.workers != here.workers:
         here = replace(here, workers=job.source.workers)
         if here.leads:
             print(f"vm-train: {here.workers} workers read the stream, as run.json says", file=sys.stderr)
-    with _on_request() as stopped:
+    with in_work(folder) if here.leads else nullcontext(), _on_request() as stopped:
         done = train(job, here, stopped)
     if not here.leads:
         return EXIT_OK if done.finished else EXIT_INTERRUPTED
@@ -238,11 +258,11 @@ def _rate(options: argparse.Namespace) -> int:
 
     from .hardware import hardware
     from .job import Job
-    from .rate_finder import plot_rates, search
+    from .rate_finder import check_plot, plot_rates, search
 
     configuration = _configuration(options)
     if options.plot is not None:
-        check_writable(options.plot)
+        check_plot(options.plot)
     with hardware(options.device, options.workers, options.threads) as here, TemporaryDirectory() as folder:
         good = _good_pictures(options.data, configuration, here, strict=False)
         split = Split(tuple(each.number for each in good), (), ())

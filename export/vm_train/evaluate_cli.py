@@ -42,7 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"vm-evaluate: {' '.join(str(error).split())}", file=sys.stderr)
     except KeyboardInterrupt:
         print("vm-evaluate: stopped", file=sys.stderr)
-        return EXIT_INTERRUPTED
+        sys.stdout.flush()
+        os._exit(EXIT_INTERRUPTED)  # the workers end with this process, which else might wait for them in vain
     return EXIT_FAILED
 
 
@@ -50,7 +51,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     # Imported here, so that a machine without torch still gets help texts and one clear line.
     from vm_synth.progress import Ticker
 
-    from .evaluated_pictures import classes_of, pictures_of
+    from .evaluated_pictures import classes_of, pictures_of, usual_colors
     from .evaluation import Rules
     from .evaluation_files import points_on_object, write_evaluation
     from .evaluation_report import lines
@@ -64,7 +65,8 @@ def _evaluate(options: argparse.Namespace) -> int:
         raise InputError(f"can't write to {options.output}: it is no folder")
     new_figure(1.0, 1.0)  # better no plots now than after an hour
     subject = _subject(options, settings)
-    job = Job(options.model, settings, options.as_robot, classes_of(subject.manifest, options.color), rules)
+    classes = classes_of(subject.manifest, usual_colors(options.model, options.list), options.color)
+    job = Job(options.model, settings, options.as_robot, classes, rules)
     ticker = Ticker(len(pictures), "vm-evaluate")
     try:
         result = evaluate(job, subject, pictures, options.workers or len(os.sched_getaffinity(0)), ticker.count)

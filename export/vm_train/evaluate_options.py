@@ -30,16 +30,15 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="folder to write to")
     which = made.add_argument_group("pictures")
     which.add_argument("--list", type=Path, metavar="FILE", help="numbers of pictures, or pictures.json of vm-train")
-    which.add_argument(
-        "--part", choices=("test", "validation", "training"), default="test", help="part of pictures.json; default test"
-    )
+    which.add_argument("--part", choices=("test", "validation", "training"), help="part of pictures.json; default test")
     which.add_argument(
         "--color",
         type=_color,
         action="append",
         default=[],
         metavar="CLASS=R,G,B",
-        help="a further color that masks have for a class; without it those of vm-synth",
+        help="a further color that masks have for a class, beside those of the train.toml next to the checkpoint, or "
+        "else of vm-synth",
     )
     which.add_argument(
         "--radius-of",

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.manifest import Manifest
 from vm_synth.dataset import COLORS
+from vm_synth.sections import read_sections
 
+from .configuration import TrainConfiguration
 from .pictures import IMAGES, Classes, Color, PictureFiles, find_pictures
 from .split import load
 
 PARTS = ("test", "validation", "training")
 
 
-def pictures_of(folders: Sequence[Path], chosen: Path | None, part: str) -> list[PictureFiles]:
-    """All pictures of the folders, or those that a list names; of a pictures.json that vm-train wrote, those of a part.
+def pictures_of(folders: Sequence[Path], chosen: Path | None, part: str | None) -> list[PictureFiles]:
+    """All pictures of the folders, or those that a list names; of a pictures.json that vm-train wrote, those of a part,
+    test if it is None.
 
     A list has the number of a picture, or the name of its image, on each line, and # before comments. Raises InputError
     for a number that no folder has, and if no picture is left.
     """
+    if part is not None and (chosen is None or chosen.suffix.lower() != ".json"):
+        raise InputError(f"--part {part} is one of a pictures.json that vm-train wrote: give it with --list")
+    part = part or "test"
     found = [files for folder in folders for files in find_pictures(folder)]
     if chosen is None:
         return found
@@ -51,13 +57,24 @@ def _named(folders: Sequence[Path]) -> str:
     return ", ".join(map(str, folders))
 
 
-def classes_of(manifest: Manifest, colors: Sequence[tuple[str, Color]]) -> Classes:
-    """The network's classes with the colors that masks of vm-synth have for them, and with further ones.
+def usual_colors(model: Path, chosen: Path | None) -> Mapping[str, tuple[Color, ...]]:
+    """Colors that masks have for classes: those of the train.toml beside a checkpoint or its pictures.json, else those
+    of vm-synth. Raises InputError."""
+    for folder in (each.parent for each in (chosen, model) if each is not None and each.suffix in (".json", ".pt")):
+        if (folder / "train.toml").exists():
+            return read_sections(TrainConfiguration, folder / "train.toml").classes.colors
+    return {name: (color,) for name, color in COLORS.items()}
+
+
+def classes_of(
+    manifest: Manifest, usual: Mapping[str, tuple[Color, ...]], colors: Sequence[tuple[str, Color]]
+) -> Classes:
+    """The network's classes with the usual colors that masks have for them, and with further ones.
 
     Raises InputError for a color of a class that the network does not have, and for a class without any color.
     """
     names = [each.name for each in manifest.classes]
-    found: dict[str, tuple[Color, ...]] = {name: (COLORS[name],) if name in COLORS else () for name in names}
+    found: dict[str, tuple[Color, ...]] = {name: usual.get(name, ()) for name in names}
     for name, color in colors:
         if name not in found:
             raise InputError(unknown("class of --color", name, names))

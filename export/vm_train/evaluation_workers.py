@@ -12,7 +12,7 @@ from pathlib import Path
 
 from vm_embedded.errors import VisualMeshError
 from vm_embedded.settings import Settings
-from vm_synth.worker_process import begin
+from vm_synth.worker_process import begin, shielded
 
 from .answers import Subject, load_subject
 from .evaluation import Evaluation, Rules, evaluated
@@ -63,7 +63,9 @@ def _parts(job: Job, subject: Subject, chunks: Sequence[Sequence[PictureFiles]],
         os.environ[name] = "1"
     pool = ProcessPoolExecutor(min(workers, len(chunks)), get_context("spawn"), _start, (job,))
     try:
-        yield from pool.map(_evaluate_chunk, chunks)
+        with shielded():
+            results = pool.map(_evaluate_chunk, chunks)
+        yield from results
     except BrokenProcessPool as error:
         raise VisualMeshError("a worker was killed (out of memory?)") from error
     finally:

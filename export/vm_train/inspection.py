@@ -17,7 +17,7 @@ from vm_embedded.errors import VisualMeshError, unknown
 from vm_embedded.lens import Lens, RadialLens, Size
 from vm_embedded.lens_file import LensFile
 from vm_embedded.lens_opencv import CalibratedLens
-from vm_synth.worker_process import begin
+from vm_synth.worker_process import begin, shielded
 
 from .picture_files import PictureFault, PictureFiles
 from .pictures import Classes, Labels, read_picture
@@ -136,7 +136,9 @@ def _found(
     chunks = -(-len(pictures) // _CHUNK)
     pool = ProcessPoolExecutor(min(workers, chunks), get_context("spawn"), begin)
     try:
-        yield from pool.map(inspected, pictures, chunksize=_CHUNK)
+        with shielded():
+            results = pool.map(inspected, pictures, chunksize=_CHUNK)
+        yield from results
     except BrokenProcessPool as error:
         raise VisualMeshError("a worker that read pictures was killed (out of memory?)") from error
     finally:

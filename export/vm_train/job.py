@@ -7,9 +7,11 @@ round. model.pt: the best of all, for vm-evaluate and vm-export.
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,6 +28,7 @@ from .configuration import TrainConfiguration
 from .loading import Graphs, View
 from .pictures import PictureFiles, find_pictures
 from .schedule import Batch, Item, schedule
+from .selection import class_shares
 from .split import Split, load, save
 from .streamed import Source, StreamedGraphs, StreamedItem, in_lanes
 from .unpacked import Unpacked
@@ -62,8 +65,7 @@ class Job:
         source: Source | None = None,
     ) -> Job:
         """Write down a new training. Raises InputError, also if its folder holds one already."""
-        if (folder / "run.json").exists():
-            raise InputError(f"{folder} holds a training already: vm-train resume {folder}, or another folder")
+        check_new(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -72,7 +74,9 @@ class Job:
         job = cls(folder, data.resolve(), configuration, split, none, unpacked, source)
         counts = job._counted()
         if not counts.any():
-            raise InputError("no training picture has a labeled point: do the lens files fit the pictures?")
+            raise InputError(
+                "no training picture has a labeled point: do the lens files fit the pictures, and [mesh] the object?"
+            )
         job = replace(job, counts=counts)
         save(folder / "pictures.json", split)
         _write(folder / "train.toml", "\n".join(documented(configuration)))
@@ -80,7 +84,8 @@ class Job:
             "format": _FORMAT,
             "version": __version__,
             "data": str(job.data),
-            "unpacked": None if unpacked is None else str(unpacked.resolve()),
+            "unpacked": None if unpacked is None else _named(unpacked, folder),
+            "configuration_sha256": job.configuration_sha256,
             "source": None if source is None else asdict(source),
             "points": dict(zip(configuration.classes.colors, counts.tolist(), strict=True)),
         }
@@ -96,17 +101,39 @@ class Job:
             if content["format"] != _FORMAT:
                 raise InputError(f"{path} is of another release: begin the training again")
             counts = np.array(list(content["points"].values()), dtype=np.int64)
-            data, kept, origin = Path(content["data"]), content["unpacked"], content.get("source")
+            data, kept, origin = Path(content["data"]), content["unpacked"], content["source"]
+            sha256 = content["configuration_sha256"]
             source = None if origin is None else Source(**origin | {"shards": tuple(origin["shards"])})
         except OSError as error:
             raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise InputError(f"{path} is damaged: {error}") from error
         configuration = read_sections(TrainConfiguration, folder / "train.toml")
-        if len(counts) != len(configuration.classes.colors):
-            raise InputError(f"{folder / 'train.toml'} has other classes than {path}")
-        unpacked = None if kept is None else Path(kept)
-        return cls(folder, data, configuration, load(folder / "pictures.json"), counts, unpacked, source)
+        unpacked = None if kept is None else folder / kept
+        job = cls(folder, data, configuration, load(folder / "pictures.json"), counts, unpacked, source)
+        if job.configuration_sha256 != sha256:
+            raise InputError(
+                f"{folder / 'train.toml'} or pictures.json was changed since the training began: "
+                "undo that, or begin another one in a new folder"
+            )
+        return job
+
+    @property
+    def configuration_sha256(self) -> str:
+        """Digest of the configuration and of which pictures are for what."""
+        text = json.dumps([list(documented(self.configuration)), asdict(self.split)])
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @property
+    def objects(self) -> npt.NDArray[np.bool_]:
+        """Which classes (C,) are objects."""
+        return np.array([kind == "object" for kind in self.configuration.classes.kinds.values()])
+
+    @property
+    def points_a_picture(self) -> float:
+        """How many points of a training picture are about to give gradients."""
+        shares = class_shares(self.configuration.training.selection, self.counts, self.objects)
+        return float(shares @ self.counts) / min(_COUNTED, self.epoch)
 
     @property
     def epoch(self) -> int:
@@ -182,12 +209,43 @@ class Job:
             "training_pictures": str(self.epoch) if self.source is None else f"{self.epoch} an epoch, streamed",
             "validation_pictures": str(len(split.validation)),
             "pictures_sha256": used,
-            "configuration_sha256": hashlib.sha256("\n".join(documented(self.configuration)).encode()).hexdigest(),
+            "configuration_sha256": self.configuration_sha256,
             "selection": recipe.selection,
             "loss": recipe.loss,
             "epochs": str(recipe.epochs),
             "seed": str(recipe.seed),
         }
+
+
+_FILES = ("train.toml", "pictures.json", "state.pt", "model.pt", "round1.pt", "log.jsonl")
+
+
+def check_new(folder: Path) -> None:
+    """Raise InputError if a folder holds a training, or files that one would write over."""
+    if (folder / "run.json").exists():
+        raise InputError(f"{folder} holds a training already: vm-train resume {folder}, or another folder")
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder} is no folder")
+    there = [name for name in _FILES if (folder / name).exists()]
+    if there:
+        raise InputError(f"{folder} holds {', '.join(there)}, which a training would write over: give a new folder")
+
+
+@contextmanager
+def in_work(folder: Path) -> Iterator[None]:
+    """Keep other processes from going on with the same training. Raises InputError if one does."""
+    with (folder / "run.json").open() as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise InputError(f"another process is training in {folder}") from error
+        yield
+
+
+def _named(unpacked: Path, folder: Path) -> str:
+    """Relative to the training's folder if it is in it, so that it may be moved."""
+    path = unpacked.resolve()
+    return str(path.relative_to(folder.resolve())) if path.is_relative_to(folder.resolve()) else str(path)
 
 
 def _write(path: Path, text: str) -> None:

@@ -12,7 +12,7 @@ from torch.utils.data import DataLoader, Dataset
 from vm_embedded.errors import GeometryError, InputError, VisualMeshError
 from vm_embedded.manifest import Manifest
 from vm_export.grid import Grid
-from vm_synth.worker_process import begin
+from vm_synth.worker_process import begin, shielded
 
 from .augmentation import Augmentation, blurred, moved, recolored
 from .graphs import OFF_SCREEN, Graph, graph_of
@@ -103,7 +103,9 @@ def loaded(graphs: Dataset[Graph], batches: Iterable[Batch], workers: int) -> Ge
         multiprocessing_context="spawn" if workers else None,
     )
     try:
-        for found in loader:
+        with shielded():
+            pictures = iter(loader)
+        for found in pictures:
             if isinstance(found, VisualMeshError):
                 raise found
             yield found

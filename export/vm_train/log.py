@@ -14,11 +14,11 @@ from vm_embedded.files import written_beside
 class Log:
     """log.jsonl and tensorboard/ in a folder. Records have a round and a step; scalars are shown in TensorBoard.
 
-    A training that goes on from an earlier state forgets what came after it. Of several processes one writes. Raises
-    InputError.
+    A training that goes on from a state of `step` steps and `validated` epochs forgets what came after it. Of several
+    processes one writes. Raises InputError.
     """
 
-    def __init__(self, folder: Path, training_round: int, step: int, writes: bool = True) -> None:
+    def __init__(self, folder: Path, training_round: int, step: int, validated: int, writes: bool = True) -> None:
         self._writes = writes
         if not writes:
             return
@@ -26,7 +26,7 @@ class Log:
 
         self._path = folder / "log.jsonl"
         if self._path.exists():
-            _cut(self._path, training_round, step)
+            _cut(self._path, training_round, step, validated)
         self._round = training_round
         try:
             self._file = self._path.open("a", encoding="utf-8")
@@ -66,17 +66,31 @@ def _scalars(record: dict[str, Any], above: str = "") -> list[tuple[str, float]]
     return found
 
 
-def _cut(path: Path, training_round: int, step: int) -> None:
-    """Leave out what came after a step, and a last line that was not finished."""
-    kept = [line for line, record in read_log(path) if (record["round"], record["step"]) <= (training_round, step)]
+def _cut(path: Path, training_round: int, step: int, validated: int) -> None:
+    """Leave out what came after a state, and all from a line on that is damaged."""
+
+    def is_before(record: dict[str, Any]) -> bool:
+        if record["round"] != training_round:
+            return bool(record["round"] < training_round)
+        return bool(record["epoch"] <= validated if "epoch" in record else record["step"] <= step)
+
+    kept = [line for line, record in read_log(path) if is_before(record)]
     with written_beside(path) as part:
         part.write_text("".join(kept), encoding="utf-8")
 
 
 def read_log(path: Path) -> list[tuple[str, dict[str, Any]]]:
-    """Whole lines of a log and their records. Raises InputError."""
+    """Whole lines of a log and their records, up to one that is damaged. Raises InputError if it can't be read."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-        return [(line, json.loads(line)) for line in lines if line.endswith("\n")]
-    except (OSError, ValueError) as error:
-        raise InputError(f"can't read {path}: {error}") from error
+        lines = path.read_bytes().splitlines(keepends=True)
+    except OSError as error:
+        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+    found: list[tuple[str, dict[str, Any]]] = []
+    for line in lines:
+        try:
+            found.append((line.decode("utf-8"), json.loads(line)))
+        except ValueError:
+            break
+        if not line.endswith(b"\n"):
+            found.pop()
+    return found

@@ -65,6 +65,7 @@ def resume_parser() -> argparse.ArgumentParser:
         description="Go on with a training that was stopped or killed, from its last state.",
     )
     made.add_argument("run", type=Path, metavar="RUN", help="folder of the training")
+    made.add_argument("--data", type=Path, metavar="DATA", help="where the pictures are now, if they were moved")
     _add_hardware(made)
     return made
 
@@ -82,7 +83,7 @@ def preview_parser() -> argparse.ArgumentParser:
     made.add_argument("--versions", type=_positive, default=5, metavar="N", help="versions of each; default 5")
     made.add_argument("--seed", type=int, default=0, metavar="S", help="same seed, same sheet; default 0")
     made.add_argument("--width", type=_positive, default=320, metavar="PX", help="width of each; default 320")
-    made.add_argument("--output", type=Path, default=Path("preview.jpg"), metavar="FILE", help="a .jpg or .png")
+    made.add_argument("-o", "--output", type=Path, default=Path("preview.jpg"), metavar="FILE", help="a .jpg or .png")
     return made
 
 
@@ -94,7 +95,7 @@ def rate_parser() -> argparse.ArgumentParser:
     )
     _add_data(made)
     _add_configuration(made)
-    made.add_argument("--steps", type=_positive, default=200, metavar="N", help="steps of the search; default 200")
+    made.add_argument("--steps", type=_steps, default=200, metavar="N", help="steps of the search; default 200")
     made.add_argument("--plot", type=Path, metavar="FILE", help="loss over rate; a .png or .svg")
     _add_hardware(made)
     return made
@@ -143,6 +144,12 @@ def _add_hardware(made: argparse.ArgumentParser) -> None:
     group.add_argument("--device", choices=DEVICES, default="auto", help="default a GPU, if there is one")
     group.add_argument("--workers", type=_whole, metavar="N", help="processes that read; default half the cores")
     group.add_argument("--threads", type=_positive, metavar="N", help="threads that compute; default the other cores")
+
+
+def _steps(text: str) -> int:
+    if not text.isdecimal() or int(text) < 20:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 20")
+    return int(text)
 
 
 def _positive(text: str) -> int:

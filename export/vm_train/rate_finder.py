@@ -10,7 +10,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats
 from vm_embedded.errors import InputError
-from vm_embedded.files import written_beside
+from vm_embedded.files import check_writable, written_beside
 from vm_export.network import Network
 from vm_synth.progress import Ticker
 
@@ -45,7 +45,11 @@ def search(job: Job, hardware: Hardware, network: Network, steps: int) -> RateSe
     epochs = -(-steps * recipe.batch // len(job.split.training))
     batches = list(schedule((recipe.seed, 0), epochs, recipe.batch, len(job.split.training), 0))[:steps]
     training = Training(
-        network, recipe, len(batches), class_shares(recipe.selection_of(1), job.counts), device=hardware.device
+        network,
+        recipe,
+        len(batches),
+        class_shares(recipe.selection_of(1), job.counts, job.objects),
+        device=hardware.device,
     )
     rates = np.geomspace(LOWEST, HIGHEST, len(batches))
     ticker = Ticker(len(batches), "vm-train")
@@ -66,10 +70,15 @@ def search(job: Job, hardware: Hardware, network: Network, steps: int) -> RateSe
     return RateSearch(rates[: len(losses)][kept], np.array(losses)[kept])
 
 
-def plot_rates(found: RateSearch, path: Path) -> None:
-    """Draw loss over rate to a .png or .svg file. Raises InputError."""
+def check_plot(path: Path) -> None:
+    """Raise InputError if nothing can be plotted to that file."""
     if path.suffix.lower() not in (".png", ".svg"):
         raise InputError(f"can't plot to {path}: its suffix must be .png or .svg")
+    check_writable(path)
+
+
+def plot_rates(found: RateSearch, path: Path) -> None:
+    """Draw loss over rate to a .png or .svg file. Raises InputError."""
     try:
         from matplotlib.figure import Figure
     except ImportError as error:

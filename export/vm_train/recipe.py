@@ -21,7 +21,7 @@ class Recipe:
     epochs: int = number(20, "how often each picture is looked at, in each round", "", (1, 1e6))
     batch: int = number(8, "pictures in a step, over all processes", "", (1, 1e5))
     rate: float = number(0.01, "highest learning rate; vm-train rate looks for it", "", (1e-9, 1e3))
-    optimizer: str = one_of(OPTIMIZERS, "adamw", "how weights follow their gradients; sgd has momentum 0.9")
+    optimizer: str = one_of(OPTIMIZERS, "adamw", "how weights follow their gradients; sgd has momentum")
     schedule: str = one_of(SCHEDULES, "one_cycle", "how the rate changes: up and down once, or not at all")
     decay: float = number(1e-4, "weight decay", "", (0.0, 1.0))
     clip: float = number(1.0, "largest norm of a step's gradient; 0 for any", "", (0.0, 1e9))
@@ -30,8 +30,8 @@ class Recipe:
     selection: str = one_of(
         RULES,
         "hard",
-        "points that give gradients: all; balanced, as many of each class; or hard, balanced and those that the "
-        "networks of earlier rounds were wrong about",
+        "points that give gradients: all; balanced, as many of each class as of the rarest object; or hard, those that "
+        "the networks of earlier rounds were wrong about, balanced",
     )
     rounds: int = number(3, "networks trained one after the other, if selection is hard", "", (2, 10))
     patience: int = number(0, "epochs without a better validation after which a round ends; 0 for none", "", (0, 1e6))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -92,7 +93,7 @@ def _train_round(job: Job, hardware: Hardware, progress: Progress, stopped: Call
             training.save(job.state_path, asdict(progress))
 
     with (
-        Log(job.folder, progress.round, training.done, hardware.leads) as log,
+        Log(job.folder, progress.round, training.done, progress.validated, hardware.leads) as log,
         _resumable(job.folder, save),
         closing(loaded(job.scheduled(), own, hardware.workers)) as loader,
     ):
@@ -135,7 +136,7 @@ def _prepared(job: Job, hardware: Hardware, progress: Progress) -> Training:
     rule = recipe.selection_of(progress.round)
     graders = [Checkpoint.load(job.round_path(each)).network for each in range(1, progress.round)]
     total = recipe.epochs * steps_an_epoch(job.epoch, recipe.batch)
-    training = Training(network, recipe, total, class_shares(rule, job.counts), graders, hardware.device)
+    training = Training(network, recipe, total, class_shares(rule, job.counts, job.objects), graders, hardware.device)
     if job.state_path.exists():
         state = read_state(job.state_path)
         if state["more"]["round"] == progress.round:
@@ -167,8 +168,13 @@ def _validated(
     first, *others = hardware.gathered(own)
     scores = sum(others, start=first)
     precisions = {name: scores.ranking(name).precision_recall.average_precision for name in scores.classes}
-    score = _score(job, precisions)
+    score, unseen = _score(job, precisions)
     progress.validated += 1
+    if unseen and progress.validated == 1 and hardware.leads:
+        print(
+            f"vm-train: the validation shows no {' or '.join(unseen)}: networks are chosen by all classes",
+            file=sys.stderr,
+        )
     known = {name: value for name, value in precisions.items() if not math.isnan(value)}
     log.write(training.done, {"epoch": progress.validated, "score": score, "average_precision": known})
     if score <= progress.best:
@@ -190,9 +196,9 @@ def _validated(
         checkpoint.save(job.model_path)
 
 
-def _score(job: Job, precisions: dict[str, float]) -> float:
-    """Mean average precision of the objects, or of all classes if none is an object; those that occur."""
-    kinds = job.configuration.classes.kinds
-    objects = [name for name, kind in kinds.items() if kind == "object"] or list(kinds)
-    values = [precisions[name] for name in objects if not math.isnan(precisions[name])]
-    return float(np.mean(values)) if values else 0.0
+def _score(job: Job, precisions: dict[str, float]) -> tuple[float, list[str]]:
+    """Mean average precision of the objects that occur, else of all classes that do; and the objects if none does."""
+    objects = [name for name, kind in job.configuration.classes.kinds.items() if kind == "object"]
+    known = {name: value for name, value in precisions.items() if not math.isnan(value)}
+    seen = [known[name] for name in objects if name in known]
+    return float(np.mean(seen or list(known.values()) or [0.0])), [] if seen else objects

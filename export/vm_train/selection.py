@@ -17,18 +17,24 @@ from vm_embedded.arrays import Floats, Mask, Singles
 from .pictures import Labels
 
 RULES = ("all", "balanced", "hard")
-"""all: every labeled point. balanced: as many of each class as of the rarest. hard: the same, and the points of a class
-by how wrong earlier networks were on them."""
+"""all: every labeled point. balanced: as many of each class as of the rarest object. hard: the same, and the points of
+a class by how wrong earlier networks were on them."""
 
 FLOOR = 0.05
 """Weight of a point that no network was wrong about (the paper's 5 % baseline)."""
 
 
-def class_shares(rule: str, counts: npt.NDArray[np.int64]) -> Floats:
-    """Share (C,) of each class's points that is selected, from its number of points in the set (C,)."""
-    if rule == "all" or not counts.any():
+def class_shares(rule: str, counts: npt.NDArray[np.int64], objects: Mask) -> Floats:
+    """Share (C,) of each class's points that is selected, from its number of points in the set (C,).
+
+    objects (C,): which classes are objects. The rarest of them says how many points of a class are selected, or the
+    rarest class if there are no objects. Classes that are rarer still are taken whole: else a single point of an odd
+    class would leave nothing to learn from.
+    """
+    occurring = counts[objects & (counts > 0)] if (objects & (counts > 0)).any() else counts[counts > 0]
+    if rule == "all" or not len(occurring):
         return np.ones(len(counts))
-    return np.asarray(counts[counts > 0].min() / np.maximum(counts, 1)).clip(max=1.0)
+    return np.asarray(occurring.min() / np.maximum(counts, 1)).clip(max=1.0)
 
 
 def hardness(errors: Singles) -> Floats:
@@ -46,7 +52,8 @@ def class_totals(labels: Labels, weights: Floats, classes: int) -> Floats:
 def selected(labels: Labels, shares: Floats, draws: Floats, weights: Floats | None = None) -> Mask:
     """Points (n,) that are selected from labels (n,), -1 for unlabeled, by draws (n,) from 0 to 1.
 
-    shares (C,): chance of a point of each class. weights (n,): factors of these chances, of mean 1 in each class.
+    shares (C,): chance of a point of each class. weights (n,): factors of these chances, of mean 1 in each class. A
+    chance above 1 is 1, so with weights a class that is taken nearly whole gives somewhat fewer points.
     """
     chance = shares[labels]
     if weights is not None:

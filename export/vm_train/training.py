@@ -7,6 +7,8 @@ and gradients are averaged over the selected points of all parts.
 
 from __future__ import annotations
 
+import io
+import math
 import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -76,11 +78,14 @@ class Training:
             group["lr"] = rate
 
     def step(self, items: Sequence[Item], graphs: Sequence[Graph]) -> Step:
-        """Learn from the graphs of this process's part of a batch."""
+        """Learn from the graphs of this process's part of a batch. Raises InputError if the loss is no number."""
         rate = float(self._optimizer.param_groups[0]["lr"])
         loss, points = self._loss(items, graphs)
-        self._optimizer.zero_grad()
         everyone = summed(torch.tensor(float(points))).clamp(min=1.0)
+        mean = float(summed(loss.detach().cpu()) / everyone)
+        if not math.isfinite(mean):
+            raise InputError(f"the loss of step {self.done + 1} is no number: begin again with a lower training.rate")
+        self._optimizer.zero_grad()
         if points:
             (loss / everyone.item()).backward()  # type: ignore[no-untyped-call]
         _sum_gradients(self.network)
@@ -89,8 +94,7 @@ class Training:
         self._optimizer.step()
         self._schedule.step()
         self.done += 1
-        total = summed(loss.detach().cpu())
-        return Step(self.done, float(total / everyone), int(everyone), rate)
+        return Step(self.done, mean, int(everyone), rate)
 
     def _loss(self, items: Sequence[Item], graphs: Sequence[Graph]) -> tuple[torch.Tensor, int]:
         """The summed loss of the selected points of some pictures, and their number."""
@@ -114,7 +118,8 @@ class Training:
         labels = torch.from_numpy(graph.labels[chosen].astype(np.int64)).to(self._device)
         single = nn.functional.cross_entropy(logits[wanted].float(), labels, reduction="none")
         if self.recipe.loss == "focal":
-            single = (1.0 - torch.exp(-single)) ** self.recipe.gamma * single
+            # Not 0, where the gradient of a power below 1 is none.
+            single = (-torch.expm1(-single)).clamp(min=1e-7) ** self.recipe.gamma * single
         return single.sum(), len(wanted)
 
     @torch.no_grad()
@@ -131,7 +136,7 @@ class Training:
     @torch.no_grad()
     def probabilities(self, graph: Graph) -> Singles:
         """The network's answers (n, C)."""
-        points, neighbors = torch.from_numpy(graph.points), torch.from_numpy(graph.neighbors)
+        points, neighbors = torch.from_numpy(graph.points), torch.tensor(graph.neighbors)
         answers: Singles = self.network(points.to(self._device), neighbors.to(self._device))[:-1].cpu().numpy()
         return answers
 
@@ -144,8 +149,10 @@ class Training:
             "schedule": self._schedule.state_dict(),
             "more": dict(more),
         }
+        content = io.BytesIO()  # on a full disk torch would fail in its own way
+        torch.save(state, content)
         with written_beside(path) as part:
-            torch.save(state, part)
+            part.write_bytes(content.getbuffer())
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Go on from a state that `read_state` read. Raises InputError if it is of another training."""
@@ -163,7 +170,9 @@ def read_state(path: Path) -> dict[str, Any]:
     try:
         state = torch.load(path, map_location="cpu", weights_only=True)
     except (OSError, RuntimeError, KeyError, ValueError, EOFError, pickle.UnpicklingError) as error:
-        raise InputError(f"can't go on from {path}: {one_line(error)}") from error
+        raise InputError(
+            f"can't go on from {path}, it is damaged: {one_line(error)}; begin again in a new folder"
+        ) from error
     if not isinstance(state, dict) or not isinstance(state.get("more"), dict):
         raise InputError(f"can't go on from {path}: it is no state of a training")
     return state

@@ -13,12 +13,21 @@ labelings = st.lists(st.integers(-1, 3), min_size=1, max_size=200).map(lambda ea
 
 @given(counts)
 def test_balanced_shares_give_every_class_as_many_points_as_the_rarest_has(counts):
-    shares = class_shares("balanced", counts)
+    none = np.zeros(len(counts), dtype=bool)
+    shares = class_shares("balanced", counts, none)
     assert ((shares >= 0.0) & (shares <= 1.0)).all()
     if counts.any():
         assert (shares * counts)[counts > 0] == pytest.approx(counts[counts > 0].min())
-    assert (class_shares("all", counts) == 1.0).all()
-    assert (class_shares("hard", counts) == shares).all()
+    assert (class_shares("all", counts, none) == 1.0).all()
+    assert (class_shares("hard", counts, none) == shares).all()
+
+
+@given(counts, st.integers(0, 7))
+def test_classes_that_are_rarer_than_every_object_are_taken_whole(counts, position):
+    objects = np.arange(len(counts)) == position % len(counts)
+    shares = class_shares("balanced", counts, objects)
+    if counts[objects].any():
+        assert shares * counts == pytest.approx(np.minimum(counts, counts[objects][0]))
 
 
 @given(labelings, st.integers(0, 99))

@@ -1,14 +1,17 @@
 """vm-train as a user types it: real processes that are stopped, killed and continued."""
 
+import fcntl
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import cv2
 import pytest
 import torch
 
@@ -256,6 +259,121 @@ def test_a_configuration_can_be_written_and_used(data, tmp_path):
     (tmp_path / "train.toml").write_text(run("config").stdout)
     done = run("check", data, "--config", tmp_path / "train.toml")
     assert "no picture shows class goal" in done.stderr  # of the usual classes, this set has no goals and no robots
+
+
+def command(module, *arguments, code=0):
+    done = subprocess.run(
+        [sys.executable, "-m", module, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=240,
+        env=environment(),
+    )
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    return done
+
+
+def copied(whole, tmp_path):
+    return Path(shutil.copytree(whole[0], tmp_path / "run"))
+
+
+def test_a_configuration_that_was_edited_is_refused(whole, tmp_path):
+    folder = copied(whole, tmp_path)
+    path = folder / "train.toml"
+    path.write_text(path.read_text().replace("epochs = 3", "epochs = 5"))
+    assert "train.toml or pictures.json was changed" in run("resume", folder, code=1).stderr
+
+
+def test_a_training_in_work_is_left_alone(whole, tmp_path):
+    folder = copied(whole, tmp_path)
+    with (folder / "run.json").open() as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        assert f"another process is training in {folder}" in run("resume", folder, code=1).stderr
+
+
+def test_files_of_others_are_not_written_over(data, configuration, tmp_path):
+    (tmp_path / "train.toml").write_text("# mine\n" + configuration.read_text())
+    done = run(data, "-o", tmp_path, "--config", tmp_path / "train.toml", code=1)
+    assert "holds train.toml, which a training would write over" in done.stderr
+    assert (tmp_path / "train.toml").read_text().startswith("# mine")
+
+
+def test_a_training_goes_on_where_its_folders_were_moved_to(whole, data, tmp_path):
+    folder = copied(whole, tmp_path)
+    (folder / "state.pt").unlink()
+    moved = Path(shutil.copytree(data, tmp_path / "moved"))
+    run("resume", folder, "--data", moved, "--workers", 1, "--threads", 1)
+    assert same(folder / "model.pt", whole[0] / "model.pt")
+    assert not (folder / "unpacked").exists()
+
+
+def test_a_damaged_log_is_cut_where_it_is_damaged(whole, tmp_path):
+    folder = copied(whole, tmp_path)
+    (folder / "state.pt").unlink()
+    with (folder / "log.jsonl").open("a") as file:
+        file.write("\0\0\n")
+    run("resume", folder, "--workers", 1, "--threads", 1)
+    assert (folder / "log.jsonl").read_text() == (whole[0] / "log.jsonl").read_text()
+
+
+def test_a_loss_that_is_no_number_ends_the_training_at_once(data, configuration, tmp_path):
+    wild = ["--set", "training.rate=1000", "--set", "training.clip=0", "--set", "training.optimizer=sgd"]
+    done = run(data, "-o", tmp_path / "run", "--config", configuration, *wild, code=1)
+    assert "lower training.rate" in done.stderr
+
+
+def test_a_full_disk_ends_in_one_line(data, configuration, tmp_path):
+    """A limit on the size of files stands for the disk."""
+    limited = ["bash", "-c", 'trap "" XFSZ; ulimit -f 8; exec "$@"', "bash", *COMMAND, data, "-o", tmp_path / "run"]
+    done = subprocess.run(
+        [str(each) for each in [*limited, "--config", configuration, "--no-unpacked", "--workers", "0"]],
+        capture_output=True,
+        text=True,
+        timeout=240,
+        env=environment(),
+    )
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith("vm-train: can't write")
+    assert "Traceback" not in done.stderr
+
+
+def test_a_validation_without_objects_chooses_by_all_classes(data, configuration, tmp_path):
+    without = [each for each in range(30) if json.loads((data / f"scene{each:04d}.json").read_text())["ball"] is None]
+    assert without
+    (tmp_path / "validation.txt").write_text("\n".join(f"{each:04d}" for each in without))
+    done = run(data, "-o", tmp_path / "run", "--config", configuration, "--validation", tmp_path / "validation.txt")
+    assert "the validation shows no ball: networks are chosen by all classes" in done.stderr
+    scores = [record["score"] for _, record in read_log(tmp_path / "run" / "log.jsonl") if "score" in record]
+    assert min(scores) > 0.0
+
+
+def test_a_rare_class_does_not_leave_the_training_without_points(data, configuration, tmp_path):
+    folder = Path(shutil.copytree(data, tmp_path / "data"))
+    mask = cv2.imread(str(folder / "mask0002.png"), cv2.IMREAD_UNCHANGED)
+    mask[100:110, 40:50] = (0, 255, 255, 255)
+    cv2.imwrite(str(folder / "mask0002.png"), mask)
+    path = tmp_path / "train.toml"
+    path.write_text(CLASSES + 'goal = { kind = "upright", colors = [[255, 255, 0]] }\n' + SMALL)
+    balanced = ["--set", "training.selection=balanced", "--set", "data.validation=0.2"]
+    run(folder, "-o", tmp_path / "run", "--config", path, *balanced)
+    records = [record for _, record in read_log(tmp_path / "run" / "log.jsonl")]
+    assert min(each["points"] for each in records if "points" in each) > 30
+
+
+def test_an_evaluation_knows_the_colors_of_its_training(data, tmp_path):
+    folder = Path(shutil.copytree(data, tmp_path / "data"))
+    for path in folder.glob("mask*.png"):
+        mask = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        mask[(mask == (0, 0, 255, 255)).all(axis=2)] = (10, 20, 30, 255)
+        cv2.imwrite(str(path), mask)
+    (tmp_path / "train.toml").write_text(CLASSES.replace("[[255, 0, 0]]", "[[30, 20, 10]]") + SMALL)
+    once = ["--set", "training.epochs=1", "--set", "training.selection=balanced"]
+    run(folder, "-o", tmp_path / "run", "--config", tmp_path / "train.toml", *once)
+    model, split = tmp_path / "run" / "model.pt", tmp_path / "run" / "pictures.json"
+    command("vm_train.evaluate_cli", model, folder, "--list", split, "-o", tmp_path / "report")
+    part = command("vm_train.evaluate_cli", model, folder, "--part", "test", "-o", tmp_path / "none", code=1)
+    assert "give it with --list" in part.stderr
 
 
 @pytest.mark.slow
