@@ -29,7 +29,7 @@ class Recipe:
     gamma: float = number(2.0, "exponent of the focal loss", "", (0.0, 20.0))
     selection: str = one_of(
         RULES,
-        "hard",
+        "balanced",
         "points that give gradients: all; balanced, as many of each class as of the rarest object; or hard, those that "
         "the networks of earlier rounds were wrong about, balanced",
     )
