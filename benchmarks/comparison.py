@@ -122,7 +122,7 @@ def main() -> None:
             made = scored(model, data, scores / name.split()[0], chosen)
             found[name].setdefault(kind, {})[str(seed)] = made
             print(kind, seed, name, flush=True)
-    RESULTS.write_text(json.dumps(found, indent=1) + "\n")
+    RESULTS.write_text(json.dumps(found) + "\n")
 
 
 if __name__ == "__main__":
