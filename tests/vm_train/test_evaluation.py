@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -15,7 +16,7 @@ from vm_export.checkpoint import Checkpoint
 from vm_export.grid import Grid
 from vm_export.onnx_graph import export
 from vm_train.answers import Exact, load_subject
-from vm_train.evaluated_pictures import classes_of, pictures_of
+from vm_train.evaluated_pictures import classes_of, pictures_of, usual_colors
 from vm_train.evaluation import Evaluation, Rules, evaluated
 from vm_train.evaluation_tables import as_csv, as_json
 from vm_train.evaluation_workers import Job, evaluate
@@ -26,7 +27,8 @@ from ..demo import CHECKPOINT, FOLDER, IMAGES, MODEL, TRUTH
 from .drawn import RADIUS, draw_set
 
 MANIFEST = read_model(MODEL).manifest
-CLASSES = classes_of(MANIFEST, [])
+USUAL = usual_colors(Path("model.onnx"), None)
+CLASSES = classes_of(MANIFEST, USUAL, [])
 SETTINGS = Settings()
 
 
@@ -189,7 +191,7 @@ def test_colors_of_no_class_end_it(tmp_path):
     cv2.imwrite(str(folder / "mask0001.png"), mask)
     with pytest.raises(InputError, match=r"mask0001.*\[0, 0, 255\]"):
         evaluated(KNOWING, find_pictures(folder), CLASSES, Rules())
-    known = classes_of(MANIFEST, [("environment", (0, 0, 255))])
+    known = classes_of(MANIFEST, USUAL, [("environment", (0, 0, 255))])
     assert len(evaluated(KNOWING, find_pictures(folder), known, Rules()).views) == 2
 
 
@@ -214,12 +216,15 @@ def test_the_radius_of_a_scene_makes_mesh_and_fit(files, tmp_path):
 def test_lists_choose_pictures(drawn, tmp_path):
     chosen = tmp_path / "list.txt"
     chosen.write_text("# some\n0003\nimage0001.jpg  # by its name\n\n")
-    assert [each.number for each in pictures_of([drawn], chosen, "test")] == ["0001", "0003"]
+    assert [each.number for each in pictures_of([drawn], chosen, None)] == ["0001", "0003"]
     run = tmp_path / "pictures.json"
     run.write_text(json.dumps({"training": ["0000"], "validation": ["0002"], "test": ["0005", "0006"]}))
-    assert [each.number for each in pictures_of([drawn], run, "test")] == ["0005", "0006"]
+    assert [each.number for each in pictures_of([drawn], run, None)] == ["0005", "0006"]
     assert [each.number for each in pictures_of([drawn], run, "validation")] == ["0002"]
-    assert len(pictures_of([drawn, drawn], None, "test")) == 20
+    assert len(pictures_of([drawn, drawn], None, None)) == 20
+    for without in (chosen, None):
+        with pytest.raises(InputError, match="give it with --list"):
+            pictures_of([drawn], without, "test")
 
 
 @pytest.mark.parametrize(("text", "part"), [("0099\n", "did you mean '0009'"), ("# none\n", "names no picture")])
@@ -227,17 +232,17 @@ def test_lists_of_what_is_not_there_are_refused(drawn, tmp_path, text, part):
     chosen = tmp_path / "list.txt"
     chosen.write_text(text)
     with pytest.raises(InputError, match=part):
-        pictures_of([drawn], chosen, "test")
+        pictures_of([drawn], chosen, None)
     with pytest.raises(InputError, match=r"missing\.txt"):
-        pictures_of([drawn], tmp_path / "missing.txt", "test")
+        pictures_of([drawn], tmp_path / "missing.txt", None)
 
 
 def test_classes_without_colors_are_asked_for():
     manifest = replace(MANIFEST, classes=(*MANIFEST.classes[:3], replace(MANIFEST.classes[3], name="grass")))
     with pytest.raises(InputError, match=r"--color grass=R,G,B"):
-        classes_of(manifest, [])
-    assert classes_of(manifest, [("grass", (1, 2, 3))]).colors["grass"] == ((1, 2, 3),)
+        classes_of(manifest, USUAL, [])
+    assert classes_of(manifest, USUAL, [("grass", (1, 2, 3))]).colors["grass"] == ((1, 2, 3),)
     with pytest.raises(InputError, match="did you mean 'ball'"):
-        classes_of(MANIFEST, [("bal", (1, 2, 3))])
+        classes_of(MANIFEST, USUAL, [("bal", (1, 2, 3))])
     with pytest.raises(InputError, match="share the color"):
-        classes_of(MANIFEST, [("environment", (255, 0, 0))])
+        classes_of(MANIFEST, USUAL, [("environment", (255, 0, 0))])

@@ -3,6 +3,7 @@
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from vm_embedded.errors import InputError
 from vm_embedded.onnx_file import read_model
-from vm_train.evaluated_pictures import classes_of
+from vm_train.evaluated_pictures import classes_of, usual_colors
 from vm_train.object_truth import SceneBall, SceneTruth, read_scene, true_objects
 from vm_train.pictures import find_pictures, read_picture
 
@@ -18,7 +19,8 @@ from ..demo import MODEL
 from .drawn import RADIUS, draw_set
 
 MANIFEST = read_model(MODEL).manifest
-CLASSES = classes_of(MANIFEST, [])
+USUAL = usual_colors(Path("model.onnx"), None)
+CLASSES = classes_of(MANIFEST, USUAL, [])
 
 
 @pytest.fixture(scope="module")

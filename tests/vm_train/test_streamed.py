@@ -18,7 +18,7 @@ from vm_export.checkpoint import Checkpoint
 from vm_synth.sections import read_sections
 from vm_train.cli import main
 from vm_train.configuration import TrainConfiguration
-from vm_train.hardware import Hardware
+from vm_train.hardware import Hardware, hardware
 from vm_train.job import Job
 from vm_train.pictures import find_pictures
 from vm_train.run import train
@@ -41,6 +41,13 @@ batch = 4
 selection = "balanced"
 """
 EPOCH, SHARDS = 14, 5
+
+
+@pytest.fixture(autouse=True)
+def repeatable():
+    """As vm-train computes."""
+    with hardware("cpu", 0, 1):
+        yield
 
 
 @pytest.fixture(scope="module")
