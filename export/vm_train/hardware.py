@@ -55,8 +55,8 @@ class Hardware:
 def hardware(device: str, workers: int | None, threads: int | None) -> Iterator[Hardware]:
     """The hardware that is there: the processes of torchrun, if it started this one, meet here.
 
-    device: auto, cpu or cuda. workers, threads: None for as many as the processor has cores for. Raises InputError if
-    there is no such device.
+    device: auto, cpu or cuda. workers: None for as many as the processor has cores for. threads: None for one. Raises
+    InputError if there is no such device.
     """
     size, rank = int(os.environ.get("WORLD_SIZE", "1")), int(os.environ.get("RANK", "0"))
     local, locals_ = int(os.environ.get("LOCAL_RANK", "0")), int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
@@ -68,7 +68,8 @@ def hardware(device: str, workers: int | None, threads: int | None) -> Iterator[
     cores = max(len(os.sched_getaffinity(0)) // locals_, 1)
     if workers is None:
         workers = max(cores - 1, 1) if gpu else max(cores // 2, 1)
-    torch.set_num_threads(threads or (1 if gpu else max(cores - workers, 1)))
+    # With more threads the last digits differ from run to run, whatever torch is told.
+    torch.set_num_threads(threads or 1)
     # Sums whose order may change from run to run would make a resumed training another one.
     torch.use_deterministic_algorithms(True, warn_only=True)
     if gpu:

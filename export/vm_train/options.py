@@ -143,7 +143,12 @@ def _add_hardware(made: argparse.ArgumentParser) -> None:
     group = made.add_argument_group("hardware")
     group.add_argument("--device", choices=DEVICES, default="auto", help="default a GPU, if there is one")
     group.add_argument("--workers", type=_whole, metavar="N", help="processes that read; default half the cores")
-    group.add_argument("--threads", type=_positive, metavar="N", help="threads that compute; default the other cores")
+    group.add_argument(
+        "--threads",
+        type=_positive,
+        metavar="N",
+        help="threads that compute; default 1; with more a resumed training is not the same to the last digit",
+    )
 
 
 def _steps(text: str) -> int:
