@@ -77,7 +77,7 @@ def parts(data: Path, numbers: tuple[str, ...], folder: Path) -> dict[str, float
         recipe = configuration(depth, width).training
         torch.manual_seed(0)
         network = Network(configuration(depth, width).network_shape)
-        training = Training(network, recipe, 10**6, np.full(network.shape.classes, 0.1))
+        training = Training(network, recipe, 10**6, np.full(network.shape.classes, 0.1), np.ones(network.shape.classes))
         batches = [graphs[start : start + BATCH] for start in range(0, len(graphs) - BATCH + 1, BATCH)]
 
         def step(number: int, training: Training = training, batches: list = batches) -> None:

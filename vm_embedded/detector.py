@@ -33,10 +33,10 @@ class Detector:
 
     def __init__(self, model: ModelFile, settings: Settings | None = None) -> None:
         self.settings = settings or Settings()
-        self.manifest = model.manifest
+        self.manifest = model.manifest.for_object(self.settings.object_radius)
         self.session = Session(model, self.settings)
         self.cache = MeshCache(self.manifest, self.settings)
-        self.shape = shape_named(self.manifest.shape, self.settings.object_radius or self.manifest.object_radius)
+        self.shape = shape_named(self.manifest.shape, self.manifest.object_radius)
 
     @classmethod
     def from_file(cls, path: str | Path, settings: Settings | None = None) -> Detector:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from .mesh import RING_NEIGHBORS
 from .shapes import SHAPES, Shape, shape_named
 
 METADATA_KEY = "visual_mesh"
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 
 KINDS = ("object", "upright", "area", "background")
 """What a class is. object: has the mesh's shape and is located. upright, area: points with bearings. background."""
@@ -89,11 +89,12 @@ class Manifest:
     """What the runtime must know to build the mesh and read the answers of a network.
 
     shape: circle or sphere. radius: the object's radius that the mesh is made for [m]. object_radius: that of the
-    real object [m]. intersections: rings across an object of `radius`. mesh: ring4, ring6 or ring8. max_distance of
-    the mesh [m]. edge: one of EDGES. classes: in the order of the network's outputs. layout: one of LAYOUTS; runs needs
-    edge hard. operations: multiplications and additions for each point. channels, scale: a point's input is its color
-    in this order, times scale. sampling: the rule at pixels, "bilinear". provenance: who made it from what. Raises
-    ModelError for values that this runtime does not know.
+    real object [m]. any_radius: whether the network knows objects of any radius, so that the mesh is made for the real
+    one's, whatever it is. intersections: rings across an object of `radius`. mesh: ring4, ring6 or ring8. max_distance
+    of the mesh [m]. edge: one of EDGES. classes: in the order of the network's outputs. layout: one of LAYOUTS; runs
+    needs edge hard. operations: multiplications and additions for each point. channels, scale: a point's input is its
+    color in this order, times scale. sampling: the rule at pixels, "bilinear". provenance: who made it from what.
+    Raises ModelError for values that this runtime does not know.
     """
 
     shape: str
@@ -104,6 +105,7 @@ class Manifest:
     max_distance: float
     edge: str
     classes: tuple[ObjectClass, ...]
+    any_radius: bool = False
     self_test: SelfTest | None = None
     layout: str = "plain"
     operations: int = 0
@@ -132,11 +134,19 @@ class Manifest:
                 raise ModelError(f"{name} in the model's manifest must be a number above 0, not {value!r}")
         if isinstance(self.operations, bool) or not isinstance(self.operations, int) or self.operations < 0:
             raise ModelError(f"operations in the model's manifest must be a whole number, not {self.operations!r}")
+        if not isinstance(self.any_radius, bool):
+            raise ModelError(f"any_radius in the model's manifest must be true or false, not {self.any_radius!r}")
         if abs(self.scale * 255.0 - 1.0) > 1e-6:
             raise ModelError(f"scale in the model's manifest must be 1/255, not {self.scale!r}")
         names = [each.name for each in self.classes]
         if not names or len(set(names)) != len(names):
             raise ModelError(f"classes in the model's manifest must be one or more different names, not {names}")
+
+    def for_object(self, radius: float | None) -> Manifest:
+        """The manifest for real objects of a radius [m]; None for that of the manifest."""
+        if radius is None:
+            return self
+        return replace(self, object_radius=radius, radius=radius if self.any_radius else self.radius)
 
     def column(self, class_name: str) -> int:
         """Position of a class among the outputs. Raises InputError for an unknown one."""

@@ -43,7 +43,12 @@ class Settings:
     roll_step: float = _number(0.05, 1e-3, 1.0, "rolls that share prepared work", "rad")
     cache_mib: float = _number(64.0, 0.0, 65536.0, "memory for prepared meshes", "MiB")
     object_radius: float | None = _number(
-        None, 1e-3, 10.0, "radius of the real object where it differs from the model's; the mesh stays", "m"
+        None,
+        1e-3,
+        10.0,
+        "radius of the real object where it differs from the model's; the mesh follows if the network knows objects of "
+        "any radius",
+        "m",
     )
     threshold: float = _number(0.5, 0.0, 1.0, "probability from which a point counts for a class")
     min_inside: float = _number(0.75, 0.0, 1.0, "mean probability that an object needs inside its outline")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import torch
 from torch import nn
 
+from .neighborhood import Neighborhood
 from .network_shape import Layer, NetworkShape
 
 _ACTIVATIONS: dict[str, type[nn.Module]] = {"selu": nn.SELU, "relu": nn.ReLU, "elu": nn.ELU, "tanh": nn.Tanh}
@@ -21,10 +22,9 @@ class GraphConvolution(nn.Module):
         self.neighbors = neighbors
         self.linear = nn.Linear((neighbors + 1) * inputs, outputs)
 
-    def forward(self, x: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
-        """(n + 1, outputs) from x (n + 1, inputs) and neighbors (n + 1, N)."""
-        gathered: torch.Tensor = torch.cat([x, x[neighbors].flatten(1)], dim=1)
-        return self.linear(gathered)  # type: ignore[no-any-return]
+    def forward(self, x: torch.Tensor, neighborhood: Neighborhood) -> torch.Tensor:
+        """(n + 1, outputs) from x (n + 1, inputs)."""
+        return self.linear(neighborhood.gather(x).flatten(1))  # type: ignore[no-any-return]
 
 
 class SeparableConvolution(nn.Module):
@@ -35,9 +35,9 @@ class SeparableConvolution(nn.Module):
         self.depthwise = nn.Parameter(torch.randn(neighbors + 1, inputs) / (neighbors + 1) ** 0.5)
         self.linear = nn.Linear(inputs, outputs)
 
-    def forward(self, x: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
-        """(n + 1, outputs) from x (n + 1, inputs) and neighbors (n + 1, N)."""
-        mixed = (x[neighbors] * self.depthwise[1:]).sum(dim=1) + x * self.depthwise[0]
+    def forward(self, x: torch.Tensor, neighborhood: Neighborhood) -> torch.Tensor:
+        """(n + 1, outputs) from x (n + 1, inputs)."""
+        mixed = (neighborhood.gather(x) * self.depthwise).sum(dim=1)
         return self.linear(mixed)  # type: ignore[no-any-return]
 
 
@@ -48,7 +48,7 @@ class Dense(nn.Module):
         super().__init__()
         self.linear = nn.Linear(inputs, outputs)
 
-    def forward(self, x: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
+    def forward(self, x: torch.Tensor, neighborhood: Neighborhood) -> torch.Tensor:
         """(n + 1, outputs) from x (n + 1, inputs); the neighbors are not used."""
         return self.linear(x)  # type: ignore[no-any-return]
 
@@ -82,10 +82,10 @@ class Network(nn.Module):
 
     def logits(self, points: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
         """Outputs (n + 1, C) before the head, from points (n + 1, 3) and neighbors (n + 1, N)."""
-        x = points
+        x, neighborhood = points, Neighborhood(neighbors)
         for layer, activation in zip(self.layers, self.activations, strict=False):
-            x = activation(layer(x, neighbors))
-        return self.layers[-1](x, neighbors)  # type: ignore[no-any-return]
+            x = activation(layer(x, neighborhood))
+        return self.layers[-1](x, neighborhood)  # type: ignore[no-any-return]
 
     def forward(self, points: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
         """Probabilities (n + 1, C) from points (n + 1, 3) and neighbors (n + 1, N)."""

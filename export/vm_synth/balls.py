@@ -36,6 +36,7 @@ class BallRanges:
         (*KINDS, *("classic",) * 4, *("panels", "pinwheel", "tango", "mosaic", "plain", "triangles", "stars") * 2),
     )
     white: float = share(0.65, "designs on a white base; the others are on a saturated color or on black")
+    hues: tuple[str, ...] = some_of(tuple(HUES), "saturated colors; one listed twice comes twice as often")
     dark: float = share(0.2, "designs on a black base, of those that aren't on white")
     black: float = share(0.5, "designs with black ink; the others' is saturated or dark gray")
     bright: float = share(0.06, "over-exposed designs: all albedo near 1, hardly any contrast")
@@ -55,8 +56,8 @@ def _linear(color: Floats) -> Color:
     return red, green, blue
 
 
-def _saturated(random: np.random.Generator) -> Color:
-    color = np.array(HUES[str(random.choice(list(HUES)))]) * random.uniform(0.75, 1.05) + random.uniform(-0.06, 0.06, 3)
+def _saturated(random: np.random.Generator, hues: tuple[str, ...]) -> Color:
+    color = np.array(HUES[str(random.choice(hues))]) * random.uniform(0.75, 1.05) + random.uniform(-0.06, 0.06, 3)
     return _linear(np.clip(color, 0.01, 0.99))
 
 
@@ -76,13 +77,13 @@ def draw_design(random: np.random.Generator, ranges: BallRanges) -> BallDesign:
     if white:
         base = _gray(random, 0.85, 0.98)
     else:
-        base = _gray(random, 0.05, 0.2) if random.random() < ranges.dark else _saturated(random)
+        base = _gray(random, 0.05, 0.2) if random.random() < ranges.dark else _saturated(random, ranges.hues)
     if random.random() < ranges.black:
         # Black on black would show no pattern.
         ink = _gray(random, 0.04, 0.15) if max(base) > 0.06 else _gray(random, 0.85, 0.98)
     else:
-        ink = _saturated(random) if random.random() < 0.8 else _gray(random, 0.2, 0.45)
-    accent = _saturated(random) if random.random() < 0.65 else _gray(random, 0.05, 0.95)
+        ink = _saturated(random, ranges.hues) if random.random() < 0.8 else _gray(random, 0.2, 0.45)
+    accent = _saturated(random, ranges.hues) if random.random() < 0.65 else _gray(random, 0.05, 0.95)
     seam_color = _scaled(base, random.uniform(0.3, 0.9)) if random.random() < 0.6 else _gray(random, 0.05, 0.4)
     if random.random() < ranges.bright:
         rest = random.uniform(0.03, 0.15)

@@ -43,6 +43,7 @@ class TargetRanges:
     distance: tuple[float, float] = drawn(
         0.0, 10.0, "distance on the plane, drawn so that the size in the picture is uniform", "m", (0.0, 100.0)
     )
+    even: float = share(0.0, "pictures for which the distance itself is uniform: more far balls")
     missing: float = share(0.1, "pictures without a ball")
     cut: float = share(0.15, "pictures whose border may cut the ball")
     hidden: float = share(0.2, "pictures with something between ball and camera, beside it or before it")

@@ -62,8 +62,8 @@ def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environm
 def _view(
     random: np.random.Generator, ranges: SceneConfiguration, lens: RadialLens, radius: float, floor: float | None
 ) -> tuple[Orientation, Floats | None]:
-    """A camera and a place (2,) for a ball that it sees, the ball's angular size being uniform; None if many cameras
-    saw none."""
+    """A camera and a place (2,) for a ball that it sees, the ball's angular size or its distance being uniform; None
+    if many cameras saw none."""
     for _ in range(TRIES):
         orientation = draw_orientation(random, ranges.camera)
         low, high = ranges.ball.distance
@@ -73,8 +73,12 @@ def _view(
         largest, smallest = (
             math.asin(radius / max(math.hypot(d, rise), 1.01 * radius)) for d in (min(low, high), high)
         )
-        angle = random.uniform(smallest, largest)
-        distance = math.sqrt(max((radius / math.sin(angle)) ** 2 - rise**2, 0.0))
+        if ranges.ball.even and random.random() < ranges.ball.even:
+            distance = random.uniform(min(low, high), high)
+            angle = math.asin(radius / max(math.hypot(distance, rise), 1.01 * radius))
+        else:
+            angle = random.uniform(smallest, largest)
+            distance = math.sqrt(max((radius / math.sin(angle)) ** 2 - rise**2, 0.0))
         heading = random.uniform(-np.pi, np.pi, 256)
         spots = distance * np.stack([np.cos(heading), np.sin(heading)], axis=1)
         depth = np.full(len(spots), radius - orientation.height)

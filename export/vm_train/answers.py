@@ -80,7 +80,7 @@ class Exact:
     network: Network
 
     def answer(self, picture: Picture, radius: float | None = None) -> Answer:
-        manifest = self.manifest
+        manifest = self.manifest.for_object(self.settings.object_radius)
         if radius is not None:
             manifest = replace(manifest, radius=radius, object_radius=radius)
         height, width = picture.labels.shape
@@ -93,7 +93,7 @@ class Exact:
             probabilities = self.network(shown.graph, colors)
         found: tuple[Detection, ...] = ()
         if self.grid.kind == VISUAL.kind:
-            scene = _scene(picture, shown, manifest, self.settings)
+            scene = _scene(picture, shown, manifest)
             found, _ = find_objects(scene, manifest.classes, probabilities, self.settings)
         return Answer(shown.pixels, plane_distances(shown.graph.rays, orientation.height), probabilities, found)
 
@@ -175,11 +175,11 @@ def _orientation(picture: Picture) -> Orientation:
     return orientation
 
 
-def _scene(picture: Picture, shown: Projection[Mesh], manifest: Manifest, settings: Settings) -> Scene:
+def _scene(picture: Picture, shown: Projection[Mesh], manifest: Manifest) -> Scene:
     """Where objects are sought among the points of a picture's own mesh."""
     height, width = picture.labels.shape
     orientation = _orientation(picture)
-    shape = shape_named(manifest.shape, settings.object_radius or manifest.object_radius)
+    shape = shape_named(manifest.shape, manifest.object_radius)
     above = orientation.height
     return Scene(
         shape=shape,

@@ -164,6 +164,7 @@ class TrainConfiguration:
             max_distance=mesh.max_distance,
             edge="hard",
             classes=self.classes.outputs,
+            any_radius=mesh.radius_of == "scene",
         )
 
     @property

@@ -14,7 +14,7 @@ from vm_embedded.lens import Lens, Size
 from vm_embedded.lens_file import LensFile
 from vm_embedded.manifest import Manifest
 from vm_embedded.mesh import Mesh, ring_mesh
-from vm_embedded.projection import Projection, project
+from vm_embedded.projection import Projection, along, project
 from vm_embedded.sampling import sample
 from vm_export.grid import VISUAL, Grid
 
@@ -55,6 +55,7 @@ def seen_points(lens: LensFile, size: Size, manifest: Manifest, grid: Grid = VIS
     mesh = ring_mesh(
         manifest.mesh_shape, orientation.height, manifest.intersections, manifest.max_distance, manifest.mesh
     )
+    mesh = _ahead(mesh, orientation.level, fitted, size)
     if grid.kind == "visual":
         return project(mesh, orientation.level, fitted, size).visible
     if grid.equal_at:
@@ -64,6 +65,24 @@ def seen_points(lens: LensFile, size: Size, manifest: Manifest, grid: Grid = VIS
         flat = seen_hexagonal_mesh(fitted, size, max(int(count), 1))
     rays = np.asarray(fitted.unproject(flat.pixels, size) @ orientation.level.T)
     return Projection(Mesh(rays, flat.neighbors), flat.pixels, np.ones(len(flat), dtype=bool))
+
+
+def _ahead(mesh: Mesh, rotation: Floats, lens: Lens, size: Size) -> Mesh:
+    """Of a mesh what lies in the cone around the picture's middle ray that holds the picture: less to project.
+
+    rotation (3, 3): camera to mesh frame. A picture that covers half of all directions, or whose border the lens does
+    not see, leaves the mesh as it is.
+    """
+    x, y = np.linspace(0.0, size[0] - 1.0, 17), np.linspace(0.0, size[1] - 1.0, 17)
+    sides = [np.stack(np.broadcast_arrays(x, at), axis=1) for at in (0.0, size[1] - 1.0)]
+    sides += [np.stack(np.broadcast_arrays(at, y), axis=1) for at in (0.0, size[0] - 1.0)]
+    middle = np.array([[size[0] - 1.0, size[1] - 1.0]]) / 2.0
+    axis, *border = lens.unproject(np.concatenate([middle, *sides]), size)
+    # Between two of the pixels that were looked at the border may be a little farther out.
+    reach = 1.05 * float(np.arccos(np.clip(np.stack(border) @ axis, -1.0, 1.0)).max()) + 0.01
+    if not reach < math.pi / 2.0:  # nor is it a number where the lens does not see
+        return mesh
+    return mesh.part(np.flatnonzero(along(mesh.rays, rotation @ axis) > math.cos(reach)))
 
 
 def _equal_hexagonal_mesh(lens: Lens, size: Size, manifest: Manifest, height: float, distance: float) -> HexagonalMesh:

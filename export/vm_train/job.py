@@ -181,6 +181,7 @@ class Job:
             self.configuration.grid,
             self.configuration.augmentation,
             mesh.radius_of == "scene",
+            self.configuration.training.window,
         )
         return Graphs(pictures, view, None if self.unpacked is None else Unpacked(self.unpacked))
 

@@ -19,13 +19,15 @@ from .graphs import OFF_SCREEN, Graph, graph_of
 from .pictures import Classes, Picture, PictureFiles
 from .schedule import Batch, Item
 from .unpacked import Unpacked, read
+from .windows import window_of
 
 
 @dataclass(frozen=True)
 class View:
     """What makes a picture a graph: classes of the masks, the network's mesh and grid, and augmentation.
 
-    own_radius: the mesh is made for the radius of each picture's own ball, as its sceneX.json has it.
+    own_radius: the mesh is made for the radius of each picture's own ball, as its sceneX.json has it. window: share of
+    width and height that augmented pictures are cut to.
     """
 
     classes: Classes
@@ -33,6 +35,7 @@ class View:
     grid: Grid = field(default_factory=Grid)
     augmentation: Augmentation = field(default_factory=Augmentation)
     own_radius: bool = False
+    window: float = 1.0
 
     def manifest_for(self, files: PictureFiles) -> Manifest:
         """The manifest with the radius of a picture's own ball, if asked for. Raises InputError."""
@@ -44,6 +47,8 @@ class View:
             if seed is None:
                 return graph_of(picture, manifest, self.grid)
             random = np.random.default_rng(seed)
+            objects = [at for at, each in enumerate(manifest.classes) if each.kind == "object"]
+            picture = window_of(picture, self.window, objects, random)
             picture = blurred(moved(picture, self.augmentation, random), self.augmentation, random)
             graph = graph_of(picture, manifest, self.grid)
         except GeometryError:  # so low a camera sees no points

@@ -18,7 +18,7 @@ from .hardware import Hardware
 from .job import Job
 from .loading import loaded
 from .schedule import schedule
-from .selection import class_shares
+from .selection import class_shares, class_weights
 from .training import Training
 
 LOWEST, HIGHEST = 1e-5, 3.0
@@ -44,13 +44,9 @@ def search(job: Job, hardware: Hardware, network: Network, steps: int) -> RateSe
     recipe = replace(job.configuration.training, schedule="constant")
     epochs = -(-steps * recipe.batch // len(job.split.training))
     batches = list(schedule((recipe.seed, 0), epochs, recipe.batch, len(job.split.training), 0))[:steps]
-    training = Training(
-        network,
-        recipe,
-        len(batches),
-        class_shares(recipe.selection_of(1), job.counts, job.objects),
-        device=hardware.device,
-    )
+    rule = recipe.selection_of(1)
+    shares, weights = class_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
+    training = Training(network, recipe, len(batches), shares, weights, device=hardware.device)
     rates = np.geomspace(LOWEST, HIGHEST, len(batches))
     ticker = Ticker(len(batches), "vm-train")
     losses: list[float] = []

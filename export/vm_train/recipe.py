@@ -20,6 +20,13 @@ class Recipe:
 
     epochs: int = number(20, "how often each picture is looked at, in each round", "", (1, 1e6))
     batch: int = number(8, "pictures in a step, over all processes", "", (1, 1e5))
+    window: float = number(
+        1.0,
+        "looks are at windows of pictures, of this share of width and height; half of them show an object if the "
+        "picture does",
+        "",
+        (0.05, 1.0),
+    )
     rate: float = number(0.01, "highest learning rate; vm-train rate looks for it", "", (1e-9, 1e3))
     optimizer: str = one_of(OPTIMIZERS, "adamw", "how weights follow their gradients; sgd has momentum")
     schedule: str = one_of(SCHEDULES, "one_cycle", "how the rate changes: up and down once, or not at all")
@@ -30,8 +37,11 @@ class Recipe:
     selection: str = one_of(
         RULES,
         "balanced",
-        "points that give gradients: all; balanced, as many of each class as of the rarest object; or hard, those that "
-        "the networks of earlier rounds were wrong about, balanced",
+        "points that give gradients: all; weighed, all, those of frequent classes counting less; balanced, as many of "
+        "each class as of the rarest object; or hard, those that earlier networks were wrong about, balanced",
+    )
+    balance: float = number(
+        1.0, "if selection is weighed: from 0, every point counts the same, to 1, every class does", "", (0.0, 1.0)
     )
     rounds: int = number(3, "networks trained one after the other, if selection is hard", "", (2, 10))
     patience: int = number(0, "epochs without a better validation after which a round ends; 0 for none", "", (0, 1e6))

@@ -25,7 +25,7 @@ from .loading import loaded
 from .log import Log
 from .point_scores import PointScores
 from .schedule import Batch, steps_an_epoch
-from .selection import class_shares
+from .selection import class_shares, class_weights
 from .training import Training, read_state, summed
 
 _SAVED = 30.0  # seconds between states
@@ -136,7 +136,8 @@ def _prepared(job: Job, hardware: Hardware, progress: Progress) -> Training:
     rule = recipe.selection_of(progress.round)
     graders = [Checkpoint.load(job.round_path(each)).network for each in range(1, progress.round)]
     total = recipe.epochs * steps_an_epoch(job.epoch, recipe.batch)
-    training = Training(network, recipe, total, class_shares(rule, job.counts, job.objects), graders, hardware.device)
+    shares, weights = class_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
+    training = Training(network, recipe, total, shares, weights, graders, hardware.device)
     if job.state_path.exists():
         state = read_state(job.state_path)
         if state["more"]["round"] == progress.round:

@@ -1,7 +1,8 @@
-"""Which points of a batch give gradients.
+"""Which points of a batch give gradients, and how much each counts.
 
-The paper balances classes by selecting, not by weighing: weighed networks overfitted on the field. Its second and third
-rounds select points by how wrong the networks of the rounds before were on them.
+The paper balances classes by selecting. Its second and third rounds select points by how wrong the networks of the
+rounds before were on them. Weighing gives the same gradient in the mean from all points instead of some, so with less
+noise; docs/results.md compares them.
 
 Every point has a chance, and a number is drawn for each. So a class is as often selected as any other over the whole
 set, not within each batch: there the rarest class may have a single point, or none.
@@ -16,9 +17,9 @@ from vm_embedded.arrays import Floats, Mask, Singles
 
 from .pictures import Labels
 
-RULES = ("all", "balanced", "hard")
-"""all: every labeled point. balanced: as many of each class as of the rarest object. hard: the same, and the points of
-a class by how wrong earlier networks were on them."""
+RULES = ("all", "weighed", "balanced", "hard")
+"""all: every labeled point. weighed: every labeled point, those of frequent classes counting less. balanced: as many of
+each class as of the rarest object. hard: the same, and the points of a class by how wrong earlier networks were."""
 
 FLOOR = 0.05
 """Weight of a point that no network was wrong about (the paper's 5 % baseline)."""
@@ -32,9 +33,21 @@ def class_shares(rule: str, counts: npt.NDArray[np.int64], objects: Mask) -> Flo
     class would leave nothing to learn from.
     """
     occurring = counts[objects & (counts > 0)] if (objects & (counts > 0)).any() else counts[counts > 0]
-    if rule == "all" or not len(occurring):
+    if rule in ("all", "weighed") or not len(occurring):
         return np.ones(len(counts))
     return np.asarray(occurring.min() / np.maximum(counts, 1)).clip(max=1.0)
+
+
+def class_weights(rule: str, counts: npt.NDArray[np.int64], balance: float) -> Floats:
+    """How much (C,) a selected point of each class counts, from the classes' numbers of points in the set (C,).
+
+    With rule weighed that is number ** -balance, so at balance 1 every class counts as much as any other, and 1 in the
+    mean over all points. With every other rule it is 1.
+    """
+    if rule != "weighed":
+        return np.ones(len(counts))
+    weights = np.maximum(counts, 1).astype(np.float64) ** -balance
+    return np.asarray(weights * counts.sum() / (weights @ counts))
 
 
 def hardness(errors: Singles) -> Floats:

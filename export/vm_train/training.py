@@ -45,8 +45,9 @@ class Step:
 class Training:
     """A network while it is trained for `total` steps.
 
-    shares (C,): chance of each class's points to give gradients. graders: networks of earlier rounds; points that they
-    were wrong about are selected rather than others of their class. device: where torch computes, "cpu" or "cuda".
+    shares (C,): chance of each class's points to give gradients. weights (C,): how much each then counts. graders:
+    networks of earlier rounds; points that they were wrong about are selected rather than others of their class.
+    device: where torch computes, "cpu" or "cuda".
     """
 
     def __init__(
@@ -55,12 +56,14 @@ class Training:
         recipe: Recipe,
         total: int,
         shares: Floats,
+        weights: Floats,
         graders: Sequence[Network] = (),
         device: str = "cpu",
     ) -> None:
         self.network = network.to(device).train()
         self.recipe, self.total, self.done = recipe, total, 0
         self._shares, self._device = shares, device
+        self._weights = torch.from_numpy(weights.astype(np.float32)).to(device)
         self._graders = [each.to(device).eval() for each in graders]
         options = {"momentum": 0.9} if recipe.optimizer == "sgd" else {}
         self._optimizer: torch.optim.Optimizer = _OPTIMIZERS[recipe.optimizer](
@@ -80,29 +83,29 @@ class Training:
     def step(self, items: Sequence[Item], graphs: Sequence[Graph]) -> Step:
         """Learn from the graphs of this process's part of a batch. Raises InputError if the loss is no number."""
         rate = float(self._optimizer.param_groups[0]["lr"])
-        loss, points = self._loss(items, graphs)
-        everyone = summed(torch.tensor(float(points))).clamp(min=1.0)
-        mean = float(summed(loss.detach().cpu()) / everyone)
+        loss, weight, points = self._loss(items, graphs)
+        weights = float(summed(torch.tensor(weight))) or 1.0
+        mean = float(summed(loss.detach().cpu())) / weights
         if not math.isfinite(mean):
             raise InputError(f"the loss of step {self.done + 1} is no number: begin again with a lower training.rate")
         self._optimizer.zero_grad()
         if points:
-            (loss / everyone.item()).backward()  # type: ignore[no-untyped-call]
+            (loss / weights).backward()  # type: ignore[no-untyped-call]
         _sum_gradients(self.network)
         if self.recipe.clip:
             nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.clip)
         self._optimizer.step()
         self._schedule.step()
         self.done += 1
-        return Step(self.done, mean, int(everyone), rate)
+        return Step(self.done, mean, int(summed(torch.tensor(points))), rate)
 
-    def _loss(self, items: Sequence[Item], graphs: Sequence[Graph]) -> tuple[torch.Tensor, int]:
-        """The summed loss of the selected points of some pictures, and their number."""
+    def _loss(self, items: Sequence[Item], graphs: Sequence[Graph]) -> tuple[torch.Tensor, float, int]:
+        """The weighed sum of losses of the selected points of some pictures, their summed weight and their number."""
         classes = self.network.shape.classes
         if not graphs:  # of a small batch other processes have all; they wait for the totals
             if self._graders:
                 summed(torch.zeros((2, classes), dtype=torch.float64))
-            return torch.zeros(()), 0
+            return torch.zeros(()), 0.0, 0
         graph, _ = together(graphs)
         points = torch.from_numpy(graph.points).to(self._device)
         neighbors = torch.from_numpy(graph.neighbors).to(self._device)
@@ -110,8 +113,8 @@ class Training:
             np.random.default_rng([2, *(item.seed or ())]).random(len(each))
             for item, each in zip(items, graphs, strict=True)
         ]
-        weights = self._weights(points, neighbors, graph) if self._graders else None
-        chosen = selected(graph.labels, self._shares, np.concatenate(draws), weights)
+        chances = self._chances(points, neighbors, graph) if self._graders else None
+        chosen = selected(graph.labels, self._shares, np.concatenate(draws), chances)
         with torch.autocast(torch.device(self._device).type, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
             logits = self.network.logits(points, neighbors)
         wanted = torch.from_numpy(np.flatnonzero(chosen)).to(self._device)
@@ -120,10 +123,11 @@ class Training:
         if self.recipe.loss == "focal":
             # Not 0, where the gradient of a power below 1 is none.
             single = (-torch.expm1(-single)).clamp(min=1e-7) ** self.recipe.gamma * single
-        return single.sum(), len(wanted)
+        weights = self._weights[labels]
+        return single @ weights, float(weights.sum()), len(wanted)
 
     @torch.no_grad()
-    def _weights(self, points: torch.Tensor, neighbors: torch.Tensor, graph: Graph) -> Floats:
+    def _chances(self, points: torch.Tensor, neighbors: torch.Tensor, graph: Graph) -> Floats:
         """How much rather than others of their class the points (n,) are selected: 1 in the mean of each class."""
         errors = np.zeros(len(graph), dtype=np.float32)
         for grader in self._graders:

@@ -23,6 +23,7 @@ from vm_embedded.session import Session
 from vm_embedded.settings import Settings as RuntimeSettings
 from vm_export import onnx_graph
 from vm_export.checkpoint import Checkpoint
+from vm_export.neighborhood import Neighborhood
 from vm_export.network import GraphConvolution, Network
 from vm_export.network_shape import ACTIVATIONS, HEADS, Layer, NetworkShape
 from vm_export.reference import Overrides, read_reference, write_reference
@@ -90,7 +91,7 @@ def test_graph_convolution_is_the_matrix_product_of_the_convention():
     for i in range(6):
         row = np.concatenate([x[i].numpy(), *(x[j].numpy() for j in neighbors[i])])
         expected[i] = row @ layer.linear.weight.detach().numpy().T + layer.linear.bias.detach().numpy()
-    np.testing.assert_allclose(layer(x, neighbors).detach().numpy(), expected, atol=1e-5)
+    np.testing.assert_allclose(layer(x, Neighborhood(neighbors)).detach().numpy(), expected, atol=1e-5)
 
 
 DOMAINS = {"plain": {""}, "runs": {"", "ai.onnx.ml"}}

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_train.selection import FLOOR, class_shares, class_totals, errors_of, hardness, selected
+from vm_train.selection import FLOOR, class_shares, class_totals, class_weights, errors_of, hardness, selected
 
 counts = st.lists(st.integers(0, 10**9), min_size=2, max_size=8).map(np.array)
 labelings = st.lists(st.integers(-1, 3), min_size=1, max_size=200).map(lambda each: np.array(each, dtype=np.int8))
@@ -71,3 +71,14 @@ def test_totals_of_parts_add_up(labels):
 def test_errors_are_one_minus_the_probability_of_the_truth():
     probabilities = np.array([[0.9, 0.1], [0.3, 0.7], [0.5, 0.5]], dtype=np.float32)
     assert errors_of(probabilities, np.array([0, 0, -1], dtype=np.int8)) == pytest.approx([0.1, 0.7, 0.0])
+
+
+@given(counts, st.floats(0.0, 1.0))
+def test_weights_balance_classes_and_are_one_in_the_mean(counts, balance):
+    weights = class_weights("weighed", counts, balance)
+    assert (class_weights("balanced", counts, balance) == 1.0).all()
+    if counts.any():
+        assert weights @ counts == pytest.approx(counts.sum())
+        occurring = counts > 0
+        totals = (weights * counts)[occurring] * counts[occurring].astype(float) ** (balance - 1.0)
+        assert totals == pytest.approx(np.full(occurring.sum(), totals[0]))

@@ -16,6 +16,7 @@ from vm_train.training import Training, read_state
 
 COUNT = 6
 SHARES = np.array([0.7, 1.0])
+WEIGHTS = np.array([1.5, 0.5])
 RECIPES = {
     "adamw": Recipe(epochs=3, batch=4),
     "sgd": Recipe(epochs=3, batch=2, optimizer="sgd", schedule="constant", loss="focal"),
@@ -48,7 +49,7 @@ def batches_of(recipe):
 
 def training(recipe=None, graders=()):
     recipe = recipe or Recipe(epochs=3, batch=2, seed=5)
-    return Training(network(), recipe, len(batches_of(recipe)), SHARES, graders)
+    return Training(network(), recipe, len(batches_of(recipe)), SHARES, WEIGHTS, graders)
 
 
 def run(made, until=None, rank=0, size=1):
@@ -139,7 +140,7 @@ def test_a_damaged_state_is_refused(content, tmp_path):
 
 def test_a_state_of_another_network_is_refused(tmp_path):
     training().save(tmp_path / "state.pt", {})
-    other = Training(Network(NetworkShape.uniform(depth=2, width=4, classes=2)), Recipe(), 5, SHARES)
+    other = Training(Network(NetworkShape.uniform(depth=2, width=4, classes=2)), Recipe(), 5, SHARES, WEIGHTS)
     with pytest.raises(InputError, match="another training"):
         other.load(read_state(tmp_path / "state.pt"))
 
