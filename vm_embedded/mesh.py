@@ -119,29 +119,33 @@ def ring_mesh(shape: Shape, height: float, intersections: float, max_distance: f
 def _ring_neighbors(counts: Indices, start: Indices, j: Indices, width: int) -> Indices:
     """Neighbor table (n + 1, width) of rings of `counts` points from `start` on; j is a point's place in its ring."""
     missing = int(start[-1])
-    fraction = j / np.repeat(counts, counts)  # and not whole numbers, because that is what the reference rounds
 
-    def around(rings: slice, index: Indices) -> Indices:
-        """Points at a place in another ring; the place after its last is its first."""
-        first, size = np.repeat(padded_start[rings], counts), np.repeat(padded_counts[rings], counts)
+    def of_rings(values: Indices) -> Indices:
+        """A value of each ring, for each of its points."""
+        return np.repeat(values, counts)
+
+    def around(first: Indices, size: Indices, index: Indices) -> Indices:
+        """Points at a place in a ring; the place after its last is its first."""
         return np.where(index == size, first, first + index)
 
     padded_counts, padded_start = np.pad(counts, 1, constant_values=1), np.pad(start, (1, 0))
-    inner, own, outer = slice(0, len(counts)), slice(1, len(counts) + 1), slice(2, len(counts) + 2)
-    out_position = fraction * np.repeat(padded_counts[outer], counts)
-    in_position = fraction * np.repeat(padded_counts[inner], counts)
+    inner, own, outer = (
+        (of_rings(padded_start[at : at + len(counts)]), of_rings(padded_counts[at : at + len(counts)]))
+        for at in range(3)
+    )
+    fraction = j / own[1]  # and not whole numbers, because that is what the reference rounds
+    out_position, in_position = fraction * outer[1], fraction * inner[1]
     out_floor, in_floor = out_position.astype(np.int32), in_position.astype(np.int32)
 
     neighbors = np.empty((missing + 1, width), dtype=np.int32)
-    own_size = np.repeat(counts, counts)
-    left = around(own, np.where(j == 0, own_size, j) - 1)
-    right = around(own, j + 1)
+    left = around(*own, np.where(j == 0, own[1], j) - 1)
+    right = around(*own, j + 1)
     if width in (4, 8):  # halves are rounded upwards, as C's round does for these positive numbers
-        top = around(outer, np.floor(out_position + 0.5).astype(np.int32))
-        bottom = around(inner, np.floor(in_position + 0.5).astype(np.int32))
+        top = around(*outer, np.floor(out_position + 0.5).astype(np.int32))
+        bottom = around(*inner, np.floor(in_position + 0.5).astype(np.int32))
     if width in (6, 8):
-        top_left, top_right = around(outer, out_floor), around(outer, out_floor + 1)
-        bottom_left, bottom_right = around(inner, in_floor), around(inner, in_floor + 1)
+        top_left, top_right = around(*outer, out_floor), around(*outer, out_floor + 1)
+        bottom_left, bottom_right = around(*inner, in_floor), around(*inner, in_floor + 1)
     columns: list[Indices]
     if width == 4:
         columns, outwards = [left, top, right, bottom], [1]

@@ -22,12 +22,14 @@ from .llvm import find_llvm, load_mitsuba
 from .plots import load_matplotlib, plot
 from .progress import Ticker
 from .report import as_json, complaints, tables
-from .sections import documented, read_sections
+from .sections import documented, overrides_of, read_sections
 from .sheet import cell, chosen, read_shown, sheet
 from .stopping import stoppable
 from .workers import Done, Job, render_all
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
+
+_EXAMPLE = "camera.picture_width=1280"
 
 _EPILOG = """\
 other commands, each with a --help of its own:
@@ -53,6 +55,13 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--hdri", type=Path, required=True, metavar="DIR", help="folder of maps (.hdr, .exr, .pfm)")
     made.add_argument("--seed", type=_whole, default=0, metavar="S", help="same seed, same pictures; default 0")
     made.add_argument("--config", type=Path, metavar="FILE", help="scene.toml; what it leaves out keeps its default")
+    made.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="SECTION.ENTRY=VALUE",
+        help=f"override an entry of the configuration, as in --set {_EXAMPLE}; give it once for each",
+    )
     made.add_argument("--workers", type=_whole, metavar="W", help="processes, of one core each; default all cores")
     made.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="render only part I of N, 1 to N")
     made.add_argument("--held-out", action="store_true", help="render only the maps that are held out for testing")
@@ -147,7 +156,7 @@ def _render(options: argparse.Namespace) -> int:
     workers = len(os.sched_getaffinity(0)) if options.workers is None else options.workers
     if workers < 1 or options.count < 1:
         raise InputError("--workers and --count must be at least 1")
-    configuration = read_sections(SceneConfiguration, options.config)
+    configuration = read_sections(SceneConfiguration, options.config, overrides_of(options.set, _EXAMPLE))
     find_llvm()
     chosen_maps = find_maps(options.hdri, configuration.maps, options.held_out)
     absentees = absent(options.hdri, configuration.maps)

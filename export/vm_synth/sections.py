@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -33,6 +33,22 @@ def read_sections(
         return read
     except VisualMeshError as error:
         raise InputError(f"configuration {path}: {error}" if path else f"configuration: {error}") from error
+
+
+def overrides_of(given: Sequence[str], example: str) -> dict[str, dict[str, Any]]:
+    """Sections of entries from SECTION.ENTRY=VALUE; a value is as in TOML, or a plain word. Raises InputError."""
+    sections: dict[str, dict[str, Any]] = {}
+    for each in given:
+        path, equals, text = each.partition("=")
+        section, dot, entry = path.strip().partition(".")
+        if not (equals and dot and entry):
+            raise InputError(f"--set {each!r} is not like {example}")
+        try:
+            value = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            value = text.strip()
+        sections.setdefault(section, {})[entry] = value
+    return sections
 
 
 def _table(path: Path) -> dict[str, Any]:

@@ -7,17 +7,16 @@ import os
 import shutil
 import signal
 import sys
-import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable
 from vm_synth.progress import Ticker
-from vm_synth.sections import documented, read_sections
+from vm_synth.sections import documented, overrides_of, read_sections
 from vm_synth.stopping import stoppable
 
 from . import check as checking
@@ -91,23 +90,7 @@ def _on_request() -> Iterator[Callable[[], bool]]:
 
 
 def _configuration(options: argparse.Namespace) -> TrainConfiguration:
-    return read_sections(TrainConfiguration, options.config, _overrides(options.set))
-
-
-def _overrides(given: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Sections of entries from SECTION.ENTRY=VALUE; a value is as in TOML, or a plain word."""
-    sections: dict[str, dict[str, Any]] = {}
-    for each in given:
-        path, equals, text = each.partition("=")
-        section, dot, entry = path.strip().partition(".")
-        if not (equals and dot and entry):
-            raise InputError(f"--set {each!r} is not like training.epochs=5")
-        try:
-            value = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
-            value = text.strip()
-        sections.setdefault(section, {})[entry] = value
-    return sections
+    return read_sections(TrainConfiguration, options.config, overrides_of(options.set, "training.epochs=5"))
 
 
 def _train(options: argparse.Namespace) -> int:

@@ -22,7 +22,7 @@ class Recipe:
     batch: int = number(8, "pictures in a step, over all processes", "", (1, 1e5))
     window: float = number(
         1.0,
-        "looks are at windows of pictures, of this share of width and height; half of them show an object if the "
+        "looks are at windows of pictures, of this share of width and height; most of them show an object if the "
         "picture does",
         "",
         (0.05, 1.0),

@@ -117,14 +117,13 @@ class Training:
         chosen = selected(graph.labels, self._shares, np.concatenate(draws), chances)
         with torch.autocast(torch.device(self._device).type, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
             logits = self.network.logits(points, neighbors)
-        wanted = torch.from_numpy(np.flatnonzero(chosen)).to(self._device)
-        labels = torch.from_numpy(graph.labels[chosen].astype(np.int64)).to(self._device)
-        single = nn.functional.cross_entropy(logits[wanted].float(), labels, reduction="none")
+        labels = torch.from_numpy(np.where(chosen, graph.labels, -1).astype(np.int64)).to(self._device)
+        single = nn.functional.cross_entropy(logits[:-1].float(), labels, ignore_index=-1, reduction="none")
         if self.recipe.loss == "focal":
             # Not 0, where the gradient of a power below 1 is none.
             single = (-torch.expm1(-single)).clamp(min=1e-7) ** self.recipe.gamma * single
-        weights = self._weights[labels]
-        return single @ weights, float(weights.sum()), len(wanted)
+        weights = torch.where(labels >= 0, self._weights[labels], 0.0)
+        return single @ weights, float(weights.sum()), int(chosen.sum())
 
     @torch.no_grad()
     def _chances(self, points: torch.Tensor, neighbors: torch.Tensor, graph: Graph) -> Floats:

@@ -1,7 +1,7 @@
 """Windows of pictures: a training that looks at parts learns as much from fewer points.
 
-Most of a picture is lawn. A window of half its width and height has a quarter of its points, and if every other window
-is put over an object, four times as many pictures are looked at in the same time. To the network it is the picture of a
+Most of a picture is lawn. A window of half its width and height has a quarter of its points, and if most windows
+are put over an object, several times as many objects are seen in the same time. To the network it is the picture of a
 smaller camera.
 """
 
@@ -17,14 +17,14 @@ from vm_embedded.lens_opencv import CalibratedLens
 
 from .pictures import Picture
 
-AIMED = 0.5
+AIMED = 0.75
 """Share of the windows that show a pixel of an object, where the picture has one."""
 
 
 def window_of(picture: Picture, share: float, objects: Sequence[int], random: np.random.Generator) -> Picture:
     """A window of a picture, of a share of its width and height; the same object if the share is 1.
 
-    objects: positions of the classes that half of the windows are put over.
+    objects: positions of the classes that most windows are put over.
     """
     if share >= 1.0:
         return picture

@@ -3,8 +3,7 @@
 import pytest
 
 from vm_embedded.errors import InputError
-from vm_synth.sections import documented, read_sections
-from vm_train.cli import _overrides
+from vm_synth.sections import documented, overrides_of, read_sections
 from vm_train.configuration import TrainConfiguration
 from vm_train.recipe import Recipe
 
@@ -66,7 +65,7 @@ def test_what_is_wrong_is_said(write, text, said):
 
 def test_entries_can_be_overridden(write):
     path = write("[training]\nepochs = 3\nbatch = 2\n")
-    given = _overrides(["training.epochs=7", "training.selection=balanced", "mesh.radius = 0.1"])
+    given = overrides_of(["training.epochs=7", "training.selection=balanced", "mesh.radius = 0.1"], "a.b=c")
     found = read_sections(TrainConfiguration, path, given)
     assert (found.training.epochs, found.training.batch) == (7, 2)
     assert (found.training.selection, found.mesh.radius) == ("balanced", 0.1)
@@ -75,7 +74,7 @@ def test_entries_can_be_overridden(write):
 @pytest.mark.parametrize("text", ["epochs=7", "training.epochs", "training.=7", "=7"])
 def test_an_override_that_is_none_is_refused(text):
     with pytest.raises(InputError, match=r"training\.epochs=5"):
-        _overrides([text])
+        overrides_of([text], "training.epochs=5")
 
 
 def test_only_hard_selection_has_rounds():

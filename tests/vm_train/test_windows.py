@@ -27,13 +27,13 @@ def test_a_window_shows_what_lies_in_the_same_directions(lens, share, seed):
     assert part.lens.orientation is whole.lens.orientation
 
 
-def test_every_other_window_is_put_over_an_object():
+def test_most_windows_are_put_over_an_object():
     shown = picture()
     shown.labels[:] = 1
     shown.labels[5, 90] = 0
     random = np.random.default_rng(3)
     share = np.mean([(window_of(shown, 0.2, [0], random).labels == 0).any() for _ in range(600)])
-    assert share == pytest.approx(0.5, abs=0.08)
+    assert share == pytest.approx(0.76, abs=0.06)
 
 
 def test_the_whole_picture_stays_as_it_is():
