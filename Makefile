@@ -7,8 +7,12 @@ OUT ?= data/train
 COUNT ?= 8000
 SEED ?= 1
 COMPARED ?= build/compare
+SCENES ?= export/vm_synth/polyhaven.toml
+NETWORKS := ball-5x4 ball-9x4 ball-best
+BUILD ?= build/networks
+TEST ?= data/test
 
-.PHONY: help setup demo test lint bench bench-synth bench-train compare data fixtures docs clean
+.PHONY: help setup demo test lint bench bench-synth bench-train data networks test-data score compare choices fixtures docs clean
 .DELETE_ON_ERROR:
 
 help: ## what can be made
@@ -17,7 +21,7 @@ help: ## what can be made
 setup: .venv/dev ## everything for developing: runtime, torch, tests
 
 demo: .venv/runtime ## find the balls in the frames of the repository
-	@$(BIN)/vm-detect --camera $(DEMO) --model $(DEMO)/ball.onnx --save-overlay demo-out
+	@$(BIN)/vm-detect --camera $(DEMO) --save-overlay demo-out
 	@echo "Annotated pictures: $(CURDIR)/demo-out/"
 
 test: lint ## lint, types and tests
@@ -32,9 +36,25 @@ bench: .venv/bench ## measure against the plain graph and the peers; write resul
 	$(BIN)/python -m benchmarks.run
 	$(BIN)/python -m benchmarks.report
 
-data: .venv/synth ## render a training set: make data HDRI=folder-of-maps [OUT=data/train] [COUNT=8000] [SEED=1]
+data: .venv/synth ## render a training set: make data HDRI=folder-of-maps [OUT=data/train] [COUNT=8000] [SEED=1] [SCENES=a.toml]
 	@test -n "$(HDRI)" || { echo 'make data needs HDRI=folder-of-maps'; exit 1; }
-	$(BIN)/vm-synth $(OUT) --count $(COUNT) --hdri $(HDRI) --seed $(SEED) --config export/vm_synth/polyhaven.toml
+	$(BIN)/vm-synth $(OUT) --count $(COUNT) --hdri $(HDRI) --seed $(SEED) --config $(SCENES)
+
+networks: .venv/dev ## the networks of the package, from seeds: make networks HDRI=folder-of-maps (hours)
+	$(MAKE) data OUT=data/soccer COUNT=8000 SEED=1 SCENES=export/vm_synth/soccer.toml
+	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
+
+vm_embedded/models/%.onnx: export/networks/%.toml
+	if test -e $(BUILD)/$*/run.json; then $(BIN)/vm-train resume $(BUILD)/$*; \
+		else $(BIN)/vm-train data/soccer -o $(BUILD)/$* --config $< --unpacked $(BUILD)/unpacked; fi
+	$(BIN)/vm-export $(BUILD)/$*/model.pt --layout runs -o $@
+
+test-data: .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
+	$(BIN)/python -m benchmarks.test_data $(HDRI) $(TEST)
+
+score: .venv/dev ## how good the networks of the package are: make score [TEST=data/test] (10 minutes)
+	$(BIN)/python -m benchmarks.shipped $(TEST)/maps $(TEST)/grid
+	$(BIN)/python -m benchmarks.shipped_report
 
 bench-synth: .venv/synth ## measure vm-synth: make bench-synth HDRI=folder-of-maps (8 minutes)
 	$(BIN)/python -m benchmarks.synth $(HDRI)
@@ -46,8 +66,12 @@ compare: .venv/dev ## compare selections and meshes: make compare DATA=set HELD_
 	$(BIN)/python -m benchmarks.comparison $(DATA) $(HELD_OUT) $(COMPARED)
 	$(BIN)/python -m benchmarks.comparison_report
 
-fixtures: .venv/dev ## draw the demo's frames and train its network again (about 20 minutes)
-	$(BIN)/python -m tests.fixtures.make_demo
+choices: .venv/dev ## what each choice of a training brings: make choices [TEST=data/test], after networks and test-data (hours)
+	$(BIN)/python -m benchmarks.choices data/soccer $(TEST)/maps build/choices
+	$(BIN)/python -m benchmarks.choices_report
+
+fixtures: .venv/dev ## draw the frames of the tests and train their network again (about 20 minutes)
+	$(BIN)/python -m tests.fixtures.make_drawn
 
 docs: .venv/dev demo ## write the help texts and the demo's picture in docs/ again
 	$(BIN)/python docs/help_pages.py

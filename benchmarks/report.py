@@ -66,14 +66,15 @@ def whole_calls(found: dict[str, Any]) -> str:
     return table(heads, rows)
 
 
-def with_a_ball(found: dict[str, Any]) -> str:
-    row = found["with_a_ball"]
-    heads = ["points", "found", *row["stages_ms"], "total", "p99"]
-    values = [ms(value) for value in row["stages_ms"].values()]
-    return table(
-        heads,
-        [[str(row["points"]), str(row["found"]), *values, ms(row["total"]["p50"]), ms(row["total"]["p99"])]],
-    )
+def shipped(found: dict[str, Any]) -> str:
+    rows = []
+    for name, row in found["shipped"].items():
+        stages = [ms(value) for value in row["stages_ms"].values()]
+        rows.append(
+            [name, str(row["points"]), str(row["found"]), *stages, ms(row["total"]["p50"]), ms(row["total"]["p99"])]
+        )
+    stages = next(iter(found["shipped"].values()))["stages_ms"]
+    return table(["network", "points", "found", *stages, "whole call", "p99"], rows)
 
 
 def peers(found: dict[str, Any]) -> str:
@@ -128,7 +129,7 @@ TABLES = {
     "machine": machine,
     "sessions": sessions,
     "whole-calls": whole_calls,
-    "with-a-ball": with_a_ball,
+    "shipped": shipped,
     "peers": peers,
     "growth": growth,
     "walks": walks,

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.demo import FOLDER, IMAGES, MODEL, TRUTH
+from tests.drawn_scenes import FOLDER, IMAGES, MODEL, TRUTH
 from vm_embedded.cli import parser
 from vm_embedded.settings import Settings
 
@@ -43,7 +43,7 @@ def lines(done):
 
 @pytest.fixture
 def folder(tmp_path):
-    """A directory with two of the demo's frames and their lens files."""
+    """A directory with two of the drawn frames and their lens files."""
     target = tmp_path / "frames"
     target.mkdir()
     for image in IMAGES[:2]:
@@ -60,7 +60,7 @@ def lens(tmp_path_factory):
     return path
 
 
-def test_the_demo_s_balls_are_found():
+def test_the_balls_of_the_drawn_frames_are_found():
     truth = json.loads(TRUTH.read_text())
     false = 0
     for line in lines(detect(FOLDER)):

@@ -28,6 +28,7 @@ LAYERS = [
         "lens_file",
         "settings",
         "objects",
+        "shipped",
     },
     {"cache", "session"},
     {"detector"},

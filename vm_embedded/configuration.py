@@ -1,6 +1,6 @@
 """vm.toml and what else says how a detector is to be run, checked at the border.
 
-model = "ball.onnx"             # paths count from the file's own folder
+model = "ball.onnx"             # paths count from the file's own folder; or a network of the package, "ball-9x4"
 lens = "lens.yaml"              # or a table: [lens] projection = ..., see lens_file.py
 [orientation]
 height = 0.8                    # [m]
@@ -24,6 +24,7 @@ from .errors import InputError, VisualMeshError, unknown
 from .lens import Lens
 from .lens_file import lens_from_table, read_lens_file
 from .settings import Settings, check_setting
+from .shipped import model_path
 
 _KEYS = ("model", "lens", "orientation", "detector")
 _ANGLES = ("height", "pitch", "roll")
@@ -78,7 +79,7 @@ def _configuration(table: Mapping[str, Any], folder: Path) -> Configuration:
     elif lens is not None:
         lens = lens_from_table(_table(table, "lens"))
     return Configuration(
-        model=None if model is None else folder / model,
+        model=None if model is None else folder / model_path(model),
         lens=lens,
         height=length(orientation["height"]) if "height" in orientation else None,
         pitch=angle(orientation["pitch"]) if "pitch" in orientation else None,

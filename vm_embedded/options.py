@@ -12,6 +12,7 @@ from .lens import Lens
 from .lens_file import read_lens_file
 from .orientation import Orientation
 from .settings import Settings
+from .shipped import DEFAULT, SHIPPED, model_path
 
 ANGLES = (
     "Angles are radians, or degrees with a suffix as in 20deg; negative ones in degrees need an equals sign, "
@@ -35,7 +36,12 @@ class Given:
 
 def add_model(parser: argparse.ArgumentParser) -> None:
     """The options --model and --config."""
-    parser.add_argument("--model", type=Path, metavar="FILE", help="network that vm-export wrote (.onnx)")
+    parser.add_argument(
+        "--model",
+        metavar="MODEL",
+        help=f"network that vm-export wrote (.onnx), or {', '.join(SHIPPED[:-1])} or {SHIPPED[-1]}, which come with "
+        f"the package; default {DEFAULT}",
+    )
     parser.add_argument("--config", type=Path, metavar="FILE", help="vm.toml; options on the command line override it")
 
 
@@ -68,14 +74,12 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 def read_options(options: argparse.Namespace) -> Given:
     """What the command line and the configuration say together. Raises InputError."""
     configured = read_configuration(options.config) if options.config else Configuration()
-    model = options.model or configured.model
-    if model is None:
-        raise InputError("no model: give --model FILE, a network that vm-export wrote")
+    model = configured.model if options.model is None else model_path(options.model)
     given = {each.name: getattr(options, each.name) for each in fields(Settings)}
     settings = {**configured.settings, **{name: value for name, value in given.items() if value is not None}}
     file = read_lens_file(options.lens) if options.lens else None
     return Given(
-        model,
+        model or model_path(DEFAULT),
         file.lens if file else configured.lens,
         _orientation(options, configured),
         Settings(**settings),

@@ -130,9 +130,9 @@ class ObjectScores:
     def _rules(self) -> tuple[Any, ...]:
         return self.distance_edges.tolist(), self.overlaps, self.min_visible, self.min_radius
 
-    def ranking(self, overlap: float, distance_bin: int | None = None) -> ObjectRanking:
-        """Ranking at one of the overlaps, of all objects or of those in a distance bin, counted from 0. Raises
-        InputError for an overlap that was not asked for."""
+    def ranking(self, overlap: float, distance_bin: int | range | None = None) -> ObjectRanking:
+        """Ranking at one of the overlaps, of all objects or of those in a distance bin or several, counted from 0.
+        Raises InputError for an overlap that was not asked for."""
         if overlap not in self._finds:
             raise InputError(f"overlap {overlap:g} was not scored, only {list(self.overlaps)}")
         finds = self._finds[overlap]
@@ -150,12 +150,13 @@ class ObjectScores:
             pictures=self.pictures,
         )
 
-    def _within(self, distances: Floats, distance_bin: int | None) -> Mask:
-        """Which distances (n,) are in a bin; all if it is None."""
+    def _within(self, distances: Floats, distance_bin: int | range | None) -> Mask:
+        """Which distances (n,) are in a bin or several; all if it is None."""
         if distance_bin is None:
             return np.ones(len(distances), dtype=bool)
-        number = range(len(self.distance_edges) - 1)[distance_bin]
-        return np.asarray(bins_of(distances, self.distance_edges) == number)
+        bins = range(len(self.distance_edges) - 1)
+        numbers = distance_bin if isinstance(distance_bin, range) else [bins[distance_bin]]
+        return np.isin(bins_of(distances, self.distance_edges), numbers)
 
 
 def chosen(overlap: Floats, threshold: float) -> list[int | None]:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.demo import FOLDER, IMAGES, MODEL
+from tests.drawn_scenes import FOLDER, IMAGES, MODEL
 from vm_embedded import Detector, InputError, Orientation, Rectilinear, Settings, read_lens_file
 from vm_embedded.bench import STAGES, cold, drawn_image, measure, walk
 from vm_embedded.configuration import read_configuration

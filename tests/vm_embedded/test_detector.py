@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from onnx import helper
 
 import vm_embedded
-from tests.demo import CHECKPOINT, FOLDER, IMAGES, MODEL
+from tests.drawn_scenes import CHECKPOINT, FOLDER, IMAGES, MODEL
 from vm_embedded import Detector, GeometryError, InputError, ModelError, Orientation, Settings, read_lens_file
 from vm_embedded.layout import PlainLayout, RunsLayout, laid_out
 from vm_embedded.manifest import LAYOUTS, METADATA_KEY
@@ -31,7 +31,7 @@ def detector():
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory):
-    """The demo's network in every layout."""
+    """The drawn frames' network in every layout."""
     folder = tmp_path_factory.mktemp("models")
     for layout in LAYOUTS:
         export(Checkpoint.load(CHECKPOINT), folder / f"{layout}.onnx", layout)

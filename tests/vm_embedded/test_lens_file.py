@@ -88,8 +88,8 @@ def test_real_lens_files_are_read(shared, folder):
         assert_read_as_written(path)
 
 
-def test_the_lens_files_of_the_demo_are_read():
-    paths = sorted((FIXTURES / "demo").glob("lens*.yaml"))
+def test_the_lens_files_of_the_drawn_frames_are_read():
+    paths = sorted((FIXTURES / "drawn").glob("lens*.yaml"))
     assert paths
     for path in paths:
         assert_read_as_written(path)

@@ -1,8 +1,8 @@
-"""Paths of the demo's files, which the repository holds."""
+"""Paths of drawn scenes and of a network that was trained on such, which the repository holds."""
 
 from pathlib import Path
 
-FOLDER = Path(__file__).parent / "fixtures" / "demo"
+FOLDER = Path(__file__).parent / "fixtures" / "drawn"
 MODEL = FOLDER / "ball.onnx"
 CHECKPOINT = FOLDER / "ball.pt"
 IMAGES = sorted(FOLDER.glob("image*.jpg"))

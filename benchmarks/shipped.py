@@ -1,0 +1,136 @@
+"""How good the networks of the package are: `make score TEST=... [GRID=...]`.
+
+TEST is a set of vm-synth of maps that no training saw. GRID is a folder of such sets, one for each lens, size of the
+picture and height, as `make test-data` renders them. Writes benchmarks/shipped.json, from which
+benchmarks/shipped_report.py makes tables, plots and model cards, and the sheet of the worst errors.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from vm_embedded.settings import Settings
+from vm_embedded.shipped import DEFAULT, SHIPPED, model_path
+from vm_train.configuration import ClassTable
+from vm_train.evaluation import Evaluation, Rules
+from vm_train.evaluation_workers import Job, evaluate
+from vm_train.object_scores import ObjectScores
+from vm_train.oddities import Oddity
+from vm_train.oddity_pictures import drawn
+from vm_train.pictures import find_pictures
+
+HERE = Path(__file__).parent
+RESULTS = HERE / "shipped.json"
+WORST = HERE.parent / "docs" / "worst.jpg"
+NETWORKS = HERE.parent / "export" / "networks"
+FRAMES_AN_HOUR = 30 * 3600
+RANGES = {"0.5 to 6 m": range(1, 12), "6 to 10 m": range(12, 20), "1 to 6 m": range(2, 12)}
+"""Bins of half a meter."""
+
+METERS = {f"{near} to {near + 1} m": range(2 * near, 2 * near + 2) for near in range(10)}
+CANDIDATES = Settings(threshold=0.2, min_inside=0.05, max_around=0.95)
+"""Reports whatever may be a ball, for curves over all confidences."""
+
+
+def evaluation(model: Path, folder: Path, settings: Settings) -> Evaluation:
+    """What comes of a network on a folder of vm-synth, each picture with a mesh for its own ball."""
+    table = tomllib.loads((NETWORKS / "ball-5x4.toml").read_text())["classes"]
+    job = Job(model, settings, False, ClassTable.from_table(table).seen_as(), Rules("scene"))
+    subject = job.subject()
+    return evaluate(job, subject, find_pictures(folder), len(os.sched_getaffinity(0)), lambda: None)
+
+
+def numbers(scores: ObjectScores, bins: range | None, overlap: float = 0.5) -> dict[str, Any]:
+    """Average precision, recall, precision and errors of distance of the balls in some bins."""
+    ranking = scores.ranking(overlap, bins)
+    outcome, errors = ranking.at(), ranking.errors()
+    found = {
+        "balls": ranking.truths,
+        "average_precision": ranking.precision_recall.average_precision,
+        "recall": outcome.recall,
+        "precision": outcome.precision,
+        "false_per_picture": outcome.false_per_picture,
+        "distance_error": errors.relative_median,
+    }
+    return {name: None if np.isnan(value) else round(float(value), 5) for name, value in found.items()}
+
+
+def scores_of(model: Path, folder: Path) -> tuple[dict[str, Any], Evaluation]:
+    """All numbers of a network on a test set: as it is used, and over all confidences."""
+    used, ranked = (evaluation(model, folder, each) for each in (Settings(), CANDIDATES))
+    ball, curve = used.objects["ball"], ranked.objects["ball"]
+    found: dict[str, Any] = {
+        "pictures": ball.pictures,
+        "points_average_precision": round(used.points.ranking("ball").precision_recall.average_precision, 5),
+        "all": numbers(ball, None),
+        "false_an_hour": round(FRAMES_AN_HOUR * ball.ranking(0.5).at().false_per_picture),
+    }
+    for kind, scores in (("used", ball), ("ranked", curve)):
+        for overlap in (0.5, 0.75):
+            found[f"{kind} {overlap}"] = {
+                name: numbers(scores, bins, overlap) for name, bins in (RANGES | METERS).items()
+            }
+    found["curve"] = _curve(curve)
+    return found, used
+
+
+def _curve(scores: ObjectScores) -> list[list[float]]:
+    """Confidence, precision and recall, at two hundred places or fewer."""
+    curve = scores.ranking(0.5).precision_recall
+    chosen = np.unique(np.linspace(0, len(curve.recall) - 1, 200).astype(int)) if len(curve.recall) else []
+    return [[round(float(each[at]), 4) for each in (curve.thresholds, curve.precision, curve.recall)] for at in chosen]
+
+
+def sheet(result: Evaluation, count: int = 20) -> tuple[np.ndarray, list[str]]:
+    """The worst errors of an evaluation, half of them missed and half of them false, and what they are."""
+    missed, false = result.oddities.missed[: count // 2], result.oddities.false[: count // 2]
+    cells, words = [], []
+    for number, each in enumerate((*missed, *false), 1):
+        cells.append(_numbered(drawn(each), number))
+        words.append(_said(each, missed=number <= len(missed)))
+    width = max(cell.shape[1] for cell in cells)
+    cells = [cv2.copyMakeBorder(cell, 2, 2, 2, width - cell.shape[1] + 2, cv2.BORDER_CONSTANT) for cell in cells]
+    cells += [np.zeros_like(cells[0])] * (-len(cells) % 4)
+    return np.vstack([np.hstack(cells[start : start + 4]) for start in range(0, len(cells), 4)]), words
+
+
+def _numbered(cell: np.ndarray, number: int) -> np.ndarray:
+    for shade, thickness in ((0, 4), (255, 2)):
+        cv2.putText(cell, str(number), (6, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (shade,) * 3, thickness, cv2.LINE_AA)
+    return cell
+
+
+def _said(oddity: Oddity, missed: bool) -> str:
+    name = oddity.files.image.stem
+    return f"{name}: missed, {oddity.radius:.0f} px" if missed else f"{name}: false, confidence {oddity.rank:.2f}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("test", type=Path, help="set of vm-synth of other maps")
+    parser.add_argument("grid", type=Path, nargs="?", help="folder of sets LENS-SIZE-HEIGHT")
+    options = parser.parse_args()
+    found: dict[str, Any] = {"networks": {}, "grid": {}}
+    for name in SHIPPED:
+        found["networks"][name], used = scores_of(model_path(name), options.test)
+        print(name, json.dumps(found["networks"][name]["used 0.5"]), flush=True)
+        if name == DEFAULT:
+            picture, found["worst"] = sheet(used)
+            cv2.imwrite(str(WORST), picture, [cv2.IMWRITE_JPEG_QUALITY, 80])
+    for folder in sorted(options.grid.iterdir()) if options.grid else ():
+        used = evaluation(model_path(DEFAULT), folder, Settings())
+        found["grid"][folder.name] = numbers(used.objects["ball"], None)
+        print(folder.name, found["grid"][folder.name], flush=True)
+    RESULTS.write_text(json.dumps(found) + "\n")
+
+
+if __name__ == "__main__":
+    main()

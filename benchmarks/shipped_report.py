@@ -1,0 +1,183 @@
+"""Tables, plots and model cards from benchmarks/shipped.json: `python -m benchmarks.shipped_report`."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.report import table
+from benchmarks.shipped import METERS, NETWORKS, RANGES, RESULTS
+from vm_embedded.onnx_file import read_model
+from vm_embedded.shipped import DEFAULT, model_path
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGE = DOCS / "results.md"
+COLORS = {"ball-5x4": "#7570b3", "ball-9x4": "#d95f02", "ball-best": "#1b9e77"}
+
+
+def number(value: float | None, digits: int = 2, unit: float = 1.0) -> str:
+    return "-" if value is None else f"{unit * value:.{digits}f}"
+
+
+def networks(found: dict[str, Any]) -> str:
+    """All networks in one table: balls within some ranges, as used and over all confidences."""
+    rows = []
+    for name, scores in found["networks"].items():
+        used, ranked = scores["used 0.5"], scores["ranked 0.5"]
+        near, far = "0.5 to 6 m", "6 to 10 m"
+        rows.append(
+            [
+                name,
+                *(number(ranked[each]["average_precision"], 3) for each in (near, far)),
+                *(number(scores["ranked 0.75"][each]["average_precision"], 3) for each in (near, far)),
+                *(number(used[each]["recall"], 1, 100.0) for each in (near, far)),
+                number(scores["all"]["false_per_picture"], 3),
+                number(used[near]["distance_error"], 2, 100.0),
+            ]
+        )
+    heads = ["network", "AP50, 0.5 to 6 m", "6 to 10 m", "AP75, 0.5 to 6 m", "6 to 10 m"]
+    heads += ["found [%], 0.5 to 6 m", "6 to 10 m", "false a picture", "error of distance [%]"]
+    return table(heads, rows)
+
+
+def grid(found: dict[str, Any]) -> str:
+    """The default network on each lens, size and height: balls found, false ones, average precision."""
+    heights = sorted({name.rsplit("-", 1)[1] for name in found["grid"]}, key=float)
+    cells = sorted({name.rsplit("-", 1)[0] for name in found["grid"]}, key=lambda name: (name.split("-")[0], len(name)))
+    rows = []
+    for cell in cells:
+        lens, size = cell.split("-")
+        row = [f"{lens}, {size.replace('x', ' x ')}"]
+        for height in heights:
+            scores = found["grid"].get(f"{cell}-{height}")
+            shown = (
+                ("-", "-")
+                if scores is None
+                else (number(scores["recall"], 0, 100.0), number(scores["false_per_picture"]))
+            )
+            row.append(" / ".join(shown))
+        rows.append(row)
+    return table(["lens, picture [px]", *(f"{height} m" for height in heights)], rows)
+
+
+def by_distance(found: dict[str, Any], name: str) -> str:
+    """Average precision of one network over distance."""
+    scores = found["networks"][name]
+    rows = []
+    for meters in METERS:
+        row = scores["ranked 0.5"][meters]
+        rows.append(
+            [
+                meters,
+                number(row["balls"], 0),
+                number(row["average_precision"], 3),
+                number(scores["ranked 0.75"][meters]["average_precision"], 3),
+                number(scores["used 0.5"][meters]["recall"], 1, 100.0),
+                number(scores["used 0.5"][meters]["distance_error"], 2, 100.0),
+            ]
+        )
+    return table(["distance", "balls", "AP50", "AP75", "found [%]", "error of distance [%]"], rows)
+
+
+def plot(found: dict[str, Any]) -> None:
+    """Precision over recall, and average precision over distance."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 4.4), layout="constrained")
+    curves, distances = figure.subplots(1, 2)
+    middles = np.arange(len(METERS)) + 0.5
+    for name, scores in found["networks"].items():
+        _, precision, recall = np.array(scores["curve"]).T
+        curves.plot(recall, precision, color=COLORS[name], label=name)
+        for overlap, style in ((0.5, "-"), (0.75, ":")):
+            values = [scores[f"ranked {overlap}"][meters]["average_precision"] for meters in METERS]
+            distances.plot(middles, np.array(values, float), style, color=COLORS[name], label=f"IoU {overlap:g}")
+    curves.set_xlabel("recall of balls, IoU 0.5")
+    curves.set_ylabel("precision")
+    distances.set_xlabel("distance on the plane [m]")
+    distances.set_ylabel("average precision (dotted: IoU 0.75)")
+    for axes in (curves, distances):
+        axes.set_ylim(0.0, 1.02)
+        axes.set_xlim(left=0.0)
+        axes.grid(alpha=0.25)
+        axes.spines[["top", "right"]].set_visible(False)
+    curves.legend(frameon=False, loc="lower left")
+    with matplotlib.rc_context({"svg.hashsalt": "shipped"}):
+        figure.savefig(DOCS / "networks.svg", metadata={"Date": None})
+
+
+def card(found: dict[str, Any], name: str) -> str:
+    """What a network is, what it was made of, how good it is and what it can't do."""
+    model = read_model(model_path(name))
+    manifest = model.manifest
+    configuration = tomllib.loads((NETWORKS / f"{name}.toml").read_text())
+    depth, width = (configuration["network"][each] for each in ("depth", "width"))
+    scores = found["networks"][name]
+    provenance = manifest.provenance
+    ranges = table(
+        ["distance", "balls", "AP50", "AP75", "found [%]"],
+        [
+            [
+                each,
+                number(scores["ranked 0.5"][each]["balls"], 0),
+                number(scores["ranked 0.5"][each]["average_precision"], 3),
+                number(scores["ranked 0.75"][each]["average_precision"], 3),
+                number(scores["used 0.5"][each]["recall"], 1, 100.0),
+            ]
+            for each in RANGES
+        ],
+    )
+    return f"""# {name}
+
+Finds balls on a soccer field. {depth} graph convolutions of {width} channels, SELU, {manifest.operations} multiplications
+and additions a point; ring6 mesh with k = {manifest.intersections:g} out to {manifest.max_distance:g} m, for balls of any
+radius (`--object-radius`, {manifest.object_radius:g} m if nothing is said). Classes: ball, other.
+
+- **Made from** {provenance["training_pictures"]} rendered pictures (`export/vm_synth/soccer.toml`, seed 1; 30 maps), chosen
+  by {provenance["validation_pictures"]} others, epoch {provenance["epoch"]} of {provenance["epochs"]}, seed {provenance["seed"]}; configuration
+  `export/networks/{name}.toml`.
+- **Made by** `make networks HDRI=folder-of-maps`. SHA-256 {model.sha256}.
+
+On {scores["pictures"]} rendered pictures of six maps that it has not seen, 1280 x 1024 px, balls of 0.05 to 0.12 m:
+
+{ranges}
+
+{scores["all"]["false_per_picture"]:.3f} false balls a picture with the default settings. The median error of distance of balls from 0.5 to 6 m is
+{100 * scores["used 0.5"]["0.5 to 6 m"]["distance_error"]:.1f} %. docs/results.md has more.
+
+**Limits.** Trained on rendered pictures alone, with balls that are mostly white, or orange, yellow and other bright
+colors, on the plane. Balls darker than the field, balls in the air, and cameras below 0.35 m or above 1.3 m were rare
+or absent.
+"""
+
+
+def main() -> None:
+    found = json.loads(RESULTS.read_text())
+    made = {"networks": networks(found), "grid": grid(found), "by distance": by_distance(found, DEFAULT)}
+    made["false an hour"] = table(
+        ["network", "false balls a picture", "an hour at 30 frames a second"],
+        [
+            [name, number(scores["all"]["false_per_picture"], 3), f"{scores['false_an_hour']:,}"]
+            for name, scores in found["networks"].items()
+        ],
+    )
+    text = PAGE.read_text()
+    for name, content in made.items():
+        mark = f"<!-- {name} -->\n"
+        if mark not in text:
+            raise SystemExit(f"{PAGE} has no {mark.strip()}")
+        before, after = text.split(mark)
+        text = before + mark + content + "\n" + after[after.index("<!-- end -->") :]
+    PAGE.write_text(text)
+    for name in found["networks"]:
+        model_path(name).with_suffix(".md").write_text(card(found, name))
+    plot(found)
+
+
+if __name__ == "__main__":
+    main()
