@@ -118,7 +118,6 @@ def card(found: dict[str, Any], name: str) -> str:
     configuration = tomllib.loads((NETWORKS / f"{name}.toml").read_text())
     depth, width = (configuration["network"][each] for each in ("depth", "width"))
     scores = found["networks"][name]
-    provenance = manifest.provenance
     ranges = table(
         ["distance", "balls", "AP50", "AP75", "found [%]"],
         [
@@ -132,23 +131,25 @@ def card(found: dict[str, Any], name: str) -> str:
             for each in RANGES
         ],
     )
+    made, used = manifest.provenance, scores["used 0.5"]["0.5 to 6 m"]
     return f"""# {name}
 
-Finds balls on a soccer field. {depth} graph convolutions of {width} channels, SELU, {manifest.operations} multiplications
-and additions a point; ring6 mesh with k = {manifest.intersections:g} out to {manifest.max_distance:g} m, for balls of any
-radius (`--object-radius`, {manifest.object_radius:g} m if nothing is said). Classes: ball, other.
+Finds balls on a soccer field. {depth} graph convolutions of {width} channels, SELU, {manifest.operations}
+multiplications and additions a point; ring6 mesh with k = {manifest.intersections:g} out to {manifest.max_distance:g} m,
+for balls of any radius (`--object-radius`, {manifest.object_radius:g} m if nothing is said). Classes: ball, other.
 
-- **Made from** {provenance["training_pictures"]} rendered pictures (`export/vm_synth/soccer.toml`, seed 1; 30 maps), chosen
-  by {provenance["validation_pictures"]} others, epoch {provenance["epoch"]} of {provenance["epochs"]}, seed {provenance["seed"]}; configuration
+- **Made from** {made["training_pictures"]} rendered pictures (`export/vm_synth/soccer.toml`, seed 1; 30 maps), chosen by
+  {made["validation_pictures"]} others: epoch {made["epoch"]} of {made["epochs"]}, seed {made["seed"]}, configuration
   `export/networks/{name}.toml`.
-- **Made by** `make networks HDRI=folder-of-maps`. SHA-256 {model.sha256}.
+- **Made by** `make networks HDRI=folder-of-maps`; the file's SHA-256 is
+  {model.sha256}.
 
 On {scores["pictures"]} rendered pictures of six maps that it has not seen, 1280 x 1024 px, balls of 0.05 to 0.12 m:
 
 {ranges}
 
-{scores["all"]["false_per_picture"]:.3f} false balls a picture with the default settings. The median error of distance of balls from 0.5 to 6 m is
-{100 * scores["used 0.5"]["0.5 to 6 m"]["distance_error"]:.1f} %. docs/results.md has more.
+With the default settings there are {scores["all"]["false_per_picture"]:.3f} false balls a picture, and the median error
+of distance of balls from 0.5 to 6 m is {100 * used["distance_error"]:.1f} %. More in docs/results.md.
 
 **Limits.** Trained on rendered pictures alone, with balls that are mostly white, or orange, yellow and other bright
 colors, on the plane. Balls darker than the field, balls in the air, and cameras below 0.35 m or above 1.3 m were rare

@@ -1,0 +1,141 @@
+"""Tables and plots of docs/results.md from benchmarks/choices.json: `python -m benchmarks.choices_report`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.choices import HEIGHTS, LENSES, RESULTS
+from benchmarks.report import table
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGE = DOCS / "results.md"
+
+GROUPS = {
+    "layers and mesh": ("3 layers", "base", "9 layers", "hexagonal, 3 layers", "hexagonal, 5 layers", "hexagonal, 9 layers"),
+    "activation": ("base", "elu", "relu"),
+    "width": ("width 2", "base", "width 8", "width 16"),
+    "rings across a ball": ("k = 3", "base", "k = 5", "k = 6"),
+    "points that give gradients": ("base", "all points", "focal loss", "balanced selection", "hard-example rounds"),
+    "classes": ("base", "six classes"),
+    "augmentation": (
+        "base", "no augmentation", "pose not augmented", "colors not augmented", "sharpness not augmented",
+    ),
+}  # fmt: skip
+BASE = {
+    "layers and mesh": "5 layers",
+    "activation": "selu",
+    "width": "width 4",
+    "rings across a ball": "k = 4",
+    "points that give gradients": "weighed",
+    "classes": "ball and other",
+    "augmentation": "all augmentation",
+}
+"""What the base is called in each group."""
+
+COLORS = {"3": "#7570b3", "5": "#1b9e77", "9": "#d95f02"}
+
+
+def values(scores: dict[str, Any], *path: str, test: str = "all") -> np.ndarray:
+    """A score of all seeds; NaN where there is none."""
+    found = []
+    for each in scores.values():
+        value: Any = each.get(test, {})
+        for key in path:
+            value = value.get(key) if isinstance(value, dict) else None
+        found.append(np.nan if value is None else float(value))
+    return np.array(found)
+
+
+def shown(found: np.ndarray, digits: int = 3) -> str:
+    """Mean, and lowest to highest if there are several seeds."""
+    if np.isnan(found).all():
+        return "-"
+    mean = f"{np.nanmean(found):.{digits}f}"
+    return mean if len(found) == 1 else f"{mean} ({np.nanmin(found):.{digits}f} to {np.nanmax(found):.{digits}f})"
+
+
+def group(results: dict[str, Any], name: str) -> str:
+    """Scores of the variants of one group."""
+    rows = []
+    for variant in GROUPS[name]:
+        scores = results[variant]
+        rows.append(
+            [
+                BASE[name] if variant == "base" else variant,
+                str(len(scores)),
+                shown(values(scores, "points", "all", "average_precision")),
+                shown(values(scores, "iou_0.5", "average_precision")),
+                shown(values(scores, "iou_0.75", "average_precision")),
+                shown(values(scores, "iou_0.5", "recall")),
+                shown(values(scores, "iou_0.5", "false_per_picture"), 2),
+            ]
+        )
+    return table(["", "seeds", "AP of points", "AP50", "AP75", "recall", "false a picture"], rows)
+
+
+def transfer(results: dict[str, Any], kinds: tuple[str, ...]) -> str:
+    """AP of points of networks that learned on one half of the pictures, on each half."""
+    rows = []
+    for name in (*(f"learned {kind}" for kind in kinds), "base"):
+        cells = [shown(values(results[name], "points", "all", "average_precision", test=kind)) for kind in kinds]
+        objects = [shown(values(results[name], "iou_0.5", "average_precision", test=kind)) for kind in kinds]
+        label = "all, 2000 pictures" if name == "base" else f"{name.removeprefix('learned ')}, 800 pictures"
+        rows.append([label, *(f"{points}; {balls}" for points, balls in zip(cells, objects, strict=True))])
+    return table(["learned from", *(f"tested on {kind}" for kind in kinds)], rows)
+
+
+def plot(results: dict[str, Any]) -> None:
+    """The paper's figures: precision over recall of ball points, and their average precision over distance."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 4.4), layout="constrained")
+    curves, distances = figure.subplots(1, 2)
+    for depth, variant in (("3", "3 layers"), ("5", "base"), ("9", "9 layers")):
+        for style, name, grid in (("-", variant, "Visual Mesh"), ("--", f"hexagonal, {depth} layers", "hexagonal")):
+            label = f"{grid}, {depth} layers"
+            recall, precision = np.array(next(iter(results[name].values()))["all"]["curve"]).T
+            curves.plot(recall, precision, style, color=COLORS[depth], label=label)
+            bins = sorted(
+                (each for each in next(iter(results[name].values()))["all"]["points"] if each != "all"),
+                key=lambda each: float(each.split("-")[0]),
+            )
+            found = np.array([values(results[name], "points", each, "average_precision").mean() for each in bins])
+            middles = [np.mean([float(end) for end in each.split("-")]) for each in bins]
+            distances.plot(middles, found, style, color=COLORS[depth], label=label)
+    curves.set_xlabel("recall of ball points")
+    curves.set_ylabel("precision")
+    distances.set_xlabel("distance of the point on the plane [m]")
+    distances.set_ylabel("average precision of ball points")
+    for axes in (curves, distances):
+        axes.set_ylim(0.0, 1.02)
+        axes.set_xlim(left=0.0)
+        axes.grid(alpha=0.25)
+        axes.spines[["top", "right"]].set_visible(False)
+    handles, labels = curves.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=6, fontsize=9, frameon=False)
+    with matplotlib.rc_context({"svg.hashsalt": "choices"}):
+        figure.savefig(DOCS / "choices.svg", metadata={"Date": None})
+
+
+def main() -> None:
+    results = json.loads(RESULTS.read_text())
+    made = {name: group(results, name) for name in GROUPS}
+    made |= {"lenses": transfer(results, LENSES), "heights": transfer(results, HEIGHTS)}
+    text = PAGE.read_text()
+    for name, content in made.items():
+        mark = f"<!-- {name} -->\n"
+        if mark not in text:
+            raise SystemExit(f"{PAGE} has no {mark.strip()}")
+        before, after = text.split(mark)
+        text = before + mark + content + "\n" + after[after.index("<!-- end -->") :]
+    PAGE.write_text(text)
+    plot(results)
+
+
+if __name__ == "__main__":
+    main()
