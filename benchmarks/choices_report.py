@@ -15,7 +15,9 @@ DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "results.md"
 
 GROUPS = {
-    "layers and mesh": ("3 layers", "base", "9 layers", "hexagonal, 3 layers", "hexagonal, 5 layers", "hexagonal, 9 layers"),
+    "layers and mesh": (
+        "3 layers", "base", "9 layers", "hexagonal, 3 layers", "hexagonal, 5 layers", "hexagonal, 9 layers",
+    ),
     "activation": ("base", "elu", "relu"),
     "width": ("width 2", "base", "width 8", "width 16"),
     "rings across a ball": ("k = 3", "base", "k = 5", "k = 6"),

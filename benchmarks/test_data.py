@@ -1,7 +1,7 @@
 """Test sets of maps that no training saw: `make test-data HDRI=folder-of-maps`.
 
 OUT/maps: balls at all distances alike, 1280 x 1024 px. OUT/grid: three lenses at two sizes and three heights, the same
-scenes at both sizes.
+scenes at both sizes. OUT/demo: what lies in tests/fixtures/demo, images, lenses and scenes.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ def main() -> None:
     options = parser.parse_args()
     large = ("camera.picture_width=1280", "camera.picture_height=1024")
     render(options.hdri, options.out / "maps", PICTURES, 9, *large, "ball.even=1.0")
+    near = ("ball.radius=[0.095,0.095]", "ball.missing=0", "ball.hidden=0", "ball.distance=[0.4,5]")
+    render(options.hdri, options.out / "demo", 12, 22, *near)
     for lens, (width, height), above in product(LENSES, SIZES, HEIGHTS):
         entries = (
             f"camera.picture_width={width}",
