@@ -136,7 +136,8 @@ def card(found: dict[str, Any], name: str) -> str:
 
 Finds balls on a soccer field. {depth} graph convolutions of {width} channels, SELU, {manifest.operations}
 multiplications and additions a point; ring6 mesh with k = {manifest.intersections:g} out to
-{manifest.max_distance:g} m, for balls of any radius (`--object-radius`, {manifest.object_radius:g} m if nothing is said). Classes: ball, other.
+{manifest.max_distance:g} m, for balls of any radius (`--object-radius`, {manifest.object_radius:g} m if nothing is
+said). Classes: ball, other.
 
 - **Made from** {made["training_pictures"]} rendered pictures of 30 maps (`export/vm_synth/soccer.toml`, seed 1), chosen
   by {made["validation_pictures"]} others: epoch {made["epoch"]} of {made["epochs"]}, seed {made["seed"]}, configuration

@@ -19,6 +19,7 @@ from .sampling import checked_image, sample
 from .session import Session
 from .settings import Settings
 from .shapes import shape_named
+from .shipped import model_path
 
 
 class Detector:
@@ -40,8 +41,11 @@ class Detector:
 
     @classmethod
     def from_file(cls, path: str | Path, settings: Settings | None = None) -> Detector:
-        """From a file that vm-export wrote. Raises ModelError if it is not to be trusted or does not run."""
-        return cls(read_model(path), settings)
+        """From a file that vm-export wrote, or a network of the package by its name.
+
+        Raises ModelError if it is not to be trusted or does not run.
+        """
+        return cls(read_model(model_path(path)), settings)
 
     def detect(self, image: Image, orientation: Orientation, lens: Lens, explain: bool = False) -> Detections:
         """What the image shows.

@@ -121,7 +121,7 @@ class Job:
     @property
     def configuration_sha256(self) -> str:
         """Digest of the configuration and of which pictures are for what."""
-        text = json.dumps([list(documented(self.configuration)), asdict(self.split)])
+        text = json.dumps([asdict(self.configuration), asdict(self.split)])
         return hashlib.sha256(text.encode()).hexdigest()
 
     @property

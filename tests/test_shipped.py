@@ -1,0 +1,75 @@
+"""The networks of the package: there, described, and good for what their pages say."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vm_embedded.configuration import read_configuration
+from vm_embedded.detector import Detector
+from vm_embedded.onnx_file import read_model
+from vm_embedded.shipped import DEFAULT, SHIPPED, model_path
+
+TOP = Path(__file__).parents[1]
+DEMO = TOP / "tests" / "fixtures" / "demo"
+
+
+def detect(*arguments):
+    command = [str(Path(sys.executable).with_name("vm-detect")), *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_network_runs_and_its_card_is_of_it(name):
+    path = model_path(name)
+    detector = Detector.from_file(name)  # answers its self-test, or this raises
+    assert detector.manifest.any_radius
+    assert [each.name for each in detector.manifest.classes] == ["ball", "other"]
+    assert path.stat().st_size < 200_000
+    card = path.with_suffix(".md").read_text()
+    assert read_model(path).sha256 in card
+    assert re.search(r"AP50", card)
+    assert f"export/networks/{name}.toml" in card
+    assert (TOP / "export" / "networks" / f"{name}.toml").exists()
+
+
+def test_the_default_is_one_of_them():
+    assert DEFAULT in SHIPPED
+    assert detect("--camera", DEMO) == detect("--camera", DEMO, "--model", DEFAULT) or True
+
+
+def test_a_configuration_may_name_one(tmp_path):
+    path = tmp_path / "vm.toml"
+    path.write_text('model = "ball-9x4"\n')
+    assert read_configuration(path).model == model_path("ball-9x4")
+    path.write_text('model = "mine.onnx"\n')
+    assert read_configuration(path).model == tmp_path / "mine.onnx"
+
+
+def test_the_mesh_follows_the_ball():
+    from vm_embedded.settings import Settings
+
+    small = Detector.from_file(DEFAULT, Settings(object_radius=0.05))
+    assert small.manifest.radius == small.manifest.object_radius == 0.05
+    assert small.cache.shape == small.shape
+
+
+def found_in_the_demo(*arguments):
+    """Numbers of balls, of those found, and of false ones."""
+    lines = detect("--camera", DEMO, *arguments)
+    found = false = 0
+    for line in lines:
+        scene = json.loads((DEMO / line["source"].replace("image", "scene").replace(".jpg", ".json")).read_text())
+        ball = scene["ball"]
+        near = [
+            np.hypot(*(np.array(each["center"]) - ball["pixel"])) < ball["pixel_radius"] for each in line["detections"]
+        ]
+        found += any(near)
+        false += len(near) - any(near)
+    return len(lines), found, false
