@@ -31,16 +31,25 @@ class Graph:
 
     points (n + 1, 3): colors, RGB from 0 to 1; row n is the off-screen point. neighbors (n + 1, N): rows of points.
     labels (n,): positions of classes, -1 where the mask says nothing. distances (n,): from the camera's foot to where
-    an object at the point would stand [m].
+    an object at the point would stand [m]. pixels (n, 2): where the points are in their pictures, (x, y) [px].
     """
 
     points: Singles
     neighbors: Indices
     labels: Labels
     distances: Floats
+    pixels: Floats
 
     def __len__(self) -> int:
         return len(self.labels)
+
+    def part(self, kept: npt.NDArray[np.intp]) -> Graph:
+        """The graph of the points `kept`, in that order; links to all others lead to the off-screen point."""
+        position = np.full(len(self) + 1, len(kept), dtype=np.int32)
+        position[kept] = np.arange(len(kept), dtype=np.int32)
+        rows = np.append(kept, len(self))
+        neighbors = position[self.neighbors[rows]]
+        return Graph(self.points[rows], neighbors, self.labels[kept], self.distances[kept], self.pixels[kept])
 
 
 def seen_points(lens: LensFile, size: Size, manifest: Manifest, grid: Grid = VISUAL) -> Projection[Mesh]:
@@ -113,7 +122,7 @@ def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> Graph
     x, y = np.rint(shown.pixels).astype(np.intp).T
     assert picture.lens.orientation is not None
     distances = plane_distances(shown.graph.rays, picture.lens.orientation.height)
-    return Graph(points, shown.graph.neighbors, picture.labels[y, x], distances)
+    return Graph(points, shown.graph.neighbors, picture.labels[y, x], distances, shown.pixels)
 
 
 def plane_distances(rays: Floats, height: float) -> Floats:
@@ -137,5 +146,6 @@ def together(graphs: Sequence[Graph]) -> tuple[Graph, npt.NDArray[np.intp]]:
         np.concatenate([*neighbors, off_screen]).astype(np.int32),
         np.concatenate([each.labels for each in graphs]),
         np.concatenate([each.distances for each in graphs]),
+        np.concatenate([each.pixels for each in graphs]),
     )
     return joined, starts

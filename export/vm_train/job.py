@@ -25,6 +25,7 @@ from vm_embedded.files import written_beside
 from vm_synth.sections import documented, read_sections
 
 from .configuration import TrainConfiguration
+from .kept_views import KeptViews
 from .loading import Graphs, View
 from .pictures import PictureFiles, find_pictures
 from .schedule import Batch, Item, schedule
@@ -183,7 +184,13 @@ class Job:
             mesh.radius_of == "scene",
             self.configuration.training.window,
         )
-        return Graphs(pictures, view, None if self.unpacked is None else Unpacked(self.unpacked))
+        if self.unpacked is None:
+            return Graphs(pictures, view)
+        count = self.configuration.training.views
+        views = KeptViews(
+            self.unpacked, count, view.classes, view.manifest, view.grid, view.augmentation, view.own_radius
+        )
+        return Graphs(pictures, view, Unpacked(self.unpacked), views if count else None)
 
     def round_path(self, training_round: int) -> Path:
         """The best network of a round, counted from 1."""

@@ -16,6 +16,7 @@ from vm_synth.worker_process import begin, shielded
 
 from .augmentation import Augmentation, blurred, moved, recolored
 from .graphs import OFF_SCREEN, Graph, graph_of
+from .kept_views import KeptViews
 from .pictures import Classes, Picture, PictureFiles
 from .schedule import Batch, Item
 from .unpacked import Unpacked, read
@@ -43,18 +44,28 @@ class View:
 
     def graph(self, picture: Picture, manifest: Manifest, seed: tuple[int, ...] | None) -> Graph:
         """What a network with a manifest sees of a picture, augmented with a seed. Raises InputError."""
+        if seed is None:
+            return self._plain(picture, manifest)
+        random = np.random.default_rng(seed)
+        return self.look(self.view(picture, manifest, random), random)
+
+    def view(self, picture: Picture, manifest: Manifest, random: np.random.Generator) -> Graph:
+        """The whole graph of a picture told to be from another pose and lens, and softened. Raises InputError."""
+        changed = blurred(moved(picture, self.augmentation, random), self.augmentation, random)
+        return self._plain(changed, manifest)
+
+    def look(self, graph: Graph, random: np.random.Generator) -> Graph:
+        """A window of a view, with other colors."""
+        objects = [at for at, each in enumerate(self.manifest.classes) if each.kind == "object"]
+        part = window_of(graph, self.window, objects, random)
+        colors = recolored(part.points[:-1], self.augmentation, random)
+        return replace(part, points=np.concatenate([colors, part.points[-1:]]))
+
+    def _plain(self, picture: Picture, manifest: Manifest) -> Graph:
         try:
-            if seed is None:
-                return graph_of(picture, manifest, self.grid)
-            random = np.random.default_rng(seed)
-            objects = [at for at, each in enumerate(manifest.classes) if each.kind == "object"]
-            picture = window_of(picture, self.window, objects, random)
-            picture = blurred(moved(picture, self.augmentation, random), self.augmentation, random)
-            graph = graph_of(picture, manifest, self.grid)
+            return graph_of(picture, manifest, self.grid)
         except GeometryError:  # so low a camera sees no points
             return empty(manifest.neighbors)
-        graph.points[:-1] = recolored(graph.points[:-1], self.augmentation, random)
-        return graph
 
 
 def ball_radius(files: PictureFiles) -> float:
@@ -71,16 +82,33 @@ def ball_radius(files: PictureFiles) -> float:
 class Graphs(Dataset[Graph]):
     """The graphs of pictures, by Item. Raises InputError for a picture that can't be read."""
 
-    def __init__(self, pictures: Sequence[PictureFiles], view: View, unpacked: Unpacked | None = None) -> None:
-        self.pictures, self.view, self.unpacked = tuple(pictures), view, unpacked
+    def __init__(
+        self,
+        pictures: Sequence[PictureFiles],
+        view: View,
+        unpacked: Unpacked | None = None,
+        views: KeptViews | None = None,
+    ) -> None:
+        self.pictures, self.view, self.unpacked, self.views = tuple(pictures), view, unpacked, views
 
     def __len__(self) -> int:
         return len(self.pictures)
 
     def __getitem__(self, item: Item) -> Graph:
         files = self.pictures[item.position]
-        picture = read(files, self.view.classes, self.unpacked)
-        return self.view.graph(picture, self.view.manifest_for(files), item.seed)
+        if self.views is None or item.seed is None:
+            return self.view.graph(self._picture(files), self.view.manifest_for(files), item.seed)
+        random = np.random.default_rng(item.seed)
+        number = int(random.integers(self.views.count))
+        graph = self.views.get(files, number)
+        if graph is None:
+            manifest = self.view.manifest_for(files)
+            graph = self.view.view(self._picture(files), manifest, self.views.random(files, number))
+            self.views.put(files, number, graph)
+        return self.view.look(graph, random)
+
+    def _picture(self, files: PictureFiles) -> Picture:
+        return read(files, self.view.classes, self.unpacked)
 
 
 def empty(neighbors: int) -> Graph:
@@ -90,6 +118,7 @@ def empty(neighbors: int) -> Graph:
         np.zeros((1, neighbors), dtype=np.int32),
         np.empty(0, dtype=np.int8),
         np.empty(0),
+        np.empty((0, 2)),
     )
 
 

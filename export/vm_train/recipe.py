@@ -27,6 +27,12 @@ class Recipe:
         "",
         (0.05, 1.0),
     )
+    views: int = number(
+        0,
+        "draws of pose, lens and sharpness that are kept for each picture, which is faster; 0: each look has its own",
+        "",
+        (0, 1e4),
+    )
     rate: float = number(0.01, "highest learning rate; vm-train rate looks for it", "", (1e-9, 1e3))
     optimizer: str = one_of(OPTIMIZERS, "adamw", "how weights follow their gradients; sgd has momentum")
     schedule: str = one_of(SCHEDULES, "one_cycle", "how the rate changes: up and down once, or not at all")

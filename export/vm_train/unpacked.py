@@ -25,7 +25,8 @@ from .pictures import Classes, Picture, parse_lens, read_picture
 
 _HEADER = struct.Struct("<8s32sIIII")  # magic, what it was made from, width, height, bytes of the lens, zero
 _MAGIC = b"vmtrain1"
-_KEPT_FREE = 1 << 30  # bytes that a training needs for its own files
+KEPT_FREE = 1 << 30
+"""Bytes that a training needs for its own files."""
 
 
 def size_of(count: int, width: int, height: int) -> int:
@@ -56,7 +57,7 @@ class Unpacked:
     def get(self, files: PictureFiles, classes: Classes) -> Picture | None:
         """A picture, read-only, if it is there as its files are now and with the labels of these classes."""
         try:
-            source = _source(files, classes)
+            source = source_of(files, classes)
             with self._path(files).open("rb") as file:
                 content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
             magic, found, width, height, text, _ = _HEADER.unpack_from(content)
@@ -74,10 +75,10 @@ class Unpacked:
         """Keep a picture; without effect if it can't be written."""
         height, width = picture.labels.shape
         try:
-            if shutil.disk_usage(self.folder).free < size_of(1, width, height) + _KEPT_FREE:
+            if shutil.disk_usage(self.folder).free < size_of(1, width, height) + KEPT_FREE:
                 raise OSError
             text = files.read("lens")
-            header = _HEADER.pack(_MAGIC, _source(files, classes), width, height, len(text), 0)
+            header = _HEADER.pack(_MAGIC, source_of(files, classes), width, height, len(text), 0)
             # Opened with x: where two processes put the same picture, neither writes into the other's file.
             with written_beside(self._path(files)) as part, part.open("xb") as file:
                 for each in (header, text, picture.image.tobytes(), picture.labels.tobytes()):
@@ -110,7 +111,7 @@ def read(files: PictureFiles, classes: Classes, unpacked: Unpacked | None) -> Pi
     return picture
 
 
-def _source(files: PictureFiles, classes: Classes) -> bytes:
+def source_of(files: PictureFiles, classes: Classes) -> bytes:
     """Digest of what a picture is made from: sizes and times of its files, and the colors of classes."""
     if files.shard is None:
         stats = [files.path(part).stat() for part in PARTS]

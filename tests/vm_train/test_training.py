@@ -10,6 +10,7 @@ from vm_embedded.errors import InputError
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape
 from vm_train.graphs import Graph, together
+from vm_train.loading import empty
 from vm_train.recipe import Recipe
 from vm_train.schedule import schedule
 from vm_train.training import Training, read_state
@@ -35,7 +36,7 @@ def graph(position):
     neighbors = np.concatenate([neighbors, np.full((1, 6), n)]).astype(np.int32)
     labels = (points[:-1].mean(axis=1) > 0.5).astype(np.int8)
     labels[::7] = -1
-    return Graph(points, neighbors, labels, np.linspace(0.0, 10.0, n))
+    return Graph(points, neighbors, labels, np.linspace(0.0, 10.0, n), np.zeros((n, 2)))
 
 
 def network(seed=3):
@@ -125,8 +126,7 @@ def test_graders_change_which_points_are_selected_but_hardly_how_many():
 def test_a_batch_without_points_changes_no_weights():
     made = training()
     before = weights(made)
-    empty = Graph(np.full((1, 3), -1.0, np.float32), np.zeros((1, 6), np.int32), np.empty(0, np.int8), np.empty(0))
-    step = made.step(batches_of(made.recipe)[0].items[:1], [empty])
+    step = made.step(batches_of(made.recipe)[0].items[:1], [empty(6)])
     assert (step.loss, made.done) == (0.0, 1)
     assert same(weights(made), before)
 
