@@ -93,7 +93,7 @@ class Exact:
             probabilities = self.network(shown.graph, colors)
         found: tuple[Detection, ...] = ()
         if self.grid.kind == VISUAL.kind:
-            scene = _scene(picture, shown, manifest)
+            scene = scene_of(picture, shown, manifest)
             found, _ = find_objects(scene, manifest.classes, probabilities, self.settings)
         return Answer(shown.pixels, plane_distances(shown.graph.rays, orientation.height), probabilities, found)
 
@@ -175,7 +175,7 @@ def _orientation(picture: Picture) -> Orientation:
     return orientation
 
 
-def _scene(picture: Picture, shown: Projection[Mesh], manifest: Manifest) -> Scene:
+def scene_of(picture: Picture, shown: Projection[Mesh], manifest: Manifest) -> Scene:
     """Where objects are sought among the points of a picture's own mesh."""
     height, width = picture.labels.shape
     orientation = _orientation(picture)

@@ -1,0 +1,101 @@
+"""The default settings of detection, chosen on the validation pictures of a training: `python -m benchmarks.threshold`.
+
+    python -m benchmarks.threshold build/networks/ball-best data/soccer
+
+Answers are computed once; each combination of settings then judges them. Prints recall, precision, F1 and false balls a
+picture, best F1 first.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.shipped import FRAMES_AN_HOUR, NETWORKS
+from vm_embedded.arrays import Singles
+from vm_embedded.errors import GeometryError
+from vm_embedded.manifest import Manifest
+from vm_embedded.objects import Scene, find_objects
+from vm_embedded.sampling import sample
+from vm_embedded.settings import Settings
+from vm_train.answers import Exact, load_subject, scene_of
+from vm_train.configuration import ClassTable
+from vm_train.evaluated_pictures import pictures_of
+from vm_train.graphs import seen_points
+from vm_train.object_scores import ObjectScores
+from vm_train.object_truth import read_scene, true_objects
+from vm_train.overlaps import TrueObject
+from vm_train.pictures import read_picture
+
+THRESHOLDS, INSIDES, AROUNDS = (0.5, 0.6, 0.7, 0.8, 0.9), (0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95), (0.25, 0.4)
+
+
+@dataclass(frozen=True)
+class Answered:
+    """A picture: its true balls, where objects are sought, and what the network says of each point."""
+
+    truths: list[TrueObject]
+    scene: Scene
+    probabilities: Singles
+
+
+def answered(subject: Exact, data: Path, numbers: Path, part: str) -> Iterator[Answered]:
+    """The pictures of a part of a training."""
+    table = tomllib.loads((NETWORKS / "ball-5x4.toml").read_text())["classes"]
+    classes = ClassTable.from_table(table).seen_as()
+    for files in pictures_of([data], numbers, part):
+        picture = read_picture(files, classes)
+        scene = read_scene(files.image.with_name(f"scene{files.number}.json"))
+        assert scene is not None
+        manifest: Manifest = replace(subject.manifest, radius=scene.ball_radius, object_radius=scene.ball_radius)
+        height, width = picture.labels.shape
+        try:
+            shown = seen_points(picture.lens, (width, height), manifest)
+        except GeometryError:
+            continue
+        colors = np.empty((len(shown), 3), dtype=np.float32)
+        sample(picture.image, shown.pixels, "bgr", "exact", out=colors)
+        answers = subject.network(shown.graph, colors) if len(shown) else np.zeros((0, 2), dtype=np.float32)
+        yield Answered(true_objects(picture, scene, manifest)["ball"], scene_of(picture, shown, manifest), answers)
+
+
+def scored(pictures: list[Answered], subject: Exact, settings: Settings) -> ObjectScores:
+    """Scores of all pictures with some settings."""
+    scores = ObjectScores(min_radius=2.0)
+    for each in pictures:
+        found, _ = find_objects(each.scene, subject.manifest.classes, each.probabilities, settings)
+        scores.add(each.truths, found)
+    return scores
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("run", type=Path, help="folder of a training")
+    parser.add_argument("data", type=Path, help="its pictures")
+    parser.add_argument("--part", default="validation", choices=("training", "validation", "test"))
+    options = parser.parse_args()
+    subject = load_subject(options.run / "model.pt", Settings())
+    assert isinstance(subject, Exact)
+    pictures = list(answered(subject, options.data, options.run / "pictures.json", options.part))
+    rows = []
+    for threshold, inside, around in product(THRESHOLDS, INSIDES, AROUNDS):
+        settings = Settings(threshold=threshold, min_inside=inside, max_around=around)
+        outcome = scored(pictures, subject, settings).ranking(0.5).at()
+        rows.append((outcome.f1, threshold, inside, around, outcome))
+    print(f"{len(pictures)} pictures\nthreshold min_inside max_around    F1 recall precision false/picture  an hour")
+    for f1, threshold, inside, around, outcome in sorted(rows, key=lambda row: -row[0])[:20]:
+        hourly = FRAMES_AN_HOUR * outcome.false_per_picture
+        print(
+            f"{threshold:9.2f} {inside:10.2f} {around:10.2f} {f1:.3f} {outcome.recall:6.3f} {outcome.precision:9.3f} "
+            f"{outcome.false_per_picture:13.4f} {hourly:8.0f}"
+        )
+
+
+if __name__ == "__main__":
+    main()
