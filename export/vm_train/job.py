@@ -145,7 +145,8 @@ class Job:
         """All batches of a round, counted from 1."""
         recipe = self.configuration.training
         seed = (recipe.seed, training_round)
-        batches = schedule(seed, recipe.epochs, recipe.batch, self.epoch, len(self.split.validation))
+        validation = len(self.split.validation)
+        batches = schedule(seed, recipe.epochs, recipe.batch, self.epoch, validation, recipe.looks)
         return batches if self.source is None else in_lanes(batches, seed, self.source)
 
     def scheduled(self) -> Graphs | StreamedGraphs:

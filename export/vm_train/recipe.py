@@ -18,7 +18,8 @@ PRECISIONS = ("full", "mixed")
 class Recipe:
     """Section [training]. Raises InputError."""
 
-    epochs: int = number(20, "how often each picture is looked at, in each round", "", (1, 1e6))
+    epochs: int = number(20, "epochs of each round; after each the network is validated", "", (1, 1e6))
+    looks: int = number(1, "how often an epoch looks at each picture", "", (1, 1e6))
     batch: int = number(8, "pictures in a step, over all processes", "", (1, 1e5))
     window: float = number(
         1.0,

@@ -135,7 +135,7 @@ def _prepared(job: Job, hardware: Hardware, progress: Progress) -> Training:
     network = Network(job.configuration.network_shape)
     rule = recipe.selection_of(progress.round)
     graders = [Checkpoint.load(job.round_path(each)).network for each in range(1, progress.round)]
-    total = recipe.epochs * steps_an_epoch(job.epoch, recipe.batch)
+    total = recipe.epochs * steps_an_epoch(recipe.looks * job.epoch, recipe.batch)
     shares, weights = class_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
     training = Training(network, recipe, total, shares, weights, graders, hardware.device)
     if job.state_path.exists():

@@ -42,19 +42,22 @@ def steps_an_epoch(training: int, batch: int) -> int:
     return -(-training // batch)
 
 
-def schedule(seed: tuple[int, ...], epochs: int, batch: int, training: int, validation: int) -> Iterator[Batch]:
-    """All batches of a training: in each epoch all pictures, shuffled, then all of the validation.
+def schedule(
+    seed: tuple[int, ...], epochs: int, batch: int, training: int, validation: int, looks: int = 1
+) -> Iterator[Batch]:
+    """All batches of a training: in each epoch all pictures, shuffled, `looks` times, then all of the validation.
 
     Positions from 0 are those of the training pictures, and from `training` on those of the validation.
     """
     step = 0
     for epoch in range(epochs):
-        shuffled = np.random.default_rng([*seed, 1, epoch]).permutation(training)
-        starts = range(0, training, batch)
+        random = np.random.default_rng([*seed, 1, epoch])
+        shuffled = np.concatenate([random.permutation(training) for _ in range(looks)])
+        starts = range(0, len(shuffled), batch)
         for start in starts:
             step += 1
             chosen = shuffled[start : start + batch].tolist()
-            items = tuple(Item(each, (*seed, 3, epoch, each)) for each in chosen)
+            items = tuple(Item(each, (*seed, 3, epoch, start + place)) for place, each in enumerate(chosen))
             yield Batch(epoch, step, items, validates=False, last=start == starts[-1])
         for start in range(0, validation, _VALIDATED):
             end = min(start + _VALIDATED, validation)
