@@ -22,12 +22,12 @@ from vm_embedded.arrays import Singles
 from vm_embedded.errors import GeometryError
 from vm_embedded.manifest import Manifest
 from vm_embedded.objects import Scene, find_objects
-from vm_embedded.sampling import sample
 from vm_embedded.settings import Settings
+from vm_export.grid import VISUAL
 from vm_train.answers import Exact, load_subject, scene_of
 from vm_train.configuration import ClassTable
 from vm_train.evaluated_pictures import pictures_of
-from vm_train.graphs import seen_points
+from vm_train.graphs import color, seen_points
 from vm_train.object_scores import ObjectScores
 from vm_train.object_truth import read_scene, true_objects
 from vm_train.overlaps import TrueObject
@@ -60,7 +60,7 @@ def answered(subject: Exact, data: Path, numbers: Path, part: str) -> Iterator[A
         except GeometryError:
             continue
         colors = np.empty((len(shown), 3), dtype=np.float32)
-        sample(picture.image, shown.pixels, "bgr", "exact", out=colors)
+        color(picture, shown, manifest, VISUAL, "exact", colors)
         answers = subject.network(shown.graph, colors) if len(shown) else np.zeros((0, 2), dtype=np.float32)
         yield Answered(true_objects(picture, scene, manifest)["ball"], scene_of(picture, shown, manifest), answers)
 

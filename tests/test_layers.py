@@ -29,6 +29,7 @@ LAYERS = [
         "settings",
         "objects",
         "shipped",
+        "footprint",
     },
     {"cache", "session"},
     {"detector"},

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from .arrays import Floats, Mask
+from .footprint import Levels, levels_of
 from .layout import Layout, laid_out
 from .lens import Lens, Size
 from .manifest import Manifest
@@ -24,22 +25,37 @@ from .orientation import Orientation, rotation_z
 from .projection import may_be_on_screen
 from .settings import Settings
 
-_Kept = TypeVar("_Kept", Mesh, Layout)
+_Kept = TypeVar("_Kept", Mesh, "Prepared")
 
 _ROUNDING = 2e-3
 """Slack [rad] for rotations that are not quite rotations, as far as Orientation lets them pass."""
 
 
 @dataclass(frozen=True, eq=False)
+class Prepared:
+    """What a bucket keeps: the points that may be on screen, as the network takes them, and which of them are colored
+    by which picture, if the network is for footprints."""
+
+    layout: Layout
+    levels: Levels | None
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it holds [bytes]."""
+        return self.layout.nbytes + sum(each.nbytes for each in self.levels or ())
+
+
+@dataclass(frozen=True, eq=False)
 class View:
     """What a frame is projected with.
 
-    layout: the points that may be on screen, as the network takes them. mesh_height: the camera height that their mesh
-    was built for [m]. rotation (3, 3): camera to mesh frame. heading (3, 3): mesh frame to the frame's observation
-    plane, a turn around the vertical.
+    layout: the points that may be on screen, as the network takes them. levels: which of them are colored by which
+    picture, or None. mesh_height: the camera height that their mesh was built for [m]. rotation (3, 3): camera to mesh
+    frame. heading (3, 3): mesh frame to the frame's observation plane, a turn around the vertical.
     """
 
     layout: Layout
+    levels: Levels | None
     mesh_height: float
     rotation: Floats
     heading: Floats
@@ -72,12 +88,13 @@ class MeshCache:
         if self.settings.height_tolerance == 0.0:
             mesh = self._look_up(height, lambda: self._build(height))
             part = mesh.part(np.flatnonzero(may_be_on_screen(mesh, orientation.rotation, lens, size, _ROUNDING)))
-            return View(laid_out(part, self.manifest), height, orientation.rotation, np.eye(3))
+            made = self._prepared(part, height, lens, size)
+            return View(made.layout, made.levels, height, orientation.rotation, np.eye(3))
         pitch = round(orientation.pitch / self.settings.pitch_step)
         roll = round(orientation.roll / self.settings.roll_step)
         key = (height, pitch, roll, lens, size)
-        layout = self._look_up(key, lambda: self._prepare(height, pitch, roll, lens, size))
-        return View(layout, height, orientation.level, rotation_z(orientation.yaw))
+        kept = self._look_up(key, lambda: self._prepare(height, pitch, roll, lens, size))
+        return View(kept.layout, kept.levels, height, orientation.level, rotation_z(orientation.yaw))
 
     def mesh_height(self, height: float) -> float:
         """Height [m] of the mesh that serves a camera height [m].
@@ -96,7 +113,7 @@ class MeshCache:
         manifest = self.manifest
         return ring_mesh(self.shape, height, manifest.intersections, manifest.max_distance, manifest.mesh)
 
-    def _prepare(self, height: float, pitch: int, roll: int, lens: Lens, size: Size) -> Layout:
+    def _prepare(self, height: float, pitch: int, roll: int, lens: Lens, size: Size) -> Prepared:
         """What orientations of this bucket can bring on screen.
 
         Turns around two axes add up to at most the sum of their angles. That is the slack of the bucket's middle; the
@@ -111,7 +128,14 @@ class MeshCache:
 
         mesh = mesh.part(np.flatnonzero(possible(mesh, pitch, roll, 0.5)))
         quarters = [possible(mesh, pitch + up, roll + lean, 0.25) for up in (-0.25, 0.25) for lean in (-0.25, 0.25)]
-        return laid_out(mesh.part(np.flatnonzero(np.any(quarters, axis=0))), self.manifest)
+        return self._prepared(mesh.part(np.flatnonzero(np.any(quarters, axis=0))), height, lens, size)
+
+    def _prepared(self, mesh: Mesh, height: float, lens: Lens, size: Size) -> Prepared:
+        layout = laid_out(mesh, self.manifest)
+        if self.manifest.sampling == "bilinear":
+            return Prepared(layout, None)
+        scale = lens.for_image(size).scale
+        return Prepared(layout, levels_of(layout.rays, self.shape, height, self.manifest.intersections, scale))
 
     def _look_up(self, key: Hashable, make: Callable[[], _Kept], counted: bool = True) -> _Kept:
         kept: _Kept | None = self._kept.get(key)

@@ -69,7 +69,8 @@ class Detector:
             projected = project(layout, view.rotation, lens, size)
         with _timed(timing, "sample"):
             points = layout.points()
-            sample(image, projected.pixels, self.settings.format, self.settings.sampling, layout.colors(points))
+            colors = layout.colors(points)
+            sample(image, projected.pixels, self.settings.format, self.settings.sampling, colors, view.levels)
         with _timed(timing, "infer"):
             probabilities = self.session.run(layout, points, projected.on_screen)
         with _timed(timing, "cluster"):

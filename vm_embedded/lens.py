@@ -59,6 +59,11 @@ class Lens(ABC):
         """Which rays (n, 3) lie within the limit."""
         return np.asarray(rays[:, 0] > math.cos(self.limit))
 
+    @property
+    @abstractmethod
+    def scale(self) -> float:
+        """Pixels for each radian on the axis [px/rad]."""
+
     def for_image(self, size: Size) -> Self:
         """The lens for an image of this size: scaled if its own has the same proportions.
 
@@ -157,6 +162,10 @@ class RadialLens(Lens):
             raise InputError(f"lens focal length must be above 0 px, not {self.focal_length}")
         if not np.isfinite([*self.center, *self.distortion]).all():
             raise InputError(f"lens center {self.center} and distortion {self.distortion} must be finite numbers")
+
+    @property
+    def scale(self) -> float:
+        return self.focal_length
 
     @abstractmethod
     def radius(self, theta: Number) -> Number:

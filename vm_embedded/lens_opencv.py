@@ -30,6 +30,10 @@ class CalibratedLens(Lens):
         if min(self.focal_lengths) <= 0:
             raise InputError(f"focal lengths must be above 0 px, not {self.focal_lengths}")
 
+    @property
+    def scale(self) -> float:
+        return math.sqrt(self.focal_lengths[0] * self.focal_lengths[1])
+
     def scaled(self, factor: float, size: Size) -> Self:
         # Pixel centers are at whole numbers, so the picture's corner lies at -0.5 and that is what stays in place.
         return replace(

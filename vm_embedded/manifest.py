@@ -29,6 +29,9 @@ EDGES = ("hard", "same")
 LAYOUTS = ("plain", "runs")
 """How the network takes its points. plain: as rows. runs: as columns, ring by ring; see layout.py."""
 
+POINT_SAMPLINGS = ("bilinear", "footprint")
+"""What color a point has. bilinear: of its place, between four pixels. footprint: of its surroundings; footprint.py."""
+
 _LARGEST = 1e9
 """Beyond every radius, distance and number of rings."""
 
@@ -93,7 +96,7 @@ class Manifest:
     one's, whatever it is. intersections: rings across an object of `radius`. mesh: ring4, ring6 or ring8. max_distance
     of the mesh [m]. edge: one of EDGES. classes: in the order of the network's outputs. layout: one of LAYOUTS; runs
     needs edge hard. operations: multiplications and additions for each point. channels, scale: a point's input is its
-    color in this order, times scale. sampling: the rule at pixels, "bilinear". provenance: who made it from what.
+    color in this order, times scale. sampling: one of POINT_SAMPLINGS. provenance: who made it from what.
     Raises ModelError for values that this runtime does not know.
     """
 
@@ -121,7 +124,7 @@ class Manifest:
             "edge": EDGES,
             "layout": LAYOUTS,
             "channels": ("rgb",),
-            "sampling": ("bilinear",),
+            "sampling": POINT_SAMPLINGS,
         }
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:

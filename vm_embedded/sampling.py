@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from .arrays import Floats, Image, Singles
 from .errors import InputError, unknown
+from .footprint import Levels
 
 # For each format: its channels, and which of them are red, green and blue.
 _CHANNELS = {"bgr": (3, (2, 1, 0)), "rgb": (3, (0, 1, 2)), "bgra": (4, (2, 1, 0)), "rgba": (4, (0, 1, 2))}
@@ -48,19 +49,45 @@ def checked_image(image: Image, format: str) -> Image:
     return image.reshape(*image.shape[:2]) if channels == 1 else image
 
 
-def sample(image: Image, pixels: Floats, format: str, sampling: str, out: Singles) -> None:
+def sample(
+    image: Image, pixels: Floats, format: str, sampling: str, out: Singles, levels: Levels | None = None
+) -> None:
     """Write the RGB colors, scaled to 0..1, at pixels (n, 2) into `out` (n, 3).
 
     `image` is one that `checked_image` returned. Pixels without all four pixels around them in it give any color.
+    levels: which points take their color from pictures that were halved, if the network is for footprints.
     """
     if format in _BAYER:
         image, format = cv2.cvtColor(image, _BAYER[format]), "rgb"  # type: ignore[assignment]
     take = _exact if sampling == "exact" else _fast
-    with np.errstate(invalid="ignore", over="ignore"):  # what the lens doesn't see has any pixel, NaN too
-        planes = take(image, pixels)
     channels = _CHANNELS[format][1] if format in _CHANNELS else (0, 0, 0)
-    for column, channel in enumerate(channels):
-        np.multiply(planes[channel], np.float32(1.0 / 255.0), out=out[:, column])
+    with np.errstate(invalid="ignore", over="ignore"):  # what the lens doesn't see has any pixel, NaN too
+        if levels is None:
+            planes = take(image, pixels)
+            for column, channel in enumerate(channels):
+                np.multiply(planes[channel], np.float32(1.0 / 255.0), out=out[:, column])
+            return
+        for level, points in enumerate(levels):
+            if level:
+                image = _halved(image)
+            if len(points):
+                planes = take(image, _in_halved(pixels[points], level, image))
+                for column, channel in enumerate(channels):
+                    out[points, column] = planes[channel] * np.float32(1.0 / 255.0)
+
+
+def _halved(image: Image) -> Image:
+    """A picture of half the width and height; the last row and column of an odd number are left out."""
+    height, width = (max(side // 2, 1) for side in image.shape[:2])
+    even = image[: 2 * height, : 2 * width]
+    return np.asarray(cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def _in_halved(pixels: Floats, level: int, image: Image) -> Floats:
+    """Pixels (n, 2) of the whole picture in one that was halved `level` times; at its border what is nearest."""
+    if not level:
+        return pixels
+    return np.clip((pixels + 0.5) / 2.0**level - 0.5, 0.0, (image.shape[1] - 1.0, image.shape[0] - 1.0))
 
 
 def _exact(image: Image, pixels: Floats) -> Singles:

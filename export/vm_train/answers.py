@@ -25,13 +25,12 @@ from vm_embedded.objects import Scene, find_objects
 from vm_embedded.onnx_file import read_model
 from vm_embedded.orientation import Orientation, rotation_z
 from vm_embedded.projection import Projection
-from vm_embedded.sampling import sample
 from vm_embedded.session import Session
 from vm_embedded.settings import Settings
 from vm_embedded.shapes import shape_named
 from vm_export.grid import VISUAL, Grid
 
-from .graphs import OFF_SCREEN, plane_distances, seen_points
+from .graphs import OFF_SCREEN, color, plane_distances, seen_points
 from .pictures import Picture
 
 if TYPE_CHECKING:
@@ -87,7 +86,7 @@ class Exact:
         orientation = _orientation(picture)
         shown = seen_points(picture.lens, (width, height), manifest, self.grid)
         colors = np.empty((len(shown), 3), dtype=np.float32)
-        sample(picture.image, shown.pixels, "bgr", self.settings.sampling, out=colors)
+        color(picture, shown, manifest, self.grid, self.settings.sampling, colors)
         probabilities = np.zeros((0, len(manifest.classes)), dtype=np.float32)
         if len(shown):
             probabilities = self.network(shown.graph, colors)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vm_embedded.errors import InputError
-from vm_embedded.manifest import KINDS, Manifest, ObjectClass
+from vm_embedded.manifest import KINDS, POINT_SAMPLINGS, Manifest, ObjectClass
 from vm_embedded.mesh import RING_NEIGHBORS
 from vm_embedded.shapes import SHAPES
 from vm_export.grid import GRIDS, Grid
@@ -112,6 +112,12 @@ class MeshSettings:
     )
     intersections: float = number(4.0, "rings that cross an object, the paper's k", "", (0.1, 100.0))
     model: str = one_of(tuple(RING_NEIGHBORS), "ring6", "which points are neighbors")
+    sampling: str = one_of(
+        POINT_SAMPLINGS,
+        "bilinear",
+        "color of a point: bilinear, between the four pixels around it; footprint, the mean of as much of the picture "
+        "as it stands for",
+    )
     max_distance: float = number(10.0, "how far out the mesh reaches", "m", (0.1, 1e4))
     grid: str = one_of(GRIDS, "visual", "the Visual Mesh, or the paper's baseline, which can't be exported")
     equal_at: float = number(
@@ -165,6 +171,7 @@ class TrainConfiguration:
             edge="hard",
             classes=self.classes.outputs,
             any_radius=mesh.radius_of == "scene",
+            sampling=mesh.sampling,
         )
 
     @property

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Indices, Singles
+from vm_embedded.footprint import alike, levels_of
 from vm_embedded.lens import Lens, Size
 from vm_embedded.lens_file import LensFile
 from vm_embedded.manifest import Manifest
@@ -118,11 +119,27 @@ def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> Graph
     height, width = picture.labels.shape
     shown = seen_points(picture.lens, (width, height), manifest, grid)
     points = np.full((len(shown) + 1, 3), OFF_SCREEN, dtype=np.float32)
-    sample(picture.image, shown.pixels, "bgr", "exact", out=points[:-1])
+    color(picture, shown, manifest, grid, "exact", points[:-1])
     x, y = np.rint(shown.pixels).astype(np.intp).T
     assert picture.lens.orientation is not None
     distances = plane_distances(shown.graph.rays, picture.lens.orientation.height)
     return Graph(points, shown.graph.neighbors, picture.labels[y, x], distances, shown.pixels)
+
+
+def color(
+    picture: Picture, shown: Projection[Mesh], manifest: Manifest, grid: Grid, sampling: str, out: Singles
+) -> None:
+    """Write the colors of a picture's points (n, 3) as a network with this manifest takes them."""
+    levels = None
+    if manifest.sampling == "footprint":
+        height, width = picture.labels.shape
+        if grid.kind == "visual":
+            assert picture.lens.orientation is not None
+            above, scale = picture.lens.orientation.height, picture.lens.lens.for_image((width, height)).scale
+            levels = levels_of(shown.graph.rays, manifest.mesh_shape, above, manifest.intersections, scale)
+        else:
+            levels = alike(len(shown), math.sqrt(height * width / max(len(shown), 1)))
+    sample(picture.image, shown.pixels, "bgr", sampling, out, levels)
 
 
 def plane_distances(rays: Floats, height: float) -> Floats:

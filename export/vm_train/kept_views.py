@@ -31,7 +31,7 @@ from .unpacked import KEPT_FREE, source_of
 
 _HEADER = struct.Struct("<8s32sII")  # magic, what it was made from, points, neighbors
 _MAGIC = b"vmviews1"
-_PART = ("shape", "radius", "intersections", "mesh", "max_distance")
+_PART = ("shape", "radius", "intersections", "mesh", "max_distance", "sampling")
 """What of a manifest decides where points are."""
 
 
