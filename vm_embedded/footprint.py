@@ -26,7 +26,8 @@ def levels_of(rays: Floats, shape: Shape, height: float, intersections: float, s
 
     The mesh: for a shape, seen from a height [m], with so many rings across an object. At an inclination phi the object
     is r / (h - c) cos(phi) in radius as an angle, with c the height of its center, so rings are 2 r cos(phi) /
-    (k (h - c)) apart; for a circle, which lies flat, that is the distance within a ring. scale: of the lens on its axis [px/rad].
+    (k (h - c)) apart; for a circle, which lies flat, that is the distance within a ring. scale: of the lens on its axis
+    [px/rad].
     """
     widest = 2.0 * shape.radius * scale / (intersections * (height - shape.center_height))
     width = widest * np.maximum(np.nan_to_num(-rays[:, 2]), 0.0)
