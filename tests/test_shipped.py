@@ -12,6 +12,7 @@ import pytest
 from vm_embedded.configuration import read_configuration
 from vm_embedded.detector import Detector
 from vm_embedded.onnx_file import read_model
+from vm_embedded.settings import Settings
 from vm_embedded.shipped import DEFAULT, SHIPPED, model_path
 
 TOP = Path(__file__).parents[1]
@@ -39,9 +40,11 @@ def test_a_network_runs_and_its_card_is_of_it(name):
     assert (TOP / "export" / "networks" / f"{name}.toml").exists()
 
 
-def test_the_default_is_one_of_them():
+def test_without_a_name_the_default_is_used():
+    image = min(DEMO.glob("image*.jpg"))
+    given = [detect("--camera", image), detect("--camera", image, "--model", DEFAULT)]
+    assert given[0][0]["detections"] == given[1][0]["detections"]
     assert DEFAULT in SHIPPED
-    assert detect("--camera", DEMO) == detect("--camera", DEMO, "--model", DEFAULT) or True
 
 
 def test_a_configuration_may_name_one(tmp_path):
@@ -53,14 +56,12 @@ def test_a_configuration_may_name_one(tmp_path):
 
 
 def test_the_mesh_follows_the_ball():
-    from vm_embedded.settings import Settings
-
     small = Detector.from_file(DEFAULT, Settings(object_radius=0.05))
     assert small.manifest.radius == small.manifest.object_radius == 0.05
     assert small.cache.shape == small.shape
 
 
-def found_in_the_demo(*arguments):
+def in_the_demo(*arguments):
     """Numbers of balls, of those found, and of false ones."""
     lines = detect("--camera", DEMO, *arguments)
     found = false = 0
@@ -73,3 +74,10 @@ def found_in_the_demo(*arguments):
         found += any(near)
         false += len(near) - any(near)
     return len(lines), found, false
+
+
+def test_the_default_finds_the_balls_of_the_demo():
+    balls, found, false = in_the_demo()
+    assert balls == 12
+    assert found >= 9
+    assert false <= 4
