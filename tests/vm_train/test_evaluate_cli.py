@@ -20,7 +20,7 @@ from vm_train.oddities import Oddity
 from vm_train.oddity_pictures import FOUND, TRUE, drawn
 from vm_train.pictures import find_pictures
 
-from ..demo import CHECKPOINT, IMAGES, MODEL
+from ..drawn_scenes import CHECKPOINT, IMAGES, MODEL
 from .drawn import draw_set
 from .test_overlaps import circle
 

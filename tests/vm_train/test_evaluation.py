@@ -23,7 +23,7 @@ from vm_train.evaluation_workers import Job, evaluate
 from vm_train.object_truth import SceneBall, SceneTruth
 from vm_train.pictures import Picture, find_pictures, read_picture
 
-from ..demo import CHECKPOINT, FOLDER, IMAGES, MODEL, TRUTH
+from ..drawn_scenes import CHECKPOINT, FOLDER, IMAGES, MODEL, TRUTH
 from .drawn import RADIUS, draw_set
 
 MANIFEST = read_model(MODEL).manifest
@@ -44,7 +44,7 @@ def files(drawn):
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory):
-    """The demo's network as a checkpoint and as a model file of each layout."""
+    """The drawn frames' network as a checkpoint and as a model file of each layout."""
     folder = tmp_path_factory.mktemp("models")
     paths = {"pt": CHECKPOINT}
     for layout in ("plain", "runs"):
@@ -53,8 +53,8 @@ def models(tmp_path_factory):
     return {name: load_subject(path, SETTINGS) for name, path in paths.items()}
 
 
-def demo_pictures():
-    """The demo's frames, which have no masks, with labels of nothing but field and with their balls."""
+def drawn_pictures():
+    """The drawn frames' frames, which have no masks, with labels of nothing but field and with their balls."""
     truth = json.loads(TRUTH.read_text())
     for path in IMAGES:
         image = cv2.imread(str(path))
@@ -65,7 +65,7 @@ def demo_pictures():
 
 
 def test_checkpoints_and_model_files_answer_alike_in_every_layout(models, files):
-    pictures = [read_picture(each, CLASSES) for each in files[:3]] + [picture for picture, _ in demo_pictures()][:2]
+    pictures = [read_picture(each, CLASSES) for each in files[:3]] + [picture for picture, _ in drawn_pictures()][:2]
     for picture in pictures:
         answers = {name: subject.answer(picture) for name, subject in models.items()}
         for each in answers.values():
@@ -88,10 +88,10 @@ def test_scores_of_checkpoints_and_model_files_agree(models, files):
             assert bins["all"]["average_precision"] == pytest.approx(expected["average_precision"], abs=1e-3)
 
 
-def test_the_demo_s_balls_are_found_where_they_are(models):
+def test_the_drawn_balls_are_found_where_they_are(models):
     result = Evaluation.of_nothing(models["runs"], Rules())
     files = find_pictures(FOLDER)
-    for each, (picture, scene) in zip(files, demo_pictures(), strict=True):
+    for each, (picture, scene) in zip(files, drawn_pictures(), strict=True):
         result.count(each, picture, scene, models["runs"].answer(picture), MANIFEST)
     ranking = result.objects["ball"].ranking(0.5)
     assert ranking.at().hits == 6
@@ -101,7 +101,7 @@ def test_the_demo_s_balls_are_found_where_they_are(models):
 
 def test_a_robot_finds_the_same_balls_with_its_shared_meshes(models):
     robot = load_subject(MODEL, SETTINGS, as_robot=True)
-    for picture, scene in demo_pictures():
+    for picture, scene in drawn_pictures():
         answer = robot.answer(picture)
         nearest = min(np.linalg.norm(each.position - scene.ball.center) for each in answer.found)
         assert nearest < 0.05 * np.linalg.norm(scene.ball.center)

@@ -15,7 +15,7 @@ from vm_train.evaluated_pictures import classes_of, usual_colors
 from vm_train.object_truth import SceneBall, SceneTruth, read_scene, true_objects
 from vm_train.pictures import find_pictures, read_picture
 
-from ..demo import MODEL
+from ..drawn_scenes import MODEL
 from .drawn import RADIUS, draw_set
 
 MANIFEST = read_model(MODEL).manifest
