@@ -288,7 +288,7 @@ def test_models_that_are_none_are_refused(tmp_path):
     (tmp_path / "model.onnx").write_bytes(os.urandom(5000))
     for model in (tmp_path / "model.onnx", tmp_path / "missing.onnx", IMAGES[0]):
         one_complaint(run("--camera", IMAGES[0], "--model", model, code=1), model.name)
-    one_complaint(run("--camera", IMAGES[0], code=1), "--model")
+    one_complaint(run("--camera", IMAGES[0], "--model", "ball-5x5", code=1), "'ball-5x5'", "did you mean 'ball-5x4'")
 
 
 def test_a_folder_that_can_t_be_made_is_named(tmp_path):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from .errors import InputError, unknown
+
 SHIPPED = ("ball-5x4", "ball-9x4", "ball-best")
 """Their names. Numbers are depth and width."""
 
@@ -14,5 +16,12 @@ _FOLDER = Path(__file__).with_name("models")
 
 
 def model_path(model: str | Path) -> Path:
-    """The file of a network that comes with the package, by name; everything else is a path already."""
-    return _FOLDER / f"{model}.onnx" if str(model) in SHIPPED else Path(model)
+    """The file of a network that comes with the package, by name; everything else is a path already.
+
+    Raises InputError for what is neither.
+    """
+    if str(model) in SHIPPED:
+        return _FOLDER / f"{model}.onnx"
+    if not Path(model).suffix and not Path(model).exists():
+        raise InputError(unknown("network of the package, and no file,", str(model), SHIPPED))
+    return Path(model)
