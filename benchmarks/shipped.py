@@ -69,6 +69,7 @@ def scores_of(model: Path, folder: Path) -> tuple[dict[str, Any], Evaluation]:
     ball, curve = used.objects["ball"], ranked.objects["ball"]
     found: dict[str, Any] = {
         "pictures": ball.pictures,
+        "size": _size(folder),
         "points_average_precision": round(used.points.ranking("ball").precision_recall.average_precision, 5),
         "all": numbers(ball, None),
         "false_an_hour": round(FRAMES_AN_HOUR * ball.ranking(0.5).at().false_per_picture),
@@ -80,6 +81,12 @@ def scores_of(model: Path, folder: Path) -> tuple[dict[str, Any], Evaluation]:
             }
     found["curve"] = _curve(curve)
     return found, used
+
+
+def _size(folder: Path) -> list[int]:
+    """Width and height of a set's pictures [px]."""
+    height, width = cv2.imread(str(min(folder.glob("image*.jpg")))).shape[:2]
+    return [width, height]
 
 
 def _curve(scores: ObjectScores) -> list[list[float]]:

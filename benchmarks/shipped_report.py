@@ -145,7 +145,8 @@ said). Classes: ball, other.
 - **Made by** `make networks HDRI=folder-of-maps`; the file's SHA-256 is
   {model.sha256}.
 
-On {scores["pictures"]} rendered pictures of six maps that it has not seen, 1280 x 1024 px, balls of 0.05 to 0.12 m:
+On {scores["pictures"]} rendered pictures of six maps that it has not seen, {" x ".join(map(str, scores["size"]))} px, with
+balls of 0.05 to 0.12 m:
 
 {ranges}
 
