@@ -132,6 +132,7 @@ def card(found: dict[str, Any], name: str) -> str:
         ],
     )
     made, used = manifest.provenance, scores["used 0.5"]["0.5 to 6 m"]
+    size = " x ".join(map(str, scores["size"]))
     return f"""# {name}
 
 Finds balls on a soccer field. {depth} graph convolutions of {width} channels, SELU, {manifest.operations}
@@ -145,8 +146,7 @@ said). Classes: ball, other.
 - **Made by** `make networks HDRI=folder-of-maps`; the file's SHA-256 is
   {model.sha256}.
 
-On {scores["pictures"]} rendered pictures of six maps that it has not seen, {" x ".join(map(str, scores["size"]))} px, with
-balls of 0.05 to 0.12 m:
+On {scores["pictures"]} rendered pictures of six maps that it has not seen, {size} px, with balls of 0.05 to 0.12 m:
 
 {ranges}
 
