@@ -161,7 +161,9 @@ or absent.
 
 def main() -> None:
     found = json.loads(RESULTS.read_text())
-    made = {"networks": networks(found), "grid": grid(found), "by distance": by_distance(found, DEFAULT)}
+    made = {"networks": networks(found), "by distance": by_distance(found, DEFAULT)}
+    if found["grid"]:
+        made["grid"] = grid(found)
     made["false an hour"] = table(
         ["network", "false balls a picture", "an hour at 30 frames a second"],
         [
