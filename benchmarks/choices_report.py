@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.choices import HEIGHTS, LENSES, RESULTS
-from benchmarks.report import table
+from benchmarks.report import fill, table
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "results.md"
@@ -128,14 +128,7 @@ def main() -> None:
     results = json.loads(RESULTS.read_text())
     made = {name: group(results, name) for name in GROUPS}
     made |= {"lenses": transfer(results, LENSES), "heights": transfer(results, HEIGHTS)}
-    text = PAGE.read_text()
-    for name, content in made.items():
-        mark = f"<!-- {name} -->\n"
-        if mark not in text:
-            raise SystemExit(f"{PAGE} has no {mark.strip()}")
-        before, after = text.split(mark)
-        text = before + mark + content + "\n" + after[after.index("<!-- end -->") :]
-    PAGE.write_text(text)
+    fill(PAGE, made)
     plot(results)
 
 

@@ -22,6 +22,18 @@ def table(heads: list[str], rows: list[list[str]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
+def fill(page: Path, made: dict[str, str]) -> None:
+    """Put each part between its mark, <!-- name -->, and <!-- end -->. Ends the program if a mark is missing."""
+    text = page.read_text()
+    for name, content in made.items():
+        mark = f"<!-- {name} -->\n"
+        if mark not in text:
+            raise SystemExit(f"{page} has no {mark.strip()}")
+        before, after = text.split(mark)
+        text = before + mark + content + "\n" + after[after.index("<!-- end -->") :]
+    page.write_text(text)
+
+
 def ms(value: float) -> str:
     return f"{value:.2f}" if value < 10 else f"{value:.1f}"
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.report import table
+from benchmarks.report import fill, table
 from benchmarks.shipped import METERS, NETWORKS, RANGES, RESULTS
 from vm_embedded.onnx_file import read_model
 from vm_embedded.shipped import DEFAULT, model_path
@@ -171,14 +171,7 @@ def main() -> None:
             for name, scores in found["networks"].items()
         ],
     )
-    text = PAGE.read_text()
-    for name, content in made.items():
-        mark = f"<!-- {name} -->\n"
-        if mark not in text:
-            raise SystemExit(f"{PAGE} has no {mark.strip()}")
-        before, after = text.split(mark)
-        text = before + mark + content + "\n" + after[after.index("<!-- end -->") :]
-    PAGE.write_text(text)
+    fill(PAGE, made)
     for name in found["networks"]:
         model_path(name).with_suffix(".md").write_text(card(found, name))
     plot(found)

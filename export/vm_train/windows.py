@@ -18,9 +18,10 @@ AIMED = 0.75
 
 
 def window_of(graph: Graph, share: float, objects: Sequence[int], random: np.random.Generator) -> Graph:
-    """The part of a picture's graph in a window of a share of its width and height; the same object if that is 1.
+    """The part of a picture's graph in a window of a share of its width and height.
 
-    objects: positions of the classes that most windows are put over. Raises no error for a graph without points.
+    The same object if that is 1, or if the graph has no points. objects: positions of the classes that most windows are
+    put over.
     """
     if share >= 1.0 or not len(graph):
         return graph
