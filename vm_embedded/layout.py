@@ -21,7 +21,7 @@ Feeds = dict[str, npt.NDArray[np.generic]]
 _OFF_SCREEN = np.float32(-1.0)
 """Color of the off-screen point."""
 
-_GAP = 1
+GAP = 1
 """The middle one of three gaps that come first: all around it is off screen, so it is what the off-screen point is."""
 
 _GAPS_BEHIND = 2
@@ -161,7 +161,7 @@ class RunsLayout(Layout):
         off_screen = ~on_screen
         np.copyto(points, _OFF_SCREEN, where=off_screen)
         columns = self.columns.astype(np.int64)
-        np.copyto(columns, _GAP + self._starts, where=off_screen)
+        np.copyto(columns, GAP + self._starts, where=off_screen)
         return {"points": points, "columns": columns}
 
     def answers(self, output: Singles) -> Singles:
@@ -181,7 +181,7 @@ def _runs(neighbors: Indices, groups: tuple[tuple[int, ...], ...]) -> tuple[_Pos
     the slot in its middle (G, m)."""
     n = len(neighbors) - 1
     slots = _in_runs(neighbors[:n, groups[0][0]], neighbors[:n, groups[0][-1]])
-    slot = np.full(n + 1, _GAP)
+    slot = np.full(n + 1, GAP)
     shown = np.flatnonzero(slots < n)
     slot[slots[shown]] = shown
 
@@ -190,7 +190,7 @@ def _runs(neighbors: Indices, groups: tuple[tuple[int, ...], ...]) -> tuple[_Pos
     for group in groups:
         wanted = np.stack([points if each == SELF else neighbors[:n, each] for each in group])
         center = len(group) // 3  # of three the second is the middle of the window, of two and of one the first
-        middle = np.full(n + 1, _GAP)  # where any of them is on screen, the others should lie beside it
+        middle = np.full(n + 1, GAP)  # where any of them is on screen, the others should lie beside it
         for offset, targets in enumerate(wanted, start=-center):
             np.copyto(middle[:n], slot[targets] - offset, where=targets < n)
         torn = np.zeros(n, dtype=bool)

@@ -17,15 +17,16 @@ from vm_embedded.manifest import Manifest
 from .grid import VISUAL, Grid
 from .network import Network
 from .network_shape import NetworkShape
+from .second_look import Gate, SecondLook
 
-_FORMAT = "vm-embedded checkpoint 2"
+_FORMAT = "vm-embedded checkpoint 3"
 
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
     """A trained network and what its model file will say about it. The manifest has no self-test yet."""
 
-    network: Network
+    network: Network | SecondLook
     manifest: Manifest
     grid: Grid = VISUAL
 
@@ -36,15 +37,23 @@ class Checkpoint:
         if shape.neighbors != manifest.neighbors:
             raise ModelError(f"the network has {shape.neighbors} neighbors, mesh {manifest.mesh} {manifest.neighbors}")
 
+    @property
+    def last(self) -> Network:
+        """The network itself, or of a second look the second one."""
+        return self.network.second if isinstance(self.network, SecondLook) else self.network
+
     def save(self, path: str | Path) -> None:
         """Write the checkpoint. Raises InputError."""
         content = {
             "format": _FORMAT,
             "network": self.network.shape.as_dict(),
+            "first": None,
             "grid": asdict(self.grid),
             "manifest": json.loads(replace(self.manifest, self_test=None).as_json()),
             "state": self.network.state_dict(),
         }
+        if isinstance(self.network, SecondLook):
+            content["first"] = {"network": self.network.first.shape.as_dict(), "gate": asdict(self.network.gate)}
         file = io.BytesIO()  # on a full disk torch would fail in its own way
         torch.save(content, file)
         with written_beside(Path(path)) as part:
@@ -61,7 +70,11 @@ class Checkpoint:
             raise InputError(f"{path} is no checkpoint: {one_line(error)}") from error
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
             raise InputError(f"{path} is no checkpoint of this format ({_FORMAT!r})")
-        network = Network(NetworkShape.from_dict(content["network"]))
+        last = Network(NetworkShape.from_dict(content["network"]))
+        network: Network | SecondLook = last
+        if content["first"] is not None:
+            first = Network(NetworkShape.from_dict(content["first"]["network"]))
+            network = SecondLook(first, last, Gate(**content["first"]["gate"]))
         try:
             network.load_state_dict(content["state"])
         except (RuntimeError, KeyError) as error:

@@ -32,7 +32,8 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--layout",
         choices=LAYOUTS,
-        help="write one file, in this layout; default: the fastest one, and beside it the portable NAME.plain.onnx",
+        help="write one file, in this layout; default: the fastest one, and beside it the portable NAME.plain.onnx "
+        "(not of a network with a second look, which has only runs)",
     )
     parser.add_argument("--to-yaml", action="store_true", help="write the reference's format instead")
     facts = parser.add_argument_group("what the file does not say, or says wrongly")
@@ -81,7 +82,7 @@ def _run(options: argparse.Namespace) -> int:
         )
     manifest = checkpoint.manifest
     classes = ", ".join(f"{each.name} ({each.kind})" for each in manifest.classes)
-    print(f"{options.model}: {len(checkpoint.network.shape.layers)} layers, {manifest.mesh}, {manifest.shape}")
+    print(f"{options.model}: {_layers(checkpoint)}, {manifest.mesh}, {manifest.shape}")
     print(f"  radius {manifest.radius:g} m, {manifest.intersections:g} intersections, to {manifest.max_distance:g} m")
     print(f"  object radius {manifest.object_radius:g} m, edge {manifest.edge}, classes: {classes}")
     if options.to_yaml:
@@ -89,13 +90,23 @@ def _run(options: argparse.Namespace) -> int:
         print(f"{output}: written in the reference's format")
         return EXIT_OK
     layout = options.layout or fastest_layout(checkpoint)
-    files = {portable: "plain"} if options.layout is None and layout != "plain" else {}
+    everywhere = options.layout is None and layout != "plain" and checkpoint.network is checkpoint.last
+    files = {portable: "plain"} if everywhere else {}
     files[output] = layout
     for path, layout in files.items():
         difference = export(checkpoint, path, layout)
         size = path.stat().st_size / 1000
         print(f"{path}: layout {layout}, {size:.1f} kB, largest difference to torch {difference:.1e}")
     return EXIT_OK
+
+
+def _layers(checkpoint: Checkpoint) -> str:
+    from .second_look import SecondLook
+
+    network, layers = checkpoint.network, len(checkpoint.network.shape.layers)
+    if isinstance(network, SecondLook):
+        return f"{len(network.first.shape.layers)} layers, {layers} for a second look"
+    return f"{layers} layers"
 
 
 def _overrides(options: argparse.Namespace) -> Overrides:

@@ -76,6 +76,11 @@ class Network(nn.Module):
                 nn.init.zeros_(module.bias)
 
     @property
+    def operations(self) -> int:
+        """Multiplications and additions for each point."""
+        return self.shape.operations
+
+    @property
     def typed_layers(self) -> list[GraphLayer]:
         """The layers, as what they are."""
         return [layer for layer in self.layers if isinstance(layer, GraphLayer)]

@@ -21,6 +21,7 @@ from .checkpoint import Checkpoint
 from .network import Network
 from .plain_graph import plain_graph
 from .runs_graph import runs_graph
+from .second_look import SecondLook
 
 LARGEST_DIFFERENCE = 1e-4
 """Probability by which ONNX Runtime may differ from torch."""
@@ -36,15 +37,24 @@ def fastest_layout(checkpoint: Checkpoint) -> str:
     """The fastest layout that a network can have, by its shape.
 
     Runs save look-ups and cost multiplications: two in nine of a convolution's are by zero, and separable ones become
-    full ones. So the wider a layer, the less they gain.
+    full ones. So the wider a layer, the less they gain. A second look there is only in runs.
     """
+    if isinstance(checkpoint.network, SecondLook):
+        return "runs"
     narrow = all(layer.width <= _WIDEST[layer.kind] for layer in checkpoint.network.shape.layers)
     return "runs" if narrow and checkpoint.manifest.edge == "hard" else "plain"
 
 
-def build(network: Network, manifest: Manifest) -> bytes:
-    """The bytes of an ONNX model in the manifest's layout: stock operators, the neighbor indices an input."""
-    return (runs_graph if manifest.layout == "runs" else plain_graph)(network, manifest)
+def build(network: Network | SecondLook, manifest: Manifest) -> bytes:
+    """The bytes of an ONNX model in the manifest's layout: stock operators, the neighbor indices an input.
+
+    Raises ModelError for a second look in another layout than runs.
+    """
+    if manifest.layout == "runs":
+        return runs_graph(network, manifest)
+    if isinstance(network, SecondLook):
+        raise ModelError(f"a network with a second look is written in layout runs, not {manifest.layout}")
+    return plain_graph(network, manifest)
 
 
 def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) -> float:
@@ -60,7 +70,7 @@ def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) 
     manifest = replace(
         checkpoint.manifest,
         layout=layout,
-        operations=network.shape.operations,
+        operations=network.operations,
         self_test=test,
         provenance=provenance,
     )
@@ -75,7 +85,7 @@ def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) 
     return difference
 
 
-def largest_difference(content: bytes, network: Network, manifest: Manifest) -> float:
+def largest_difference(content: bytes, network: Network | SecondLook, manifest: Manifest) -> float:
     """Largest difference of a probability between ONNX Runtime and torch, over several numbers of points."""
     session = Session(ModelFile(Path("the new model"), content, replace(manifest, self_test=None), ""), Settings())
     worst = 0.0
@@ -85,7 +95,7 @@ def largest_difference(content: bytes, network: Network, manifest: Manifest) -> 
     return worst
 
 
-def _example(network: Network, points: int, seed: int) -> SelfTest:
+def _example(network: Network | SecondLook, points: int, seed: int) -> SelfTest:
     """Random colors on a random graph of `points` points, rounded as the manifest does, and torch's answer."""
     random = np.random.default_rng(seed)
     colors: Singles = np.full((points + 1, 3), -1.0, dtype=np.float32)

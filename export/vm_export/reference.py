@@ -26,6 +26,7 @@ from vm_embedded.mesh import RING_NEIGHBORS
 from .checkpoint import Checkpoint
 from .network import Dense, GraphConvolution, Network, SeparableConvolution
 from .network_shape import Layer, NetworkShape
+from .second_look import SecondLook
 
 DEFAULT_CLASSES = ("ball", "goal", "line", "field", "environment")
 """The order of the authors' own networks, for files without a class_map and five outputs."""
@@ -176,6 +177,8 @@ def write_reference(checkpoint: Checkpoint, path: str | Path) -> None:
     Separable convolutions are multiplied out, and the fourth channel gets its zero weights back. Raises InputError.
     """
     network, manifest = checkpoint.network, checkpoint.manifest
+    if isinstance(network, SecondLook):
+        raise InputError("the reference's format is for one network; this one has a second look")
     neighbors = network.shape.neighbors
     groups: list[list[dict[str, Any]]] = []
     for spec, layer in zip(network.shape.layers, network.layers, strict=True):

@@ -147,6 +147,17 @@ class NetworkSettings:
 
 
 @dataclass(frozen=True)
+class SecondLookSettings:
+    """Section [second_look], for vm-train --first: which points the network gets of the one that looks first."""
+
+    above: float = number(0.05, "probability of an object above which a point is worth it", "", (0.0, 0.999))
+    rings: int = number(4, "steps around such points that are worth it too", "", (0, 100))
+
+    def __post_init__(self) -> None:
+        check_entries(self)
+
+
+@dataclass(frozen=True)
 class TrainConfiguration:
     """All sections."""
 
@@ -154,6 +165,7 @@ class TrainConfiguration:
     classes: ClassTable = dataclasses.field(default_factory=ClassTable.usual, metadata={"read": ClassTable.from_table})
     mesh: MeshSettings = dataclasses.field(default_factory=MeshSettings)
     network: NetworkSettings = dataclasses.field(default_factory=NetworkSettings)
+    second_look: SecondLookSettings = dataclasses.field(default_factory=SecondLookSettings)
     training: Recipe = dataclasses.field(default_factory=Recipe)
     augmentation: Augmentation = dataclasses.field(default_factory=Augmentation)
 

@@ -1,8 +1,9 @@
 """The folder of a training: everything that is needed to do it, and what came of it.
 
 train.toml: the configuration. pictures.json: which pictures are for what. run.json: the data, and the classes' numbers
-of points. state.pt: how far it is. log.jsonl and tensorboard: what happened. round1.pt, ...: the best network of each
-round. model.pt: the best of all, for vm-evaluate and vm-export.
+of points. first.pt: the network that looks first, if the new one is for a second look. state.pt: how far it is.
+log.jsonl and tensorboard: what happened. round1.pt, ...: the best network of each round. model.pt: the best of all, for
+vm-evaluate and vm-export.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from vm_embedded.files import written_beside
 from vm_synth.sections import documented, read_sections
 
 from .configuration import TrainConfiguration
+from .first_look import FirstLook
 from .kept_views import KeptViews
 from .loading import Graphs, View
 from .pictures import PictureFiles, find_pictures
@@ -36,7 +38,7 @@ from .unpacked import Unpacked
 
 _COUNTED = 300  # pictures of which classes are counted
 
-_FORMAT = 1
+_FORMAT = 2
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Job:
     """What is to be done. data: the pictures' folder. counts (C,): points of each class in some training pictures.
 
     unpacked: where decoded pictures are kept, or None. source: where training pictures are streamed from, or None if
-    they are in the folder.
+    they are in the folder. first: the network that looks first, or None.
     """
 
     folder: Path
@@ -54,6 +56,7 @@ class Job:
     counts: npt.NDArray[np.int64]
     unpacked: Path | None
     source: Source | None = None
+    first: FirstLook | None = None
 
     @classmethod
     def begin(
@@ -64,15 +67,20 @@ class Job:
         split: Split,
         unpacked: Path | None,
         source: Source | None = None,
+        first: Path | None = None,
     ) -> Job:
-        """Write down a new training. Raises InputError, also if its folder holds one already."""
+        """Write down a new training. first: checkpoint of the network that looks first.
+
+        Raises InputError, also if its folder holds a training already.
+        """
         check_new(folder)
+        looks_first = None if first is None else _first(first, configuration)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
         none = np.zeros(len(configuration.classes.colors), dtype=np.int64)
-        job = cls(folder, data.resolve(), configuration, split, none, unpacked, source)
+        job = cls(folder, data.resolve(), configuration, split, none, unpacked, source, looks_first)
         counts = job._counted()
         if not counts.any():
             raise InputError(
@@ -80,6 +88,9 @@ class Job:
             )
         job = replace(job, counts=counts)
         save(folder / "pictures.json", split)
+        if first is not None:
+            with written_beside(folder / "first.pt") as part:
+                part.write_bytes(first.read_bytes())
         _write(folder / "train.toml", "\n".join(documented(configuration)))
         content = {
             "format": _FORMAT,
@@ -88,6 +99,7 @@ class Job:
             "unpacked": None if unpacked is None else _named(unpacked, folder),
             "configuration_sha256": job.configuration_sha256,
             "source": None if source is None else asdict(source),
+            "first_sha256": None if looks_first is None else looks_first.sha256,
             "points": dict(zip(configuration.classes.colors, counts.tolist(), strict=True)),
         }
         _write(folder / "run.json", json.dumps(content, indent=1) + "\n")
@@ -103,7 +115,7 @@ class Job:
                 raise InputError(f"{path} is of another release: begin the training again")
             counts = np.array(list(content["points"].values()), dtype=np.int64)
             data, kept, origin = Path(content["data"]), content["unpacked"], content["source"]
-            sha256 = content["configuration_sha256"]
+            sha256, first_sha256 = content["configuration_sha256"], content["first_sha256"]
             source = None if origin is None else Source(**origin | {"shards": tuple(origin["shards"])})
         except OSError as error:
             raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
@@ -111,7 +123,10 @@ class Job:
             raise InputError(f"{path} is damaged: {error}") from error
         configuration = read_sections(TrainConfiguration, folder / "train.toml")
         unpacked = None if kept is None else folder / kept
-        job = cls(folder, data, configuration, load(folder / "pictures.json"), counts, unpacked, source)
+        first = None if first_sha256 is None else _first(folder / "first.pt", configuration)
+        job = cls(folder, data, configuration, load(folder / "pictures.json"), counts, unpacked, source, first)
+        if first is not None and first.sha256 != first_sha256:
+            raise InputError(f"{folder / 'first.pt'} was changed since the training began: begin another one")
         if job.configuration_sha256 != sha256:
             raise InputError(
                 f"{folder / 'train.toml'} or pictures.json was changed since the training began: "
@@ -184,12 +199,13 @@ class Job:
             self.configuration.augmentation,
             mesh.radius_of == "scene",
             self.configuration.training.window,
+            self.first,
         )
         if self.unpacked is None:
             return Graphs(pictures, view)
         count = self.configuration.training.views
         views = KeptViews(
-            self.unpacked, count, view.classes, view.manifest, view.grid, view.augmentation, view.own_radius
+            self.unpacked, count, view.classes, view.manifest, view.grid, view.augmentation, view.own_radius, self.first
         )
         return Graphs(pictures, view, Unpacked(self.unpacked), views if count else None)
 
@@ -226,7 +242,7 @@ class Job:
         }
 
 
-_FILES = ("train.toml", "pictures.json", "state.pt", "model.pt", "round1.pt", "log.jsonl")
+_FILES = ("train.toml", "pictures.json", "first.pt", "state.pt", "model.pt", "round1.pt", "log.jsonl")
 
 
 def check_new(folder: Path) -> None:
@@ -249,6 +265,11 @@ def in_work(folder: Path) -> Iterator[None]:
         except OSError as error:
             raise InputError(f"another process is training in {folder}") from error
         yield
+
+
+def _first(path: Path, configuration: TrainConfiguration) -> FirstLook:
+    gate = configuration.second_look
+    return FirstLook.load(path, configuration.manifest, gate.above, gate.rings)
 
 
 def _named(unpacked: Path, folder: Path) -> str:

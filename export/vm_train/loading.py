@@ -15,6 +15,7 @@ from vm_export.grid import Grid
 from vm_synth.worker_process import begin, shielded
 
 from .augmentation import Augmentation, blurred, moved, recolored
+from .first_look import FirstLook
 from .graphs import OFF_SCREEN, Graph, graph_of
 from .kept_views import KeptViews
 from .pictures import Classes, Picture, PictureFiles
@@ -28,7 +29,7 @@ class View:
     """What makes a picture a graph: classes of the masks, the network's mesh and grid, and augmentation.
 
     own_radius: the mesh is made for the radius of each picture's own ball, as its sceneX.json has it. window: share of
-    width and height that augmented pictures are cut to.
+    width and height that augmented pictures are cut to. first: passes on what the network sees, or None for all.
     """
 
     classes: Classes
@@ -37,6 +38,7 @@ class View:
     augmentation: Augmentation = field(default_factory=Augmentation)
     own_radius: bool = False
     window: float = 1.0
+    first: FirstLook | None = None
 
     def manifest_for(self, files: PictureFiles) -> Manifest:
         """The manifest with the radius of a picture's own ball, if asked for. Raises InputError."""
@@ -63,9 +65,10 @@ class View:
 
     def _plain(self, picture: Picture, manifest: Manifest) -> Graph:
         try:
-            return graph_of(picture, manifest, self.grid)
+            graph = graph_of(picture, manifest, self.grid)
         except GeometryError:  # so low a camera sees no points
             return empty(manifest.neighbors)
+        return graph if self.first is None else self.first.part(graph)
 
 
 def ball_radius(files: PictureFiles) -> float:

@@ -38,6 +38,13 @@ def parser() -> argparse.ArgumentParser:
     _add_data(made)
     made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="folder of the training; new")
     _add_configuration(made)
+    made.add_argument(
+        "--first",
+        type=Path,
+        metavar="MODEL",
+        help="checkpoint (.pt) of a small network that looks first: the new one learns from, and is asked about, only "
+        "what [second_look] says, and the model file holds both",
+    )
     made.add_argument("--strict", action="store_true", help="don't begin if any picture is at fault; default: skip it")
     add_stream(made)
     lists = made.add_argument_group(

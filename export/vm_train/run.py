@@ -134,7 +134,7 @@ def _prepared(job: Job, hardware: Hardware, progress: Progress) -> Training:
     torch.manual_seed(int(np.random.default_rng([recipe.seed, progress.round]).integers(2**31)))
     network = Network(job.configuration.network_shape)
     rule = recipe.selection_of(progress.round)
-    graders = [Checkpoint.load(job.round_path(each)).network for each in range(1, progress.round)]
+    graders = [Checkpoint.load(job.round_path(each)).last for each in range(1, progress.round)]
     total = recipe.epochs * steps_an_epoch(recipe.looks * job.epoch, recipe.batch)
     shares, weights = class_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
     training = Training(network, recipe, total, shares, weights, graders, hardware.device)
@@ -191,7 +191,8 @@ def _validated(
         "torch": torch.__version__,
     }
     manifest = replace(job.configuration.manifest, provenance=provenance)
-    checkpoint = Checkpoint(training.network, manifest, job.configuration.grid)
+    network = training.network if job.first is None else job.first.then(training.network)
+    checkpoint = Checkpoint(network, manifest, job.configuration.grid)
     checkpoint.save(job.round_path(progress.round))
     if score > best_ever:
         checkpoint.save(job.model_path)
