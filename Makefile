@@ -44,16 +44,18 @@ networks: .venv/dev ## the networks of the package, from seeds: make networks HD
 	$(MAKE) data OUT=data/soccer COUNT=4000 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 
+vm_embedded/models/ball-best.onnx: vm_embedded/models/ball-5x4.onnx
+vm_embedded/models/ball-best.onnx: LOOKS_FIRST = --first $(BUILD)/ball-5x4/model.pt
 vm_embedded/models/%.onnx: export/networks/%.toml
 	if test -e $(BUILD)/$*/run.json; then $(BIN)/vm-train resume $(BUILD)/$*; \
-		else $(BIN)/vm-train data/soccer -o $(BUILD)/$* --config $< --unpacked $(BUILD)/unpacked; fi
+		else $(BIN)/vm-train data/soccer -o $(BUILD)/$* --config $< --unpacked $(BUILD)/unpacked $(LOOKS_FIRST); fi
 	$(BIN)/vm-export $(BUILD)/$*/model.pt --layout runs -o $@
 
 test-data: .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
 	$(BIN)/python -m benchmarks.test_data $(HDRI) $(TEST)
 
 score: .venv/dev ## how good the networks of the package are: make score [TEST=data/test] (10 minutes)
-	$(BIN)/python -m benchmarks.shipped $(TEST)/maps $(TEST)/grid
+	$(BIN)/python -m benchmarks.shipped $(TEST)
 	$(BIN)/python -m benchmarks.shipped_report
 
 bench-synth: .venv/synth ## measure vm-synth: make bench-synth HDRI=folder-of-maps (8 minutes)
@@ -67,7 +69,7 @@ compare: .venv/dev ## compare selections and meshes: make compare DATA=set HELD_
 	$(BIN)/python -m benchmarks.comparison_report
 
 choices: .venv/dev ## what each choice of a training brings: make choices [TEST=data/test], after networks and test-data (hours)
-	$(BIN)/python -m benchmarks.choices data/soccer $(TEST)/maps build/choices
+	$(BIN)/python -m benchmarks.choices data/soccer $(TEST)/clutter build/choices
 	$(BIN)/python -m benchmarks.choices_report
 
 fixtures: .venv/dev ## draw the frames of the tests and train their network again (about 20 minutes)

@@ -60,7 +60,7 @@ class Variant:
     seeds: int = 1
 
 
-COMMON: Changes = {"training": {"epochs": 6, "rate": 0.01}, "data": {"test": 0.0}}
+COMMON: Changes = {"training": {"epochs": 4, "looks": 3, "rate": 0.01}, "data": {"test": 0.0}}
 VARIANTS: dict[str, Variant] = {
     "base": Variant({}, seeds=3),
     "3 layers": Variant({"network": {"depth": 3}}, seeds=3),

@@ -1,8 +1,7 @@
-"""How good the networks of the package are: `make score TEST=... [GRID=...]`.
+"""How good the networks of the package are: `make score TEST=...`, with what `make test-data` rendered.
 
-TEST is a set of vm-synth of maps that no training saw. GRID is a folder of such sets, one for each lens, size of the
-picture and height, as `make test-data` renders them. Writes benchmarks/shipped.json, from which
-benchmarks/shipped_report.py makes tables, plots and model cards, and the sheet of the worst errors.
+Writes benchmarks/shipped.json, from which benchmarks/shipped_report.py makes tables, plots and model cards, and the
+sheet of the worst errors.
 """
 
 from __future__ import annotations
@@ -34,6 +33,9 @@ NETWORKS = HERE.parent / "export" / "networks"
 FRAMES_AN_HOUR = 30 * 3600
 RANGES = {"0.5 to 6 m": range(1, 12), "6 to 10 m": range(12, 20), "1 to 6 m": range(2, 12)}
 """Bins of half a meter."""
+
+SETS = ("field", "clutter")
+"""Test sets: a field with robots and people, and one that is full of what may be taken for a ball."""
 
 METERS = {f"{near} to {near + 1} m": range(2 * near, 2 * near + 2) for near in range(10)}
 CANDIDATES = Settings(threshold=0.2, min_inside=0.05, max_around=0.95)
@@ -122,17 +124,19 @@ def _said(oddity: Oddity, missed: bool) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("test", type=Path, help="set of vm-synth of other maps")
-    parser.add_argument("grid", type=Path, nargs="?", help="folder of sets LENS-SIZE-HEIGHT")
+    parser.add_argument("test", type=Path, help="folder of test sets")
     options = parser.parse_args()
     found: dict[str, Any] = {"networks": {}, "grid": {}}
     for name in SHIPPED:
-        found["networks"][name], used = scores_of(model_path(name), options.test)
-        print(name, json.dumps(found["networks"][name]["used 0.5"]), flush=True)
-        if name == DEFAULT:
-            picture, found["worst"] = sheet(used)
-            cv2.imwrite(str(WORST), picture, [cv2.IMWRITE_JPEG_QUALITY, 80])
-    for folder in sorted(options.grid.iterdir()) if options.grid else ():
+        found["networks"][name] = {}
+        for each in SETS:
+            scores, used = scores_of(model_path(name), options.test / each)
+            found["networks"][name][each] = scores
+            print(name, each, json.dumps(scores["ranked 0.5"]), flush=True)
+            if name == DEFAULT and each == "field":
+                picture, found["worst"] = sheet(used)
+                cv2.imwrite(str(WORST), picture, [cv2.IMWRITE_JPEG_QUALITY, 80])
+    for folder in sorted((options.test / "grid").iterdir()):
         used = evaluation(model_path(DEFAULT), folder, Settings())
         found["grid"][folder.name] = numbers(used.objects["ball"], None)
         print(folder.name, found["grid"][folder.name], flush=True)

@@ -1,7 +1,10 @@
 """Test sets of maps that no training saw: `make test-data HDRI=folder-of-maps`.
 
-OUT/maps: balls at all distances alike, 1280 x 1024 px. OUT/grid: three lenses at two sizes and three heights, the same
-scenes at both sizes. OUT/demo: what lies in tests/fixtures/demo, images, lenses and scenes.
+OUT/field: a ball among robots, goals, lines and people, at all distances alike, 1280 x 1024 px. OUT/clutter: the same
+with what the training pictures have besides: furniture, bags and boxes, domes, discs, balloons, balls of other sizes or
+out of air, and balls that are half hidden or in the air. OUT/grid: scenes as in field, with
+three lenses at two sizes and three heights, the same scenes at both sizes. OUT/demo: what lies in tests/fixtures/demo,
+images, lenses and scenes.
 """
 
 from __future__ import annotations
@@ -13,10 +16,18 @@ from itertools import product
 from pathlib import Path
 
 SCENES = Path(__file__).parents[1] / "export" / "vm_synth" / "soccer.toml"
-PICTURES, GRID_PICTURES = 800, 50
+FIELD_PICTURES, CLUTTER_PICTURES, GRID_PICTURES = 500, 400, 40
 LENSES = ("rectilinear", "equisolid", "equidistant")
 SIZES = ((640, 512), (1280, 1024))
 HEIGHTS = (0.4, 0.8, 1.2)
+UNCLUTTERED = (
+    "things.round_things=[0, 0]",
+    "things.clutter=[0, 0]",
+    "things.furniture=[0, 0]",
+    "ball.hidden=0",
+    "ball.off_plane=0",
+    "ball.wrong_size=0",
+)
 
 
 def render(hdri: Path, out: Path, count: int, seed: int, *entries: str) -> None:
@@ -33,8 +44,9 @@ def main() -> None:
     parser.add_argument("hdri", type=Path, help="folder of maps")
     parser.add_argument("out", type=Path, help="folder for the sets")
     options = parser.parse_args()
-    large = ("camera.picture_width=1280", "camera.picture_height=1024")
-    render(options.hdri, options.out / "maps", PICTURES, 9, *large, "ball.even=1.0")
+    large = ("camera.picture_width=1280", "camera.picture_height=1024", "ball.even=1.0")
+    render(options.hdri, options.out / "field", FIELD_PICTURES, 11, *large, *UNCLUTTERED)
+    render(options.hdri, options.out / "clutter", CLUTTER_PICTURES, 9, *large)
     near = ("ball.radius=[0.095,0.095]", "ball.missing=0", "ball.hidden=0", "ball.distance=[0.4,5]")
     render(options.hdri, options.out / "demo", 12, 22, *near)
     for lens, (width, height), above in product(LENSES, SIZES, HEIGHTS):
@@ -46,7 +58,8 @@ def main() -> None:
             "ball.even=1.0",
             "ball.distance=[0.3, 8]",
         )
-        render(options.hdri, options.out / "grid" / f"{lens}-{width}x{height}-{above}", GRID_PICTURES, 10, *entries)
+        name = f"{lens}-{width}x{height}-{above}"
+        render(options.hdri, options.out / "grid" / name, GRID_PICTURES, 10, *entries, *UNCLUTTERED)
 
 
 if __name__ == "__main__":
