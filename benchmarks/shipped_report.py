@@ -156,8 +156,8 @@ to 0.12 m:
 With the default settings there are {number(scores["all"]["false_per_picture"], 3)} false balls a picture, and the
 median error of distance of balls from 0.5 to 6 m is {number(used["distance_error"], 1, 100.0)} %. On
 {clutter["pictures"]} pictures that are full of things that look like balls, AP50 from 0.5 to 6 m is
-{number(hard["average_precision"], 3)}, with {number(clutter["all"]["false_per_picture"], 3)} false balls a picture. More
-in docs/results.md.
+{number(hard["average_precision"], 3)}, with {number(clutter["all"]["false_per_picture"], 3)} false balls a picture.
+More in docs/results.md.
 
 **Limits.** Trained on rendered pictures alone, with balls that are mostly white, or orange, yellow and other bright
 colors, on the plane. Balls darker than the field, balls in the air, and cameras below 0.35 m or above 1.3 m were rare
