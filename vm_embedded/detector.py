@@ -34,7 +34,7 @@ class Detector:
 
     def __init__(self, model: ModelFile, settings: Settings | None = None) -> None:
         self.settings = settings or Settings()
-        self.manifest = model.manifest.for_object(self.settings.object_radius)
+        self.manifest = model.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         self.session = Session(model, self.settings)
         self.cache = MeshCache(self.manifest, self.settings)
         self.shape = shape_named(self.manifest.shape, self.manifest.object_radius)

@@ -145,11 +145,15 @@ class Manifest:
         if not names or len(set(names)) != len(names):
             raise ModelError(f"classes in the model's manifest must be one or more different names, not {names}")
 
-    def for_object(self, radius: float | None) -> Manifest:
-        """The manifest for real objects of a radius [m]; None for that of the manifest."""
-        if radius is None:
-            return self
-        return replace(self, object_radius=radius, radius=radius if self.any_radius else self.radius)
+    def used_for(self, object_radius: float | None, max_distance: float | None) -> Manifest:
+        """The manifest for real objects of a radius [m] and a mesh that reaches so far [m]; None for what it says."""
+        radius = self.object_radius if object_radius is None else object_radius
+        return replace(
+            self,
+            object_radius=radius,
+            radius=radius if self.any_radius and object_radius is not None else self.radius,
+            max_distance=self.max_distance if max_distance is None else max_distance,
+        )
 
     def column(self, class_name: str) -> int:
         """Position of a class among the outputs. Raises InputError for an unknown one."""

@@ -50,6 +50,14 @@ class Settings:
         "any radius",
         "m",
     )
+    max_distance: float | None = _number(
+        None,
+        0.1,
+        1e4,
+        "how far out the mesh reaches, if not as far as the model says; an object is seen whole where the mesh goes on "
+        "behind it",
+        "m",
+    )
     threshold: float = _number(0.5, 0.0, 1.0, "probability from which a point counts for a class")
     min_inside: float = _number(0.75, 0.0, 1.0, "mean probability that an object needs inside its outline")
     max_around: float = _number(0.25, 0.0, 1.0, "mean probability that an object may have in the band around it")

@@ -79,7 +79,7 @@ class Exact:
     network: Network
 
     def answer(self, picture: Picture, radius: float | None = None) -> Answer:
-        manifest = self.manifest.for_object(self.settings.object_radius)
+        manifest = self.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         if radius is not None:
             manifest = replace(manifest, radius=radius, object_radius=radius)
         height, width = picture.labels.shape

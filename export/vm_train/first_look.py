@@ -17,8 +17,8 @@ from vm_export.second_look import Gate, SecondLook
 
 from .graphs import Graph
 
-_ALIKE = ("shape", "radius", "intersections", "mesh", "max_distance", "classes", "any_radius", "sampling")
-"""What two networks must have in common to look at one mesh."""
+_ALIKE = ("shape", "radius", "intersections", "mesh", "classes", "any_radius", "sampling")
+"""What two networks must have in common to look at one mesh; how far out it reaches changes nothing near by."""
 
 
 @dataclass(frozen=True, eq=False)

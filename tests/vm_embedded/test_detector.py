@@ -128,6 +128,16 @@ def test_own_meshes_and_shared_ones_find_the_same_balls():
         assert shared_mesh[0].distance == pytest.approx(own_mesh[0].distance, rel=0.05)
 
 
+def test_the_mesh_reaches_as_far_as_it_is_told(detector):
+    image, orientation, lens = frame()
+    whole = detector.detect(image, orientation, lens)
+    assert detector.manifest.max_distance > 2.0
+    near = Detector.from_file(MODEL, Settings(max_distance=2.0)).detect(image, orientation, lens)
+    reach = near.rays[:, :2] / -near.rays[:, 2:] * orientation.height
+    assert 1.8 < np.hypot(*reach.T).max() < 2.0
+    assert 0 < len(near.pixels) < len(whole.pixels)
+
+
 def test_detections_iterate_and_have_a_length(detector):
     found = detector.detect(*frame())
     assert len(found) == len(list(found)) >= 1

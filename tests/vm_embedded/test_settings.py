@@ -64,15 +64,16 @@ def test_a_number_of_more_digits_than_a_float_has_is_refused_by_name(name):
         Settings(**{name: 10**400})
 
 
-@pytest.mark.parametrize("name", sorted(set(RANGES) - {"object_radius"}))
+@pytest.mark.parametrize("name", sorted(set(RANGES) - {"object_radius", "max_distance"}))
 def test_a_setting_with_a_value_can_not_have_none(name):
     with pytest.raises(InputError, match=name):
         Settings(**{name: None})
 
 
-def test_the_object_radius_may_be_left_to_the_model():
-    assert Settings(object_radius=None).object_radius is None
-    assert Settings(object_radius=0.11).object_radius == 0.11
+@pytest.mark.parametrize("name", ["object_radius", "max_distance"])
+def test_what_the_model_knows_may_be_left_to_it(name):
+    assert getattr(Settings(**{name: None}), name) is None
+    assert getattr(Settings(**{name: 0.11}), name) == 0.11
 
 
 @pytest.mark.parametrize("value", [1.5, 2.0])

@@ -51,7 +51,7 @@ def test_seen_points_are_those_of_the_mesh_that_are_on_screen(lens, height, roll
 @pytest.mark.parametrize("any_radius", [True, False])
 def test_a_manifest_for_other_objects_has_another_mesh_only_if_the_network_knows_any(any_radius):
     manifest = replace(MANIFEST, any_radius=any_radius)
-    other = manifest.for_object(0.05)
+    other = manifest.used_for(0.05, None)
     assert other.object_radius == 0.05
     assert other.radius == (0.05 if any_radius else 0.1)
-    assert manifest.for_object(None) is manifest
+    assert manifest.used_for(None, None) == manifest
