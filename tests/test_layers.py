@@ -30,6 +30,7 @@ LAYERS = [
         "objects",
         "shipped",
         "footprint",
+        "relative",
     },
     {"cache", "session"},
     {"detector"},

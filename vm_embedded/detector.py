@@ -15,6 +15,7 @@ from .objects import Scene, find_objects
 from .onnx_file import ModelFile, read_model
 from .orientation import Orientation
 from .projection import project
+from .relative import make_relative
 from .sampling import checked_image, sample
 from .session import Session
 from .settings import Settings
@@ -71,6 +72,8 @@ class Detector:
             points = layout.points()
             colors = layout.colors(points)
             sample(image, projected.pixels, self.settings.format, self.settings.sampling, colors, view.levels)
+            if self.manifest.colors == "relative":
+                make_relative(colors, projected.on_screen & layout.original)
         with _timed(timing, "infer"):
             probabilities = self.session.run(layout, points, projected.on_screen)
         with _timed(timing, "cluster"):

@@ -15,10 +15,11 @@ import numpy as np
 from .arrays import Indices, Singles
 from .errors import InputError, ModelError, unknown
 from .mesh import RING_NEIGHBORS
+from .relative import COLORINGS
 from .shapes import SHAPES, Shape, shape_named
 
 METADATA_KEY = "visual_mesh"
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 
 KINDS = ("object", "upright", "area", "background")
 """What a class is. object: has the mesh's shape and is located. upright, area: points with bearings. background."""
@@ -96,8 +97,8 @@ class Manifest:
     one's, whatever it is. intersections: rings across an object of `radius`. mesh: ring4, ring6 or ring8. max_distance
     of the mesh [m]. edge: one of EDGES. classes: in the order of the network's outputs. layout: one of LAYOUTS; runs
     needs edge hard. operations: multiplications and additions for each point. channels, scale: a point's input is its
-    color in this order, times scale. sampling: one of POINT_SAMPLINGS. provenance: who made it from what.
-    Raises ModelError for values that this runtime does not know.
+    color in this order, times scale. sampling: one of POINT_SAMPLINGS. colors: one of COLORINGS. provenance: who made
+    it from what. Raises ModelError for values that this runtime does not know.
     """
 
     shape: str
@@ -115,6 +116,7 @@ class Manifest:
     channels: str = "rgb"
     scale: float = 1.0 / 255.0
     sampling: str = "bilinear"
+    colors: str = "absolute"
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -125,6 +127,7 @@ class Manifest:
             "layout": LAYOUTS,
             "channels": ("rgb",),
             "sampling": POINT_SAMPLINGS,
+            "colors": COLORINGS,
         }
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:

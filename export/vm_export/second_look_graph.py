@@ -46,8 +46,10 @@ def _worth(graph: Graph, gate: Gate, answers: str, convolve: Convolve, places: i
     chosen = graph.node("Gather", [answers, graph.constant("gate.classes", list(gate.classes))], "gate.chosen", axis=0)
     largest = graph.node("ReduceMax", [chosen], "gate.largest", axes=[0], keepdims=1)
     above = graph.node("Greater", [largest, graph.constant("gate.above", gate.above)], "gate.passed")
-    red = graph.node("Gather", ["points", graph.constant("gate.red", [0])], "gate.color", axis=0)
-    shown = graph.node("GreaterOrEqual", [red, graph.constant("gate.black", 0.0)], "gate.shown")
+    # Of what is off screen every group is looked up around the gap that stands for it, of all else the first is not.
+    row = graph.node("Gather", ["columns", graph.constant("gate.row", [0])], "gate.columns", axis=0)
+    off_screen = graph.node("Equal", [row, graph.constant("gate.gap", GAP + 1)], "gate.off_screen")
+    shown = graph.node("Not", [off_screen], "gate.shown")
     worth = graph.node("Cast", [graph.node("And", [above, shown], "gate.seeds")], "gate.ring0", to=FLOAT)
     for ring in range(1, gate.rings + 1):
         reached = convolve(f"gate.step{ring}", worth, np.ones((1, places, 1)))

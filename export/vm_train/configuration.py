@@ -10,6 +10,7 @@ from typing import Any
 from vm_embedded.errors import InputError
 from vm_embedded.manifest import KINDS, POINT_SAMPLINGS, Manifest, ObjectClass
 from vm_embedded.mesh import RING_NEIGHBORS
+from vm_embedded.relative import COLORINGS
 from vm_embedded.shapes import SHAPES
 from vm_export.grid import GRIDS, Grid
 from vm_export.network_shape import ACTIVATIONS, NetworkShape
@@ -118,6 +119,11 @@ class MeshSettings:
         "color of a point: bilinear, between the four pixels around it; footprint, the mean of as much of the picture "
         "as it stands for",
     )
+    colors: str = one_of(
+        COLORINGS,
+        "absolute",
+        "colors that the network takes: absolute, or relative to the mean and the deviation of all points of a picture",
+    )
     max_distance: float = number(10.0, "how far out the mesh reaches", "m", (0.1, 1e4))
     grid: str = one_of(GRIDS, "visual", "the Visual Mesh, or the paper's baseline, which can't be exported")
     equal_at: float = number(
@@ -184,6 +190,7 @@ class TrainConfiguration:
             classes=self.classes.outputs,
             any_radius=mesh.radius_of == "scene",
             sampling=mesh.sampling,
+            colors=mesh.colors,
         )
 
     @property

@@ -17,7 +17,7 @@ from vm_export.second_look import Gate, SecondLook
 
 from .graphs import Graph
 
-_ALIKE = ("shape", "radius", "intersections", "mesh", "classes", "any_radius", "sampling")
+_ALIKE = ("shape", "radius", "intersections", "mesh", "classes", "any_radius", "sampling", "colors")
 """What two networks must have in common to look at one mesh; how far out it reaches changes nothing near by."""
 
 
@@ -47,11 +47,6 @@ class FirstLook:
             raise InputError("a second look is for objects, and no class of [classes] is of that kind")
         digest = hashlib.sha256(path.read_bytes()).hexdigest()
         return cls(checkpoint.last, Gate(above, rings, objects), digest)
-
-    @property
-    def key(self) -> tuple[str, float, int]:
-        """What decides which points pass."""
-        return self.sha256, self.gate.above, self.gate.rings
 
     @torch.no_grad()
     def part(self, graph: Graph) -> Graph:

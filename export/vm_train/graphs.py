@@ -16,6 +16,7 @@ from vm_embedded.lens_file import LensFile
 from vm_embedded.manifest import Manifest
 from vm_embedded.mesh import Mesh, ring_mesh
 from vm_embedded.projection import Projection, along, project
+from vm_embedded.relative import make_relative
 from vm_embedded.sampling import sample
 from vm_export.grid import VISUAL, Grid
 
@@ -140,6 +141,8 @@ def color(
         else:
             levels = alike(len(shown), math.sqrt(height * width / max(len(shown), 1)))
     sample(picture.image, shown.pixels, "bgr", sampling, out, levels)
+    if manifest.colors == "relative":
+        make_relative(out)
 
 
 def plane_distances(rays: Floats, height: float) -> Floats:

@@ -205,7 +205,7 @@ class Job:
             return Graphs(pictures, view)
         count = self.configuration.training.views
         views = KeptViews(
-            self.unpacked, count, view.classes, view.manifest, view.grid, view.augmentation, view.own_radius, self.first
+            self.unpacked, count, view.classes, view.manifest, view.grid, view.augmentation, view.own_radius
         )
         return Graphs(pictures, view, Unpacked(self.unpacked), views if count else None)
 

@@ -24,7 +24,6 @@ from vm_embedded.manifest import Manifest
 from vm_export.grid import Grid
 
 from .augmentation import Augmentation
-from .first_look import FirstLook
 from .graphs import Graph
 from .picture_files import PictureFiles
 from .pictures import Classes
@@ -51,12 +50,10 @@ class KeptViews:
         grid: Grid,
         augmentation: Augmentation,
         own_radius: bool,
-        first: FirstLook | None = None,
     ) -> None:
         self.count = count
         self._classes = classes
         made = [{name: getattr(manifest, name) for name in _PART}, asdict(grid), asdict(augmentation), own_radius]
-        made += [] if first is None else [first.key]
         digest = hashlib.sha256(json.dumps(made, sort_keys=True).encode()).hexdigest()
         self._folder = folder / f"views-{digest[:12]}"
         try:

@@ -11,6 +11,7 @@ from torch.utils.data import DataLoader, Dataset
 
 from vm_embedded.errors import GeometryError, InputError, VisualMeshError
 from vm_embedded.manifest import Manifest
+from vm_embedded.relative import make_relative
 from vm_export.grid import Grid
 from vm_synth.worker_process import begin, shielded
 
@@ -47,28 +48,35 @@ class View:
     def graph(self, picture: Picture, manifest: Manifest, seed: tuple[int, ...] | None) -> Graph:
         """What a network with a manifest sees of a picture, augmented with a seed. Raises InputError."""
         if seed is None:
-            return self._plain(picture, manifest)
+            return self._passed(self._plain(picture, manifest))
         random = np.random.default_rng(seed)
         return self.look(self.view(picture, manifest, random), random)
 
     def view(self, picture: Picture, manifest: Manifest, random: np.random.Generator) -> Graph:
-        """The whole graph of a picture told to be from another pose and lens, and softened. Raises InputError."""
+        """The whole graph of a picture told to be from another pose and lens, and softened, in absolute colors.
+
+        Raises InputError.
+        """
         changed = blurred(moved(picture, self.augmentation, random), self.augmentation, random)
-        return self._plain(changed, manifest)
+        return self._plain(changed, replace(manifest, colors="absolute"))
 
     def look(self, graph: Graph, random: np.random.Generator) -> Graph:
-        """A window of a view, with other colors."""
+        """A window of a view with other colors, or what the first network passes on of it."""
         objects = [at for at, each in enumerate(self.manifest.classes) if each.kind == "object"]
-        part = window_of(graph, self.window, objects, random)
-        colors = recolored(part.points[:-1], self.augmentation, random)
-        return replace(part, points=np.concatenate([colors, part.points[-1:]]))
+        colors = recolored(graph.points[:-1], self.augmentation, random)
+        if self.manifest.colors == "relative":
+            make_relative(colors)
+        told = replace(graph, points=np.concatenate([colors, graph.points[-1:]]))
+        return self._passed(window_of(told, self.window, objects, random))
+
+    def _passed(self, graph: Graph) -> Graph:
+        return graph if self.first is None else self.first.part(graph)
 
     def _plain(self, picture: Picture, manifest: Manifest) -> Graph:
         try:
-            graph = graph_of(picture, manifest, self.grid)
+            return graph_of(picture, manifest, self.grid)
         except GeometryError:  # so low a camera sees no points
             return empty(manifest.neighbors)
-        return graph if self.first is None else self.first.part(graph)
 
 
 def ball_radius(files: PictureFiles) -> float:

@@ -38,6 +38,7 @@ pitch_step = 0.02
 roll_step = 0.03
 cache_mib = 32
 object_radius = 0.11
+max_distance = 7.5
 threshold = 0.6
 min_inside = 0.7
 max_around = 0.3
@@ -75,6 +76,7 @@ def test_a_full_configuration_is_read(write):
         "roll_step": 0.03,
         "cache_mib": 32,
         "object_radius": 0.11,
+        "max_distance": 7.5,
         "threshold": 0.6,
         "min_inside": 0.7,
         "max_around": 0.3,
