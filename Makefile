@@ -69,7 +69,7 @@ compare: .venv/dev ## compare selections and meshes: make compare DATA=set HELD_
 	$(BIN)/python -m benchmarks.comparison_report
 
 choices: .venv/dev ## what each choice of a training brings: make choices [TEST=data/test], after networks and test-data (hours)
-	$(BIN)/python -m benchmarks.choices data/soccer $(TEST)/clutter build/choices
+	$(BIN)/python -m benchmarks.choices data/soccer $(TEST)/field build/choices
 	$(BIN)/python -m benchmarks.choices_report
 
 fixtures: .venv/dev ## draw the frames of the tests and train their network again (about 20 minutes)

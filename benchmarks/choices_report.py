@@ -21,7 +21,10 @@ GROUPS = {
     "activation": ("base", "elu", "relu"),
     "width": ("width 2", "base", "width 8", "width 16"),
     "rings across a ball": ("k = 3", "base", "k = 5", "k = 6"),
-    "points that give gradients": ("base", "all points", "focal loss", "balanced selection", "hard-example rounds"),
+    "what a point gives": ("base", "absolute colors", "bilinear points", "mesh to 10 m"),
+    "points that give gradients": (
+        "base", "balance 0.15", "balance 0.7", "all points", "focal loss", "balanced selection", "hard-example rounds",
+    ),
     "classes": ("base", "six classes"),
     "augmentation": (
         "base", "no augmentation", "pose not augmented", "colors not augmented", "sharpness not augmented",
@@ -32,7 +35,8 @@ BASE = {
     "activation": "selu",
     "width": "width 4",
     "rings across a ball": "k = 4",
-    "points that give gradients": "weighed",
+    "what a point gives": "relative colors, footprints, to 14 m",
+    "points that give gradients": "weighed, balance 0.3",
     "classes": "ball and other",
     "augmentation": "all augmentation",
 }
