@@ -179,6 +179,9 @@ def write_reference(checkpoint: Checkpoint, path: str | Path) -> None:
     network, manifest = checkpoint.network, checkpoint.manifest
     if isinstance(network, SecondLook):
         raise InputError("the reference's format is for one network; this one has a second look")
+    if (manifest.sampling, manifest.colors) != ("bilinear", "absolute"):
+        kind = f"{manifest.sampling} points and {manifest.colors} colors"
+        raise InputError(f"the reference's networks take bilinear points and absolute colors; this one takes {kind}")
     neighbors = network.shape.neighbors
     groups: list[list[dict[str, Any]]] = []
     for spec, layer in zip(network.shape.layers, network.layers, strict=True):

@@ -149,6 +149,9 @@ def test_what_does_not_fit_is_refused(tmp_path):
         onnx_graph.export(made, tmp_path / "model.onnx", "plain")
     with pytest.raises(InputError, match="has a second look"):
         write_reference(made, tmp_path / "model.yaml")
+    for facts in ({"sampling": "footprint"}, {"colors": "relative"}):
+        with pytest.raises(InputError, match="this one takes"):
+            write_reference(Checkpoint(made.network.first, manifest(**facts)), tmp_path / "model.yaml")
     assert not list(tmp_path.iterdir())
 
 
