@@ -125,9 +125,12 @@ def _said(oddity: Oddity, missed: bool) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("test", type=Path, help="folder of test sets")
+    parser.add_argument("--network", choices=SHIPPED, help="score this one again, and keep what is known of the others")
     options = parser.parse_args()
     found: dict[str, Any] = {"networks": {}, "grid": {}}
-    for name in SHIPPED:
+    if options.network:
+        found = json.loads(RESULTS.read_text())
+    for name in (options.network,) if options.network else SHIPPED:
         found["networks"][name] = {}
         for each in SETS:
             scores, used = scores_of(model_path(name), options.test / each)
@@ -136,7 +139,7 @@ def main() -> None:
             if name == DEFAULT and each == "field":
                 picture, found["worst"] = sheet(used)
                 cv2.imwrite(str(WORST), picture, [cv2.IMWRITE_JPEG_QUALITY, 80])
-    for folder in sorted((options.test / "grid").iterdir()):
+    for folder in sorted((options.test / "grid").glob("*")) if options.network in (None, DEFAULT) else ():
         used = evaluation(model_path(DEFAULT), folder, Settings())
         found["grid"][folder.name] = numbers(used.objects["ball"], None)
         print(folder.name, found["grid"][folder.name], flush=True)

@@ -171,8 +171,9 @@ def main() -> None:
         "networks on fields": networks(found, "field"),
         "networks in clutter": networks(found, "clutter"),
         **{f"{name} by distance": by_distance(found["networks"][name]["field"]) for name in ("ball-9x4", DEFAULT)},
-        "grid": grid(found),
     }
+    if found["grid"]:
+        made["grid"] = grid(found)
     made["false an hour"] = table(
         ["network", "test pictures", "false balls a picture", "an hour at 30 frames a second"],
         [
