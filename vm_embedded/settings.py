@@ -59,7 +59,7 @@ class Settings:
         "m",
     )
     threshold: float = _number(0.5, 0.0, 1.0, "probability from which a point counts for a class")
-    min_inside: float = _number(0.75, 0.0, 1.0, "mean probability that an object needs inside its outline")
+    min_inside: float = _number(0.85, 0.0, 1.0, "mean probability that an object needs inside its outline")
     max_around: float = _number(0.25, 0.0, 1.0, "mean probability that an object may have in the band around it")
     max_widths: float = _number(
         2.0, 1.0, 100.0, "width of a cluster from which it can't be one object", "object widths"
