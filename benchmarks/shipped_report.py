@@ -135,17 +135,19 @@ def card(found: dict[str, Any], name: str) -> str:
     )
     made, used = manifest.provenance, scores["used 0.5"]["0.5 to 6 m"]
     hard = clutter["ranked 0.5"]["0.5 to 6 m"]
+    kilobytes = model_path(name).stat().st_size / 1000
     size = " x ".join(map(str, scores["size"]))
     return f"""# {name}
 
-Finds balls on a soccer field. {first}{depth} graph convolutions of {width} channels, SELU; ring6 mesh with
-k = {manifest.intersections:g} out to {manifest.max_distance:g} m, for balls of any radius (`--object-radius`,
-{manifest.object_radius:g} m if nothing is said). {model_path(name).stat().st_size / 1000:.0f} kB. Classes: ball, other.
+Finds balls on a soccer field. {first}{depth} graph convolutions
+of {width} channels, SELU; ring6 mesh with k = {manifest.intersections:g} out to {manifest.max_distance:g} m,
+for balls of any radius (`--object-radius`,
+{manifest.object_radius:g} m if nothing is said). {kilobytes:.0f} kB. Classes: ball, other.
 
 - **Made from** {made["training_pictures"]} rendered pictures of 30 maps (`export/vm_synth/soccer.toml`, seed 1), chosen
   by {made["validation_pictures"]} others: epoch {made["epoch"]} of {made["epochs"]}, seed {made["seed"]}, configuration
   `export/networks/{name}.toml`.
-- **Made by** `make networks HDRI=folder-of-maps`; the file's SHA-256 is
+- **To make it again**: `make networks HDRI=folder-of-maps`; the file's SHA-256 is
   {model.sha256}.
 
 On {scores["pictures"]} rendered pictures of fields under six maps that it has not seen, {size} px, with balls of 0.05

@@ -67,8 +67,9 @@ def _part(graph: Graph, worth: str, groups: Groups) -> tuple[str, str]:
 
     ends = graph.constant("look.zero", 0), graph.node("Size", [slots], "look.count"), graph.constant("look.step", 1)
     numbers = graph.node("Range", [*ends], "look.numbers")
-    off_screen = graph.node("Cast", [worth], "look.somewhere", to=INT64)
-    nowhere = graph.node("Mul", [off_screen, graph.constant("look.none", 0)], "look.nowhere")
+    # The place of the off-screen point, 0, for every slot that is not in the part.
+    whole = graph.node("Cast", [worth], "look.worth", to=INT64)
+    nowhere = graph.node("Mul", [whole, graph.constant("look.none", 0)], "look.nowhere")
     row = graph.constant("look.row", [1, -1])
     rows = [graph.node("Reshape", [each, row], f"{each}.row") for each in (slots, numbers)]
     position = graph.node("ScatterElements", [nowhere, *rows], "look.position", axis=1)
