@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.lens_file import read_lens_file
-from vm_synth.sections import read_sections
+from vm_embedded.sections import read_sections
 from vm_train.configuration import TrainConfiguration
 from vm_train.split import Split
 

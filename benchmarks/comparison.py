@@ -18,7 +18,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from vm_synth.sections import read_sections
+from vm_embedded.sections import read_sections
 from vm_train.configuration import TrainConfiguration
 from vm_train.split import Split
 

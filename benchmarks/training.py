@@ -20,8 +20,8 @@ import numpy as np
 import torch
 
 from vm_embedded.bench import machine
+from vm_embedded.sections import read_sections
 from vm_export.network import Network
-from vm_synth.sections import read_sections
 from vm_train.augmentation import OFF
 from vm_train.configuration import TrainConfiguration
 from vm_train.hardware import Hardware

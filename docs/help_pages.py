@@ -11,10 +11,10 @@ from pathlib import Path
 
 from vm_embedded import bench_cli as bench
 from vm_embedded import cli as detect
+from vm_embedded.sections import documented
 from vm_export import cli as export
 from vm_synth import cli as synth
 from vm_synth.configuration import SceneConfiguration
-from vm_synth.sections import documented
 from vm_train import evaluate_cli as evaluate
 from vm_train import options as train
 from vm_train.configuration import TrainConfiguration

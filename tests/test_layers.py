@@ -14,7 +14,7 @@ PACKAGE = Path(vm_embedded.__file__).parent
 TOP = PACKAGE.parent
 
 LAYERS = [
-    {"errors", "arrays", "files", "progress"},
+    {"errors", "arrays", "files", "progress", "entries", "sections"},
     {"shapes", "recursion", "lens", "lens_opencv", "orientation", "yaml_reader"},
     {"mesh"},
     {

@@ -16,16 +16,17 @@ import cv2
 
 from .arrays import Image
 from .bench import STAGES, Run, cold, drawn_image, machine, measure, rss_mib, sgemm_rate, walk
-from .configuration import angle, length
+from .configuration import Configuration, angle, length
 from .detector import Detector
 from .errors import InputError, VisualMeshError
 from .files import check_writable, written_beside
 from .lens import Lens, Rectilinear, Size
 from .onnx_file import ModelFile, read_model
-from .options import ANGLES, Given, add_model, add_pose, add_settings, read_options
+from .options import ANGLES, add_model, add_pose, add_settings, read_options
 from .orientation import Orientation
 from .progress import Progress
 from .sampling import checked_image
+from .shipped import model_path
 from .sources import check_file_format, read_image
 from .tuning import check_editable, tuned, write_settings
 
@@ -98,12 +99,12 @@ def _run(options: argparse.Namespace) -> int:
         check_writable(options.json)
     if options.tune is not None:
         _check_tuning(options, given)
-    model = read_model(given.model)
+    model = read_model(model_path(given.model))
     if options.threads is None:
         most = min(options.up_to or work.cores, work.cores)
-        settings = [replace(given.settings, threads=count) for count in range(1, most + 1)]
+        settings = [replace(given.detector, threads=count) for count in range(1, most + 1)]
     else:
-        settings = [given.settings]
+        settings = [given.detector]
     detectors = [Detector(model, each) for each in settings]
     progress = Progress(options.frames)
     runs = measure(detectors, work.image, work.lens, work.orientations, progress.show)
@@ -114,7 +115,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.tune is not None:
         progress = Progress(options.frames)
         highest = max(each.threads for each in settings)
-        found["tuned"] = tuned(model, given.settings, highest, work.image, work.lens, work.orientations, progress.show)
+        found["tuned"] = tuned(model, given.detector, highest, work.image, work.lens, work.orientations, progress.show)
         progress.clear()
     text = json.dumps(found, indent=1, allow_nan=False)
     if json_to_stdout:
@@ -146,15 +147,19 @@ class _Work:
         return self.image.shape[1], self.image.shape[0]
 
 
-def _work(options: argparse.Namespace, given: Given) -> _Work:
+def _work(options: argparse.Namespace, given: Configuration) -> _Work:
     """The frame, the lens and the walk. Raises InputError."""
     swing, sway = angle(options.swing), length(options.sway)
     if options.frames < 1 or (options.up_to is not None and options.up_to < 1):
         raise InputError(f"--frames and --up-to must be at least 1, not {options.frames} and {options.up_to}")
-    middle = given.orientation or given.lens_orientation or Orientation.from_roll_pitch(_HEIGHT, 0.0, _PITCH)
+    middle = (
+        given.orientation.orientation()
+        or (given.lens.orientation if given.lens else None)
+        or Orientation.from_roll_pitch(_HEIGHT, 0.0, _PITCH)
+    )
     if abs(sway) >= middle.height:
         raise InputError(f"--sway {sway:g} m takes a camera at {middle.height:g} m below the plane")
-    image, lens = _frame_and_lens(options, given.lens, given.settings.format)
+    image, lens = _frame_and_lens(options, given.lens.lens if given.lens else None, given.detector.format)
     orientations = walk(middle, swing, sway, options.frames)
     return _Work(image, lens, middle, swing, sway, orientations, len(os.sched_getaffinity(0)))
 
@@ -178,10 +183,10 @@ def _size(text: str) -> Size:
     return int(parts[0]), int(parts[1])
 
 
-def _check_tuning(options: argparse.Namespace, given: Given) -> None:
+def _check_tuning(options: argparse.Namespace, given: Configuration) -> None:
     """Raise InputError if tuning would be in vain."""
     check_editable(options.tune)
-    if given.settings.height_tolerance == 0.0:
+    if given.detector.height_tolerance == 0.0:
         raise InputError("--tune has nothing to tune with --height-tolerance 0, which prepares nothing")
     if options.frames < _TUNED_FRAMES:
         raise InputError(f"--tune needs a walk of at least {_TUNED_FRAMES} frames, not {options.frames}")

@@ -103,8 +103,8 @@ def _lens_beside(path: Path | None) -> Path | None:
 
 def _run(options: argparse.Namespace) -> int:
     given = read_options(options)
-    settings = given.settings
-    pose = _Pose(given.lens, given.orientation)
+    settings = given.detector
+    pose = _Pose(given.lens.lens if given.lens else None, given.orientation.orientation())
     detector = Detector.from_file(given.model, settings)
     emit = [name.strip() for name in options.emit_points.split(",")] if options.emit_points else []
     for name in emit:

@@ -1,104 +1,27 @@
-"""vm.toml and what else says how a detector is to be run, checked at the border.
+"""vm.toml: everything about a detector that is to run, a section each, checked at the border.
 
-model = "ball.onnx"             # paths count from the file's own folder; or a network of the package, "ball-9x4"
-lens = "lens.yaml"              # or a table: [lens] projection = ..., see lens_file.py
-[orientation]
-height = 0.8                    # [m]
-pitch = "20deg"                 # [rad] if a bare number
-roll = 0.0
-[detector]
-threads = 1                     # every field of Settings
+`vm-detect --print-config` writes it with all defaults. Paths count from the file's own folder.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import re
-import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterator, Mapping
+from dataclasses import Field, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError, VisualMeshError, unknown
-from .lens import Lens
-from .lens_file import lens_from_table, read_lens_file
-from .settings import Settings, check_setting
-from .shipped import model_path
+from .entries import check_entries, entry
+from .errors import InputError, VisualMeshError
+from .lens_file import LensFile, lens_from_table, read_lens_file
+from .orientation import Orientation
+from .sections import read_sections
+from .settings import Settings
+from .shipped import DEFAULT, SHIPPED, model_path
 
-_KEYS = ("model", "lens", "orientation", "detector")
-_ANGLES = ("height", "pitch", "roll")
 _DEGREES = re.compile(r"\s*([-+0-9.eE]+)\s*deg\s*")
-
-
-@dataclass(frozen=True)
-class Configuration:
-    """What was configured; None and missing settings are left to whoever asks.
-
-    height [m], pitch and roll [rad] of the camera, where no frame brings its own.
-    """
-
-    model: Path | None = None
-    lens: Lens | None = None
-    height: float | None = None
-    pitch: float | None = None
-    roll: float | None = None
-    settings: Mapping[str, Any] = field(default_factory=dict)
-
-
-def read_configuration(path: str | Path) -> Configuration:
-    """Read a vm.toml. Raises InputError naming the file, an unknown key with the nearest known one, or a bad value."""
-    path = Path(path)
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"can't read configuration {path}: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"configuration {path}: {error}") from error
-    try:
-        return _configuration(table, path.parent)
-    except VisualMeshError as error:
-        raise InputError(f"configuration {path}: {error}") from error
-
-
-def _configuration(table: Mapping[str, Any], folder: Path) -> Configuration:
-    _only(table, _KEYS, "key")
-    orientation = _table(table, "orientation")
-    settings = _table(table, "detector")
-    known = {each.name: each for each in fields(Settings)}
-    _only(orientation, _ANGLES, "key in [orientation]")
-    _only(settings, known, "key in [detector]")
-    for name, value in settings.items():
-        check_setting(known[name], value)
-    model = table.get("model")
-    if model is not None and not isinstance(model, str):
-        raise InputError(f"model must be a path, not {model!r}")
-    lens = table.get("lens")
-    if isinstance(lens, str):
-        lens = read_lens_file(folder / lens).lens
-    elif lens is not None:
-        lens = lens_from_table(_table(table, "lens"))
-    return Configuration(
-        model=None if model is None else folder / model_path(model),
-        lens=lens,
-        height=length(orientation["height"]) if "height" in orientation else None,
-        pitch=angle(orientation["pitch"]) if "pitch" in orientation else None,
-        roll=angle(orientation["roll"]) if "roll" in orientation else None,
-        settings=settings,
-    )
-
-
-def _table(table: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-    value = table.get(key, {})
-    if not isinstance(value, Mapping):
-        raise InputError(f"{key} must be a table, [{key}], not {value!r}")
-    return value
-
-
-def _only(table: Mapping[str, Any], allowed: Any, what: str) -> None:
-    for key in table:
-        if key not in allowed:
-            raise InputError(unknown(what, key, allowed))
 
 
 def length(value: object) -> float:
@@ -126,3 +49,86 @@ def _finite(value: object, what: str) -> float:
     if not math.isfinite(number):
         raise InputError(what)
     return number
+
+
+def _length(entry: Field[Any], value: object) -> float:
+    return length(value)
+
+
+def _angle(entry: Field[Any], value: object) -> float:
+    return angle(value)
+
+
+@dataclass(frozen=True)
+class FixedPose:
+    """Section [orientation]: where the camera is, if neither the frames nor a pose stream say so."""
+
+    height: float | None = entry(_length, None, "height of the camera over the plane", "m")
+    pitch: float | None = entry(_angle, None, 'angle of the optical axis below the horizon, or as in "20deg"', "rad")
+    roll: float | None = entry(_angle, None, 'lean of the camera to the right, or as in "-2deg"', "rad")
+
+    def __post_init__(self) -> None:
+        check_entries(self)
+
+    def orientation(self) -> Orientation | None:
+        """The orientation, or None if no height is given. Raises InputError for angles without one."""
+        if self.height is None:
+            if self.pitch is not None or self.roll is not None:
+                raise InputError("pitch and roll need a height: give --height")
+            return None
+        return Orientation.from_roll_pitch(self.height, self.roll or 0.0, self.pitch or 0.0)
+
+
+def _read_model(value: object) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"model must be a path, not {value!r}")
+    return value
+
+
+def _documented_model(value: str) -> Iterator[str]:
+    yield f"# the network: a file that vm-export wrote, or one of the package: {', '.join(SHIPPED)}"
+    yield f"model = {json.dumps(value)}"
+
+
+def _read_lens(value: object) -> Path | LensFile:
+    if isinstance(value, str):
+        return Path(value)
+    if not isinstance(value, Mapping):
+        raise InputError(f"lens must be a table, [lens], not {value!r}")
+    return LensFile(lens_from_table(value), None)
+
+
+def _documented_lens(_: LensFile | None) -> Iterator[str]:
+    yield "# the lens: a file of the reference, of OpenCV or of ROS, or TOML; or a table, [lens], with projection,"
+    yield "# focal_length [px], fov [rad], and where they matter center, distortion and size [px]"
+    yield '# lens = "lens.yaml"'
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """All sections, and the two that are no tables of entries."""
+
+    model: str = field(default=DEFAULT, metadata={"read": _read_model, "documented": _documented_model})
+    lens: LensFile | None = field(default=None, metadata={"read": _read_lens, "documented": _documented_lens})
+    orientation: FixedPose = field(default_factory=FixedPose)
+    detector: Settings = field(default_factory=Settings)
+
+
+def read_configuration(path: str | Path) -> Configuration:
+    """Read a vm.toml. Raises InputError naming the file, the line, an unknown key with the nearest known one, or a bad
+    value."""
+    path = Path(path)
+    read = read_sections(Configuration, path)
+    try:
+        lens: object = read.lens
+        if isinstance(lens, Path):
+            read = replace(read, lens=read_lens_file(path.parent / lens))
+        return replace(read, model=str(path.parent / model_path(read.model)))
+    except VisualMeshError as error:
+        raise InputError(f"configuration {path}: {error}") from error
+
+
+def overridden(configuration: Configuration, sections: Mapping[str, Mapping[str, Any]]) -> Configuration:
+    """A configuration in which the given entries of the given sections count instead. Raises InputError."""
+    changed = {name: replace(getattr(configuration, name), **entries) for name, entries in sections.items()}
+    return replace(configuration, **changed)

@@ -3,35 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, fields
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
-from .configuration import Configuration, angle, length, read_configuration
-from .errors import InputError
-from .lens import Lens
+from .configuration import Configuration, FixedPose, overridden, read_configuration
 from .lens_file import read_lens_file
-from .orientation import Orientation
 from .settings import Settings
-from .shipped import DEFAULT, SHIPPED, model_path
+from .shipped import DEFAULT, SHIPPED
 
 ANGLES = (
     "Angles are radians, or degrees with a suffix as in 20deg; negative ones in degrees need an equals sign, "
     "--pitch=-20deg."
 )
-
-
-@dataclass(frozen=True)
-class Given:
-    """What the user gave; None where nothing was said.
-
-    lens_orientation: what the file of --lens says, from a frame of its own.
-    """
-
-    model: Path
-    lens: Lens | None
-    orientation: Orientation | None
-    settings: Settings
-    lens_orientation: Orientation | None = None
 
 
 def add_model(parser: argparse.ArgumentParser) -> None:
@@ -56,44 +40,38 @@ def add_pose(parser: argparse.ArgumentParser, when: str) -> None:
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
     """An option for each field of Settings."""
-    settings = parser.add_argument_group("settings")
-    for each in fields(Settings):
-        unit, limits = each.metadata["unit"], each.metadata.get("range")
+    add_section(parser.add_argument_group("settings"), Settings, "")
+
+
+def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str) -> None:
+    """An option for each entry of a section, whose names begin with `prefix`."""
+    for each in fields(section):
+        unit = each.metadata["unit"]
         default = "the model's" if each.default is None else each.default
         help = f"{each.metadata['help']}{f' [{unit}]' if unit else ''}; default {default}"
-        option = "--" + each.name.replace("_", "-")
+        option = "--" + (prefix + each.name).replace("_", "-")
         if "allowed" in each.metadata:
-            settings.add_argument(option, choices=each.metadata["allowed"], help=help)
-        elif limits is None:
-            settings.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=help)
+            group.add_argument(option, choices=each.metadata["allowed"], help=help)
+        elif isinstance(each.default, bool):
+            group.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=help)
         else:
             kind = int if isinstance(each.default, int) else float
-            settings.add_argument(option, type=kind, metavar="N" if kind is int else "X", help=help)
+            group.add_argument(option, type=kind, metavar="N" if kind is int else "X", help=help)
 
 
-def read_options(options: argparse.Namespace) -> Given:
+def read_options(options: argparse.Namespace) -> Configuration:
     """What the command line and the configuration say together. Raises InputError."""
     configured = read_configuration(options.config) if options.config else Configuration()
-    model = configured.model if options.model is None else model_path(options.model)
-    given = {each.name: getattr(options, each.name) for each in fields(Settings)}
-    settings = {**configured.settings, **{name: value for name, value in given.items() if value is not None}}
-    file = read_lens_file(options.lens) if options.lens else None
-    return Given(
-        model or model_path(DEFAULT),
-        file.lens if file else configured.lens,
-        _orientation(options, configured),
-        Settings(**settings),
-        file.orientation if file else None,
-    )
+    sections = {"orientation": FixedPose, "detector": Settings}
+    configured = overridden(configured, {name: _given(options, each) for name, each in sections.items()})
+    if options.model is not None:
+        configured = replace(configured, model=options.model)
+    if options.lens is not None:
+        configured = replace(configured, lens=read_lens_file(options.lens))
+    return configured
 
 
-def _orientation(options: argparse.Namespace, configured: Configuration) -> Orientation | None:
-    """The orientation of the command line and the configuration, or None without a height."""
-    height = length(options.height) if options.height is not None else configured.height
-    pitch = angle(options.pitch) if options.pitch is not None else configured.pitch
-    roll = angle(options.roll) if options.roll is not None else configured.roll
-    if height is None:
-        if pitch is not None or roll is not None:
-            raise InputError("pitch and roll need a height: give --height")
-        return None
-    return Orientation.from_roll_pitch(height, roll or 0.0, pitch or 0.0)
+def _given(options: argparse.Namespace, section: Any) -> dict[str, Any]:
+    """The entries of a section that the command line gives."""
+    given = {each.name: getattr(options, each.name) for each in fields(section)}
+    return {name: value for name, value in given.items() if value is not None}

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from vm_embedded.arrays import Floats, Singles
+from vm_embedded.entries import check_entries, share
 
 from .ball_design import BallDesign, Color
 from .ball_patterns import KINDS
 from .ball_prints import logo, print_images, word
 from .ball_sphere import Sphere, directions_of, unit
-from .ranges import check_entries, drawn, share, some_of, uniform
+from .ranges import drawn, some_of, uniform
 
 WHITE_ALBEDO, WHITE_CHROMA = 0.45, 0.25
 """What counts as white: the darkest channel is above the first, the channels differ by less than the second."""

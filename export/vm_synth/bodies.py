@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vm_embedded.entries import check_entries, share
+
 from .carrier import CARRIERS, carriers, own_body
 from .clutter import CLUTTER, FURNITURE, pedestal
 from .distractors import DISTRACTORS, distractor_ball
 from .goals import goal
 from .people import legs, person, shoes
-from .ranges import check_entries, drawn, log_uniform, share, some_of, uniform
+from .ranges import drawn, log_uniform, some_of, uniform
 from .robots import fallen, humanoid, nao, wheeled_robot
 from .solids import LABELS, Body, Joined, joined
 

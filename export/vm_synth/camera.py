@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from vm_embedded.entries import check_entries, number, share
 from vm_embedded.lens import PROJECTIONS, RadialLens, Rectilinear, Size
 from vm_embedded.lens_file import lens_from_table
 from vm_embedded.orientation import Orientation
 
-from .ranges import check_entries, drawn, number, share, some_of, uniform
+from .ranges import drawn, some_of, uniform
 
 
 @dataclass(frozen=True)

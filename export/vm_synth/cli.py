@@ -13,6 +13,7 @@ import cv2
 
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable, written_beside
+from vm_embedded.sections import documented, overrides_of, read_sections
 
 from .configuration import SceneConfiguration
 from .dataset import Plan, digest, indices_in, is_done, shard_of
@@ -22,7 +23,6 @@ from .llvm import find_llvm, load_mitsuba
 from .plots import load_matplotlib, plot
 from .progress import Ticker
 from .report import as_json, complaints, tables
-from .sections import documented, overrides_of, read_sections
 from .sheet import cell, chosen, read_shown, sheet
 from .stopping import stoppable
 from .workers import Done, Job, render_all

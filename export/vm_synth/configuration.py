@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
+from vm_embedded.entries import check_entries, one_of, share
+
 from .balls import BallRanges
 from .bodies import BodyRanges
 from .camera import CameraRanges
 from .environment import MapRanges
 from .field import FieldRanges
-from .ranges import check_entries, drawn, one_of, share
+from .ranges import drawn
 from .sensor import SensorRanges
 
 CLASSES = ("ball", "goal", "line", "field", "environment", "robot")

@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Singles
+from vm_embedded.entries import check_entries, share
 
-from .ranges import check_entries, drawn, log_uniform, share, some_of, uniform
+from .ranges import drawn, log_uniform, some_of, uniform
 
 TURFS = ("blades", "felt", "natural")
 

@@ -13,8 +13,9 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Image, Singles
+from vm_embedded.entries import check_entries, share
 
-from .ranges import Range, check_entries, drawn, log_uniform, share, some_of, uniform
+from .ranges import Range, drawn, log_uniform, some_of, uniform
 
 TONES = ("srgb", "gamma", "filmic")
 PATTERNS = {

@@ -13,11 +13,12 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Image, Singles
+from vm_embedded.entries import check_entries, number, share
 from vm_embedded.lens import Lens, RadialLens, Size
 from vm_embedded.lens_file import LensFile
 from vm_embedded.lens_opencv import CalibratedLens
 from vm_embedded.orientation import Orientation
-from vm_synth.ranges import check_entries, drawn, number, share
+from vm_synth.ranges import drawn
 from vm_synth.sensor import LUMINANCE
 
 from .pictures import Picture

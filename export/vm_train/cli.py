@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable
+from vm_embedded.sections import documented, overrides_of, read_sections
 from vm_synth.progress import Ticker
-from vm_synth.sections import documented, overrides_of, read_sections
 from vm_synth.stopping import stoppable
 
 from . import check as checking

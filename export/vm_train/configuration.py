@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from vm_embedded.entries import check_entries, number, one_of, share
 from vm_embedded.errors import InputError
 from vm_embedded.manifest import KINDS, POINT_SAMPLINGS, Manifest, ObjectClass
 from vm_embedded.mesh import RING_NEIGHBORS
@@ -15,7 +16,6 @@ from vm_embedded.shapes import SHAPES
 from vm_export.grid import GRIDS, Grid
 from vm_export.network_shape import ACTIVATIONS, NetworkShape
 from vm_synth.dataset import COLORS
-from vm_synth.ranges import check_entries, number, one_of, share
 
 from .augmentation import Augmentation
 from .pictures import Classes, Color
@@ -48,6 +48,8 @@ class ClassTable:
     def from_table(cls, table: Mapping[str, Any]) -> ClassTable:
         """From `name = { kind = "object", colors = [[255, 0, 0]] }`. Raises InputError."""
         colors, kinds = {}, {}
+        if not isinstance(table, Mapping):
+            raise InputError(f"classes must be a section, [classes], not {table!r}")
         for name, entry in table.items():
             if not isinstance(entry, Mapping) or set(entry) != {"kind", "colors"}:
                 raise InputError(f'{name} must be like {{ kind = "object", colors = [[255, 0, 0]] }}, not {entry!r}')
@@ -58,6 +60,7 @@ class ClassTable:
 
     def documented(self) -> Iterator[str]:
         """The section's lines."""
+        yield "[classes]"
         yield f"# each class: its kind, of {', '.join(KINDS)}, and its RGB colors in masks"
         for name, colors in self.colors.items():
             shown = ", ".join(str(list(each)) for each in colors)
@@ -168,7 +171,9 @@ class TrainConfiguration:
     """All sections."""
 
     data: DataSettings = dataclasses.field(default_factory=DataSettings)
-    classes: ClassTable = dataclasses.field(default_factory=ClassTable.usual, metadata={"read": ClassTable.from_table})
+    classes: ClassTable = dataclasses.field(
+        default_factory=ClassTable.usual, metadata={"read": ClassTable.from_table, "documented": ClassTable.documented}
+    )
     mesh: MeshSettings = dataclasses.field(default_factory=MeshSettings)
     network: NetworkSettings = dataclasses.field(default_factory=NetworkSettings)
     second_look: SecondLookSettings = dataclasses.field(default_factory=SecondLookSettings)

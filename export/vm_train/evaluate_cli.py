@@ -7,7 +7,7 @@ import math
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import vm_embedded
@@ -99,12 +99,12 @@ def _subject(options: argparse.Namespace, settings: Settings) -> Subject:
 
 
 def _settings(options: argparse.Namespace) -> Settings:
-    configured = read_configuration(options.config).settings if options.config else {}
+    configured = read_configuration(options.config).detector if options.config else Settings()
     given = {each.name: getattr(options, each.name) for each in fields(Settings)}
     if given["format"] not in (None, "bgr"):
         raise InputError(f"--format {given['format']} is for a robot's camera; pictures of a folder are read as bgr")
     chosen = {name: value for name, value in given.items() if value is not None}
-    return Settings(**{**configured, **chosen, "format": "bgr"})
+    return replace(configured, **{**chosen, "format": "bgr"})
 
 
 def _about(options: argparse.Namespace, settings: Settings, subject: Subject, colors: Any) -> dict[str, Any]:

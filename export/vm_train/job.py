@@ -23,7 +23,7 @@ import numpy.typing as npt
 from vm_embedded import __version__
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
-from vm_synth.sections import documented, read_sections
+from vm_embedded.sections import documented, read_sections
 
 from .configuration import TrainConfiguration
 from .first_look import FirstLook

@@ -66,10 +66,9 @@ def test_tuned_settings_are_written_and_read_by_vm_detect(tmp_path):
     path.write_text('# ours\nmodel = "ball.onnx"\n\n[detector]\nthreads = 7 # too many\nsampling = "fast"\n')
     out = run("--model", MODEL, "--frames", 300, "--up-to", 1, "--size", "320x240", "--tune", path).stdout
     assert "pitch_step" in out
-    settings = read_configuration(path).settings
-    assert settings["threads"] == 1
-    assert settings["sampling"] == "fast"
-    assert settings["pitch_step"] == settings["roll_step"]
+    settings = read_configuration(path).detector
+    assert (settings.threads, settings.sampling) == (1, "fast")
+    assert settings.pitch_step == settings.roll_step
     assert "# ours" in path.read_text()
     assert "# too many" in path.read_text()
 

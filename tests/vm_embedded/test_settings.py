@@ -5,12 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vm_embedded.entries import checked
 from vm_embedded.errors import InputError
 from vm_embedded.sampling import FORMATS, SAMPLINGS
-from vm_embedded.settings import Settings, check_setting
+from vm_embedded.settings import Settings
 
 KNOWN = {each.name: each for each in fields(Settings)}
-RANGES = {name: each.metadata["range"] for name, each in KNOWN.items() if "range" in each.metadata}
+RANGES = {name: each.metadata["limits"] for name, each in KNOWN.items() if "limits" in each.metadata}
 CHOICES = {name: each.metadata["allowed"] for name, each in KNOWN.items() if "allowed" in each.metadata}
 WHOLE = {"threads"}
 
@@ -23,7 +24,7 @@ def test_every_setting_says_what_it_is_for():
     for name, each in KNOWN.items():
         assert len(each.metadata["help"]) > 10, name
         assert isinstance(each.metadata["unit"], str), name
-        kinds = ("range" in each.metadata) + ("allowed" in each.metadata) + isinstance(each.default, bool)
+        kinds = ("limits" in each.metadata) + ("allowed" in each.metadata) + isinstance(each.default, bool)
         assert kinds == 1, name
 
 
@@ -121,12 +122,12 @@ def test_a_choice_is_one_of_the_allowed_texts(name, value):
 )
 def test_a_value_that_passes_the_check_makes_settings_and_no_other_does(name, value):
     try:
-        check_setting(KNOWN[name], value)
+        kept = checked(KNOWN[name], value)
     except InputError:
         with pytest.raises(InputError):
             Settings(**{name: value})
     else:
-        assert getattr(Settings(**{name: value}), name) is value
+        assert getattr(Settings(**{name: value}), name) == kept == value
 
 
 def test_settings_can_not_be_changed():

@@ -12,11 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vm_synth
+from vm_embedded.entries import check_entries, number, one_of, share
 from vm_embedded.errors import InputError
+from vm_embedded.sections import documented, read_sections
 from vm_synth.configuration import CLASSES, SceneConfiguration
 from vm_synth.environment import MapRanges
-from vm_synth.ranges import check_entries, drawn, log_uniform, number, one_of, share, some_of, uniform
-from vm_synth.sections import documented, read_sections
+from vm_synth.ranges import drawn, log_uniform, some_of, uniform
 from vm_synth.solids import LABELS
 
 DEFAULT = SceneConfiguration()
@@ -25,9 +26,20 @@ ENTRIES = [
     for section in fields(DEFAULT)
     for entry in fields(getattr(DEFAULT, section.name))
 ]
-RANGES = [each for each in ENTRIES if each.values[1].metadata.get("kind") == "range"]
-NUMBERS = [each for each in ENTRIES if each.values[1].metadata.get("kind") == "number"]
-NAMES = [each for each in ENTRIES if each.values[1].metadata.get("kind") == "names"]
+
+
+def kind_of(entry):
+    """What an entry is, by its default."""
+    if "check" not in entry.metadata:
+        return None
+    if isinstance(entry.default, tuple):
+        return "names" if "allowed" in entry.metadata else "range"
+    return "name" if "allowed" in entry.metadata else "number"
+
+
+RANGES = [each for each in ENTRIES if kind_of(each.values[1]) == "range"]
+NUMBERS = [each for each in ENTRIES if kind_of(each.values[1]) == "number"]
+NAMES = [each for each in ENTRIES if kind_of(each.values[1]) == "names"]
 
 
 @pytest.fixture(scope="module")
@@ -65,11 +77,11 @@ def values_of(entry):
         return st.dictionaries(st.text(st.characters(exclude_categories=["Cs"]), max_size=8), st.floats(1.0, 80.0))
     if entry.name == "lens":
         return st.just({}) | LENSES
-    if metadata["kind"] == "range":
+    if kind_of(entry) == "range":
         return st.tuples(between(entry), between(entry)).map(lambda ends: tuple(float(each) for each in sorted(ends)))
-    if metadata["kind"] == "number":
+    if kind_of(entry) == "number":
         return between(entry)
-    if metadata["kind"] == "name":
+    if kind_of(entry) == "name":
         return st.sampled_from(metadata["allowed"])
     return st.lists(st.sampled_from(metadata["allowed"]), min_size=1, unique=True).map(tuple)
 
@@ -173,7 +185,7 @@ def refused(write, section, name, value):
     with pytest.raises(InputError) as caught:
         read_sections(SceneConfiguration, path)
     message = str(caught.value)
-    start = f"configuration {path}: [{section}] "
+    start = f"configuration {path}, line 2: [{section}] "
     assert message.startswith(start)
     assert "\n" not in message
     return message[len(start) :]
@@ -217,7 +229,7 @@ MESSAGES = {
     "unknown section": ("[cammera]\n", r"unknown section 'cammera'; did you mean 'camera'\? .*allowed: maps, camera"),
     "unknown entry": ("[camera]\nhight = [1, 2]\n", r"entry in \[camera\] 'hight'; did you mean 'height'\?"),
     "entry of another section": ("[ball]\nturfs = ['felt']\n", r"unknown entry in \[ball\] 'turfs'"),
-    "entry at the top": ("height = [1, 2]\n", "unknown section 'height'"),
+    "entry at the top": ("height = [1, 2]\n", "unknown key 'height'"),
     "section that is none": ("camera = 3\n", r"camera must be a section, \[camera\], not 3"),
     "list of sections": ("[[camera]]\nsteep = 1\n", r"camera must be a section, \[camera\]"),
     "one name of many": ("[ball]\noff_plane_label = 'rbot'\n", r"\[ball\] unknown off_plane_label 'rbot'.*'robot'"),
@@ -236,7 +248,7 @@ MESSAGES = {
 
 @pytest.mark.parametrize(("text", "says"), MESSAGES.values(), ids=MESSAGES)
 def test_what_is_wrong_is_said(write, text, says):
-    with pytest.raises(InputError, match=rf"configuration .*scene\.toml: .*{says}"):
+    with pytest.raises(InputError, match=rf"configuration .*scene\.toml(, line 1|, line 2)?: .*{says}"):
         read_sections(SceneConfiguration, write(text))
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from vm_embedded.errors import InputError
-from vm_synth.sections import documented, overrides_of, read_sections
+from vm_embedded.sections import documented, overrides_of, read_sections
 from vm_train.configuration import TrainConfiguration
 from vm_train.recipe import Recipe
 

@@ -14,8 +14,8 @@ import torch
 
 from tests.vm_train.drawn import CLASSES, draw_set
 from vm_embedded.errors import InputError
+from vm_embedded.sections import read_sections
 from vm_export.checkpoint import Checkpoint
-from vm_synth.sections import read_sections
 from vm_train.cli import main
 from vm_train.configuration import TrainConfiguration
 from vm_train.hardware import Hardware, hardware
