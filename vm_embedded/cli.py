@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import asyncio
 import os
 import sys
 from collections.abc import Sequence
@@ -11,11 +12,15 @@ from pathlib import Path
 
 import cv2
 
+from .cameras import is_live
+from .configuration import Configuration
+from .daemon import EXIT_CONFIGURATION, Daemon
 from .detector import Detector
 from .errors import InputError, VisualMeshError
+from .events import EventLog
 from .lens import Lens
 from .lens_file import read_lens_file
-from .options import ANGLES, add_model, add_pose, add_settings, read_options
+from .options import ANGLES, add_live, add_model, add_pose, add_settings, read_options
 from .orientation import Orientation
 from .progress import Progress
 from .sinks import json_line, make_folder, save_overlay, save_points
@@ -34,9 +39,12 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--camera",
-        required=True,
         metavar="SOURCE",
-        help="an image, a directory or quoted glob of images, a video file, or a camera's number or device",
+        help="an image, a directory or quoted glob of images, or a video file: each frame once; or what is live: a "
+        "camera's number or device, an http, https or rtsp address, gstreamer:PIPELINE, synthetic, or fault:SCRIPT",
+    )
+    parser.add_argument(
+        "--live", action="store_true", help="play files at their rate, as if a camera gave them, and skip what is late"
     )
     add_model(parser)
     add_pose(parser, "for frames imageNAME.* without a lensNAME.yaml beside them, which goes first")
@@ -46,6 +54,7 @@ def parser() -> argparse.ArgumentParser:
     output.add_argument("--emit-points", metavar="CLASS,...", help="list the points of these classes in the JSON")
     output.add_argument("--explain", action="store_true", help="list rejected clusters in the JSON, with reasons")
     add_settings(parser)
+    add_live(parser)
     return parser
 
 
@@ -103,6 +112,26 @@ def _lens_beside(path: Path | None) -> Path | None:
 
 def _run(options: argparse.Namespace) -> int:
     given = read_options(options)
+    if not given.camera.source:
+        raise InputError("no camera: give --camera")
+    if options.live or is_live(given.camera.source):
+        return _watch(options)
+    return _look(options, given)
+
+
+def _watch(options: argparse.Namespace) -> int:
+    """Run as a daemon on a live camera."""
+    log = EventLog("vm-detect")
+    try:
+        daemon = Daemon(lambda: read_options(options), log)
+        return asyncio.run(daemon.run())
+    except VisualMeshError as error:
+        log("can't start", "error", reason=str(error))
+        return EXIT_CONFIGURATION
+
+
+def _look(options: argparse.Namespace, given: Configuration) -> int:
+    """Process each frame of a file or folder once."""
     settings = given.detector
     pose = _Pose(given.lens.lens if given.lens else None, given.orientation.orientation())
     detector = Detector.from_file(given.model, settings)
@@ -110,7 +139,7 @@ def _run(options: argparse.Namespace) -> int:
     for name in emit:
         detector.manifest.column(name)
     check_file_format(settings.format)
-    source = open_source(options.camera, raw=settings.format != "bgr")
+    source = open_source(given.camera.source, raw=settings.format != "bgr")
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:
             make_folder(folder)

@@ -13,10 +13,13 @@ from dataclasses import Field, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from .camera import CameraSettings
 from .entries import check_entries, entry
 from .errors import InputError, VisualMeshError
 from .lens_file import LensFile, lens_from_table, read_lens_file
 from .orientation import Orientation
+from .outputs import OutputSettings
+from .poses import PoseSettings
 from .sections import read_sections
 from .settings import Settings
 from .shipped import DEFAULT, SHIPPED, model_path
@@ -112,6 +115,9 @@ class Configuration:
     lens: LensFile | None = field(default=None, metadata={"read": _read_lens, "documented": _documented_lens})
     orientation: FixedPose = field(default_factory=FixedPose)
     detector: Settings = field(default_factory=Settings)
+    camera: CameraSettings = field(default_factory=CameraSettings)
+    pose: PoseSettings = field(default_factory=PoseSettings)
+    output: OutputSettings = field(default_factory=OutputSettings)
 
 
 def read_configuration(path: str | Path) -> Configuration:

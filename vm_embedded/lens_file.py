@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 
 from .errors import InputError, VisualMeshError, unknown
 from .lens import Lens, RadialLens, projection_named
-from .lens_opencv import BrownLens, FisheyeLens
+from .lens_opencv import BrownLens, CalibratedLens, FisheyeLens
 from .orientation import Orientation
 from .yaml_reader import read_yaml
 
@@ -55,11 +55,47 @@ def read_lens_file(path: str | Path) -> LensFile:
             table = {_REFERENCE_NAMES.get(key, key): value for key, value in table.items()}
             hoc = table.pop("Hoc", None)
             return LensFile(lens_from_table(table), None if hoc is None else Orientation.from_hoc(hoc))
-        return LensFile(lens_from_calibration(table), None)
+        hoc = table.pop("Hoc", None)
+        return LensFile(lens_from_calibration(table), None if hoc is None else Orientation.from_hoc(hoc))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"lens file {path}: {error}") from error
     except VisualMeshError as error:
         raise InputError(f"lens file {path}: {error}") from error
+
+
+def lens_text(lens: Lens, orientation: Orientation) -> str:
+    """A lens and an orientation as a lens file, to the last digit: the reference's, or a calibration with Hoc."""
+    hoc = np.eye(4)
+    hoc[:3, :3] = orientation.rotation
+    hoc[2, 3] = orientation.height
+    if isinstance(lens, RadialLens):
+        lines = [
+            f"projection: {type(lens).__name__.upper()}",
+            f"focal_length: {lens.focal_length!r}",
+            f"centre: {_listed(lens.center)}",
+            f"k: {_listed(lens.distortion)}",
+            f"fov: {lens.fov!r}",
+        ]
+        if lens.size is not None:
+            lines.append(f"size: {_listed(lens.size)}")
+    elif isinstance(lens, CalibratedLens):
+        (fx, fy), (cx, cy) = lens.focal_lengths, lens.optical_center
+        fisheye = isinstance(lens, FisheyeLens)
+        lines = [
+            f"distortion_model: {'equidistant' if fisheye else 'rational_polynomial'}",
+            f"camera_matrix: {_listed((fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0))}",
+            f"distortion_coefficients: {_listed(lens.coefficients)}",
+        ]
+        if lens.size is not None:
+            lines += [f"image_width: {lens.size[0]}", f"image_height: {lens.size[1]}"]
+    else:
+        raise InputError(f"a lens of type {type(lens).__name__} has no file format")
+    lines += ["Hoc:", *(f"  - {_listed(row)}" for row in hoc.tolist())]
+    return "\n".join(lines) + "\n"
+
+
+def _listed(numbers: Sequence[float]) -> str:
+    return f"[{', '.join(repr(each) for each in numbers)}]"
 
 
 def lens_from_table(table: Mapping[str, Any]) -> RadialLens:

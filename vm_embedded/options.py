@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
+from .camera import CameraSettings
 from .configuration import Configuration, FixedPose, overridden, read_configuration
 from .lens_file import read_lens_file
+from .outputs import OutputSettings
+from .poses import PoseSettings
 from .settings import Settings
 from .shipped import DEFAULT, SHIPPED
+
+LIVE = {"camera": CameraSettings, "pose": PoseSettings, "output": OutputSettings}
+"""Sections that are for live cameras."""
 
 ANGLES = (
     "Angles are radians, or degrees with a suffix as in 20deg; negative ones in degrees need an equals sign, "
@@ -43,27 +50,40 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     add_section(parser.add_argument_group("settings"), Settings, "")
 
 
-def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str) -> None:
-    """An option for each entry of a section, whose names begin with `prefix`."""
+def add_live(parser: argparse.ArgumentParser) -> None:
+    """An option for each entry of the sections that are for live cameras."""
+    for name, section in LIVE.items():
+        group = parser.add_argument_group(f"[{name}], for live cameras")
+        add_section(group, section, f"{name}_", ("source",) if name == "camera" else ())
+
+
+def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, but: Sequence[str] = ()) -> None:
+    """An option for each entry of a section, `but` some; their names begin with `prefix`."""
     for each in fields(section):
+        if each.name in but:
+            continue
         unit = each.metadata["unit"]
-        default = "the model's" if each.default is None else each.default
-        help = f"{each.metadata['help']}{f' [{unit}]' if unit else ''}; default {default}"
+        default = "the model's" if each.default is None else "none" if each.default == "" else each.default
+        help = f"{each.metadata['help']}{f' [{unit}]' if unit else ''}; default {default}".replace("%", "%%")
         option = "--" + (prefix + each.name).replace("_", "-")
         if "allowed" in each.metadata:
             group.add_argument(option, choices=each.metadata["allowed"], help=help)
         elif isinstance(each.default, bool):
             group.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=help)
         else:
-            kind = int if isinstance(each.default, int) else float
-            group.add_argument(option, type=kind, metavar="N" if kind is int else "X", help=help)
+            kind = str if isinstance(each.default, str) else int if isinstance(each.default, int) else float
+            group.add_argument(option, type=kind, metavar={str: "TEXT", int: "N", float: "X"}[kind], help=help)
 
 
 def read_options(options: argparse.Namespace) -> Configuration:
     """What the command line and the configuration say together. Raises InputError."""
     configured = read_configuration(options.config) if options.config else Configuration()
-    sections = {"orientation": FixedPose, "detector": Settings}
-    configured = overridden(configured, {name: _given(options, each) for name, each in sections.items()})
+    sections = {"orientation": (FixedPose, ""), "detector": (Settings, "")}
+    sections |= {name: (section, f"{name}_") for name, section in LIVE.items()}
+    given = {name: _given(options, section, prefix) for name, (section, prefix) in sections.items()}
+    if getattr(options, "camera", None) is not None:
+        given["camera"]["source"] = options.camera
+    configured = overridden(configured, given)
     if options.model is not None:
         configured = replace(configured, model=options.model)
     if options.lens is not None:
@@ -71,7 +91,7 @@ def read_options(options: argparse.Namespace) -> Configuration:
     return configured
 
 
-def _given(options: argparse.Namespace, section: Any) -> dict[str, Any]:
+def _given(options: argparse.Namespace, section: Any, prefix: str) -> dict[str, Any]:
     """The entries of a section that the command line gives."""
-    given = {each.name: getattr(options, each.name) for each in fields(section)}
+    given = {each.name: getattr(options, prefix + each.name, None) for each in fields(section)}
     return {name: value for name, value in given.items() if value is not None}

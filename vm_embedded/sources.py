@@ -47,10 +47,11 @@ class Frame:
 
 @dataclass(frozen=True)
 class Source:
-    """Frames to iterate over, and how many there are, where that is known."""
+    """Frames to iterate over, and where that is known how many there are, and how many a second."""
 
     frames: Iterator[Frame]
     count: int | None
+    rate: float | None = None
 
 
 def open_source(name: str, raw: bool = False) -> Source:
@@ -126,7 +127,12 @@ def _video(name: str) -> Source:
     first = _grabbed(capture)
     if first is None:
         raise InputError(f"{'camera' if live else 'video'} {name} gives no frames")
-    return Source(_captured(capture, first, Path(name).name), None if live or count <= 0 else count)
+    rate = capture.get(cv2.CAP_PROP_FPS)
+    return Source(
+        _captured(capture, first, Path(name).name),
+        None if live or count <= 0 else count,
+        rate if 0.0 < rate < 1e4 else None,
+    )
 
 
 def _captured(capture: cv2.VideoCapture, first: Image, name: str) -> Iterator[Frame]:

@@ -12,7 +12,7 @@ import hashlib
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +22,7 @@ import numpy as np
 from vm_embedded.arrays import Image
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
-from vm_embedded.lens import RadialLens
-from vm_embedded.orientation import Orientation
+from vm_embedded.lens_file import lens_text
 
 from .configuration import CLASSES, SceneConfiguration
 from .outlines import outline, polygon_area
@@ -148,7 +147,7 @@ def write_picture(folder: Path, index: int, map_name: str, scene: Scene, picture
         "image": encoded(image, scene.sensor),
         "mask": _png(mask_colors(picture)),
         "coverage": _png(np.rint(picture.coverage * 255.0).astype(np.uint8)),
-        "lens": lens_text(scene.lens, scene.orientation).encode(),
+        "lens": lens_text(replace(scene.lens, size=None), scene.orientation).encode(),
         "scene": (json.dumps(truth(index, map_name, scene, picture), allow_nan=False) + "\n").encode(),
     }
     for part, content in contents.items():
@@ -167,23 +166,6 @@ def mask_colors(picture: Picture) -> Image:
 
 def _png(image: Image) -> bytes:
     return cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 6])[1].tobytes()
-
-
-def lens_text(lens: RadialLens, orientation: Orientation) -> str:
-    """Lens and Hoc in the reference's file format, to the last digit."""
-    hoc = np.eye(4)
-    hoc[:3, :3] = orientation.rotation
-    hoc[2, 3] = orientation.height
-    lines = [
-        f"projection: {type(lens).__name__.upper()}",
-        f"focal_length: {lens.focal_length!r}",
-        f"centre: [{lens.center[0]!r}, {lens.center[1]!r}]",
-        f"k: [{lens.distortion[0]!r}, {lens.distortion[1]!r}]",
-        f"fov: {lens.fov!r}",
-        "Hoc:",
-        *(f"  - [{', '.join(repr(each) for each in row)}]" for row in hoc.tolist()),
-    ]
-    return "\n".join(lines) + "\n"
 
 
 def truth(index: int, map_name: str, scene: Scene, picture: Picture) -> dict[str, Any]:

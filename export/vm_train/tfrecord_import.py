@@ -12,7 +12,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +23,9 @@ from vm_embedded.arrays import Image
 from vm_embedded.errors import InputError, VisualMeshError, unknown
 from vm_embedded.files import written_beside
 from vm_embedded.lens import projection_named
+from vm_embedded.lens_file import lens_text
 from vm_embedded.orientation import Orientation
 from vm_embedded.progress import Progress
-from vm_synth.dataset import lens_text
 
 from .pictures import IMAGES
 from .tfexample import BytesList, Example, FloatList
@@ -342,4 +342,4 @@ class _Found:
             distortion=(k0 / scale**2, k1 / scale**4),
         )
         hoc = np.array(self.floats("Hoc", 16)).reshape(4, 4)
-        return lens_text(lens, Orientation.from_hoc(hoc))
+        return lens_text(replace(lens, size=None), Orientation.from_hoc(hoc))

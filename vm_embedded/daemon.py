@@ -1,0 +1,318 @@
+"""A detector that runs for as long as the robot does: frames and poses in, messages out, and the truth about itself.
+
+One thread does everything but read the camera and write files: it waits for the newest shot, for the pose of that
+shot's moment, detects, and sends. Nothing here waits for anybody else.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, fields
+
+import cv2
+
+from .camera import Shot
+from .cameras import camera_opener
+from .configuration import Configuration
+from .detections import Detections
+from .detector import Detector
+from .errors import InputError, VisualMeshError, one_line
+from .events import EventLog
+from .grabber import MOST_LEFT, Grabber
+from .health import Health
+from .lens import Lens
+from .messages import STATES, Message, frame_message, state_message
+from .metrics import Histogram, exposition, resident_bytes
+from .notify import Notifier
+from .orientation import Orientation
+from .outputs import Outputs
+from .pose_stream import PoseStream
+from .poses import StalePoseError
+
+EXIT_OK, EXIT_FAILED, EXIT_HUNG, EXIT_CONFIGURATION = 0, 1, 75, 78
+"""As sysexits.h has them: 75 asks to be started again, 78 says that it would be in vain."""
+
+_TICK = 0.02
+"""Seconds between two looks at clocks, if nothing else happens."""
+
+_HEARTBEAT = 1.0
+"""Seconds between two messages at most."""
+
+_CLOCK_JUMP = 0.5
+"""Change of the wall clock against the monotonic one that is worth a word [s]."""
+
+
+@dataclass
+class Tally:
+    """What became of frames after the camera. late: older than max_age_ms. failed: of a wrong size, or unanswered."""
+
+    frames: int = 0
+    detections: int = 0
+    late: int = 0
+    stale: int = 0
+    failed: int = 0
+
+
+class Daemon:
+    """Runs until it is told to stop.
+
+    configure: reads the configuration, once at the start and again whenever it is asked to.
+    """
+
+    def __init__(self, configure: Callable[[], Configuration], log: EventLog) -> None:
+        self._configure = configure
+        self._log = log
+        self.configuration = configure()
+        self.detector = _detector(self.configuration)
+        self.tally = Tally()
+        self.stages: dict[str, Histogram] = {}
+        self.state, self.reason = "", ""
+        self.health = Health(1e-3 * self.configuration.camera.lost_ms)
+        self._began = time.monotonic()
+        self._sent = 0.0  # when the last message was
+        self._fed = 0.0  # when the watchdog was
+        self._stops = 0  # times that it was told to stop
+        self._notifier = Notifier()
+        self._fatal: str | None = None
+
+    async def run(self) -> int:
+        """Run, and return the exit status."""
+        loop = asyncio.get_running_loop()
+        self._woken = asyncio.Event()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, self._stop)
+        loop.add_signal_handler(signal.SIGHUP, self.reload)
+        self._loop = loop
+        self.outputs = Outputs(self.configuration.output)
+        self.poses = PoseStream(self.configuration.pose, self._bad_pose)
+        try:
+            await self.outputs.open()
+            await self.poses.open()
+            self.grabber = self._grabber()
+        except InputError:
+            await self._close()
+            raise
+        self._show_state()
+        self._notifier.send(READY=1)
+        self._log("ready", model=self.configuration.model, camera=self.configuration.camera.source)
+        wall = time.time() - time.monotonic()
+        while not self._stops and not self._finished():
+            await self._step()
+            drift = time.time() - time.monotonic() - wall
+            if abs(drift) > _CLOCK_JUMP:
+                self._log("clock jumped", "warning", seconds=round(drift, 3))
+                wall += drift
+        self.health.stopping = True
+        self._show_state()
+        self._notifier.send(STOPPING=1)
+        await self._close()
+        reason = self._fatal or ("told to" if self._stops else "end of the camera")
+        self._log("stopped", frames=self.tally.frames, reason=reason)
+        return EXIT_HUNG if self._fatal else EXIT_OK
+
+    def _finished(self) -> bool:
+        """Whether the camera has come to its end, or nothing but a new process helps."""
+        if self.grabber.hanging >= MOST_LEFT:
+            self._fatal = f"{MOST_LEFT} reads of the camera hang"
+        return self._fatal is not None or (self.grabber.ended and not self.grabber.waiting)
+
+    async def _step(self) -> None:
+        """Wait for a shot, or a moment, and do what is due."""
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._woken.wait(), _TICK)
+        self._woken.clear()
+        self._feed_watchdog()
+        self._show_state()
+        shot = self.grabber.take()
+        if shot is not None:
+            await self._answer(shot)
+        if time.monotonic() - self._sent > _HEARTBEAT:
+            self._send(state_message(self.state, self.reason, self._figures()))
+
+    def _feed_watchdog(self) -> None:
+        """Tell systemd that this loop runs, four times as often as it wants to hear it."""
+        period, now = self._notifier.watchdog, time.monotonic()
+        if period is not None and now - self._fed > 0.25 * period:
+            self._fed = now
+            self._notifier.send(WATCHDOG=1)
+
+    async def _answer(self, shot: Shot) -> None:
+        """Detect in a shot and say what was found, unless it is too old or has no pose."""
+        if self._late(shot):
+            return
+        try:
+            lens, orientation = self._lens(shot), await self._orientation(shot)
+            started = time.perf_counter()
+            detections = self.detector.detect(shot.image, orientation, lens)
+        except StalePoseError as error:
+            self.tally.stale += 1
+            self.health.pose_trouble = str(error)
+            return
+        except (VisualMeshError, cv2.error, ValueError) as error:
+            self.tally.failed += 1
+            self.health.trouble(time.monotonic(), one_line(error))
+            return
+        if self._late(shot):
+            return
+        now = time.monotonic()
+        self.health.answer(now)
+        self.tally.frames += 1
+        self.tally.detections += len(detections)
+        self._show_state()
+        self._send(frame_message(self.tally.frames, shot, detections, now))
+        self._time(detections, time.perf_counter() - started, now - shot.captured)
+
+    def _late(self, shot: Shot) -> bool:
+        """Whether a shot is too old to be reported."""
+        age = time.monotonic() - shot.captured
+        late = age > 1e-3 * self.configuration.camera.max_age_ms
+        if late:
+            self.tally.late += 1
+            self.health.trouble(time.monotonic(), f"frame is {1e3 * age:.0f} ms old")
+        return late
+
+    def _lens(self, shot: Shot) -> Lens:
+        given = self.configuration.lens
+        lens = given.lens if given is not None else shot.lens
+        if lens is None:
+            raise InputError("no lens: give --lens")
+        return lens
+
+    async def _orientation(self, shot: Shot) -> Orientation:
+        """Of the camera when the shot was taken. Raises StalePoseError or InputError."""
+        pose = self.configuration.pose
+        if pose.source == "fixed":
+            fixed = shot.orientation or self.configuration.orientation.orientation()
+            if fixed is None:
+                raise InputError("no orientation: give --height, or --pose-source")
+            return fixed
+        poses = self.poses.poses
+        deadline = time.monotonic() + 1e-3 * pose.wait_ms
+        while pose.interpolate and poses.newest < shot.captured and (left := deadline - time.monotonic()) > 0.0:
+            self.poses.arrived.clear()
+            try:
+                await asyncio.wait_for(self.poses.arrived.wait(), left)
+            except TimeoutError:
+                break
+        return poses.at(shot.captured)
+
+    def _time(self, detections: Detections, took: float, age: float) -> None:
+        stages = {name: 1e-3 * value for name, value in detections.timing_ms.items()}
+        for name, seconds in {**stages, "answer": took, "age": age}.items():
+            self.stages.setdefault(name, Histogram()).add(seconds)
+
+    def _bad_pose(self, why: str) -> None:
+        self.health.trouble(time.monotonic(), why)
+
+    def _show_state(self) -> None:
+        """See what state it is in, and say so if it has changed."""
+        now = time.monotonic()
+        lost = self.grabber.supervise(now)
+        state, reason = self.health.state(now, lost, self.grabber.trouble)
+        if state != self.state:
+            self._log(
+                "state",
+                "info" if state in ("ok", "starting", "stopping") else "warning",
+                state=state,
+                was=self.state,
+                reason=reason,
+            )
+            self.state, self.reason = state, reason
+            self._send(state_message(state, reason, self._figures()))
+            self._notifier.send(STATUS=f"{state}{': ' if reason else ''}{reason}")
+        self.reason = reason
+
+    def _send(self, message: Message) -> None:
+        message["state"] = self.state
+        self._sent = time.monotonic()
+        self.outputs.send(message)
+
+    def _figures(self) -> Message:
+        """What a state's message tells besides."""
+        counts = {each.name: getattr(self.grabber.counts, each.name) for each in fields(self.grabber.counts)}
+        return {**vars(self.tally), **counts, "dropped": self.outputs.dropped}
+
+    def _grabber(self) -> Grabber:
+        settings = self.configuration.camera
+        grabber = Grabber(camera_opener(settings, self.configuration.detector.format != "bgr"), settings, self._wake)
+        grabber.start()
+        return grabber
+
+    def _wake(self) -> None:
+        """Called in other threads, whose loop may be gone."""
+        with suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._woken.set)
+
+    def reload(self) -> None:
+        """Read configuration and model again; what is bad changes nothing."""
+        try:
+            configuration = self._configure()
+            detector = _detector(configuration)
+        except VisualMeshError as error:
+            self._log("reload refused", "error", reason=str(error))
+            return
+        kept = [name for name in ("camera", "pose", "output") if _differs(self.configuration, configuration, name)]
+        self.configuration, self.detector = configuration, detector
+        self._log("reloaded", model=configuration.model, needs_restart=kept)
+
+    def _stop(self) -> None:
+        self._stops += 1
+        if self._stops > 1:
+            os._exit(EXIT_FAILED)
+        self._woken.set()
+
+    async def _close(self) -> None:
+        await self.poses.close()
+        await self.outputs.close()
+        if hasattr(self, "grabber"):
+            self.grabber.stop(0.3)
+        self._notifier.close()
+
+    def metrics(self) -> str:
+        """For Prometheus."""
+        tally, counts, cache = self.tally, self.grabber.counts, self.detector.cache
+        now = time.monotonic()
+        return exposition(
+            {
+                "frames": ("frames that were answered", tally.frames),
+                "detections": ("objects that were reported", tally.detections),
+                "frames_grabbed": ("new frames of the camera", counts.grabbed),
+                "frames_skipped": ("frames that gave way to newer ones", counts.skipped),
+                "frames_broken": ("frames that could not be decoded", counts.broken),
+                "frames_frozen": ("frames that equalled the one before", counts.frozen),
+                "frames_ahead": ("frames from the future", counts.ahead),
+                "frames_late": ("frames that were too old to be reported", tally.late),
+                "frames_without_pose": ("frames for which there was no pose", tally.stale),
+                "frames_failed": ("frames that could not be answered", tally.failed),
+                "reconnects": ("times that the camera was opened again", counts.reconnects),
+                "poses": ("poses that came", self.poses.received),
+                "poses_bad": ("poses that were refused", self.poses.bad),
+                "lines_dropped": ("lines that slow readers lost", self.outputs.dropped),
+                "cache_hits": ("frames whose mesh was prepared", cache.hits),
+                "cache_misses": ("frames whose mesh was not", cache.misses),
+            },
+            {
+                "frame_age_seconds": ("since a frame was answered last", now - max(self.health.answered, self._began)),
+                "resident_bytes": ("memory of the process", resident_bytes()),
+                "uptime_seconds": ("since the process began", now - self._began),
+            },
+            self.state,
+            STATES,
+            self.stages,
+        )
+
+
+def _detector(configuration: Configuration) -> Detector:
+    """The configured network, with its self-test done. Raises VisualMeshError."""
+    detector = Detector.from_file(configuration.model, configuration.detector)
+    configuration.orientation.orientation()
+    return detector
+
+
+def _differs(one: Configuration, other: Configuration, section: str) -> bool:
+    return bool(getattr(one, section) != getattr(other, section))

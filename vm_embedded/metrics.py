@@ -1,0 +1,65 @@
+"""Counts and durations for Prometheus, in its text format."""
+
+from __future__ import annotations
+
+import math
+import resource
+from bisect import bisect_left
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+BUCKETS = (0.0005, 0.001, 0.002, 0.003, 0.005, 0.008, 0.012, 0.02, 0.033, 0.05, 0.1, 0.25, 1.0, math.inf)
+"""Upper ends of histograms [s]."""
+
+
+class Histogram:
+    """How many durations fell into each bucket, and their sum [s]."""
+
+    def __init__(self) -> None:
+        self.counts = [0] * len(BUCKETS)
+        self.sum = 0.0
+
+    def add(self, seconds: float) -> None:
+        """One more."""
+        self.counts[bisect_left(BUCKETS, seconds)] += 1
+        self.sum += seconds
+
+    def lines(self, name: str, labels: str) -> Iterator[str]:
+        """Of the text format."""
+        total = 0
+        comma = "," if labels else ""
+        for end, count in zip(BUCKETS, self.counts, strict=True):
+            total += count
+            upper = "+Inf" if math.isinf(end) else f"{end:g}"
+            yield f'{name}_bucket{{{labels}{comma}le="{upper}"}} {total}'
+        yield f"{name}_sum{{{labels}}} {self.sum:.9g}"
+        yield f"{name}_count{{{labels}}} {total}"
+
+
+def exposition(
+    counters: Mapping[str, tuple[str, float]],
+    gauges: Mapping[str, tuple[str, float]],
+    state: str,
+    states: tuple[str, ...],
+    stages: Mapping[str, Histogram],
+) -> str:
+    """All of it. counters, gauges: help and value by name."""
+    lines = []
+    for kind, values in (("counter", counters), ("gauge", gauges)):
+        for name, (help, value) in values.items():
+            full = f"vm_{name}{'_total' if kind == 'counter' else ''}"
+            lines += [f"# HELP {full} {help}", f"# TYPE {full} {kind}", f"{full} {value:.12g}"]
+    lines += ["# HELP vm_state whether the detector is in a state", "# TYPE vm_state gauge"]
+    lines += [f'vm_state{{state="{each}"}} {int(each == state)}' for each in states]
+    lines += ["# HELP vm_stage_seconds how long each stage of a frame takes", "# TYPE vm_stage_seconds histogram"]
+    for stage, histogram in stages.items():
+        lines += histogram.lines("vm_stage_seconds", f'stage="{stage}"')
+    return "\n".join(lines) + "\n"
+
+
+def resident_bytes() -> int:
+    """Memory of this process [bytes]."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+    except (OSError, IndexError, ValueError):
+        return 0
