@@ -122,6 +122,8 @@ class Faults:
         self._faults = script.faults
         self._starts = [each.at for each in script.faults]
         self._began: float | None = None
+        self.last: Shot | None = None
+        """The last good shot; a frozen camera gives it again even when it is opened again."""
 
     def now(self) -> Fault | None:
         """The fault of this moment."""
@@ -138,7 +140,6 @@ class FaultCamera:
 
     def __init__(self, faults: Faults, open_camera: Callable[[], Camera]) -> None:
         self._faults = faults
-        self._last: Shot | None = None
         _check_plugged(faults.now())
         self._camera = open_camera()
 
@@ -150,14 +151,14 @@ class FaultCamera:
             time.sleep(fault.seconds)
         shot = self._camera.read()
         if shot is None or fault is None:
-            self._last = shot
+            self._faults.last = shot
             return shot
         return self._spoilt(shot, fault.kind)
 
     def _spoilt(self, shot: Shot, kind: str) -> Shot:
         truth: dict[str, Any] = {**shot.truth, "fault": kind}
-        if kind == "frozen" and self._last is not None:
-            return replace(shot, image=self._last.image, truth=truth)
+        if kind == "frozen" and self._faults.last is not None:
+            return replace(shot, image=self._faults.last.image, truth=truth)
         if kind == "truncated":
             content = cv2.imencode(".jpg", shot.image)[1].tobytes()
             return replace(shot, image=decode_jpeg(content[: len(content) // 2]), truth=truth)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import json
 import os
 import sys
 from collections.abc import Sequence
@@ -12,8 +13,9 @@ from pathlib import Path
 
 import cv2
 
-from .cameras import is_live
+from .cameras import camera_opener, is_live
 from .configuration import Configuration
+from .control import ask, usual_path
 from .daemon import EXIT_CONFIGURATION, Daemon
 from .detector import Detector
 from .errors import InputError, VisualMeshError
@@ -23,6 +25,7 @@ from .lens_file import read_lens_file
 from .options import ANGLES, add_live, add_model, add_pose, add_settings, read_options
 from .orientation import Orientation
 from .progress import Progress
+from .sections import documented
 from .sinks import json_line, make_folder, save_overlay, save_points
 from .sources import Frame, check_file_format, open_source
 
@@ -34,8 +37,9 @@ def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="vm-detect",
         description="Find objects in frames: one line of JSON for each frame on standard output.",
-        epilog="Exit status: 0 at least one frame was processed (bad ones are named on standard error), 1 none was, "
-        "2 wrong usage, 130 interrupted. " + ANGLES,
+        epilog="Exit status: 0 at least one frame was processed (bad ones are named on standard error), or a live "
+        "camera was stopped; 1 none was, or a detector that was asked is not well; 2 wrong usage; 75 reads of the "
+        "camera hang, 78 the configuration of a live one can't be used; 130 interrupted. " + ANGLES,
     )
     parser.add_argument(
         "--camera",
@@ -48,7 +52,14 @@ def parser() -> argparse.ArgumentParser:
     )
     add_model(parser)
     add_pose(parser, "for frames imageNAME.* without a lensNAME.yaml beside them, which goes first")
-    output = parser.add_argument_group("output")
+    daemon = parser.add_argument_group("a running detector, and its configuration")
+    daemon.add_argument("--status", dest="ask", action="store_const", const="status", help="print how it is, and exit")
+    daemon.add_argument(
+        "--record", dest="ask", action="store_const", const="record", help="have it write down its last seconds"
+    )
+    daemon.add_argument("--check-config", action="store_true", help="read the configuration and the model, and exit")
+    daemon.add_argument("--print-config", action="store_true", help="print a vm.toml with every entry, and exit")
+    output = parser.add_argument_group("output, for files")
     output.add_argument("--save-overlay", type=Path, metavar="DIR", help="write pictures with what was found")
     output.add_argument("--save-points", type=Path, metavar="DIR", help="write NAME.npz: pixels, rays, probabilities")
     output.add_argument("--emit-points", metavar="CLASS,...", help="list the points of these classes in the JSON")
@@ -112,11 +123,35 @@ def _lens_beside(path: Path | None) -> Path | None:
 
 def _run(options: argparse.Namespace) -> int:
     given = read_options(options)
+    if options.print_config:
+        print("\n".join(documented(given)))
+        return EXIT_OK
+    if options.ask:
+        return _ask(given, options.ask)
+    if options.check_config:
+        return _check(given)
     if not given.camera.source:
         raise InputError("no camera: give --camera")
     if options.live or is_live(given.camera.source):
         return _watch(options)
     return _look(options, given)
+
+
+def _ask(given: Configuration, word: str) -> int:
+    """Print the answer of a running detector. Fails if it is not well."""
+    answer = ask(Path(given.status.socket) if given.status.socket else usual_path(), word)
+    print(answer)
+    return EXIT_OK if word != "status" or json.loads(answer)["state"] == "ok" else EXIT_FAILED
+
+
+def _check(given: Configuration) -> int:
+    """Say whether a detector would run with what is configured."""
+    detector = Detector.from_file(given.model, given.detector)
+    given.orientation.orientation()
+    if given.camera.source and is_live(given.camera.source):
+        camera_opener(given.camera)
+    print(f"{given.model}: {len(detector.manifest.classes)} classes, self-test passed; the configuration is good")
+    return EXIT_OK
 
 
 def _watch(options: argparse.Namespace) -> int:

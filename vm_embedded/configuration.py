@@ -20,9 +20,11 @@ from .lens_file import LensFile, lens_from_table, read_lens_file
 from .orientation import Orientation
 from .outputs import OutputSettings
 from .poses import PoseSettings
+from .recorder import RecorderSettings
 from .sections import read_sections
 from .settings import Settings
 from .shipped import DEFAULT, SHIPPED, model_path
+from .status_settings import StatusSettings
 
 _DEGREES = re.compile(r"\s*([-+0-9.eE]+)\s*deg\s*")
 
@@ -118,6 +120,8 @@ class Configuration:
     camera: CameraSettings = field(default_factory=CameraSettings)
     pose: PoseSettings = field(default_factory=PoseSettings)
     output: OutputSettings = field(default_factory=OutputSettings)
+    status: StatusSettings = field(default_factory=StatusSettings)
+    recorder: RecorderSettings = field(default_factory=RecorderSettings)
 
 
 def read_configuration(path: str | Path) -> Configuration:

@@ -7,18 +7,22 @@ shot's moment, detects, and sends. Nothing here waits for anybody else.
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Protocol
 
 import cv2
 
 from .camera import Shot
 from .cameras import camera_opener
 from .configuration import Configuration
+from .control import Control, usual_path
 from .detections import Detections
 from .detector import Detector
 from .errors import InputError, VisualMeshError, one_line
@@ -33,6 +37,11 @@ from .orientation import Orientation
 from .outputs import Outputs
 from .pose_stream import PoseStream
 from .poses import StalePoseError
+from .recorder import Moment, Recorder
+from .sections import documented
+from .shipped import model_path
+from .status_page import StatusPage
+from .web import Answer, WebServer
 
 EXIT_OK, EXIT_FAILED, EXIT_HUNG, EXIT_CONFIGURATION = 0, 1, 75, 78
 """As sysexits.h has them: 75 asks to be started again, 78 says that it would be in vain."""
@@ -42,6 +51,9 @@ _TICK = 0.02
 
 _HEARTBEAT = 1.0
 """Seconds between two messages at most."""
+
+_FIXED = ("camera", "pose", "output", "status", "recorder")
+"""Sections that count from the next start on."""
 
 _CLOCK_JUMP = 0.5
 """Change of the wall clock against the monotonic one that is worth a word [s]."""
@@ -58,6 +70,16 @@ class Tally:
     failed: int = 0
 
 
+class Part(Protocol):
+    """What is opened at the start and closed at the end."""
+
+    async def open(self) -> None:
+        """Raises InputError."""
+
+    async def close(self) -> None:
+        """Give back what it holds."""
+
+
 class Daemon:
     """Runs until it is told to stop.
 
@@ -67,8 +89,9 @@ class Daemon:
     def __init__(self, configure: Callable[[], Configuration], log: EventLog) -> None:
         self._configure = configure
         self._log = log
-        self.configuration = configure()
-        self.detector = _detector(self.configuration)
+        self._configured(configure())
+        self.recorder = Recorder(self.configuration.recorder, lambda event, what: log(event, folder=what))
+        self.last: Message | None = None
         self.tally = Tally()
         self.stages: dict[str, Histogram] = {}
         self.state, self.reason = "", ""
@@ -80,6 +103,16 @@ class Daemon:
         self._notifier = Notifier()
         self._fatal: str | None = None
 
+    def _configured(self, configuration: Configuration) -> None:
+        """Take a configuration and load its network, whose self-test is done then. Raises VisualMeshError."""
+        configuration.orientation.orientation()
+        detector = Detector.from_file(configuration.model, configuration.detector)
+        self.configuration, self.detector = configuration, detector
+        replayed = Configuration(
+            model=str(Path(model_path(configuration.model)).resolve()), detector=configuration.detector
+        )
+        self._documented = "\n".join(documented(replayed)) + "\n"
+
     async def run(self) -> int:
         """Run, and return the exit status."""
         loop = asyncio.get_running_loop()
@@ -87,12 +120,18 @@ class Daemon:
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self._stop)
         loop.add_signal_handler(signal.SIGHUP, self.reload)
+        loop.add_signal_handler(signal.SIGUSR1, self.record)
         self._loop = loop
         self.outputs = Outputs(self.configuration.output)
         self.poses = PoseStream(self.configuration.pose, self._bad_pose)
+        status = self.configuration.status
+        commands = {"status": self._status, "record": self.record, "metrics": self.metrics}
+        self.control = Control(Path(status.socket) if status.socket else usual_path(), commands)
+        self.page = StatusPage(status.picture_fps, self._figures)
+        self._parts: list[Part] = [self.outputs, self.poses, self.control, *self._servers()]
         try:
-            await self.outputs.open()
-            await self.poses.open()
+            for part in self._parts:
+                await part.open()
             self.grabber = self._grabber()
         except InputError:
             await self._close()
@@ -115,6 +154,15 @@ class Daemon:
         self._log("stopped", frames=self.tally.frames, reason=reason)
         return EXIT_HUNG if self._fatal else EXIT_OK
 
+    def _servers(self) -> Iterator[WebServer]:
+        status = self.configuration.status
+        metrics = {"/metrics": lambda: Answer("text/plain; version=0.0.4", self.metrics().encode())}
+        if status.page:
+            pages = {"/": self.page.page, "/state": self.page.state, **metrics}
+            yield WebServer(status.page, pages, {"/stream": self.page.stream})
+        if status.metrics:
+            yield WebServer(status.metrics, metrics)
+
     def _finished(self) -> bool:
         """Whether the camera has come to its end, or nothing but a new process helps."""
         if self.grabber.hanging >= MOST_LEFT:
@@ -132,7 +180,7 @@ class Daemon:
         if shot is not None:
             await self._answer(shot)
         if time.monotonic() - self._sent > _HEARTBEAT:
-            self._send(state_message(self.state, self.reason, self._figures()))
+            self._send(state_message(self.state, self.reason))
 
     def _feed_watchdog(self) -> None:
         """Tell systemd that this loop runs, four times as often as it wants to hear it."""
@@ -164,7 +212,10 @@ class Daemon:
         self.tally.frames += 1
         self.tally.detections += len(detections)
         self._show_state()
-        self._send(frame_message(self.tally.frames, shot, detections, now))
+        self.last = frame_message(self.tally.frames, self.state, shot, detections, now)
+        self._send(self.last)
+        self.page.show(shot.image, detections)
+        self.recorder.keep(Moment(shot, lens, orientation, self.last), self._documented)
         self._time(detections, time.perf_counter() - started, now - shot.captured)
 
     def _late(self, shot: Shot) -> bool:
@@ -223,19 +274,32 @@ class Daemon:
                 reason=reason,
             )
             self.state, self.reason = state, reason
-            self._send(state_message(state, reason, self._figures()))
+            self._send(state_message(state, reason))
             self._notifier.send(STATUS=f"{state}{': ' if reason else ''}{reason}")
         self.reason = reason
 
     def _send(self, message: Message) -> None:
-        message["state"] = self.state
         self._sent = time.monotonic()
         self.outputs.send(message)
 
     def _figures(self) -> Message:
-        """What a state's message tells besides."""
+        """State, counts, and what was seen last."""
         counts = {each.name: getattr(self.grabber.counts, each.name) for each in fields(self.grabber.counts)}
-        return {**vars(self.tally), **counts, "dropped": self.outputs.dropped}
+        poses = {"poses": self.poses.received, "poses_bad": self.poses.bad}
+        return state_message(self.state, self.reason) | {
+            "counts": {**vars(self.tally), **counts, **poses, "dropped": self.outputs.dropped},
+            "memory_mib": round(resident_bytes() / 2**20, 1),
+            "last": self.last,
+        }
+
+    def _status(self) -> str:
+        return json.dumps(self._figures(), allow_nan=False)
+
+    def record(self) -> str:
+        """Write down the last seconds."""
+        said = self.recorder.record(self._documented)
+        self._log("record", result=said)
+        return said
 
     def _grabber(self) -> Grabber:
         settings = self.configuration.camera
@@ -251,13 +315,12 @@ class Daemon:
     def reload(self) -> None:
         """Read configuration and model again; what is bad changes nothing."""
         try:
-            configuration = self._configure()
-            detector = _detector(configuration)
+            before, configuration = self.configuration, self._configure()
+            self._configured(configuration)
         except VisualMeshError as error:
             self._log("reload refused", "error", reason=str(error))
             return
-        kept = [name for name in ("camera", "pose", "output") if _differs(self.configuration, configuration, name)]
-        self.configuration, self.detector = configuration, detector
+        kept = [name for name in _FIXED if getattr(before, name) != getattr(configuration, name)]
         self._log("reloaded", model=configuration.model, needs_restart=kept)
 
     def _stop(self) -> None:
@@ -267,8 +330,9 @@ class Daemon:
         self._woken.set()
 
     async def _close(self) -> None:
-        await self.poses.close()
-        await self.outputs.close()
+        for part in self._parts:
+            await part.close()
+        self.recorder.close(0.3)
         if hasattr(self, "grabber"):
             self.grabber.stop(0.3)
         self._notifier.close()
@@ -305,14 +369,3 @@ class Daemon:
             STATES,
             self.stages,
         )
-
-
-def _detector(configuration: Configuration) -> Detector:
-    """The configured network, with its self-test done. Raises VisualMeshError."""
-    detector = Detector.from_file(configuration.model, configuration.detector)
-    configuration.orientation.orientation()
-    return detector
-
-
-def _differs(one: Configuration, other: Configuration, section: str) -> bool:
-    return bool(getattr(one, section) != getattr(other, section))

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import cv2
 
+from .arrays import Image
 from .camera import BrokenFrameError, Camera, CameraSettings, Shot, same_image
 from .cameras import Opener
 from .errors import VisualMeshError, one_line
@@ -55,6 +56,7 @@ class Grabber:
         self._wake = wake
         self._lock = threading.Lock()
         self._newest: Shot | None = None
+        self._image: Image | None = None  # of the last new frame, also across readers
         self._fresh = -math.inf  # when the last new frame came
         self._opened = 0.0  # when the last try to open the camera began
         self._retry = 0.0  # when to try again, if there is no reader
@@ -131,8 +133,14 @@ class Grabber:
             if reader is not self._reader:
                 return
             if shot.captured > arrived + _EARLY:
+                self.trouble = f"a frame came from {shot.captured - arrived:.3f} s ahead"
                 self.counts.ahead += 1
                 return
+            if self.settings.frozen and self._image is not None and same_image(shot.image, self._image):
+                self.trouble = "the same picture came again"
+                self.counts.frozen += 1
+                return
+            self._image = shot.image
             self.counts.grabbed += 1
             self.counts.skipped += self._newest is not None
             self._newest = shot
@@ -140,12 +148,11 @@ class Grabber:
             self._pause = 1e-3 * self.settings.retry_ms
         self._wake()
 
-    def _complain(self, reader: _Reader, trouble: str, broken: int = 0, frozen: int = 0) -> None:
+    def _complain(self, reader: _Reader, trouble: str, broken: int = 0) -> None:
         with self._lock:
             if reader is self._reader:
                 self.trouble = trouble
                 self.counts.broken += broken
-                self.counts.frozen += frozen
 
     def _end(self, reader: _Reader) -> None:
         with self._lock:
@@ -178,7 +185,6 @@ class _Reader(threading.Thread):
         self._grabber._wake()
 
     def _read(self, camera: Camera) -> None:
-        before: Shot | None = None
         while not self.left:
             try:
                 shot = camera.read()
@@ -188,8 +194,4 @@ class _Reader(threading.Thread):
             if shot is None:
                 self._grabber._end(self)
                 return
-            if self._grabber.settings.frozen and before is not None and same_image(shot.image, before.image):
-                self._grabber._complain(self, "the same picture comes again", frozen=1)
-                continue
-            before = shot
             self._grabber._give(self, shot)

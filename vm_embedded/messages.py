@@ -18,11 +18,11 @@ STATES = ("starting", "ok", "degraded", "camera_lost", "pose_stale", "stopping")
 Message = dict[str, Any]
 
 
-def frame_message(number: int, shot: Shot, detections: Detections, now: float) -> Message:
+def frame_message(number: int, state: str, shot: Shot, detections: Detections, now: float) -> Message:
     """What a frame shows. t: when it was taken, monotonic [s]; wall: the same since 1970 [s]; age_ms: since then."""
     message: Message = {
         "type": "frame",
-        "state": "ok",
+        "state": state,
         "frame": number,
         "t": round(shot.captured, 6),
         "wall": round(time.time() - (time.monotonic() - shot.captured), 6),
@@ -36,10 +36,10 @@ def frame_message(number: int, shot: Shot, detections: Detections, now: float) -
     return message
 
 
-def state_message(state: str, reason: str, health: Mapping[str, Any]) -> Message:
+def state_message(state: str, reason: str) -> Message:
     """How the detector is, and no detections. t as in frames."""
     times = {"t": round(time.monotonic(), 6), "wall": round(time.time(), 6)}
-    return {"type": "state", "state": state, **times, "reason": reason, **health}
+    return {"type": "state", "state": state, **times, "reason": reason}
 
 
 def as_line(message: Message) -> bytes:

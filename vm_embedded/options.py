@@ -13,10 +13,18 @@ from .configuration import Configuration, FixedPose, overridden, read_configurat
 from .lens_file import read_lens_file
 from .outputs import OutputSettings
 from .poses import PoseSettings
+from .recorder import CONFIGURATION, MESSAGES, RecorderSettings
 from .settings import Settings
 from .shipped import DEFAULT, SHIPPED
+from .status_settings import StatusSettings
 
-LIVE = {"camera": CameraSettings, "pose": PoseSettings, "output": OutputSettings}
+LIVE = {
+    "camera": CameraSettings,
+    "pose": PoseSettings,
+    "output": OutputSettings,
+    "status": StatusSettings,
+    "recorder": RecorderSettings,
+}
 """Sections that are for live cameras."""
 
 ANGLES = (
@@ -77,7 +85,8 @@ def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, but: 
 
 def read_options(options: argparse.Namespace) -> Configuration:
     """What the command line and the configuration say together. Raises InputError."""
-    configured = read_configuration(options.config) if options.config else Configuration()
+    config = options.config or _recorded(getattr(options, "camera", None))
+    configured = read_configuration(config) if config else Configuration()
     sections = {"orientation": (FixedPose, ""), "detector": (Settings, "")}
     sections |= {name: (section, f"{name}_") for name, section in LIVE.items()}
     given = {name: _given(options, section, prefix) for name, (section, prefix) in sections.items()}
@@ -89,6 +98,13 @@ def read_options(options: argparse.Namespace) -> Configuration:
     if options.lens is not None:
         configured = replace(configured, lens=read_lens_file(options.lens))
     return configured
+
+
+def _recorded(source: str | None) -> Path | None:
+    """The vm.toml of a recording, if the source is one."""
+    folder = Path(source or "")
+    recorded = source is not None and (folder / MESSAGES).is_file() and (folder / CONFIGURATION).is_file()
+    return folder / CONFIGURATION if recorded else None
 
 
 def _given(options: argparse.Namespace, section: Any, prefix: str) -> dict[str, Any]:

@@ -1,0 +1,238 @@
+"""vm-detect on a live camera: a real process, its messages, states, sockets and signals."""
+
+import json
+import signal
+import socket
+import stat
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.live.running import COMMAND, arguments, running
+from vm_embedded.camera_synthetic import Motion
+from vm_embedded.control import ask
+
+DEMO = Path(__file__).parents[1] / "fixtures" / "demo"
+
+
+def counts(tmp_path):
+    """What the running detector counts."""
+    return json.loads(ask(tmp_path / "control", "status"))["counts"]
+
+
+def test_a_drawn_camera_is_watched_and_its_ball_is_where_it_is(tmp_path):
+    with running(tmp_path, "--camera", "synthetic") as found:
+        found.wait_for_state("ok")
+        found.wait(lambda: sum(len(each["detections"]) for each in found.frames) > 10)
+        status, seconds = found.stop()
+    assert status == 0
+    assert seconds < 1.0
+    assert found.states[0] == "starting"
+    assert found.states[-1] == "stopping"
+    errors = []
+    for each in found.frames:
+        assert 0.0 < each["age_ms"] < 250.0
+        for ball in each["detections"][:1]:
+            truth = Motion().ball(each["t"])
+            errors.append(np.linalg.norm(ball["position"] - truth) / np.linalg.norm(truth))
+    assert np.median(errors) < 0.05
+    numbers = [each["frame"] for each in found.frames]
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
+def test_state_messages_have_no_detections_and_frames_have_a_state(tmp_path):
+    with running(tmp_path, "--camera", "synthetic") as found:
+        found.wait_for_state("ok")
+        found.wait(lambda: len(found.frames) > 3)
+        found.stop()
+    for each in found.messages:
+        assert ("detections" in each) == (each["type"] == "frame")
+        assert each["state"] in ("starting", "ok", "degraded", "stopping")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_it_and_its_sockets_are_gone(tmp_path, number):
+    with running(tmp_path, "--camera", "synthetic", "--output-unix", tmp_path / "lines") as found:
+        found.wait_for_state("ok")
+        for name in ("lines", "control"):
+            assert stat.S_IMODE((tmp_path / name).stat().st_mode) == 0o660
+        status, seconds = found.stop(number)
+    assert status == 0
+    assert seconds < 1.0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_systemd_hears_that_it_is_ready_how_it_is_and_that_it_lives(tmp_path):
+    path = tmp_path / "notify"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
+        listening.bind(str(path))
+        listening.settimeout(30.0)
+        env = {"NOTIFY_SOCKET": str(path), "WATCHDOG_USEC": "400000"}
+        with running(tmp_path, "--camera", "synthetic", env=env) as found:
+            heard = []
+            while heard.count("WATCHDOG=1") < 5 or "STATUS=ok" not in heard:
+                heard += listening.recv(4096).decode().split("\n")
+            found.stop()
+            listening.settimeout(1.0)
+            while "STOPPING=1" not in heard:
+                heard += listening.recv(4096).decode().split("\n")
+    assert heard.count("READY=1") == 1
+    assert heard.index("READY=1") < heard.index("STATUS=ok")
+
+
+def test_many_read_the_socket_and_one_that_sleeps_holds_nobody_up(tmp_path):
+    path = tmp_path / "lines"
+    options = ("--camera", "synthetic", "--output-unix", path, "--output-backlog-kib", 8, "--no-output-stdout")
+    with running(tmp_path, *options) as found:
+        found.wait_for_state("ok")
+        readers = [socket.socket(socket.AF_UNIX) for _ in range(3)]
+        sleeper = socket.socket(socket.AF_UNIX)
+        sleeper.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+        for each in (*readers, sleeper):
+            each.connect(str(path))
+        heard = [each.makefile() for each in readers]
+        # As many lines as the sleeper's buffers can't hold.
+        lines = [[json.loads(file.readline()) for _ in range(20)] for file in heard]
+        for each in lines[1:]:
+            assert {one["frame"] for one in each if "frame" in one} & {
+                one["frame"] for one in lines[0] if "frame" in one
+            }
+        found.wait(
+            lambda: (
+                json.loads(ask(tmp_path / "control", "status"))["counts"]["dropped"] > 0 or heard[0].readline() == ""
+            )
+        )
+        for each in (*heard, *readers, sleeper):
+            each.close()
+        found.stop()
+
+
+def test_lines_also_go_to_a_file_and_by_udp(tmp_path):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listening:
+        listening.bind(("127.0.0.1", 0))
+        listening.settimeout(30.0)
+        port = listening.getsockname()[1]
+        where = ("--output-udp", f"127.0.0.1:{port}", "--output-file", tmp_path / "lines.jsonl")
+        with running(tmp_path, "--camera", "synthetic", *where, "--output-format", "ros") as found:
+            message = {"detections": {"detections": []}}
+            while not message["detections"]["detections"]:
+                message = json.loads(listening.recv(65536))
+            found.process.send_signal(signal.SIGTERM)
+            assert found.process.wait(30) == 0
+    detection = message["detections"]["detections"][0]
+    assert detection["results"][0]["hypothesis"]["class_id"] == "ball"
+    assert message["points"][0]["point"] == detection["results"][0]["pose"]["pose"]["position"]
+    assert message["detections"]["header"]["frame_id"] == "base_footprint"
+    kept = [json.loads(line) for line in (tmp_path / "lines.jsonl").read_text().splitlines()]
+    assert message in kept
+
+
+def test_a_socket_that_was_left_behind_is_replaced_and_one_in_use_is_not(tmp_path):
+    left = socket.socket(socket.AF_UNIX)
+    left.bind(str(tmp_path / "control"))
+    left.close()
+    with running(tmp_path, "--camera", "synthetic") as found:
+        found.wait_for_state("ok")
+        other = subprocess.run(
+            arguments(tmp_path, "--camera", "synthetic"), capture_output=True, text=True, timeout=60, check=False
+        )
+        assert other.returncode == 78
+        assert "another process" in other.stderr
+        assert json.loads(ask(tmp_path / "control", "status"))["state"] == "ok"
+        found.stop()
+
+
+def test_what_can_never_work_ends_it_at_the_start_with_a_status_of_its_own(tmp_path):
+    for options, says in (
+        (("--camera", "synthetic:fast"), "synthetic:TURN"),
+        (("--camera", "fault:none.toml"), "none.toml"),
+        (("--camera", "http://"), "no address"),
+        (("--camera", "synthetic", "--pose-source", "udp:nowhere"), "127.0.0.1:5600"),
+        (("--camera", "synthetic", "--pose-source", "radio"), "radio"),
+        (("--camera", "synthetic", "--output-udp", "here"), "here"),
+        (("--camera", "synthetic", "--output-unix", tmp_path / "no" / "folder"), "No such file"),
+        (("--camera", "synthetic", "--output-file", tmp_path), "directory"),
+        (("--camera", "synthetic", "--status-page", "127.0.0.1:0"), "127.0.0.1:0"),
+        (("--camera", "synthetic", "--model", tmp_path / "none.onnx"), "none.onnx"),
+        (("--camera", "synthetic", "--camera-pixel-format", "MJPEG", "--camera", "9"), "four letters"),
+    ):
+        done = subprocess.run(arguments(tmp_path, *options), capture_output=True, text=True, timeout=60, check=False)
+        assert done.returncode == 78, (options, done.stderr)
+        assert says in done.stderr
+        assert "Traceback" not in done.stderr
+        assert (tmp_path / "control").exists() is False
+
+
+def test_a_camera_that_is_not_there_yet_is_waited_for(tmp_path):
+    with running(tmp_path, "--camera", "/dev/video-none", "--camera-retry-ms", "20") as found:
+        found.wait_for_state("camera_lost")
+        found.wait(lambda: found.messages[-1].get("reason", "").startswith("there is no camera"))
+        found.wait(lambda: counts(tmp_path)["reconnects"] > 2)
+        asked = subprocess.run(arguments(tmp_path, "--status"), capture_output=True, text=True, timeout=60, check=False)
+        assert asked.returncode == 1
+        assert json.loads(asked.stdout)["state"] == "camera_lost"
+        assert found.stop()[0] == 0
+    assert found.frames == []
+
+
+def test_hangup_reads_the_configuration_again_and_keeps_the_old_one_if_it_is_bad(tmp_path):
+    path = tmp_path / "vm.toml"
+    path.write_text('[camera]\nsource = "synthetic"\n[detector]\nthreshold = 0.5\n')
+    with running(tmp_path, "--config", path) as found:
+        found.wait_for_state("ok")
+        path.write_text("[detector]\ntreshold = 0.6\n")
+        found.process.send_signal(signal.SIGHUP)
+        refused = found.wait(lambda: [each for each in found.events if each["event"] == "reload refused"])
+        assert "line 2" in refused[0]["reason"]
+        before = len(found.frames)
+        found.wait(lambda: len(found.frames) > before + 5)
+        path.write_text('model = "ball-5x4"\n[camera]\nsource = "synthetic"\n')
+        found.process.send_signal(signal.SIGHUP)
+        found.wait(lambda: [each for each in found.events if each["event"] == "reloaded"])
+        before = len(found.frames)
+        found.wait(lambda: len(found.frames) > before + 5)
+        found.stop()
+
+
+def test_a_recording_is_detected_in_again_bit_by_bit(tmp_path):
+    kept = tmp_path / "recordings"
+    options = ("--camera", "synthetic", "--recorder-folder", kept, "--recorder-seconds", 0.5)
+    with running(tmp_path, *options) as found:
+        found.wait(lambda: len(found.frames) > 20)
+        done = subprocess.run(arguments(tmp_path, "--record"), capture_output=True, text=True, timeout=60, check=True)
+        assert "frames to" in done.stdout
+        found.wait(lambda: [each for each in found.events if each["event"] == "recorded"])
+        found.stop()
+    (folder,) = kept.iterdir()
+    recorded = [json.loads(line) for line in (folder / "recording.jsonl").read_text().splitlines()]
+    assert len(recorded) > 3
+    done = subprocess.run([COMMAND, "--camera", folder], capture_output=True, text=True, timeout=60, check=True)
+    again = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [each["detections"] for each in again] == [each["detections"] for each in recorded]
+    assert any(each["detections"] for each in again)
+
+
+def test_the_printed_configuration_is_one_and_says_what_the_defaults_are(tmp_path):
+    path = tmp_path / "vm.toml"
+    printed = subprocess.run([COMMAND, "--print-config"], capture_output=True, text=True, timeout=60, check=True).stdout
+    path.write_text(printed)
+    again = [COMMAND, "--config", path, "--print-config"]
+    assert subprocess.run(again, capture_output=True, text=True, timeout=60, check=True).stdout.count(
+        "\n"
+    ) == printed.count("\n")
+    checked = [COMMAND, "--config", path, "--check-config", "--camera", "synthetic"]
+    assert "self-test passed" in subprocess.run(checked, capture_output=True, text=True, timeout=60, check=True).stdout
+
+
+def test_files_may_be_played_as_a_camera_gives_them_and_end(tmp_path):
+    lens = ("--lens", DEMO / "lens0000000.yaml", "--height", "0.6")
+    options = ("--camera", DEMO, "--live", "--camera-fps", "20", *lens)
+    started = time.monotonic()
+    done = subprocess.run(arguments(tmp_path, *options), capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert time.monotonic() - started > 12 / 20
+    frames = [json.loads(line) for line in done.stdout.splitlines()]
+    assert 0 < sum(each["type"] == "frame" for each in frames) <= 12
