@@ -34,7 +34,8 @@ class Shot:
 
     image: BGR, or as the camera gives it if the pixel format is another. captured: when it was taken, in seconds of
     the monotonic clock. encoded: the JPEG that it came as. orientation, lens: of the
-    camera, if it knows its own. truth: what a drawn camera knows besides.
+    camera, if it knows its own. truth: what a drawn camera knows besides. arrived:
+    when it was there to be taken, as whoever reads the camera notes.
     """
 
     image: Image
@@ -43,6 +44,7 @@ class Shot:
     orientation: Orientation | None = None
     lens: Lens | None = None
     truth: dict[str, Any] = field(default_factory=dict)
+    arrived: float = 0.0
 
 
 class Camera(Protocol):

@@ -30,11 +30,14 @@ class MjpegCamera:
     def __init__(self, settings: CameraSettings, raw: bool = False) -> None:
         self.settings = settings
         self._raw = raw
+        self._answer: http.client.HTTPResponse | None = None
         self._within = False  # whether the boundary before the next part was read already
         url = address_of(settings.source)
         kind = http.client.HTTPSConnection if url.scheme == "https" else http.client.HTTPConnection
         self._connection = kind(url.hostname or "", url.port, timeout=1e-3 * settings.open_ms)
         try:
+            self._connection.connect()
+            connected = self._connection.sock  # http.client lets go of it if the server will end the connection
             self._answer = self._ask(url.path or "/", url.query, url.username, url.password)
         except (OSError, http.client.HTTPException) as error:
             self.close()
@@ -42,7 +45,7 @@ class MjpegCamera:
         except CameraError:
             self.close()
             raise
-        self._connection.sock.settimeout(1e-3 * settings.lost_ms)
+        connected.settimeout(1e-3 * settings.lost_ms)
 
     def _ask(self, path: str, query: str, user: str | None, password: str | None) -> http.client.HTTPResponse:
         headers = {"Accept": "multipart/x-mixed-replace, */*"}
@@ -88,16 +91,18 @@ class MjpegCamera:
         return self._up_to_boundary(deadline) if length is None else self._bytes(length, deadline)
 
     def _line(self) -> bytes:
+        assert self._answer is not None
         line = self._answer.readline(65536)
         if not line:
             raise CameraError(f"{self.settings.source} has ended")
         return line
 
     def _bytes(self, length: int, deadline: float) -> bytes:
-        content = bytearray()
+        answer, content = self._answer, bytearray()
+        assert answer is not None
         while len(content) < length:
             self._in_time(deadline)
-            some = self._answer.read1(length - len(content))
+            some = answer.read1(length - len(content))
             if not some:
                 raise CameraError(f"{self.settings.source} ended within a picture")
             content += some
@@ -121,6 +126,8 @@ class MjpegCamera:
     def close(self) -> None:
         """End the connection."""
         self._connection.close()
+        if self._answer is not None:
+            self._answer.close()
 
 
 def address_of(source: str) -> SplitResult:

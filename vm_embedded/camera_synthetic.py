@@ -53,7 +53,7 @@ class Motion:
     def orientation(self, time: float) -> Orientation:
         """Of the camera."""
         return Orientation.from_roll_pitch(
-            height=0.6 + 0.02 * math.sin(9.0 * time),
+            height=0.8 + 0.02 * math.sin(9.0 * time),
             roll=0.04 * math.sin(4.5 * time),
             pitch=0.4 + 0.03 * math.cos(9.0 * time),
             yaw=math.remainder(self.turn * time, 2.0 * math.pi),
@@ -61,7 +61,7 @@ class Motion:
 
     def ball(self, time: float) -> Floats:
         """Center (3,) of the ball [m], from the point below the camera."""
-        distance = 1.8 + 0.8 * math.sin(0.9 * time)
+        distance = 2.0 + 0.7 * math.sin(0.9 * time)
         bearing = self.turn * time + 0.3 * math.sin(0.6 * time)
         return np.array([distance * math.cos(bearing), distance * math.sin(bearing), RADIUS])
 

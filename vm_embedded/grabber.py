@@ -10,7 +10,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 
@@ -143,7 +143,7 @@ class Grabber:
             self._image = shot.image
             self.counts.grabbed += 1
             self.counts.skipped += self._newest is not None
-            self._newest = shot
+            self._newest = replace(shot, arrived=arrived)
             self._fresh = arrived
             self._pause = 1e-3 * self.settings.retry_ms
         self._wake()
@@ -181,8 +181,9 @@ class _Reader(threading.Thread):
                 camera.close()
         except (VisualMeshError, cv2.error, OSError, ValueError, MemoryError) as error:
             self._grabber._complain(self, one_line(error))
-        self.failed = True
-        self._grabber._wake()
+        finally:
+            self.failed = True
+            self._grabber._wake()
 
     def _read(self, camera: Camera) -> None:
         while not self.left:

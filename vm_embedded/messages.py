@@ -19,7 +19,8 @@ Message = dict[str, Any]
 
 
 def frame_message(number: int, state: str, shot: Shot, detections: Detections, now: float) -> Message:
-    """What a frame shows. t: when it was taken, monotonic [s]; wall: the same since 1970 [s]; age_ms: since then."""
+    """What a frame shows. t: when it was taken, monotonic [s]; wall: the same since 1970 [s]; age_ms: since
+    then; latency_ms: since it had arrived."""
     message: Message = {
         "type": "frame",
         "state": state,
@@ -27,6 +28,7 @@ def frame_message(number: int, state: str, shot: Shot, detections: Detections, n
         "t": round(shot.captured, 6),
         "wall": round(time.time() - (time.monotonic() - shot.captured), 6),
         "age_ms": round(1e3 * (now - shot.captured), 3),
+        "latency_ms": round(1e3 * (now - shot.arrived), 3),
         "points": len(detections.pixels),
         "detections": [each.as_dict() for each in detections],
         "timing_ms": {stage: round(value, 3) for stage, value in detections.timing_ms.items()},

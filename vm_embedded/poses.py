@@ -50,7 +50,7 @@ class PoseSettings:
         "what is turned: camera, x forward and y left; optical, as OpenCV's and ROS's, z forward and x right",
     )
     latency_ms: float = number(0.0, "how much earlier than its t a pose was true", "ms", (-1000, 1000))
-    wait_ms: float = number(20.0, "how long a frame waits for a pose as new as itself", "ms", (0, 1000))
+    wait_ms: float = number(40.0, "how long a frame waits for a pose as new as itself", "ms", (0, 1000))
     interpolate: bool = switch(True, "take the pose of the frame's moment between two others, not the newest one")
     extrapolate_ms: float = number(5.0, "how far the motion goes on behind the newest pose", "ms", (0, 100))
     max_age_ms: float = number(100.0, "how much older than the frame the newest pose may be", "ms", (1, 10000))
