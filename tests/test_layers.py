@@ -14,7 +14,7 @@ PACKAGE = Path(vm_embedded.__file__).parent
 TOP = PACKAGE.parent
 
 LAYERS = [
-    {"errors", "arrays", "files", "progress", "entries", "sections"},
+    {"errors", "arrays", "files", "progress", "entries", "sections", "events", "notify", "metrics", "local_sockets"},
     {"shapes", "recursion", "lens", "lens_opencv", "orientation", "yaml_reader"},
     {"mesh"},
     {
@@ -34,8 +34,11 @@ LAYERS = [
     },
     {"cache", "session"},
     {"detector"},
-    {"configuration", "sources", "overlay", "sinks", "bench"},
-    {"options", "tuning"},
+    {"sources", "overlay", "sinks", "bench", "poses", "pose_lines", "camera", "messages", "web"},
+    {"camera_opencv", "camera_mjpeg", "camera_files", "camera_synthetic", "camera_fault"},
+    {"cameras", "pose_stream", "outputs", "recorder", "status_settings", "status_page", "control"},
+    {"configuration", "grabber", "health"},
+    {"options", "tuning", "daemon"},
     {"cli", "bench_cli"},
 ]
 LAYER_OF = {name: number for number, names in enumerate(LAYERS) for name in names}

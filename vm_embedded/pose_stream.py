@@ -66,10 +66,9 @@ class PoseStream:
         task = asyncio.current_task()
         assert task is not None
         self._keep(task)
-        try:
+        with suppress(asyncio.CancelledError):  # which asyncio would take for a failure
             await self._lines(reader)
-        finally:
-            writer.close()
+        writer.close()
 
     async def _lines(self, reader: asyncio.StreamReader) -> None:
         """Take lines until the end; a writer whose line has no end is not listened to any more."""

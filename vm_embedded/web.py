@@ -60,7 +60,8 @@ class WebServer:
         assert task is not None
         self._tasks.add(task)
         try:
-            with suppress(OSError, ValueError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
+            # asyncio takes a handler that was cancelled for one that failed, and says so at length.
+            with suppress(OSError, ValueError, EOFError, asyncio.LimitOverrunError, asyncio.CancelledError):
                 head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _SECONDS)
                 await self._answer(head.decode("latin-1").split("\r\n"), writer)
         finally:
