@@ -38,8 +38,8 @@ LAYERS = [
     {"camera_opencv", "camera_mjpeg", "camera_files", "camera_synthetic", "camera_fault"},
     {"cameras", "pose_stream", "outputs", "recorder", "status_settings", "status_page", "control"},
     {"configuration", "grabber", "health"},
-    {"options", "tuning", "daemon"},
-    {"cli", "bench_cli"},
+    {"options", "tuning", "daemon", "doctor"},
+    {"cli", "bench_cli", "doctor_cli"},
 ]
 LAYER_OF = {name: number for number, names in enumerate(LAYERS) for name in names}
 

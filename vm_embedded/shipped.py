@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from .errors import InputError, unknown
@@ -22,6 +23,6 @@ def model_path(model: str | Path) -> Path:
     """
     if str(model) in SHIPPED:
         return _FOLDER / f"{model}.onnx"
-    if not Path(model).suffix and not Path(model).exists():
+    if not Path(model).suffix and not os.path.exists(model):  # noqa: PTH110 (Path.exists raises for long names)
         raise InputError(unknown("network of the package, and no file,", str(model), SHIPPED))
     return Path(model)
