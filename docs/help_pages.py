@@ -1,4 +1,4 @@
-"""Writes docs/command-line.md from the parsers, and docs/scene.toml and docs/train.toml from the entries of
+"""Writes docs/command-line.md from the parsers, and docs/vm.toml, scene.toml and train.toml from the entries of
 configurations, so that they and the programs can't drift apart.
 
 python docs/help_pages.py writes them; a test checks that they are what this would write.
@@ -11,6 +11,8 @@ from pathlib import Path
 
 from vm_embedded import bench_cli as bench
 from vm_embedded import cli as detect
+from vm_embedded import doctor_cli as doctor
+from vm_embedded.configuration import Configuration
 from vm_embedded.sections import documented
 from vm_export import cli as export
 from vm_synth import cli as synth
@@ -21,6 +23,7 @@ from vm_train.configuration import TrainConfiguration
 
 PAGE = Path(__file__).parent / "command-line.md"
 SCENE = Path(__file__).parent / "scene.toml"
+ROBOT = Path(__file__).parent / "vm.toml"
 TRAIN = Path(__file__).parent / "train.toml"
 
 
@@ -29,7 +32,7 @@ def page() -> str:
     parts = [
         "# Command line\n\nMade from the programs' own help texts; every program also prints them with `--help`.\n"
     ]
-    robot = (detect.parser(), bench.parser(), export.parser())
+    robot = (detect.parser(), doctor.parser(), bench.parser(), export.parser())
     workstation = (each for program in (synth, train, evaluate) for each in program.parsers().values())
     for parser in (*robot, *workstation):
         parts.append(f"## {parser.prog}\n\n{parser.description}\n")
@@ -42,6 +45,11 @@ def page() -> str:
         if parser.epilog:
             parts.append(f"{parser.epilog}\n")
     return "\n".join(parts)
+
+
+def robot_configuration() -> str:
+    """All entries of a vm.toml with their meanings and defaults."""
+    return "\n".join(documented(Configuration()))
 
 
 def scene() -> str:
@@ -65,5 +73,6 @@ def _row(action: argparse.Action) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(page())
+    ROBOT.write_text(robot_configuration())
     SCENE.write_text(scene())
     TRAIN.write_text(training())

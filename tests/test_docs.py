@@ -16,6 +16,7 @@ def test_command_line_and_configuration_pages_are_what_the_programs_say(monkeypa
 
     sys.modules.pop("help_pages")
     assert help_pages.PAGE.read_text() == help_pages.page(), "run: make docs"
+    assert help_pages.ROBOT.read_text() == help_pages.robot_configuration(), "run: make docs"
     assert help_pages.SCENE.read_text() == help_pages.scene(), "run: make docs"
     assert help_pages.TRAIN.read_text() == help_pages.training(), "run: make docs"
 

@@ -65,9 +65,7 @@ def processor(cpuinfo: Path) -> Finding:
     model = named.get("model name", "unknown")
     missing = [name for name in ("avx2", "fma") if name not in flags]
     if missing:
-        return Finding(
-            "processor", WARNING, f"{model} has no {' and no '.join(missing)}: expect two to four times as long"
-        )
+        return Finding("processor", WARNING, f"{model} has no {' and no '.join(missing)}, and will be slow")
     extra = ", avx512" if "avx512f" in flags else ""
     return Finding("processor", GOOD, f"{model}: avx2, fma{extra}")
 
