@@ -54,7 +54,7 @@ def test_the_way_between_two_orientations_is_straight_and_even(one, other, share
 
 @given(st.floats(-10.0, 10.0), st.floats(0.05, 0.95))
 def test_a_steady_turn_is_met_at_every_moment(rate, moment):
-    poses = Poses(PoseSettings(max_age_ms=200.0))
+    poses = Poses(PoseSettings(max_age_ms=200.0, extrapolate_ms=50.0))
     for at in np.linspace(0.0, 0.9, 10).tolist():
         poses.add(at, Orientation.from_roll_pitch(0.6, 0.0, 0.3, rate * at))
     expected = Orientation.from_roll_pitch(0.6, 0.0, 0.3, rate * moment)
