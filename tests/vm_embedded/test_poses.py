@@ -47,8 +47,8 @@ def test_the_way_between_two_orientations_is_straight_and_even(one, other, share
     if whole > 3.0:
         return  # the other way round is as short
     found = between(one, other, share)
-    assert turn_between(one, found) == pytest.approx(share * whole, abs=1e-6)
-    assert turn_between(found, other) == pytest.approx((1.0 - share) * whole, abs=1e-6)
+    assert turn_between(one, found) == pytest.approx(share * whole, abs=2e-5)
+    assert turn_between(found, other) == pytest.approx((1.0 - share) * whole, abs=2e-5)
     assert found.height == pytest.approx(one.height + share * (other.height - one.height))
 
 
@@ -58,7 +58,7 @@ def test_a_steady_turn_is_met_at_every_moment(rate, moment):
     for at in np.linspace(0.0, 0.9, 10).tolist():
         poses.add(at, Orientation.from_roll_pitch(0.6, 0.0, 0.3, rate * at))
     expected = Orientation.from_roll_pitch(0.6, 0.0, 0.3, rate * moment)
-    assert turn_between(poses.at(moment), expected) < 1e-6
+    assert turn_between(poses.at(moment), expected) < 2e-5  # OpenCV takes turns below 1e-5 rad for none
 
 
 def test_motion_goes_on_for_as_long_as_it_may_and_then_stands():
