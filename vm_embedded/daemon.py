@@ -106,6 +106,16 @@ class Daemon:
         self._stops = 0  # times that it was told to stop
         self._notifier = Notifier()
         self._fatal: str | None = None
+        self._woken = asyncio.Event()
+        camera, status = self.configuration.camera, self.configuration.status
+        raw = self.configuration.detector.format != "bgr"
+        self.grabber = Grabber(camera_opener(camera, raw), camera, self._wake)
+        self.poses = PoseStream(self.configuration.pose, self._bad_pose)
+        self.outputs = Outputs(self.configuration.output)
+        self.page = StatusPage(status.picture_fps, self._figures)
+        commands = {"status": self._status, "record": self.record, "metrics": self.metrics}
+        control = Control(Path(status.socket) if status.socket else usual_path(), commands)
+        self._parts: list[Part] = [self.outputs, self.poses, control, *self._servers()]
 
     def _configured(self, configuration: Configuration) -> None:
         """Take a configuration and load its network, whose self-test is done then. Raises VisualMeshError."""
@@ -121,26 +131,18 @@ class Daemon:
         """Run, and return the exit status."""
         loop = asyncio.get_running_loop()
         sys.setswitchinterval(_SWITCH)
-        self._woken = asyncio.Event()
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self._stop)
         loop.add_signal_handler(signal.SIGHUP, self.reload)
         loop.add_signal_handler(signal.SIGUSR1, self.record)
         self._loop = loop
-        self.outputs = Outputs(self.configuration.output)
-        self.poses = PoseStream(self.configuration.pose, self._bad_pose)
-        status = self.configuration.status
-        commands = {"status": self._status, "record": self.record, "metrics": self.metrics}
-        self.control = Control(Path(status.socket) if status.socket else usual_path(), commands)
-        self.page = StatusPage(status.picture_fps, self._figures)
-        self._parts: list[Part] = [self.outputs, self.poses, self.control, *self._servers()]
         try:
             for part in self._parts:
                 await part.open()
-            self.grabber = self._grabber()
         except InputError:
             await self._close()
             raise
+        self.grabber.start()
         self._show_state()
         self._notifier.send(READY=1)
         self._log("ready", model=self.configuration.model, camera=self.configuration.camera.source)
@@ -306,12 +308,6 @@ class Daemon:
         self._log("record", result=said)
         return said
 
-    def _grabber(self) -> Grabber:
-        settings = self.configuration.camera
-        grabber = Grabber(camera_opener(settings, self.configuration.detector.format != "bgr"), settings, self._wake)
-        grabber.start()
-        return grabber
-
     def _wake(self) -> None:
         """Called in other threads, whose loop may be gone."""
         with suppress(RuntimeError):
@@ -338,8 +334,7 @@ class Daemon:
         for part in self._parts:
             await part.close()
         self.recorder.close(0.3)
-        if hasattr(self, "grabber"):
-            self.grabber.stop(0.3)
+        self.grabber.stop(0.3)
         self._notifier.close()
 
     def metrics(self) -> str:
