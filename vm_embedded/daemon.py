@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -24,15 +24,15 @@ from .camera import Shot
 from .cameras import camera_opener
 from .configuration import Configuration
 from .control import Control, usual_path
-from .detections import Detections
 from .detector import Detector
 from .errors import InputError, VisualMeshError, one_line
 from .events import EventLog
+from .figures import Figures
 from .grabber import MOST_LEFT, Grabber
 from .health import Health
 from .lens import Lens
-from .messages import STATES, Message, frame_message, state_message
-from .metrics import Histogram, exposition, resident_bytes
+from .messages import Message, frame_message, state_message
+from .metrics import resident_bytes
 from .notify import Notifier
 from .orientation import Orientation
 from .outputs import Outputs
@@ -63,17 +63,6 @@ _CLOCK_JUMP = 0.5
 """Change of the wall clock against the monotonic one that is worth a word [s]."""
 
 
-@dataclass
-class Tally:
-    """What became of frames after the camera. late: older than max_age_ms. failed: of a wrong size, or unanswered."""
-
-    frames: int = 0
-    detections: int = 0
-    late: int = 0
-    stale: int = 0
-    failed: int = 0
-
-
 class Part(Protocol):
     """What is opened at the start and closed at the end."""
 
@@ -96,11 +85,10 @@ class Daemon:
         self._configured(configure())
         self.recorder = Recorder(self.configuration.recorder, lambda event, what: log(event, folder=what))
         self.last: Message | None = None
-        self.tally = Tally()
-        self.stages: dict[str, Histogram] = {}
+        self.figures = Figures()
         self.state, self.reason = "", ""
         self.health = Health(1e-3 * self.configuration.camera.lost_ms)
-        self._began = time.monotonic()
+        self._spoilt = 0  # frames that the camera gave in vain
         self._sent = 0.0  # when the last message was
         self._fed = 0.0  # when the watchdog was
         self._stops = 0  # times that it was told to stop
@@ -112,7 +100,7 @@ class Daemon:
         self.grabber = Grabber(camera_opener(camera, raw), camera, self._wake)
         self.poses = PoseStream(self.configuration.pose, self._bad_pose)
         self.outputs = Outputs(self.configuration.output)
-        self.page = StatusPage(status.picture_fps, self._figures)
+        self.page = StatusPage(status.picture_fps, self._told)
         commands = {"status": self._status, "record": self.record, "metrics": self.metrics}
         control = Control(Path(status.socket) if status.socket else usual_path(), commands)
         self._parts: list[Part] = [self.outputs, self.poses, control, *self._servers()]
@@ -158,7 +146,7 @@ class Daemon:
         self._notifier.send(STOPPING=1)
         await self._close()
         reason = self._fatal or ("told to" if self._stops else "end of the camera")
-        self._log("stopped", frames=self.tally.frames, reason=reason)
+        self._log("stopped", frames=self.figures.tally.frames, reason=reason)
         return EXIT_HUNG if self._fatal else EXIT_OK
 
     def _servers(self) -> Iterator[WebServer]:
@@ -205,32 +193,30 @@ class Daemon:
             started = time.perf_counter()
             detections = self.detector.detect(shot.image, orientation, lens)
         except StalePoseError as error:
-            self.tally.stale += 1
+            self.figures.tally.stale += 1
             self.health.pose_trouble = str(error)
             return
         except (VisualMeshError, cv2.error, ValueError) as error:
-            self.tally.failed += 1
+            self.figures.tally.failed += 1
             self.health.trouble(time.monotonic(), one_line(error))
             return
         if self._late(shot):
             return
         now = time.monotonic()
         self.health.answer(now)
-        self.tally.frames += 1
-        self.tally.detections += len(detections)
+        self.figures.answered(detections, time.perf_counter() - started, now - shot.captured)
         self._show_state()
-        self.last = frame_message(self.tally.frames, self.state, shot, detections, now)
+        self.last = frame_message(self.figures.tally.frames, self.state, shot, detections, now)
         self._send(self.last)
         self.page.show(shot.image, detections)
         self.recorder.keep(Moment(shot, lens, orientation, self.last), self._documented)
-        self._time(detections, time.perf_counter() - started, now - shot.captured)
 
     def _late(self, shot: Shot) -> bool:
         """Whether a shot is too old to be reported."""
         age = time.monotonic() - shot.captured
         late = age > 1e-3 * self.configuration.camera.max_age_ms
         if late:
-            self.tally.late += 1
+            self.figures.tally.late += 1
             self.health.trouble(time.monotonic(), f"frame is {1e3 * age:.0f} ms old")
         return late
 
@@ -259,11 +245,6 @@ class Daemon:
                 break
         return poses.at(shot.captured)
 
-    def _time(self, detections: Detections, took: float, age: float) -> None:
-        stages = {name: 1e-3 * value for name, value in detections.timing_ms.items()}
-        for name, seconds in {**stages, "answer": took, "age": age}.items():
-            self.stages.setdefault(name, Histogram()).add(seconds)
-
     def _bad_pose(self, why: str) -> None:
         self.health.trouble(time.monotonic(), why)
 
@@ -271,6 +252,10 @@ class Daemon:
         """See what state it is in, and say so if it has changed."""
         now = time.monotonic()
         lost = self.grabber.supervise(now)
+        spoilt = self.grabber.counts.spoilt
+        if spoilt != self._spoilt:
+            self._spoilt = spoilt
+            self.health.trouble(now, self.grabber.trouble)
         state, reason = self.health.state(now, lost, self.grabber.trouble)
         if state != self.state:
             self._log(
@@ -289,18 +274,22 @@ class Daemon:
         self._sent = time.monotonic()
         self.outputs.send(message)
 
-    def _figures(self) -> Message:
+    def _told(self) -> Message:
         """State, counts, and what was seen last."""
-        counts = {each.name: getattr(self.grabber.counts, each.name) for each in fields(self.grabber.counts)}
-        poses = {"poses": self.poses.received, "poses_bad": self.poses.bad}
         return state_message(self.state, self.reason) | {
-            "counts": {**vars(self.tally), **counts, **poses, "dropped": self.outputs.dropped},
+            "counts": self._counted().counts(self.grabber.counts),
             "memory_mib": round(resident_bytes() / 2**20, 1),
             "last": self.last,
         }
 
+    def _counted(self) -> Figures:
+        """The figures, with what others count."""
+        tally = self.figures.tally
+        tally.poses, tally.poses_bad, tally.dropped = self.poses.received, self.poses.bad, self.outputs.dropped
+        return self.figures
+
     def _status(self) -> str:
-        return json.dumps(self._figures(), allow_nan=False)
+        return json.dumps(self._told(), allow_nan=False)
 
     def record(self) -> str:
         """Write down the last seconds."""
@@ -321,8 +310,10 @@ class Daemon:
         except VisualMeshError as error:
             self._log("reload refused", "error", reason=str(error))
             return
-        kept = [name for name in _FIXED if getattr(before, name) != getattr(configuration, name)]
-        self._log("reloaded", model=configuration.model, needs_restart=kept)
+        kept = {name: getattr(before, name) for name in _FIXED}
+        waiting = [name for name, section in kept.items() if section != getattr(configuration, name)]
+        self.configuration = replace(configuration, **kept)
+        self._log("reloaded", model=configuration.model, needs_restart=waiting)
 
     def _stop(self) -> None:
         self._stops += 1
@@ -339,33 +330,4 @@ class Daemon:
 
     def metrics(self) -> str:
         """For Prometheus."""
-        tally, counts, cache = self.tally, self.grabber.counts, self.detector.cache
-        now = time.monotonic()
-        return exposition(
-            {
-                "frames": ("frames that were answered", tally.frames),
-                "detections": ("objects that were reported", tally.detections),
-                "frames_grabbed": ("new frames of the camera", counts.grabbed),
-                "frames_skipped": ("frames that gave way to newer ones", counts.skipped),
-                "frames_broken": ("frames that could not be decoded", counts.broken),
-                "frames_frozen": ("frames that equalled the one before", counts.frozen),
-                "frames_ahead": ("frames from the future", counts.ahead),
-                "frames_late": ("frames that were too old to be reported", tally.late),
-                "frames_without_pose": ("frames for which there was no pose", tally.stale),
-                "frames_failed": ("frames that could not be answered", tally.failed),
-                "reconnects": ("times that the camera was opened again", counts.reconnects),
-                "poses": ("poses that came", self.poses.received),
-                "poses_bad": ("poses that were refused", self.poses.bad),
-                "lines_dropped": ("lines that slow readers lost", self.outputs.dropped),
-                "cache_hits": ("frames whose mesh was prepared", cache.hits),
-                "cache_misses": ("frames whose mesh was not", cache.misses),
-            },
-            {
-                "frame_age_seconds": ("since a frame was answered last", now - max(self.health.answered, self._began)),
-                "resident_bytes": ("memory of the process", resident_bytes()),
-                "uptime_seconds": ("since the process began", now - self._began),
-            },
-            self.state,
-            STATES,
-            self.stages,
-        )
+        return self._counted().metrics(self.state, self.grabber.counts, self.detector.cache, self.health.answered)

@@ -38,6 +38,11 @@ class Counts:
     ahead: int = 0
     reconnects: int = 0
 
+    @property
+    def spoilt(self) -> int:
+        """Frames that were not used because something was wrong with them."""
+        return self.broken + self.frozen + self.ahead
+
 
 class Grabber:
     """The newest shot of a camera.
@@ -76,10 +81,6 @@ class Grabber:
             shot, self._newest = self._newest, None
         return shot
 
-    def age(self, now: float) -> float:
-        """Seconds since the last new frame came."""
-        return now - self._fresh
-
     @property
     def waiting(self) -> bool:
         """Whether there is a shot to take."""
@@ -94,6 +95,8 @@ class Grabber:
     def supervise(self, now: float) -> bool:
         """Leave a reader that is late, begin a new one when it is time to; whether the camera is lost."""
         with self._lock:
+            if self.ended:
+                return False
             reader = self._reader
             if reader is not None:
                 since = max(self._fresh, self._opened)
@@ -104,7 +107,7 @@ class Grabber:
                 if late or reader.failed:
                     self._leave(reader, now)
             lost = self._reader is None or self._fresh <= self._opened
-            due = self._reader is None and not self.ended and now >= self._retry
+            due = self._reader is None and now >= self._retry
         if due and self.hanging < MOST_LEFT:
             self.counts.reconnects += 1
             self.start()
