@@ -14,7 +14,19 @@ PACKAGE = Path(vm_embedded.__file__).parent
 TOP = PACKAGE.parent
 
 LAYERS = [
-    {"errors", "arrays", "files", "progress", "entries", "sections", "events", "notify", "metrics", "local_sockets"},
+    {
+        "errors",
+        "arrays",
+        "files",
+        "progress",
+        "entries",
+        "sections",
+        "events",
+        "notify",
+        "metrics",
+        "local_sockets",
+        "decoding",
+    },
     {"shapes", "recursion", "lens", "lens_opencv", "orientation", "yaml_reader"},
     {"mesh"},
     {

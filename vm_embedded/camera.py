@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-import cv2
 import numpy as np
 
 from .arrays import Image
+from .decoding import decode
 from .entries import check_entries, number, switch, words
-from .errors import VisualMeshError
+from .errors import InputError, VisualMeshError
 from .lens import Lens
 from .orientation import Orientation
 
@@ -89,22 +89,12 @@ class CameraSettings:
         check_entries(self)
 
 
-def decode_jpeg(content: bytes, raw: bool = False) -> Image:
-    """A JPEG as BGR, or with `raw` in the channels that it has.
-
-    Raises BrokenFrameError for one that is cut short: OpenCV would decode what there is and fill up with grey.
-    """
-    end = content.rstrip(b"\x00")  # some cameras pad their buffers
-    if not end.startswith(b"\xff\xd8") or not end.endswith(b"\xff\xd9"):
-        raise BrokenFrameError(f"JPEG of {len(content)} bytes is cut short")
-    flags = cv2.IMREAD_UNCHANGED if raw else cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+def decode_frame(content: bytes, raw: bool = False) -> Image:
+    """A picture that a camera sent. Raises BrokenFrameError for one that is cut short or none."""
     try:
-        image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
-    except cv2.error:
-        image = None
-    if image is None:
-        raise BrokenFrameError(f"JPEG of {len(content)} bytes can't be decoded")
-    return np.asarray(image, dtype=np.uint8)
+        return decode(content, raw)
+    except InputError as error:
+        raise BrokenFrameError(f"picture of {len(content)} bytes {error}") from error
 
 
 def same_image(one: Image, other: Image) -> bool:

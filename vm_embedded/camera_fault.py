@@ -19,7 +19,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from .camera import Camera, CameraError, Shot, decode_jpeg
+from .camera import Camera, CameraError, Shot, decode_frame
 from .entries import check_entries, number
 from .errors import InputError, unknown
 from .sections import read_sections
@@ -161,7 +161,7 @@ class FaultCamera:
             return replace(shot, image=self._faults.last.image, truth=truth)
         if kind == "truncated":
             content = cv2.imencode(".jpg", shot.image)[1].tobytes()
-            return replace(shot, image=decode_jpeg(content[: len(content) // 2]), truth=truth)
+            return replace(shot, image=decode_frame(content[: len(content) // 2]), truth=truth)
         if kind == "slow":
             time.sleep(_LATE)
         if kind == "resize":

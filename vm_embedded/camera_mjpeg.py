@@ -7,7 +7,7 @@ import http.client
 import time
 from urllib.parse import SplitResult, unquote, urlsplit
 
-from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, decode_jpeg
+from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, decode_frame
 from .errors import InputError, one_line
 
 _LARGEST = 64 * 2**20
@@ -71,7 +71,7 @@ class MjpegCamera:
         except (OSError, ValueError, http.client.HTTPException) as error:
             raise CameraError(f"{self.settings.source}: {one_line(error)}") from error
         captured = time.monotonic() - 1e-3 * self.settings.latency_ms
-        return Shot(decode_jpeg(content, self._raw), captured, content)
+        return Shot(decode_frame(content, self._raw), captured, content)
 
     def _part(self, deadline: float) -> bytes:
         """The content of the next part."""

@@ -12,7 +12,7 @@ os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")
 import cv2
 import numpy as np
 
-from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, decode_jpeg
+from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, decode_frame
 from .errors import InputError
 
 _OLDEST = 1.0
@@ -78,7 +78,7 @@ class OpenCvCamera:
         captured = self._captured(arrived)
         if self._motion_jpeg:
             content = image.tobytes()
-            return Shot(decode_jpeg(content, self._raw), captured, content)
+            return Shot(decode_frame(content, self._raw), captured, content)
         if image.dtype != np.uint8 or image.size == 0:
             raise BrokenFrameError(f"frame of {image.dtype} {image.shape} is no picture")
         return Shot(np.asarray(image), captured)

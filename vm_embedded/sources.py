@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from .arrays import Image
+from .decoding import decode
 from .errors import InputError
 from .sampling import FORMATS
 
@@ -102,19 +103,10 @@ def read_image(path: str | Path, raw: bool = False) -> Image:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
-    # OpenCV decodes what there is of a file that was cut short, and calls it success.
-    jpeg_cut = content.startswith(b"\xff\xd8") and b"\xff\xd9" not in content[-1024:]
-    png_cut = content.startswith(b"\x89PNG") and b"IEND" not in content[-1024:]
-    image = None
-    if content and not jpeg_cut and not png_cut:
-        flags = cv2.IMREAD_UNCHANGED if raw else cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-        try:
-            image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
-        except cv2.error:
-            image = None
-    if image is None:
-        raise InputError(f"{path} is {'cut short' if jpeg_cut or png_cut else 'no image that can be decoded'}")
-    return np.asarray(image, dtype=np.uint8)
+    try:
+        return decode(content, raw)
+    except InputError as error:
+        raise InputError(f"{path} {error}") from error
 
 
 def _video(name: str) -> Source:

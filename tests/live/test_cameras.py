@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.live.running import running
-from vm_embedded.camera import BrokenFrameError, CameraError, CameraSettings, decode_jpeg, same_image
+from vm_embedded.camera import BrokenFrameError, CameraError, CameraSettings, decode_frame, same_image
 from vm_embedded.camera_mjpeg import MjpegCamera, NoMotionJpegError, address_of
 from vm_embedded.camera_synthetic import SIZE, SyntheticCamera
 from vm_embedded.cameras import camera_opener, is_live
@@ -171,8 +171,8 @@ def test_a_video_is_played_at_its_rate_again_and_again(tmp_path):
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.99])
 def test_half_a_jpeg_is_no_picture(pictures, share):
     with pytest.raises(BrokenFrameError):
-        decode_jpeg(pictures[0][: int(share * len(pictures[0]))])
-    assert decode_jpeg(pictures[0] + bytes(100)).shape == (SIZE[1], SIZE[0], 3)
+        decode_frame(pictures[0][: int(share * len(pictures[0]))])
+    assert decode_frame(pictures[0] + bytes(100)).shape == (SIZE[1], SIZE[0], 3)
 
 
 def test_names_of_cameras():
