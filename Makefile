@@ -25,7 +25,7 @@ demo: .venv/runtime ## find the balls in the frames of the repository
 	@echo "Annotated pictures: $(CURDIR)/demo-out/"
 
 test: lint ## lint, types and tests
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 lint: .venv/dev ## style and types
 	$(BIN)/ruff check .
