@@ -210,7 +210,7 @@ def test_a_broken_image_is_named(tmp_path, content, lens):
     assert done.stdout == ""
 
 
-@pytest.mark.parametrize("name", ["missing.jpg", "missing/", "none*.jpg", "/dev/video77", "99"])
+@pytest.mark.parametrize("name", ["missing.jpg", "missing/", "none*.jpg"])
 def test_a_missing_source_is_named(name, tmp_path):
     one_complaint(detect(name, code=1, cwd=tmp_path), name)
 
@@ -374,7 +374,15 @@ def test_progress_is_shown_on_a_terminal_and_nowhere_else(folder):
 
 def test_package_data_and_scripts_are_declared():
     project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
-    assert set(project["scripts"]) == {"vm-detect", "vm-export", "vm-bench", "vm-synth", "vm-train", "vm-evaluate"}
+    assert set(project["scripts"]) == {
+        "vm-detect",
+        "vm-doctor",
+        "vm-export",
+        "vm-bench",
+        "vm-synth",
+        "vm-train",
+        "vm-evaluate",
+    }
     assert [each.split(">")[0] for each in project["dependencies"]] == [
         "numpy",
         "onnxruntime",

@@ -7,6 +7,7 @@ played at their own rate (camera_files.py), a drawn field (camera_synthetic.py),
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -87,6 +88,11 @@ class CameraSettings:
 
     def __post_init__(self) -> None:
         check_entries(self)
+
+
+def named(source: str) -> str:
+    """A source as it may be shown: without the password that an address may have."""
+    return re.sub(r"//[^/@]*@", "//", source)
 
 
 def decode_frame(content: bytes, raw: bool = False) -> Image:

@@ -78,7 +78,7 @@ class RandomFaults:
 
 
 def _read_source(value: object) -> str:
-    if not isinstance(value, str) or value.startswith("fault:"):
+    if not isinstance(value, str) or not value or value.startswith("fault:"):
         raise InputError(f"source must be the name of another camera, not {value!r}")
     return value
 
@@ -116,7 +116,8 @@ class FaultScript:
 
 
 class Faults:
-    """The faults of a script as time goes by, from when the camera is first opened."""
+    """The faults of a script as time goes by, from when the camera is first opened. One at a time: that which began
+    last."""
 
     def __init__(self, script: FaultScript) -> None:
         self._faults = script.faults
@@ -134,6 +135,10 @@ class Faults:
         fault = self._faults[last] if last >= 0 else None
         return fault if fault is not None and passed < fault.at + fault.seconds else None
 
+    def left(self, fault: Fault) -> float:
+        """How long a fault goes on [s]."""
+        return max(fault.at + fault.seconds - (time.monotonic() - (self._began or 0.0)), 0.0)
+
 
 class FaultCamera:
     """Another camera with faults. Raises CameraError while it is unplugged."""
@@ -148,7 +153,7 @@ class FaultCamera:
         fault = self._faults.now()
         _check_plugged(fault)
         if fault is not None and fault.kind == "hang":
-            time.sleep(fault.seconds)
+            time.sleep(self._faults.left(fault))
         shot = self._camera.read()
         if shot is None or fault is None:
             self._faults.last = shot

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 from .camera import BrokenFrameError, CameraError, CameraSettings, Shot
 from .errors import InputError
-from .sources import Frame, open_source
+from .lens_file import read_lens_file
+from .sources import Frame, lens_beside, open_source
 
 RATE = 30.0
 """Frames a second of what has no rate of its own."""
@@ -41,7 +42,11 @@ class FileCamera:
         if frame is None:
             return None
         try:
-            return Shot(frame.read(), self._due)
+            beside = lens_beside(frame.path)
+            if beside is None:
+                return Shot(frame.read(), self._due)
+            file = read_lens_file(beside)
+            return Shot(frame.read(), self._due, orientation=file.orientation, lens=file.lens)
         except InputError as error:
             raise BrokenFrameError(str(error)) from error
 

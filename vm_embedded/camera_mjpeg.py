@@ -7,7 +7,7 @@ import http.client
 import time
 from urllib.parse import SplitResult, unquote, urlsplit
 
-from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, decode_frame
+from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, decode_frame, named
 from .errors import InputError, one_line
 
 _LARGEST = 64 * 2**20
@@ -31,6 +31,7 @@ class MjpegCamera:
         self.settings = settings
         self._raw = raw
         self._answer: http.client.HTTPResponse | None = None
+        self._begun = False  # whether a part was read
         self._within = False  # whether the boundary before the next part was read already
         url = address_of(settings.source)
         kind = http.client.HTTPSConnection if url.scheme == "https" else http.client.HTTPConnection
@@ -41,7 +42,7 @@ class MjpegCamera:
             self._answer = self._ask(url.path or "/", url.query, url.username, url.password)
         except (OSError, http.client.HTTPException) as error:
             self.close()
-            raise CameraError(f"no answer from {settings.source}: {one_line(error)}") from error
+            raise CameraError(f"no answer from {named(settings.source)}: {one_line(error)}") from error
         except CameraError:
             self.close()
             raise
@@ -55,21 +56,22 @@ class MjpegCamera:
         self._connection.request("GET", f"{path}?{query}" if query else path, headers=headers)
         answer = self._connection.getresponse()
         if answer.status != 200:
-            raise CameraError(f"{self.settings.source} answers {answer.status} {answer.reason[:100]}")
+            raise CameraError(f"{named(self.settings.source)} answers {answer.status} {answer.reason[:100]}")
         kind = answer.headers.get_content_type()
         boundary = answer.headers.get_param("boundary")
         if kind != "multipart/x-mixed-replace" or not isinstance(boundary, str):
-            raise NoMotionJpegError(f"{self.settings.source} gives {kind}, no multipart/x-mixed-replace")
+            raise NoMotionJpegError(f"{named(self.settings.source)} gives {kind}, no multipart/x-mixed-replace")
         self._boundary = b"--" + boundary.removeprefix("--").encode("latin-1")
         return answer
 
     def read(self) -> Shot:
         """The next shot. Raises CameraError at the end of the stream, BrokenFrameError for half a picture."""
-        deadline = time.monotonic() + 1e-3 * self.settings.lost_ms
+        limit = self.settings.lost_ms if self._begun else max(self.settings.open_ms, self.settings.lost_ms)
+        deadline, self._begun = time.monotonic() + 1e-3 * limit, True
         try:
             content = self._part(deadline)
         except (OSError, ValueError, http.client.HTTPException) as error:
-            raise CameraError(f"{self.settings.source}: {one_line(error)}") from error
+            raise CameraError(f"{named(self.settings.source)}: {one_line(error)}") from error
         captured = time.monotonic() - 1e-3 * self.settings.latency_ms
         return Shot(decode_frame(content, self._raw), captured, content)
 
@@ -94,7 +96,7 @@ class MjpegCamera:
         assert self._answer is not None
         line = self._answer.readline(65536)
         if not line:
-            raise CameraError(f"{self.settings.source} has ended")
+            raise CameraError(f"{named(self.settings.source)} has ended")
         return line
 
     def _bytes(self, length: int, deadline: float) -> bytes:
@@ -104,7 +106,7 @@ class MjpegCamera:
             self._in_time(deadline)
             some = answer.read1(length - len(content))
             if not some:
-                raise CameraError(f"{self.settings.source} ended within a picture")
+                raise CameraError(f"{named(self.settings.source)} ended within a picture")
             content += some
         return bytes(content)
 
@@ -121,7 +123,7 @@ class MjpegCamera:
 
     def _in_time(self, deadline: float) -> None:
         if time.monotonic() > deadline:
-            raise CameraError(f"{self.settings.source} sends too slowly")
+            raise CameraError(f"{named(self.settings.source)} sends too slowly")
 
     def close(self) -> None:
         """End the connection."""

@@ -12,7 +12,7 @@ os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")
 import cv2
 import numpy as np
 
-from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, decode_frame
+from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, decode_frame, named
 from .errors import InputError
 
 _OLDEST = 1.0
@@ -43,7 +43,7 @@ class OpenCvCamera:
             self._capture = cv2.VideoCapture(source, cv2.CAP_FFMPEG, limits)
         if not self._capture.isOpened():
             self._capture.release()
-            raise CameraError(f"can't open camera {source}")
+            raise CameraError(f"can't open camera {named(source)}")
         self._motion_jpeg = self._device is not None and self._configure()
 
     def _configure(self) -> bool:
@@ -71,7 +71,7 @@ class OpenCvCamera:
         good, image = self._capture.read()
         arrived = time.monotonic()
         if not good or image is None:
-            raise CameraError(f"camera {self.settings.source} gives no frames")
+            raise CameraError(f"camera {named(self.settings.source)} gives no frames")
         if self._device is not None and not self._device.exists():
             # After an unplug the last frame may come again and again.
             raise CameraError(f"camera {self._device} is gone")

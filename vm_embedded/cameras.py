@@ -37,6 +37,8 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
         return lambda: FaultCamera(faults, inner)
     if source.partition(":")[0] == "synthetic":
         motion_of(source)
+        if raw:
+            raise InputError("a drawn camera gives bgr, and nothing else")
         return lambda: SyntheticCamera(settings)
     if source.startswith(("http://", "https://")):
         address_of(source)

@@ -6,6 +6,7 @@ import argparse
 import asyncio
 import json
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,10 +14,10 @@ from pathlib import Path
 
 import cv2
 
-from .cameras import camera_opener, is_live
+from .cameras import is_live
 from .configuration import Configuration
 from .control import ask, usual_path
-from .daemon import EXIT_CONFIGURATION, Daemon
+from .daemon import EXIT_CONFIGURATION, REFUSED, Daemon, ready
 from .detector import Detector
 from .errors import InputError, VisualMeshError
 from .events import EventLog
@@ -27,7 +28,7 @@ from .orientation import Orientation
 from .progress import Progress
 from .sections import documented
 from .sinks import json_line, make_folder, save_overlay, save_points
-from .sources import Frame, check_file_format, open_source
+from .sources import Frame, check_file_format, lens_beside, open_source
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
@@ -102,7 +103,7 @@ class _Pose:
     def of(self, frame: Frame) -> tuple[Lens, Orientation]:
         """Lens and orientation of a frame. Raises InputError saying what is missing."""
         lens, orientation = self.lens, self.orientation
-        beside = _lens_beside(frame.path)
+        beside = lens_beside(frame.path)
         if beside is not None:
             file = read_lens_file(beside)
             lens, orientation = file.lens, file.orientation or orientation
@@ -113,16 +114,15 @@ class _Pose:
         return lens, orientation
 
 
-def _lens_beside(path: Path | None) -> Path | None:
-    """lensNAME.yaml beside imageNAME.jpg, if it is there."""
-    if path is None or not path.stem.startswith("image"):
-        return None
-    beside = path.with_name("lens" + path.stem.removeprefix("image") + ".yaml")
-    return beside if beside.exists() else None
-
-
 def _run(options: argparse.Namespace) -> int:
-    given = read_options(options)
+    asked = options.print_config or options.ask or options.check_config
+    live = options.live or (is_live(options.camera) if options.camera else options.config is not None)
+    try:
+        given = read_options(options)
+    except InputError as error:
+        if asked or not live:
+            raise
+        return _refuse(error)
     if options.print_config:
         print("\n".join(documented(given)))
         return EXIT_OK
@@ -131,7 +131,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.check_config:
         return _check(given)
     if not given.camera.source:
-        raise InputError("no camera: give --camera")
+        parser().error("no camera: give --camera, or [camera] source in vm.toml")
     if options.live or is_live(given.camera.source):
         return _watch(options)
     return _look(options, given)
@@ -140,29 +140,41 @@ def _run(options: argparse.Namespace) -> int:
 def _ask(given: Configuration, word: str) -> int:
     """Print the answer of a running detector. Fails if it is not well."""
     answer = ask(Path(given.status.socket) if given.status.socket else usual_path(), word)
+    if answer.startswith(REFUSED):
+        raise InputError(answer.removeprefix(REFUSED))
+    try:
+        well = word != "status" or json.loads(answer)["state"] == "ok"
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"what answers there is no detector: {answer[:60]!r}") from error
     print(answer)
-    return EXIT_OK if word != "status" or json.loads(answer)["state"] == "ok" else EXIT_FAILED
+    return EXIT_OK if well else EXIT_FAILED
 
 
 def _check(given: Configuration) -> int:
     """Say whether a detector would run with what is configured."""
-    detector = Detector.from_file(given.model, given.detector)
-    given.orientation.orientation()
-    if given.camera.source and is_live(given.camera.source):
-        camera_opener(given.camera)
+    detector = ready(given)
     print(f"{given.model}: {len(detector.manifest.classes)} classes, self-test passed; the configuration is good")
     return EXIT_OK
 
 
 def _watch(options: argparse.Namespace) -> int:
     """Run as a daemon on a live camera."""
-    log = EventLog("vm-detect")
+    for number in (signal.SIGHUP, signal.SIGUSR1):
+        signal.signal(number, signal.SIG_IGN)  # until there is something to read again, and to record
     try:
-        daemon = Daemon(lambda: read_options(options), log)
+        for name in ("save_overlay", "save_points", "emit_points", "explain"):
+            if getattr(options, name):
+                raise InputError(f"--{name.replace('_', '-')} is for files, each frame of which is looked at")
+        daemon = Daemon(lambda: read_options(options), EventLog("vm-detect"))
         return asyncio.run(daemon.run())
     except VisualMeshError as error:
-        log("can't start", "error", reason=str(error))
-        return EXIT_CONFIGURATION
+        return _refuse(error)
+
+
+def _refuse(error: VisualMeshError) -> int:
+    """Log why a daemon can't run; its status says that another start would be in vain."""
+    EventLog("vm-detect")("can't start", "error", reason=str(error))
+    return EXIT_CONFIGURATION
 
 
 def _look(options: argparse.Namespace, given: Configuration) -> int:

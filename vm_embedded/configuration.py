@@ -1,6 +1,6 @@
 """vm.toml: everything about a detector that is to run, a section each, checked at the border.
 
-`vm-detect --print-config` writes it with all defaults. Paths count from the file's own folder.
+`vm-detect --print-config` writes it with all defaults. Paths of model and lens count from the file's own folder.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 from .camera import CameraSettings
 from .entries import check_entries, entry
 from .errors import InputError, VisualMeshError
+from .lens import RadialLens
 from .lens_file import LensFile, lens_from_table, read_lens_file
 from .orientation import Orientation
 from .outputs import OutputSettings
@@ -103,10 +104,18 @@ def _read_lens(value: object) -> Path | LensFile:
     return LensFile(lens_from_table(value), None)
 
 
-def _documented_lens(_: LensFile | None) -> Iterator[str]:
+def _documented_lens(value: LensFile | None) -> Iterator[str]:
     yield "# the lens: a file of the reference, of OpenCV or of ROS, or TOML; or a table, [lens], with projection,"
     yield "# focal_length [px], fov [rad], and where they matter center, distortion and size [px]"
-    yield '# lens = "lens.yaml"'
+    lens = value.lens if value is not None else None
+    if isinstance(lens, RadialLens):
+        size = "" if lens.size is None else f", size = {list(lens.size)}"
+        yield (
+            f'lens = {{ projection = "{type(lens).__name__.lower()}", focal_length = {lens.focal_length!r}, '
+            f"fov = {lens.fov!r}, center = {list(lens.center)}, distortion = {list(lens.distortion)}{size} }}"
+        )
+    else:
+        yield '# lens = "lens.yaml"'
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import socket
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -16,6 +17,9 @@ NAME = "vm-detect.sock"
 
 _SECONDS = 2.0
 """How long who asks waits for an answer."""
+
+_LARGEST = 2**20
+"""Bytes of an answer."""
 
 Command = Callable[[], str]
 """Does what a word says, and answers with text."""
@@ -44,7 +48,8 @@ class Control:
         self._server = await asyncio.start_unix_server(self._answer, sock=self._file.socket, limit=1024)
 
     async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        with suppress(OSError, ValueError, TimeoutError):
+        # asyncio takes a handler that was cancelled for one that failed, and says so at length.
+        with suppress(OSError, ValueError, TimeoutError, asyncio.CancelledError):
             word = (await asyncio.wait_for(reader.readline(), _SECONDS)).decode("ascii", "replace").strip()
             command = self._commands.get(word)
             answer = command() if command else f"unknown command {word!r}; known are {', '.join(self._commands)}"
@@ -67,9 +72,10 @@ def ask(path: Path, word: str) -> str:
         try:
             connection.connect(str(path))
             connection.sendall(word.encode() + b"\n")
-            answer = b""
-            while part := connection.recv(65536):
+            answer, deadline = b"", time.monotonic() + _SECONDS
+            while (part := connection.recv(65536)) and len(answer) < _LARGEST:
                 answer += part
+                connection.settimeout(max(deadline - time.monotonic(), 1e-3))
         except (OSError, ValueError) as error:
             why = getattr(error, "strerror", None) or str(error) or "no answer"
             raise InputError(f"no detector answers at {path}: {why}") from error

@@ -20,8 +20,8 @@ from typing import Protocol
 
 import cv2
 
-from .camera import Shot
-from .cameras import camera_opener
+from .camera import Shot, named
+from .cameras import camera_opener, is_live
 from .configuration import Configuration
 from .control import Control, usual_path
 from .detector import Detector
@@ -56,11 +56,30 @@ _SWITCH = 0.0005
 _HEARTBEAT = 1.0
 """Seconds between two messages at most."""
 
+REFUSED = "refused: "
+"""What answers of the control socket begin with that are none."""
+
 _FIXED = ("camera", "pose", "output", "status", "recorder")
 """Sections that count from the next start on."""
 
 _CLOCK_JUMP = 0.5
 """Change of the wall clock against the monotonic one that is worth a word [s]."""
+
+
+def ready(configuration: Configuration) -> Detector:
+    """The configured network, its self-test done, if all that is configured goes together. Raises VisualMeshError."""
+    detector = Detector.from_file(configuration.model, configuration.detector)
+    camera, fixed = configuration.camera.source, configuration.orientation.orientation()
+    if is_live(camera):
+        camera_opener(configuration.camera, configuration.detector.format != "bgr")
+    if configuration.recorder.trigger_class:
+        detector.manifest.column(configuration.recorder.trigger_class)
+    if is_live(camera) and camera.partition(":")[0] not in ("synthetic", "fault"):
+        if configuration.lens is None:
+            raise InputError(f"camera {named(camera)} needs a lens: give --lens")
+        if configuration.pose.source == "fixed" and fixed is None:
+            raise InputError(f"camera {named(camera)} needs poses: give --height, or --pose-source")
+    return detector
 
 
 class Part(Protocol):
@@ -107,9 +126,7 @@ class Daemon:
 
     def _configured(self, configuration: Configuration) -> None:
         """Take a configuration and load its network, whose self-test is done then. Raises VisualMeshError."""
-        configuration.orientation.orientation()
-        detector = Detector.from_file(configuration.model, configuration.detector)
-        self.configuration, self.detector = configuration, detector
+        self.configuration, self.detector = configuration, ready(configuration)
         replayed = Configuration(
             model=str(Path(model_path(configuration.model)).resolve()), detector=configuration.detector
         )
@@ -133,7 +150,7 @@ class Daemon:
         self.grabber.start()
         self._show_state()
         self._notifier.send(READY=1)
-        self._log("ready", model=self.configuration.model, camera=self.configuration.camera.source)
+        self._log("ready", model=self.configuration.model, camera=named(self.configuration.camera.source))
         wall = time.time() - time.monotonic()
         while not self._stops and not self._finished():
             await self._step()
@@ -145,9 +162,9 @@ class Daemon:
         self._show_state()
         self._notifier.send(STOPPING=1)
         await self._close()
-        reason = self._fatal or ("told to" if self._stops else "end of the camera")
-        self._log("stopped", frames=self.figures.tally.frames, reason=reason)
-        return EXIT_HUNG if self._fatal else EXIT_OK
+        reason, frames = self._fatal or ("told to" if self._stops else "end of the camera"), self.figures.tally.frames
+        self._log("stopped", frames=frames, reason=reason)
+        return EXIT_HUNG if self._fatal else EXIT_OK if frames or self._stops else EXIT_FAILED
 
     def _servers(self) -> Iterator[WebServer]:
         status = self.configuration.status
@@ -190,6 +207,7 @@ class Daemon:
             return
         try:
             lens, orientation = self._lens(shot), await self._orientation(shot)
+            self.health.pose_trouble = ""
             started = time.perf_counter()
             detections = self.detector.detect(shot.image, orientation, lens)
         except StalePoseError as error:
@@ -222,7 +240,7 @@ class Daemon:
 
     def _lens(self, shot: Shot) -> Lens:
         given = self.configuration.lens
-        lens = given.lens if given is not None else shot.lens
+        lens = shot.lens or (given.lens if given is not None else None)
         if lens is None:
             raise InputError("no lens: give --lens")
         return lens
@@ -252,6 +270,8 @@ class Daemon:
         """See what state it is in, and say so if it has changed."""
         now = time.monotonic()
         lost = self.grabber.supervise(now)
+        if self.outputs.failure:
+            self.health.trouble(now, f"lines are lost: {self.outputs.failure}")
         spoilt = self.grabber.counts.spoilt
         if spoilt != self._spoilt:
             self._spoilt = spoilt
@@ -293,8 +313,12 @@ class Daemon:
 
     def record(self) -> str:
         """Write down the last seconds."""
-        said = self.recorder.record(self._documented)
-        self._log("record", result=said)
+        try:
+            said = self.recorder.record(self._documented)
+        except InputError as error:
+            self._log("not recorded", "warning", reason=str(error))
+            return f"{REFUSED}{error}"
+        self._log("recording", result=said)
         return said
 
     def _wake(self) -> None:
@@ -306,13 +330,17 @@ class Daemon:
         """Read configuration and model again; what is bad changes nothing."""
         try:
             before, configuration = self.configuration, self._configure()
-            self._configured(configuration)
+            as_opened = replace(configuration.detector, format=before.detector.format)
+            self._configured(replace(configuration, detector=as_opened))
         except VisualMeshError as error:
             self._log("reload refused", "error", reason=str(error))
             return
+        self.recorder.forget()
         kept = {name: getattr(before, name) for name in _FIXED}
         waiting = [name for name, section in kept.items() if section != getattr(configuration, name)]
-        self.configuration = replace(configuration, **kept)
+        if configuration.detector.format != before.detector.format:
+            waiting.append("detector.format")
+        self.configuration = replace(self.configuration, **kept)
         self._log("reloaded", model=configuration.model, needs_restart=waiting)
 
     def _stop(self) -> None:

@@ -13,10 +13,10 @@ from importlib import metadata
 from pathlib import Path
 
 from .camera_opencv import device_of
-from .cameras import camera_opener, is_live
+from .cameras import camera_opener
 from .configuration import Configuration
 from .control import usual_path
-from .detector import Detector
+from .daemon import ready
 from .errors import VisualMeshError, one_line
 
 GOOD, WARNING, BAD = "ok", "warning", "failure"
@@ -113,9 +113,9 @@ def wheels(installed: set[str]) -> Finding:
 def network(configuration: Configuration) -> Finding:
     """Whether the model loads and answers its self-test."""
     try:
-        detector = Detector.from_file(configuration.model, configuration.detector)
+        detector = ready(configuration)
     except VisualMeshError as error:
-        return Finding("model", BAD, str(error), "vm-export the network again, and copy it to here")
+        return Finding("model", BAD, str(error), "vm-detect --check-config says whether it is mended")
     digest = detector.session.model.sha256
     return Finding("model", GOOD, f"{configuration.model}: self-test passed, sha256 {digest[:16]}...")
 
@@ -133,8 +133,7 @@ def camera(configuration: Configuration, root: Path) -> Iterator[Finding]:
         return
     device = device_of(source)
     try:
-        if is_live(source):
-            camera_opener(configuration.camera)
+        camera_opener(configuration.camera, configuration.detector.format != "bgr")
         if device is not None and not (root / device.relative_to("/")).exists():
             there = ", ".join(str(each) for each in nodes) or "no camera at all"
             yield Finding("camera", BAD, f"there is no {device}; there is {there}", "ls -l /dev/v4l/by-id/")

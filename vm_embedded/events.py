@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from typing import Any, TextIO
@@ -15,7 +16,7 @@ class EventLog:
 
     def __init__(self, program: str, stream: TextIO | None = None) -> None:
         self.program = program
-        self._stream = sys.stderr if stream is None else stream
+        self._stream = stream or sys.stderr or open(os.devnull, "w")  # noqa: SIM115, PTH123
         self._text = self._stream.isatty()
 
     def __call__(self, event: str, level: str = "info", **fields: Any) -> None:
@@ -29,4 +30,4 @@ class EventLog:
         try:
             print(" ".join(line.split("\n")), file=self._stream, flush=True)
         except (OSError, ValueError):  # a full disk, a closed terminal
-            self._stream = open("/dev/null", "w")  # noqa: SIM115, PTH123
+            self._stream = open(os.devnull, "w")  # noqa: SIM115, PTH123

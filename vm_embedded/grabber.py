@@ -122,13 +122,14 @@ class Grabber:
         self._pause = min(2.0 * self._pause, 1e-3 * self.settings.longest_retry_ms)
 
     def stop(self, seconds: float) -> None:
-        """End, and wait so long for the thread to close the camera."""
+        """End, and wait so long for threads to close the camera."""
         with self._lock:
             if self._reader is not None:
                 self._leave(self._reader, time.monotonic())
             self.ended = True
+        deadline = time.monotonic() + seconds
         for each in self._left:
-            each.join(seconds)
+            each.join(max(deadline - time.monotonic(), 0.0))
 
     def _give(self, reader: _Reader, shot: Shot) -> None:
         arrived = time.monotonic()

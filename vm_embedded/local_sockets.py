@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import socket
 import stat
+from dataclasses import Field
 from pathlib import Path
+from typing import Any
 
 from .errors import InputError
 
@@ -69,6 +71,16 @@ class SocketFile:
                 self.path.unlink()
         except OSError:
             return
+
+
+def checked_address(entry: Field[Any], value: object) -> str:
+    """An entry that is ADDRESS:PORT, several with commas between, unix:PATH, or nothing. Raises InputError."""
+    if not isinstance(value, str):
+        raise InputError(f"{entry.name} must be a text, not {value!r}")
+    for each in filter(None, value.split(",")):
+        if not (each.startswith("unix:") and len(each) > len("unix:")):
+            address(each, entry.name)
+    return value
 
 
 def address(text: str, what: str) -> tuple[str, int]:

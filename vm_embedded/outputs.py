@@ -8,15 +8,16 @@ from __future__ import annotations
 import asyncio
 import os
 import queue
+import select
 import sys
 import threading
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from .entries import check_entries, number, one_of, switch, words
+from .entries import check_entries, entry, number, one_of, switch, words
 from .errors import InputError
-from .local_sockets import SocketFile, address, datagram_socket
+from .local_sockets import SocketFile, address, checked_address, datagram_socket
 from .messages import Message, as_line, as_ros
 
 FORMATS = ("json", "ros")
@@ -28,7 +29,9 @@ class OutputSettings:
 
     stdout: bool = switch(True, "lines on standard output")
     file: str = words("", "file that lines are appended to")
-    udp: str = words("", "where each line is sent as a datagram: ADDRESS:PORT, several with commas between")
+    udp: str = entry(
+        checked_address, "", "where each line is sent as a datagram: ADDRESS:PORT, several with commas between"
+    )
     unix: str = words("", "socket that is made; every reader of it gets every line")
     format: str = one_of(FORMATS, "json", "json, or ros: the field names of vision_msgs and geometry_msgs of ROS 2")
     frame_id: str = words("base_footprint", "what ROS is to call the frame on the ground below the camera")
@@ -39,9 +42,11 @@ class OutputSettings:
 
 
 class Output(Protocol):
-    """One way out. dropped: lines that were lost on it."""
+    """One way out. dropped: lines that were lost on it. failure: why the last one was, if not because of a slow
+    reader."""
 
     dropped: int
+    failure: str
 
     def send(self, line: bytes) -> None:
         """Send a line, or drop it; never wait."""
@@ -62,6 +67,8 @@ class Outputs:
         settings, most = self.settings, 1024 * self.settings.backlog_kib
         try:
             if settings.stdout:
+                if sys.stdout is None:
+                    raise InputError("standard output is closed; --no-output-stdout goes without it")
                 self._outputs.append(DescriptorOutput(os.dup(sys.stdout.fileno()), most))
             if settings.file:
                 self._outputs.append(DescriptorOutput(_opened(settings.file), most))
@@ -77,6 +84,11 @@ class Outputs:
     def dropped(self) -> int:
         """Lines that were lost, over all ways."""
         return sum(each.dropped for each in self._outputs)
+
+    @property
+    def failure(self) -> str:
+        """Why lines are lost; nothing if they are not, or only to slow readers."""
+        return next((each.failure for each in self._outputs if each.failure), "")
 
     def send(self, message: Message) -> None:
         """Send a message all ways."""
@@ -103,6 +115,7 @@ class DescriptorOutput:
 
     def __init__(self, descriptor: int, most: int) -> None:
         self.dropped = 0
+        self.failure = ""
         self._descriptor = descriptor
         self._most, self._given, self._written = most, 0, 0  # bytes; each is changed by one thread only
         self._lines: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
@@ -118,15 +131,26 @@ class DescriptorOutput:
         self._lines.put(line)
 
     def _write(self) -> None:
+        torn = False
         while (line := self._lines.get()) is not None:
-            rest = memoryview(line)
+            rest = memoryview(b"\n" + line if torn else line)  # nobody should take the next line for more of this one
             try:
                 while rest:
-                    rest = rest[os.write(self._descriptor, rest) :]
-            except OSError:  # a full disk, or a reader that has gone: the others go on
+                    rest = rest[self._some(rest) :]
+                self.failure, torn = "", False
+            except OSError as error:  # a full disk, or a reader that has gone: the others go on
+                self.failure, torn = error.strerror or str(error), torn or len(rest) < len(line)
                 self.dropped += 1
             self._written += len(line)
         os.close(self._descriptor)
+
+    def _some(self, rest: memoryview) -> int:
+        """Write what can be written, once something can."""
+        while True:
+            try:
+                return os.write(self._descriptor, rest)
+            except BlockingIOError:
+                select.select([], [self._descriptor], [])
 
     async def close(self) -> None:
         """Give the thread a moment; one that hangs in a write ends with the process."""
@@ -139,6 +163,7 @@ class DatagramOutput:
 
     def __init__(self, where: str) -> None:
         self.dropped = 0
+        self.failure = ""
         self._socket, self._address = datagram_socket(*address(where, "[output] udp"), "can't send to")
 
     def send(self, line: bytes) -> None:
@@ -158,6 +183,7 @@ class SocketOutput:
 
     def __init__(self, file: SocketFile, most: int) -> None:
         self.dropped = 0
+        self.failure = ""
         self._file, self._most = file, most
         self._writers: set[asyncio.StreamWriter] = set()
         self._server: asyncio.Server | None = None
@@ -174,7 +200,7 @@ class SocketOutput:
         try:
             while await reader.read(4096):  # readers have nothing to say; the end of it says that they left
                 pass
-        except ConnectionError:
+        except (ConnectionError, asyncio.CancelledError):  # the latter asyncio would take for a failure
             pass
         finally:
             self._writers.discard(writer)

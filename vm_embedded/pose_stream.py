@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import stat
 import sys
 import time
 from collections.abc import Callable
@@ -46,17 +48,14 @@ class PoseStream:
             transport, _ = await loop.create_datagram_endpoint(lambda: _Datagrams(self.take), sock=listening)
             self._transports.append(transport)
         elif self.settings.source == "stdin":
+            if sys.stdin is None or not _can_be_waited_for(sys.stdin.fileno()):
+                raise InputError("poses from stdin need a pipe, a socket or a terminal there")
             reader = asyncio.StreamReader(limit=LONGEST)
-            try:
-                pipe, _ = await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin)
-            except (ValueError, OSError) as error:
-                raise InputError(f"poses from stdin need a pipe, a socket or a terminal: {error}") from error
+            pipe, _ = await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(os.dup(0)))
             self._transports.append(pipe)
             self._keep(asyncio.ensure_future(self._lines(reader)))
         elif self.settings.source != "fixed":
-            raise InputError(
-                f"source of poses must be fixed, stdin, unix:PATH or udp:ADDRESS:PORT, not {self.settings.source!r}"
-            )
+            raise InputError(f"unknown source of poses {self.settings.source!r}")
 
     def _keep(self, task: asyncio.Task[None]) -> None:
         self._tasks.add(task)
@@ -71,7 +70,7 @@ class PoseStream:
         writer.close()
 
     async def _lines(self, reader: asyncio.StreamReader) -> None:
-        """Take lines until the end; a writer whose line has no end is not listened to any more."""
+        """Take lines until the end. One that is too long is left out."""
         with suppress(ConnectionError):
             while line := await self._line(reader):
                 self.take(line)
@@ -81,7 +80,7 @@ class PoseStream:
             return await reader.readline()
         except ValueError:
             self._refuse(f"pose of more than {LONGEST} bytes")
-            return b""
+            return b"\n"
 
     def take(self, line: bytes) -> None:
         """A line as it came. What is wrong with it is reported and counted."""
@@ -122,10 +121,17 @@ class PoseStream:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         for transport in self._transports:
             transport.close()
+        if self.settings.source == "stdin" and sys.stdin is not None:
+            os.set_blocking(sys.stdin.fileno(), True)  # a terminal is shared with whoever comes after
         if self._server is not None:
             self._server.close()
         if self._file is not None:
             self._file.close()
+
+
+def _can_be_waited_for(descriptor: int) -> bool:
+    mode = os.fstat(descriptor).st_mode
+    return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode) or os.isatty(descriptor)
 
 
 class _Datagrams(asyncio.DatagramProtocol):

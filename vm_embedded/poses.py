@@ -8,14 +8,16 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import Field, dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 
 from .arrays import Floats
-from .entries import check_entries, number, one_of, switch, words
-from .errors import GeometryError, VisualMeshError
+from .entries import check_entries, entry, number, one_of, switch
+from .errors import GeometryError, InputError, VisualMeshError
+from .local_sockets import address
 from .orientation import Orientation
 
 CLOCKS = ("monotonic", "wall", "arrival")
@@ -25,15 +27,29 @@ _KEPT = 3.0
 """Seconds of poses that are kept; no frame is that old."""
 
 
+_SHORTEST = 0.005
+"""Seconds between two poses at least, as far as jumps go: lines that wait together arrive at one moment."""
+
+
 class StalePoseError(VisualMeshError):
     """There is no pose for the moment of a frame."""
+
+
+def _source(entry: Field[Any], value: object) -> str:
+    kind, _, rest = value.partition(":") if isinstance(value, str) else ("", "", "")
+    if kind == "udp":
+        address(rest, "source udp:ADDRESS:PORT")
+    elif not (value in ("fixed", "stdin") or (kind == "unix" and rest)):
+        raise InputError(f"source must be fixed, stdin, unix:PATH or udp:ADDRESS:PORT, not {value!r}")
+    return str(value)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PoseSettings:
     """Section [pose]: where poses come from, and how far they are trusted."""
 
-    source: str = words(
+    source: str = entry(
+        _source,
         "fixed",
         "fixed: as [orientation] says; or lines of JSON from stdin, from unix:PATH, a socket that is made there, or "
         "from udp:ADDRESS:PORT",
@@ -105,6 +121,7 @@ class Poses:
         if elapsed > 1e-3 * self.settings.max_age_ms:
             self._poses.clear()
             return
+        elapsed = max(elapsed, _SHORTEST)
         climb = abs(orientation.height - before.height)
         if climb > self.settings.max_climb * elapsed:
             raise GeometryError(
@@ -124,11 +141,11 @@ class Poses:
         ahead = time - self.newest
         if ahead > 1e-3 * self.settings.max_age_ms:
             raise StalePoseError(f"newest pose is {1e3 * ahead:.0f} ms older than the frame")
-        if not self.settings.interpolate or len(self._poses) == 1:
-            return self._poses[-1][1]
         times = [each[0] for each in self._poses]
         if time < times[0] - 1e-3 * self.settings.max_age_ms:
             raise StalePoseError(f"oldest pose is {1e3 * (times[0] - time):.0f} ms newer than the frame")
+        if not self.settings.interpolate or len(self._poses) == 1:
+            return self._poses[-1][1]
         time = min(max(time, times[0]), times[-1] + 1e-3 * self.settings.extrapolate_ms)
         after = min(max(bisect_right(times, time), 1), len(times) - 1)
         (start, one), (end, other) = self._poses[after - 1], self._poses[after]

@@ -12,6 +12,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -70,6 +71,7 @@ class Recorder:
         self._report = report
         self._moments: deque[Moment] = deque()
         self._nbytes = 0
+        self._ends = False
         self._writing: threading.Thread | None = None
         self._last = -float("inf")  # when a class last made a recording
 
@@ -89,19 +91,23 @@ class Recorder:
             now = time.monotonic()
             if now - self._last >= self.settings.pause:
                 self._last = now
-                self.record(configuration)
+                with suppress(InputError):
+                    self.record(configuration)
 
     def record(self, configuration: str) -> str:
-        """Begin to write what is kept, with a vm.toml; what comes of it in one line."""
+        """Begin to write what is kept, with a vm.toml, and say so. Raises InputError if nothing is written."""
         if not self.settings.folder:
-            return "nothing is kept: [recorder] has no folder"
+            raise InputError("nothing is kept: [recorder] has no folder")
         if self._writing is not None and self._writing.is_alive():
-            return "the last recording is still being written"
+            raise InputError("the last recording is still being written")
         if not self._moments:
-            return "nothing is kept yet"
-        folder = Path(self.settings.folder) / time.strftime("%Y-%m-%dT%H-%M-%S")
+            raise InputError("nothing is kept yet")
+        now = time.time()
+        name = f"{time.strftime('%Y-%m-%dT%H-%M-%S', time.localtime(now))}.{int(1e3 * now) % 1000:03d}"
+        folder = Path(self.settings.folder) / name
         moments = list(self._moments)
-        self._writing = threading.Thread(target=self._write, args=(folder, moments, configuration), name="recorder")
+        arguments = (folder, moments, configuration)
+        self._writing = threading.Thread(target=self._write, args=arguments, name="recorder", daemon=True)
         self._writing.start()
         return f"recording {len(moments)} frames to {folder}"
 
@@ -111,6 +117,8 @@ class Recorder:
             part.mkdir(parents=True)
             written = 0
             for index, each in enumerate(moments):
+                if self._ends:
+                    raise InputError("the detector stops")
                 written += _write_moment(part, index, each)
                 if written > 2**20 * self.settings.disk_mib:
                     raise InputError(f"more than {self.settings.disk_mib:g} MiB")
@@ -124,8 +132,14 @@ class Recorder:
         else:
             self._report("recorded", str(folder))
 
+    def forget(self) -> None:
+        """Let go of all moments, because what follows comes of other settings."""
+        self._moments.clear()
+        self._nbytes = 0
+
     def close(self, seconds: float) -> None:
-        """Wait so long for a recording that is being written."""
+        """Give up a recording that is being written, and wait so long until its half is removed."""
+        self._ends = True
         if self._writing is not None:
             self._writing.join(seconds)
 

@@ -109,6 +109,14 @@ def read_image(path: str | Path, raw: bool = False) -> Image:
         raise InputError(f"{path} {error}") from error
 
 
+def lens_beside(path: Path | None) -> Path | None:
+    """lensNAME.yaml beside imageNAME.jpg, if it is there."""
+    if path is None or not path.stem.startswith("image"):
+        return None
+    beside = path.with_name("lens" + path.stem.removeprefix("image") + ".yaml")
+    return beside if beside.exists() else None
+
+
 def _video(name: str) -> Source:
     """A video file, or a camera by number or device path."""
     capture = cv2.VideoCapture(int(name) if name.isdigit() else name)

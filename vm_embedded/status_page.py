@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import cv2
@@ -18,6 +19,9 @@ from .web import Answer, Write
 _PAGE = Path(__file__).with_name("status_page.html")
 _BOUNDARY = b"--picture"
 _QUALITY = 80
+
+_STILL = 2.0
+"""Seconds after which a picture is sent again, if there is no new one."""
 
 
 class StatusPage:
@@ -61,7 +65,8 @@ class StatusPage:
                 await write(_BOUNDARY + head + picture + b"\r\n")
             await asyncio.sleep(self._period)
             self._changed.clear()
-            await self._changed.wait()
+            with suppress(TimeoutError):  # then the same picture again: who has gone is noticed by writing only
+                await asyncio.wait_for(self._changed.wait(), _STILL)
 
     async def _picture(self) -> bytes | None:
         """The latest picture as a JPEG."""

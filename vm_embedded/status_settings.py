@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .entries import check_entries, number, words
+from .entries import check_entries, entry, number, words
+from .local_sockets import checked_address
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,8 +17,12 @@ class StatusSettings:
         "socket for vm-detect --status and its like; if none is named, vm-detect.sock in $RUNTIME_DIRECTORY or "
         "$XDG_RUNTIME_DIR, or else in /tmp with the user's number in its name",
     )
-    page: str = words("", "ADDRESS:PORT of a page with state and picture, as 127.0.0.1:8080; none: no page")
-    metrics: str = words("", "ADDRESS:PORT or unix:PATH at which Prometheus gets figures; none: not at all")
+    page: str = entry(
+        checked_address, "", "ADDRESS:PORT of a page with state and picture, as 127.0.0.1:8080; none: no page"
+    )
+    metrics: str = entry(
+        checked_address, "", "ADDRESS:PORT or unix:PATH at which Prometheus gets figures; none: not at all"
+    )
     picture_fps: float = number(10.0, "pictures a second that the page shows", "1/s", (0.1, 100))
 
     def __post_init__(self) -> None:

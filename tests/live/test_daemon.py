@@ -148,6 +148,12 @@ def test_a_socket_that_was_left_behind_is_replaced_and_one_in_use_is_not(tmp_pat
 def test_what_can_never_work_ends_it_at_the_start_with_a_status_of_its_own(tmp_path):
     for options, says in (
         (("--camera", "synthetic:fast"), "synthetic:TURN"),
+        (("--camera", "synthetic", "--camera-fps", -1), "fps must be a number"),
+        (("--camera", "synthetic", "--format", "grey"), "bgr"),
+        (("--camera", "synthetic", "--recorder-trigger-class", "bal"), "'bal'"),
+        (("--camera", "synthetic", "--explain"), "--explain is for files"),
+        (("--camera", "/dev/video-none"), "needs a lens"),
+        (("--config", tmp_path / "none.toml"), "none.toml"),
         (("--camera", "fault:none.toml"), "none.toml"),
         (("--camera", "http://"), "no address"),
         (("--camera", "synthetic", "--pose-source", "udp:nowhere"), "127.0.0.1:5600"),
@@ -167,7 +173,8 @@ def test_what_can_never_work_ends_it_at_the_start_with_a_status_of_its_own(tmp_p
 
 
 def test_a_camera_that_is_not_there_yet_is_waited_for(tmp_path):
-    with running(tmp_path, "--camera", "/dev/video-none", "--camera-retry-ms", "20") as found:
+    pose = ("--lens", DEMO / "lens0000000.yaml", "--height", 0.6)
+    with running(tmp_path, "--camera", "/dev/video-none", "--camera-retry-ms", "20", *pose) as found:
         found.wait_for_state("camera_lost")
         found.wait(lambda: any(each.get("reason", "").startswith("there is no camera") for each in found.messages))
         found.wait(lambda: counts(tmp_path)["reconnects"] > 2)
@@ -294,3 +301,81 @@ def test_a_second_signal_ends_it_at_once(tmp_path):
         started = time.monotonic()
         assert found.process.wait(30) in (0, 1)
         assert time.monotonic() - started < 1.0
+
+
+def test_what_is_wrong_with_an_output_shows_in_the_state(tmp_path):
+    with running(tmp_path, "--camera", "synthetic", "--output-file", "/dev/full") as found:
+        found.wait_for_state("degraded")
+        found.wait(lambda: "No space left" in json.loads(ask(tmp_path / "control", "status"))["reason"])
+        found.stop()
+
+
+def test_a_recording_that_is_being_written_and_reads_that_hang_do_not_delay_the_end(tmp_path):
+    source, kept = tmp_path / "script.toml", tmp_path / "recordings"
+    source.write_text('faults = [{ kind = "hang", at = 8.0, seconds = 100.0 }]\n')
+    large = ("--camera-width", 1280, "--camera-height", 960, "--recorder-folder", kept)
+    retry = ("--camera-lost-ms", 200, "--camera-open-ms", 200, "--camera-retry-ms", 10)
+    with running(tmp_path, "--camera", f"fault:{source}", *large, *retry) as found:
+        found.wait(lambda: len(found.frames) > 3)
+        found.wait_for_state("camera_lost")
+        done = subprocess.run(arguments(tmp_path, "--record"), capture_output=True, text=True, timeout=60, check=False)
+        found.process.send_signal(signal.SIGTERM)
+        started = time.monotonic()
+        found.process.wait(60)
+        assert time.monotonic() - started < 1.5
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_long_line_on_standard_input_is_left_out_and_the_next_one_is_read(tmp_path):
+    with running(tmp_path, "--camera", "synthetic", "--pose-source", "stdin", stdin=subprocess.PIPE) as found:
+        found.wait_for_state("pose_stale")
+        found.process.stdin.write(b"x" * 9000 + b"\n")
+        for _ in range(200):
+            pose = {"t": time.monotonic(), "height": 0.8, "quaternion": [0.98, 0.0, 0.199, 0.0]}
+            found.process.stdin.write(json.dumps(pose).encode() + b"\n")
+            found.process.stdin.flush()
+            time.sleep(0.01)
+        found.wait_for_state("ok")
+        found.stop()
+
+
+def test_what_can_not_be_read_or_written_is_said_without_a_traceback(tmp_path):
+    command = arguments(tmp_path, "--camera", "synthetic")
+    for more, says in (
+        ("--pose-source stdin </dev/null", "stdin need a pipe"),
+        ("--pose-source stdin <&-", "stdin need a pipe"),
+        (">&-", "standard output is closed"),
+    ):
+        line = f"{' '.join(command)} {more}"
+        done = subprocess.run(line, shell=True, capture_output=True, text=True, timeout=60, check=False)
+        assert done.returncode == 78, (more, done.stderr)
+        assert says in done.stderr
+        assert "Traceback" not in done.stderr
+
+
+def test_a_client_that_says_nothing_is_let_go_of_at_the_end(tmp_path):
+    with running(tmp_path, "--camera", "synthetic") as found:
+        found.wait_for_state("ok")
+        with socket.socket(socket.AF_UNIX) as silent:
+            silent.connect(str(tmp_path / "control"))
+            assert found.stop()[0] == 0
+
+
+def test_asking_what_is_no_detector_ends(tmp_path):
+    path = tmp_path / "other"
+    with socket.socket(socket.AF_UNIX) as other:
+        other.bind(str(path))
+        other.listen()
+        command = [COMMAND, "--status", "--status-socket", path]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode == 1
+    assert "no detector answers" in done.stderr
+
+
+def test_passwords_of_cameras_are_not_shown(tmp_path):
+    pose = ("--lens", DEMO / "lens0000000.yaml", "--height", 0.6)
+    with running(tmp_path, "--camera", "http://user:secret@127.0.0.1:9/x", *pose) as found:
+        found.wait_for_state("camera_lost")
+        found.stop()
+    assert "secret" not in json.dumps([found.messages, found.events])
+    assert "no answer from http://127.0.0.1:9/x" in json.dumps(found.messages)
