@@ -33,6 +33,9 @@ Trained networks answer near 0 and 1, and there the ranks are to be kept: the bi
 in the middle 8e-4. Bins include their lower edge, the last one also its upper.
 """
 
+_ROUNDING = 1e-6
+"""By how much a softmax in single precision may be above 1."""
+
 
 @dataclass(frozen=True, eq=False)
 class Roc:
@@ -171,8 +174,9 @@ class PointScores:
         """
         labeled = labels >= 0
         chosen, own = probabilities[labeled].astype(np.float64), labels[labeled].astype(np.intp)
-        if not ((chosen >= 0.0) & (chosen <= 1.0)).all():
+        if not ((chosen >= 0.0) & (chosen <= 1.0 + _ROUNDING)).all():
             raise ModelError("the network's probabilities are not all numbers from 0 to 1")
+        chosen = np.minimum(chosen, 1.0)
         if own.max(initial=0) >= len(self.classes):
             raise InputError(f"label {own.max()} is of no class; there are {len(self.classes)}")
         rows = bins_of(np.asarray(distances)[labeled], self.distance_edges)

@@ -251,7 +251,13 @@ def test_a_network_that_finds_none_of_a_class_has_recall_and_f1_of_0():
     assert math.isnan(found.markedness)
 
 
-@pytest.mark.parametrize("wrong", [math.nan, -0.1, 1.1])
+def test_a_softmax_that_is_rounded_up_counts_as_one():
+    rounded = np.array([[np.nextafter(np.float32(1.0), np.float32(2.0)), 0.0, 0.0]], dtype=np.float32)
+    assert rounded.max() > 1.0
+    assert scored(rounded, np.array([0]), np.ones(1)).ranking("ball").at(0.5).recall == 1.0
+
+
+@pytest.mark.parametrize("wrong", [math.nan, -0.1, 1.00001, 1.1])
 def test_probabilities_that_are_none_are_refused(wrong):
     with pytest.raises(ModelError, match="not all numbers from 0 to 1"):
         scored(np.array([[wrong, 0.0, 0.0]]), np.array([0]), np.ones(1))
