@@ -6,7 +6,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-_SHOWN = 1.0
+_SHOWN = 0.5
 """Seconds for which a single trouble shows."""
 
 

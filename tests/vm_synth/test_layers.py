@@ -15,7 +15,7 @@ PACKAGE = Path(vm_synth.__file__).parent
 MODULES = sorted(path for path in PACKAGE.glob("*.py") if path.stem != "__init__")
 
 LAYERS = [
-    {"ranges", "sections", "llvm", "progress", "stopping", "worker_process"},
+    {"ranges", "llvm", "progress", "stopping", "worker_process"},
     {"paints", "environment", "smoothing", "outlines", "ball_sphere", "ball_design"},
     {"solids", "camera", "field", "sensor", "ball_prints"},
     {"primitives", "ball_patterns"},
