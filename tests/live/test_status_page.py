@@ -74,7 +74,7 @@ def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_cam
         rate = float(text("now").split("frames answered")[1].split("/s")[0])
         assert rate > 5.0
         wait(lambda: "ball" in text("found"))
-        browser.save_screenshot("/tmp/page.png")
+        browser.save_screenshot(str(tmp_path / "page.png"))
         wait(lambda: text("state") == "camera_lost")
         assert "unplugged" in text("reason")
         wait(lambda: text("state") == "ok")
