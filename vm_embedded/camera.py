@@ -34,9 +34,9 @@ class Shot:
     """One frame of a live camera.
 
     image: BGR, or as the camera gives it if the pixel format is another. captured: when it was taken, in seconds of
-    the monotonic clock. encoded: the JPEG that it came as. orientation, lens: of the
-    camera, if it knows its own. truth: what a drawn camera knows besides. arrived:
-    when it was there to be taken, as whoever reads the camera notes.
+    the monotonic clock. encoded: the JPEG that it came as. orientation, lens: of the camera, if it knows its own.
+    truth: what a drawn camera knows besides. arrived: when it was there to be taken, as whoever reads the camera notes
+    in the same clock [s].
     """
 
     image: Image

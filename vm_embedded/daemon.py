@@ -239,6 +239,7 @@ class Daemon:
         return late
 
     def _lens(self, shot: Shot) -> Lens:
+        """The shot's own lens, or the configured one. Raises InputError."""
         given = self.configuration.lens
         lens = shot.lens or (given.lens if given is not None else None)
         if lens is None:

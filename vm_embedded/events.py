@@ -8,8 +8,6 @@ import sys
 import time
 from typing import Any, TextIO
 
-LEVELS = ("debug", "info", "warning", "error")
-
 
 class EventLog:
     """Writes events. A log that can't be written is no reason to stop."""

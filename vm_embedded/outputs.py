@@ -206,11 +206,6 @@ class SocketOutput:
             self._writers.discard(writer)
             writer.close()
 
-    @property
-    def readers(self) -> int:
-        """How many read."""
-        return len(self._writers)
-
     def send(self, line: bytes) -> None:
         """Send a line to all who keep up."""
         for writer in self._writers:

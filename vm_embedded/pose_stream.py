@@ -36,13 +36,13 @@ class PoseStream:
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def open(self) -> None:
-        """Begin to listen. Raises InputError for a source that is none, or can't be had."""
+        """Begin to listen. Raises InputError for a source that can't be had."""
         kind, _, rest = self.settings.source.partition(":")
         loop = asyncio.get_running_loop()
-        if kind == "unix" and rest:
+        if kind == "unix":
             self._file = SocketFile(rest)
             self._server = await asyncio.start_unix_server(self._converse, sock=self._file.socket, limit=LONGEST)
-        elif kind == "udp" and rest:
+        elif kind == "udp":
             host, port = address(rest, "source of poses")
             listening, _ = datagram_socket(host, port, "poses from", listen=True)
             transport, _ = await loop.create_datagram_endpoint(lambda: _Datagrams(self.take), sock=listening)
@@ -51,11 +51,11 @@ class PoseStream:
             if sys.stdin is None or not _can_be_waited_for(sys.stdin.fileno()):
                 raise InputError("poses from stdin need a pipe, a socket or a terminal there")
             reader = asyncio.StreamReader(limit=LONGEST)
-            pipe, _ = await loop.connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(os.dup(0)))
+            pipe, _ = await loop.connect_read_pipe(
+                lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(os.dup(sys.stdin.fileno()))
+            )
             self._transports.append(pipe)
             self._keep(asyncio.ensure_future(self._lines(reader)))
-        elif self.settings.source != "fixed":
-            raise InputError(f"unknown source of poses {self.settings.source!r}")
 
     def _keep(self, task: asyncio.Task[None]) -> None:
         self._tasks.add(task)

@@ -26,7 +26,6 @@ FRAMES = ("camera", "optical")
 _KEPT = 3.0
 """Seconds of poses that are kept; no frame is that old."""
 
-
 _SHORTEST = 0.005
 """Seconds between two poses at least, as far as jumps go: lines that wait together arrive at one moment."""
 
@@ -82,7 +81,6 @@ class Poses:
 
     def __init__(self, settings: PoseSettings) -> None:
         self.settings = settings
-        self.refused = 0
         self._poses: deque[tuple[float, Orientation]] = deque()
 
     def __len__(self) -> int:
@@ -99,11 +97,7 @@ class Poses:
         Raises GeometryError for one that is not newer than the last, or that jumps. If no other comes before the last
         is stale, the next one is taken as it is: the robot was carried, or its sensors began anew.
         """
-        try:
-            self._check(time, orientation)
-        except GeometryError:
-            self.refused += 1
-            raise
+        self._check(time, orientation)
         self._poses.append((time, orientation))
         while time - self._poses[0][0] > _KEPT:
             self._poses.popleft()
