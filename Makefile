@@ -11,8 +11,9 @@ SCENES ?= export/vm_synth/polyhaven.toml
 NETWORKS := ball-5x4 ball-9x4 ball-best
 BUILD ?= build/networks
 TEST ?= data/test
+TARGET ?= linux_x86_64-cp311
 
-.PHONY: help setup demo test lint bench bench-synth bench-train data networks test-data score compare choices fixtures docs clean
+.PHONY: help setup demo test lint bundle lock bench bench-synth bench-train data networks test-data score compare choices fixtures docs clean
 .DELETE_ON_ERROR:
 
 help: ## what can be made
@@ -31,6 +32,16 @@ lint: .venv/dev ## style and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+bundle: .venv/bundle ## all that a robot needs, in one file: make bundle [MODEL=model.onnx] [CONFIG=vm.toml] [TARGET=linux_x86_64-cp311]
+	$(BIN)/python deploy/bundle.py --target $(TARGET) $(if $(MODEL),--model $(MODEL)) $(if $(CONFIG),--config $(CONFIG))
+
+lock: ## choose the robot's packages, and write their hashes to deploy/robot.txt
+	$(PYTHON) -m venv build/lock
+	build/lock/bin/pip install --disable-pip-version-check --quiet 'pip-tools>=7.4,<8'
+	cd deploy && echo pip | CUSTOM_COMPILE_COMMAND='make lock' ../build/lock/bin/pip-compile --quiet --generate-hashes \
+		--allow-unsafe --strip-extras --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-annotate \
+		--constraint constraints.txt --output-file robot.txt ../pyproject.toml -
 
 bench: .venv/bench ## measure against the plain graph and the peers; write results.json and docs/performance.md (10 minutes)
 	$(BIN)/python -m benchmarks.run
@@ -93,6 +104,10 @@ clean: ## remove what was made
 
 .venv/dev: .venv/made pyproject.toml deploy/constraints.txt
 	$(PIP) --editable '.[dev]'
+	@touch $@ .venv/runtime
+
+.venv/bundle: .venv/made pyproject.toml deploy/constraints.txt
+	$(PIP) --editable '.[bundle]'
 	@touch $@ .venv/runtime
 
 .venv/bench: .venv/made pyproject.toml deploy/constraints.txt

@@ -48,7 +48,7 @@ LAYERS = [
     {"detector"},
     {"sources", "overlay", "sinks", "bench", "poses", "pose_lines", "camera", "messages", "web"},
     {"camera_opencv", "camera_mjpeg", "camera_files", "camera_synthetic", "camera_fault"},
-    {"cameras", "pose_stream", "outputs", "recorder", "status_settings", "status_page", "control"},
+    {"cameras", "pose_stream", "outputs", "recorder", "status_settings", "deploy_settings", "status_page", "control"},
     {"configuration", "grabber", "health", "figures"},
     {"options", "tuning", "daemon", "doctor"},
     {"cli", "bench_cli", "doctor_cli"},

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from .camera import CameraSettings
+from .deploy_settings import DeploySettings
 from .entries import check_entries, entry
 from .errors import InputError, VisualMeshError
 from .lens import RadialLens
@@ -131,6 +132,7 @@ class Configuration:
     output: OutputSettings = field(default_factory=OutputSettings)
     status: StatusSettings = field(default_factory=StatusSettings)
     recorder: RecorderSettings = field(default_factory=RecorderSettings)
+    deploy: DeploySettings = field(default_factory=DeploySettings)
 
 
 def read_configuration(path: str | Path) -> Configuration:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import os
 import signal
 import sys
@@ -106,7 +107,8 @@ class Daemon:
         self.last: Message | None = None
         self.figures = Figures()
         self.state, self.reason = "", ""
-        self.health = Health(1e-3 * self.configuration.camera.lost_ms)
+        budget = 1e-3 * self.configuration.status.budget_ms or math.inf
+        self.health = Health(1e-3 * self.configuration.camera.lost_ms, budget)
         self._spoilt = 0  # frames that the camera gave in vain
         self._sent = 0.0  # when the last message was
         self._fed = 0.0  # when the watchdog was
@@ -221,7 +223,7 @@ class Daemon:
         if self._late(shot):
             return
         now = time.monotonic()
-        self.health.answer(now)
+        self.health.answer(now, now - shot.arrived)
         self.figures.answered(detections, time.perf_counter() - started, now - shot.captured)
         self._show_state()
         self.last = frame_message(self.figures.tally.frames, self.state, shot, detections, now)
@@ -300,6 +302,7 @@ class Daemon:
         return state_message(self.state, self.reason) | {
             "counts": self._counted().counts(self.grabber.counts),
             "memory_mib": round(resident_bytes() / 2**20, 1),
+            "model_sha256": self.detector.session.model.sha256,
             "last": self.last,
         }
 

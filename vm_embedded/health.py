@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from statistics import median
 
 _SHOWN = 0.5
 """Seconds for which a single trouble shows."""
+
+_TIMED = 15
+"""Frames whose median latency must be within the budget."""
 
 
 @dataclass
@@ -15,9 +19,11 @@ class Health:
     """Told what happens, says how it is. Times in monotonic seconds.
 
     limit: without an answered frame for so long the detector is not ok [s].
+    budget: so long may frames wait for their answer [s]; infinite for any time.
     """
 
     limit: float
+    budget: float = math.inf
     stopping: bool = False
     answered: float = -math.inf
     """When the last frame was answered."""
@@ -26,14 +32,16 @@ class Health:
 
     def __post_init__(self) -> None:
         self._troubles: deque[tuple[float, str]] = deque(maxlen=32)
+        self._latencies: deque[float] = deque(maxlen=_TIMED)
 
     def trouble(self, now: float, what: str) -> None:
         """Something went wrong with a frame, a pose or a message."""
         self._troubles.append((now, what))
 
-    def answer(self, now: float) -> None:
-        """A fresh frame was answered."""
+    def answer(self, now: float, latency: float) -> None:
+        """A fresh frame was answered, so long after its arrival [s]."""
         self.answered = now
+        self._latencies.append(latency)
         self.pose_trouble = ""
 
     def state(self, now: float, camera_lost: bool, camera_trouble: str) -> tuple[str, str]:
@@ -55,4 +63,6 @@ class Health:
             return "degraded", last or "no frame was answered in time"
         if self._troubles:
             return "degraded", self._troubles[-1][1]
+        if len(self._latencies) == _TIMED and (latency := median(self._latencies)) > self.budget:
+            return "degraded", f"frames take {1e3 * latency:.1f} ms, the budget is {1e3 * self.budget:g} ms"
         return "ok", ""

@@ -23,6 +23,13 @@ class StatusSettings:
     metrics: str = entry(
         checked_address, "", "ADDRESS:PORT or unix:PATH at which Prometheus gets figures; none: not at all"
     )
+    budget_ms: float = number(
+        0.0,
+        "longest time from a frame's arrival to its message, at the median of fifteen, before the state is degraded; "
+        "0: any",
+        "ms",
+        (0, 10000),
+    )
     picture_fps: float = number(10.0, "pictures a second that the page shows", "1/s", (0.1, 100))
 
     def __post_init__(self) -> None:

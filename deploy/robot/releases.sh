@@ -1,0 +1,154 @@
+# Where releases are, and how one gives way to another; read by install.sh, vm-deploy and uninstall.sh, which set PREFIX.
+#
+#   PREFIX/releases/ID/bundle   what was delivered, but for the wheels
+#   PREFIX/releases/ID/venv     the program
+#   PREFIX/releases/ID/etc      vm.toml, model and lens as they are used
+#   PREFIX/releases/ID/complete written last: a release without it is none
+#   PREFIX/current, previous    links to releases; `current` is what the unit starts
+#   PREFIX/trial                while `current` has not shown yet that it is well: the two links before it
+#   PREFIX/supervisor           systemd, or none
+# shellcheck shell=sh
+
+UNITS=/etc/systemd/system
+RULES=/etc/udev/rules.d
+COMMAND=/usr/local/bin/vm-deploy
+UNIT=vm-detect.service
+RESCUE=vm-detect-rollback.service
+RULE=60-vm-embedded.rules
+PATIENCE=3 # seconds for which a release must be ok without a break
+
+say() { printf '%s\n' "$*"; }
+
+fail() {
+    printf '%s: %s\n' "${0##*/}" "$*" >&2
+    exit 1
+}
+
+field() { # NAME FILE: an entry of a manifest.json, which has one on each line
+    sed -n "s/^ *\"$1\": \"\{0,1\}\([^\",]*\)\"\{0,1\},\{0,1\}\$/\1/p" "$2" | head -n 1
+}
+
+linked() { # LINK: the release that it points to, or nothing
+    if [ -L "$PREFIX/$1" ]; then basename "$(readlink "$PREFIX/$1")"; fi
+}
+
+point() { # LINK RELEASE, or no release: change or remove a link at once
+    if [ -n "$2" ]; then
+        ln -sfn "releases/$2" "$PREFIX/.$1.new" && mv -fT "$PREFIX/.$1.new" "$PREFIX/$1"
+    else
+        rm -f "$PREFIX/$1"
+    fi
+}
+
+whole() { [ -n "$1" ] && [ -e "$PREFIX/releases/$1/complete" ]; }
+
+supervised() { [ "$(cat "$PREFIX/supervisor" 2>/dev/null)" = systemd ]; }
+
+lock() { # or fail, if another of these commands is at work
+    exec 9>"$PREFIX/.lock" || fail "can't write $PREFIX; are you root?"
+    flock -n 9 || fail "another install.sh or vm-deploy is at work"
+}
+
+detect() { # ARGUMENT...: vm-detect of the current release, with its configuration
+    RUNTIME_DIRECTORY=/run/vm-detect "$PREFIX/current/venv/bin/vm-detect" --config "$PREFIX/current/etc/vm.toml" "$@"
+}
+
+setting() { # NAME: an entry of [deploy]
+    detect --print-config | sed -n "/^\[deploy\]/,/^\[/ s/^$1 = \"\{0,1\}\([^\"]*\)\"\{0,1\}\$/\1/p"
+}
+
+state() { # of the detector that runs, and why; nothing if none does
+    detect --status 2>/dev/null | sed -n 's/^{"type": "state", "state": "\([a-z_]*\)".*"reason": "\([^"]*\)".*/\1 \2/p'
+}
+
+placed() { # FILE FOLDER: write a file of the current release where the system looks for it
+    sed "s|@PREFIX@|$PREFIX|g" "$PREFIX/current/bundle/$1" >"$2/.$1.new" && mv -f "$2/.$1.new" "$2/$1"
+}
+
+start() { # the current release, and wait until it is READY
+    placed "$UNIT" "$UNITS" && placed "$RESCUE" "$UNITS" && placed "$RULE" "$RULES" || return 1
+    ln -sfn "$PREFIX/vm-deploy" "$COMMAND" || return 1
+    udevadm control --reload 2>/dev/null || :
+    systemctl daemon-reload || return 1
+    systemctl reset-failed "$UNIT" 2>/dev/null || :
+    systemctl restart "$UNIT" 9>&-
+}
+
+forgotten() { # by the system: unit, rule and command
+    systemctl disable --now "$UNIT" 2>/dev/null || :
+    rm -f "$UNITS/$UNIT" "$UNITS/$RESCUE" "$RULES/$RULE" "$COMMAND"
+    systemctl daemon-reload || :
+    udevadm control --reload 2>/dev/null || :
+}
+
+well() { # STATE: whether the detector is ok in time, or at least no worse than the state that it was in before
+    limit=$(setting healthy_s)
+    end=$(($(date +%s) + ${limit%%.*}))
+    good=0 found=
+    while [ "$(date +%s)" -lt "$end" ]; do
+        found=$(state)
+        case $found in
+        ok*) good=$((good + 1)) ;;
+        *) good=0 ;;
+        esac
+        [ "$good" -lt "$PATIENCE" ] || return 0
+        sleep 1
+    done
+    if [ -n "$found" ] && [ "${found%% *}" = "$1" ]; then
+        say "it is $found, as it was before"
+        return 0
+    fi
+    say "it is ${found:-not running} after $limit s"
+    return 1
+}
+
+activate() { # RELEASE: put it in the place of the current one, and take that back if it is not well
+    old=$(linked current) older=$(linked previous)
+    before=$(if [ -n "$old" ]; then state; else say camera_lost; fi)
+    printf '%s\n%s\n' "$old" "$older" >"$PREFIX/.trial.new" && mv -f "$PREFIX/.trial.new" "$PREFIX/trial" || return 1
+    trap 'say interrupted; back; exit 1' INT TERM HUP
+    sync
+    say "switching from ${old:-nothing} to $1"
+    if ! { point current "$1" && point previous "$old"; }; then
+        back
+        return 1
+    fi
+    if supervised; then
+        say "starting $UNIT"
+        if ! { start && say "watching it" && well "${before%% *}"; }; then
+            say "$1 is not well:"
+            journalctl --unit "$UNIT" --lines 10 --no-pager --output cat 2>/dev/null || :
+            back
+            return 1
+        fi
+    fi
+    rm -f "$PREFIX/trial"
+    trap - INT TERM HUP
+    sync
+}
+
+back() { # to the release before the one on trial
+    old=$(sed -n 1p "$PREFIX/trial") older=$(sed -n 2p "$PREFIX/trial")
+    if whole "$old"; then
+        say "going back to $old"
+        point current "$old"
+        point previous "$older"
+        rm -f "$PREFIX/trial"
+        sync
+        if supervised; then start || say "$old does not start either: systemctl status $UNIT"; fi
+    else
+        say "there is no release to go back to"
+        if supervised; then forgotten; fi
+        point current ""
+        rm -f "$PREFIX/trial"
+    fi
+}
+
+prune() { # remove releases that are neither current nor previous
+    for each in "$PREFIX"/releases/*; do
+        case ${each##*/} in
+        "$(linked current)" | "$(linked previous)") ;;
+        *) rm -rf "$each" ;;
+        esac
+    done
+}

@@ -1,0 +1,64 @@
+#!/bin/sh
+# Remove vm-embedded from this robot; its configuration stays for the next install.sh.
+set -eu
+umask 022
+
+HERE=$(cd "$(dirname "$0")" && pwd -P)
+PREFIX=${HERE%%/releases/*}
+PURGE=
+
+# shellcheck source=deploy/robot/releases.sh
+. "$HERE/releases.sh"
+
+usage() {
+    cat <<END
+usage: uninstall.sh [--prefix DIR] [--purge]
+
+  --prefix DIR  where releases are; default /opt/vm-embedded, or where this file is
+  --purge       remove the configuration, too
+END
+}
+
+[ "$PREFIX" != "$HERE" ] || PREFIX=/opt/vm-embedded
+while [ $# -gt 0 ]; do
+    case $1 in
+    --prefix)
+        PREFIX=${2-}
+        shift $(($# > 1))
+        ;;
+    --prefix=*) PREFIX=${1#*=} ;;
+    --purge) PURGE=1 ;;
+    -h | --help)
+        usage
+        exit 0
+        ;;
+    *)
+        printf 'uninstall.sh: unknown option %s\n' "$1" >&2
+        usage >&2
+        exit 2
+        ;;
+    esac
+    shift
+done
+[ -d "$PREFIX/releases" ] || [ -d "$PREFIX/left" ] || fail "nothing is installed at $PREFIX"
+
+lock
+if supervised; then
+    forgotten
+fi
+if [ -d "$PREFIX/current/etc" ]; then
+    rm -rf "$PREFIX/.left.new"
+    mkdir -p "$PREFIX/.left.new/bundle"
+    cp -rp "$PREFIX/current/etc" "$PREFIX/.left.new/etc"
+    cp -rp "$PREFIX/current/bundle/etc" "$PREFIX/.left.new/bundle/etc"
+    rm -rf "$PREFIX/left"
+    mv "$PREFIX/.left.new" "$PREFIX/left"
+fi
+rm -rf "$PREFIX/current" "$PREFIX/previous" "$PREFIX/trial" "$PREFIX/vm-deploy" "$PREFIX/supervisor" "$PREFIX/releases"
+if [ -n "$PURGE" ]; then
+    rm -rf "$PREFIX/left" "$PREFIX/.lock"
+    rmdir "$PREFIX" 2>/dev/null || :
+    say "vm-embedded is removed"
+else
+    say "vm-embedded is removed; its configuration is in $PREFIX/left, for the next install.sh (--purge removes it)"
+fi
