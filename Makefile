@@ -13,7 +13,7 @@ BUILD ?= build/networks
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
 
-.PHONY: help setup demo test lint bundle lock bench bench-synth bench-train data networks test-data score compare choices fixtures docs clean
+.PHONY: help setup demo test lint bundle deb deploy logs lock bench bench-synth bench-train data networks test-data score compare choices fixtures docs clean
 .DELETE_ON_ERROR:
 
 help: ## what can be made
@@ -26,6 +26,7 @@ demo: .venv/runtime ## find the balls in the frames of the repository
 	@echo "Annotated pictures: $(CURDIR)/demo-out/"
 
 test: lint ## lint, types and tests
+	$(BIN)/python deploy/bundle.py --download
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 lint: .venv/dev ## style and types
@@ -35,6 +36,19 @@ lint: .venv/dev ## style and types
 
 bundle: .venv/bundle ## all that a robot needs, in one file: make bundle [MODEL=model.onnx] [CONFIG=vm.toml] [TARGET=linux_x86_64-cp311]
 	$(BIN)/python deploy/bundle.py --target $(TARGET) $(if $(MODEL),--model $(MODEL)) $(if $(CONFIG),--config $(CONFIG))
+
+BUNDLE = dist/vm-embedded-robot-$(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' vm_embedded/__init__.py)-$(TARGET).tar.gz
+
+deb: bundle ## the same as a Debian package
+	$(BIN)/python deploy/debian.py $(BUNDLE)
+
+deploy: bundle ## bundle, copy, install, and show what it sees: make deploy ROBOT=user@host [MODEL=] [CONFIG=] [TARGET=]
+	@test -n "$(ROBOT)" || { echo 'make deploy needs ROBOT=user@host'; exit 1; }
+	sh deploy/deploy.sh $(BUNDLE) $(ROBOT)
+
+logs: ## what happens on a robot: make logs ROBOT=user@host
+	@test -n "$(ROBOT)" || { echo 'make logs needs ROBOT=user@host'; exit 1; }
+	ssh $(ROBOT) 'if [ "$$(id -u)" = 0 ]; then s=; else s=sudo; fi; $$s journalctl --unit vm-detect --lines 50 --follow'
 
 lock: ## choose the robot's packages, and write their hashes to deploy/robot.txt
 	$(PYTHON) -m venv build/lock

@@ -1,7 +1,7 @@
 """What each choice brings: `make choices`, after `make networks` and `make test-data`.
 
-Small networks trained on the same pictures, each with one thing changed, several seeds of each, two trainings at a
-time. They are scored on pictures of maps that no training saw. What is there already is not done again. Writes
+Small networks trained on the same pictures, each with one thing changed, some with several seeds, a training on each
+core. They are scored on pictures of maps that no training saw. What is there already is not done again. Writes
 benchmarks/choices.json, from which benchmarks/choices_report.py makes the tables and plots of docs/results.md.
 """
 
@@ -34,6 +34,9 @@ BASE = Path(__file__).parents[1] / "export" / "networks" / "ball-5x4.toml"
 TRAINING, VALIDATION = 2000, 200
 """Pictures of each training."""
 
+TESTED = 200
+"""Held-out pictures that each is scored on, and on each half."""
+
 Changes = dict[str, dict[str, Any]]
 
 SIX = {
@@ -60,19 +63,19 @@ class Variant:
     seeds: int = 1
 
 
-COMMON: Changes = {"training": {"epochs": 4, "looks": 3, "rate": 0.01}, "data": {"test": 0.0}}
+COMMON: Changes = {"training": {"epochs": 2, "looks": 4, "views": 1, "rate": 0.02}, "data": {"test": 0.0}}
 VARIANTS: dict[str, Variant] = {
     "base": Variant({}, seeds=3),
-    "3 layers": Variant({"network": {"depth": 3}}, seeds=3),
+    "3 layers": Variant({"network": {"depth": 3}}, seeds=2),
     "9 layers": Variant({"network": {"depth": 9}}, seeds=3),
-    "hexagonal, 3 layers": Variant({"network": {"depth": 3}, "mesh": HEXAGONAL}, seeds=3),
+    "hexagonal, 3 layers": Variant({"network": {"depth": 3}, "mesh": HEXAGONAL}, seeds=2),
     "hexagonal, 5 layers": Variant({"mesh": HEXAGONAL}, seeds=3),
     "hexagonal, 9 layers": Variant({"network": {"depth": 9}, "mesh": HEXAGONAL}, seeds=3),
-    "elu": Variant({"network": {"activation": "elu"}}, seeds=3),
-    "relu": Variant({"network": {"activation": "relu"}}, seeds=3),
+    "elu": Variant({"network": {"activation": "elu"}}, seeds=2),
+    "relu": Variant({"network": {"activation": "relu"}}, seeds=2),
     "width 2": Variant({"network": {"width": 2}}),
-    "width 8": Variant({"network": {"width": 8}}),
-    "width 16": Variant({"network": {"width": 16}}),
+    "width 8": Variant({"network": {"width": 8}, "training": {"rate": 0.005}}),
+    "width 16": Variant({"network": {"width": 16}, "training": {"rate": 0.002}}),
     "k = 3": Variant({"mesh": {"intersections": 3}}),
     "k = 5": Variant({"mesh": {"intersections": 5}}),
     "k = 6": Variant({"mesh": {"intersections": 6}}),
@@ -151,16 +154,14 @@ def folder_of(out: Path, name: str, seed: int) -> Path:
     return out / name.replace(" ", "-").replace(",", "").replace("=", "is") / f"seed{seed}"
 
 
-def scored(model: Path, data: Path, out: Path, numbers: list[str] | None = None) -> dict[str, Any]:
-    """What vm-evaluate says of a network, on all pictures of a folder or on some."""
+def scored(model: Path, data: Path, out: Path, numbers: list[str]) -> dict[str, Any]:
+    """What vm-evaluate says of a network on some pictures of a folder."""
     if not (out / "scores.json").exists():
         out.mkdir(parents=True, exist_ok=True)
         command = [sys.executable, "-m", "vm_train.evaluate_cli", str(model), str(data), "-o", str(out)]
-        command += ["--radius-of", "scene", "--workers", "1"]
-        if numbers is not None:
-            listed = out / "numbers.txt"
-            listed.write_text("\n".join(numbers) + "\n")
-            command += ["--list", str(listed)]
+        listed = out / "numbers.txt"
+        listed.write_text("\n".join(numbers) + "\n")
+        command += ["--radius-of", "scene", "--workers", "1", "--list", str(listed)]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return _kept(json.loads((out / "scores.json").read_text())) | {"curve": _curve(out / "point_curves.csv")}
 
@@ -201,12 +202,12 @@ def tasks() -> Iterator[tuple[str, int]]:
 
 
 def evaluated(task: tuple[str, int, Path, Path]) -> dict[str, Any]:
-    """Scores of a trained variant, on all test pictures and on the halves that it is compared on."""
+    """Scores of a trained variant, on test pictures of all kinds and of the halves that it is compared on."""
     name, seed, held_out, out = task
-    folder = folder_of(out, name, seed)
-    found = {"all": scored(folder / "model.pt", held_out, folder / "scores")}
+    folder, kinds = folder_of(out, name, seed), kinds_of(held_out)
+    found = {"all": scored(folder / "model.pt", held_out, folder / "scores", list(kinds)[:TESTED])}
     for half in LENSES + HEIGHTS if VARIANTS[name].only or name == "base" else ():
-        numbers = [number for number, kinds in kinds_of(held_out).items() if half in kinds]
+        numbers = [number for number, its in kinds.items() if half in its][:TESTED]
         found[half] = scored(folder / "model.pt", held_out, folder / f"scores-{half}", numbers)
     return found
 
@@ -219,7 +220,7 @@ def main() -> None:
     options = parser.parse_args()
     os.environ["OMP_NUM_THREADS"] = "1"
     found: dict[str, Any] = {}
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), mp_context=get_context("spawn")) as pool:
         todo = list(tasks())
         for folder in pool.map(trained, [(*each, options.data, options.out) for each in todo]):
             print(folder, flush=True)

@@ -145,7 +145,8 @@ def own_wheel(top: Path, origin: Origin, folder: Path) -> Path:
 
 def _pip(what: str, *words: str | Path, env: Mapping[str, str] | None = None) -> None:
     command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", *words]
-    ran = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **(env or {})})
+    # Modes of files go into a wheel.
+    ran = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **(env or {})}, umask=0o022)
     if ran.returncode:
         raise InputError(f"{what}:\n{ran.stderr.strip()}")
 
@@ -163,11 +164,11 @@ def configured(configuration: Path | None, model: str | None) -> dict[str, bytes
     text = configuration.read_text(encoding="utf-8")
     table = tomllib.loads(text)
     files = {MODEL: _model(model or given.model)}
-    text = _renamed(text, table, "model", MODEL)
+    text = _renamed(text, "model", MODEL)
     if isinstance(table.get("lens"), str):
         lens = configuration.parent / table["lens"]
         files[lens.name] = lens.read_bytes()
-        text = _renamed(text, table, "lens", lens.name)
+        text = _renamed(text, "lens", lens.name)
     return {CONFIGURATION: text.encode(), **files}
 
 
@@ -178,11 +179,11 @@ def _model(model: str) -> bytes:
     return read.content
 
 
-def _renamed(text: str, table: dict[str, object], key: str, value: str) -> str:
+def _renamed(text: str, key: str, value: str) -> str:
     """vm.toml with another value of an entry that stands before all sections. Raises InputError."""
-    line = f'{key} = "{value}"'
+    table, line = tomllib.loads(text), f"{key} = {json.dumps(value)}"
     found = re.compile(rf"^{key}\s*=.*$", re.MULTILINE)
-    text = found.sub(line, text, count=1) if key in table else f"{line}\n{text}"
+    text = found.sub(lambda _: line, text, count=1) if key in table else f"{line}\n{text}"
     if tomllib.loads(text) != table | {key: value}:
         raise InputError(f"the configuration's {key} must be on a line of its own, as {line}")
     return text
@@ -260,8 +261,12 @@ def main() -> int:
     parser.add_argument("--config", type=Path, help="vm.toml; default: a drawn field, to try it out")
     parser.add_argument("--wheels", type=Path, default=TOP / "build" / "wheels", help="where downloads are kept")
     parser.add_argument("--dist", type=Path, default=TOP / "dist", help="where the bundle goes")
+    parser.add_argument("--download", action="store_true", help="only download what a bundle needs")
     options = parser.parse_args()
     try:
+        if options.download:
+            wheelhouse(Target.named(options.target), options.wheels)
+            return 0
         path = bundle(Target.named(options.target), options.config, options.model, options.wheels, options.dist)
     except VisualMeshError as error:
         print(f"make bundle: {error}", file=sys.stderr)

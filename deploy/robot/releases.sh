@@ -44,6 +44,8 @@ whole() { [ -n "$1" ] && [ -e "$PREFIX/releases/$1/complete" ]; }
 
 supervised() { [ "$(cat "$PREFIX/supervisor" 2>/dev/null)" = systemd ]; }
 
+booted() { [ -d /run/systemd/system ]; } # or this is the image of a robot, in which nothing runs
+
 lock() { # or fail, if another of these commands is at work
     exec 9>"$PREFIX/.lock" || fail "can't write $PREFIX; are you root?"
     flock -n 9 || fail "another install.sh or vm-deploy is at work"
@@ -62,13 +64,15 @@ state() { # of the detector that runs, and why; nothing if none does
 }
 
 placed() { # FILE FOLDER: write a file of the current release where the system looks for it
+    mkdir -p "$2" || return 1
     sed "s|@PREFIX@|$PREFIX|g" "$PREFIX/current/bundle/$1" >"$2/.$1.new" && mv -f "$2/.$1.new" "$2/$1"
 }
 
 start() { # the current release, and wait until it is READY
     placed "$UNIT" "$UNITS" && placed "$RESCUE" "$UNITS" && placed "$RULE" "$RULES" || return 1
-    ln -sfn "$PREFIX/vm-deploy" "$COMMAND" || return 1
+    mkdir -p "${COMMAND%/*}" && ln -sfn "$PREFIX/vm-deploy" "$COMMAND" || return 1
     udevadm control --reload 2>/dev/null || :
+    booted || return 0
     systemctl daemon-reload || return 1
     systemctl reset-failed "$UNIT" 2>/dev/null || :
     systemctl restart "$UNIT" 9>&-
@@ -115,7 +119,7 @@ activate() { # RELEASE: put it in the place of the current one, and take that ba
     fi
     if supervised; then
         say "starting $UNIT"
-        if ! { start && say "watching it" && well "${before%% *}"; }; then
+        if ! { start && say "watching it" && { ! booted || well "${before%% *}"; }; }; then
             say "$1 is not well:"
             journalctl --unit "$UNIT" --lines 10 --no-pager --output cat 2>/dev/null || :
             back

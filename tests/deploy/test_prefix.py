@@ -1,0 +1,208 @@
+"""The real bundle under a prefix, without a network and without systemd: installed, run, upgraded, and upgraded badly."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import time
+
+import pytest
+
+from .bundles import changed
+
+CUT_OFF = ["unshare", "--user", "--map-root-user", "--net"]
+"""Words before a command that leave it no network."""
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """Words before a command that leave it no network, where this machine can do that."""
+    if subprocess.run([*CUT_OFF, "true"], capture_output=True).returncode:
+        pytest.skip("needs user and network namespaces (unshare)")
+    seen = subprocess.run([*CUT_OFF, "ip", "route"], capture_output=True, text=True)
+    assert not seen.stdout
+    return CUT_OFF
+
+
+class Prefix:
+    """A folder with releases."""
+
+    def __init__(self, path, alone):
+        self.path, self._alone = path, alone
+
+    def install(self, bundle, *options):
+        command = [*self._alone, bundle / "install.sh", "--prefix", self.path, "--no-systemd", *options]
+        return subprocess.run(list(map(str, command)), capture_output=True, text=True)
+
+    def deploy(self, *words):
+        command = [*self._alone, self.path / "vm-deploy", *words]
+        return subprocess.run(list(map(str, command)), capture_output=True, text=True)
+
+    def link(self, name):
+        return os.readlink(self.path / name).removeprefix("releases/") if (self.path / name).is_symlink() else None
+
+    def releases(self):
+        return {each.name for each in (self.path / "releases").iterdir()}
+
+
+@pytest.fixture(scope="module")
+def prefix(bundle, alone, tmp_path_factory):
+    found = Prefix(tmp_path_factory.mktemp("robot") / "prefix", alone)
+    first = changed(bundle, tmp_path_factory.mktemp("bundles") / "first", "1-first")
+    ran = found.install(first)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    return found
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _installed(prefix):
+    return prefix
+
+
+def test_a_dry_run_changes_nothing(bundle, alone, tmp_path):
+    other = Prefix(tmp_path / "prefix", alone)
+    ran = other.install(bundle, "--dry-run")
+    assert ran.returncode == 0, ran.stderr
+    assert "would install" in ran.stdout
+    assert not other.path.exists()
+
+
+def test_it_is_small_and_has_neither_torch_nor_onnx(prefix):
+    size = subprocess.run(["du", "-sk", prefix.path], capture_output=True, text=True, check=True).stdout.split()[0]
+    assert int(size) / 1024 < 330
+    packages = {each.name for each in (prefix.path / "current/venv/lib/python3.11/site-packages").iterdir()}
+    assert {"numpy", "onnxruntime", "cv2", "vm_embedded"} <= packages
+    assert not {"torch", "onnx", "pip", "setuptools"} & packages
+
+
+def test_it_runs_as_systemd_runs_it(prefix, tmp_path):
+    """READY, WATCHDOG and detections, told to a socket as systemd has it."""
+    told = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    told.bind(str(tmp_path / "notify"))
+    told.settimeout(60.0)
+    environment = os.environ | {
+        "NOTIFY_SOCKET": str(tmp_path / "notify"),
+        "WATCHDOG_USEC": "2000000",
+        "RUNTIME_DIRECTORY": str(tmp_path),
+    }
+    environment.pop("PYTHONPATH", None)
+    program, configuration = prefix.path / "current/venv/bin/vm-detect", prefix.path / "current/etc/vm.toml"
+    command = [program, "--config", configuration, "--output-unix", "", "--output-stdout"]
+    command = [str(each) for each in command]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        try:
+            heard = []
+            while not {"READY=1", "WATCHDOG=1", "STATUS=ok"} <= set(heard):
+                heard += told.recv(4096).decode().split("\n")
+            lines = (json.loads(line) for line in process.stdout)
+            found = next(line for line in lines if line.get("detections"))
+            assert found["detections"][0]["class"] == "ball"
+            process.send_signal(signal.SIGTERM)
+            process.stdout.read()
+            assert process.wait(10.0) == 0
+        finally:
+            process.kill()
+            told.close()
+
+
+def test_an_upgrade_keeps_what_the_robot_has_changed_and_goes_back(prefix, bundle, tmp_path):
+    used = prefix.path / "current" / "etc" / "vm.toml"
+    used.write_text(used.read_text().replace("threshold = 0.5", "threshold = 0.6"))
+    began = time.monotonic()
+    ran = prefix.install(changed(bundle, tmp_path / "second", "2-second"))
+    assert ran.returncode == 0, ran.stderr
+    print(f"an upgrade that shares its packages: {time.monotonic() - began:.1f} s")
+    assert (prefix.link("current"), prefix.link("previous")) == ("2-second", "1-first")
+    assert "threshold = 0.6" in used.read_text()
+    assert "2-second is in use already" in prefix.install(tmp_path / "second").stdout
+
+    theirs = {"etc/vm.toml": ("threshold = 0.5", "threshold = 0.7")}
+    ran = prefix.install(changed(bundle, tmp_path / "third", "3-third", theirs))
+    assert ran.returncode == 0, ran.stderr
+    assert "threshold = 0.7" in used.read_text()
+    assert "threshold = 0.6" in (used.parent / "vm.toml.of-3-third").read_text()
+    assert prefix.releases() == {"2-second", "3-third"}
+
+    assert prefix.deploy("rollback").returncode == 0
+    assert (prefix.link("current"), prefix.link("previous")) == ("2-second", "3-third")
+    assert "threshold = 0.6" in used.read_text()
+    said = prefix.deploy("status").stdout
+    assert "current   2-second" in said
+    assert "previous  3-third" in said
+
+
+@pytest.mark.parametrize(
+    ("files", "manifest", "words"),
+    [
+        ({"etc/vm.toml": ("threshold = 0.5", "treshold = 0.5")}, {}, ["treshold", "threshold"]),
+        ({"etc/model.onnx": b"no network"}, {}, ["model.onnx"]),
+        ({}, {"machine": "aarch64"}, ["aarch64", "x86_64", "TARGET="]),
+        ({}, {"python": "cp399"}, ["Python 3.99"]),
+        ({}, {"glibc": "9.99"}, ["glibc 9.99"]),
+        ({"requirements.txt": "numpy==1.0\n", "wheels/numpy-1.0-py3-none-any.whl": b""}, {}, ["numpy"]),
+        ({"requirements.txt": "numpy==0.0\n"}, {"disk_mib": "99999999"}, ["MiB left", "99999999"]),
+    ],
+    ids=["configuration", "model", "machine", "python", "glibc", "unhashed", "disk"],
+)
+def test_a_bad_upgrade_changes_nothing(prefix, bundle, tmp_path, files, manifest, words):
+    before = prefix.link("current"), prefix.link("previous"), prefix.releases()
+    ran = prefix.install(changed(bundle, tmp_path / "bad", "9-bad", files, **manifest))
+    assert ran.returncode == 1, ran.stdout
+    for word in words:
+        assert word in ran.stderr, ran.stderr
+    assert before == (prefix.link("current"), prefix.link("previous"), prefix.releases())
+    assert not (prefix.path / "trial").exists()
+
+
+def test_a_damaged_bundle_is_noticed_before_anything_else(prefix, bundle, tmp_path):
+    damaged = changed(bundle, tmp_path / "damaged", "9-damaged")
+    (wheel,) = damaged.glob("wheels/numpy-*.whl")
+    content = bytearray(wheel.read_bytes())
+    content[len(content) // 2] ^= 1
+    wheel.unlink()
+    wheel.write_bytes(content)
+    ran = prefix.install(damaged)
+    assert ran.returncode == 1
+    assert "damaged" in ran.stderr
+    assert "numpy" in ran.stderr + ran.stdout
+
+
+def test_only_one_is_at_work_at_a_time(prefix, bundle, tmp_path):
+    with subprocess.Popen(["flock", prefix.path / ".lock", "sleep", "60"]) as holder:
+        while subprocess.run(["flock", "-n", prefix.path / ".lock", "true"]).returncode == 0:
+            time.sleep(0.01)
+        try:
+            ran = prefix.install(changed(bundle, tmp_path / "other", "9-other"))
+        finally:
+            subprocess.run(["pkill", "-P", str(holder.pid)])
+            holder.kill()
+    assert ran.returncode == 1
+    assert "at work" in ran.stderr
+
+
+@pytest.mark.parametrize("options", [["--prefix", "relative"], ["--prefix", "/a b"], ["--prefix", ""], ["--prefix", "/"]])
+def test_a_prefix_must_be_a_plain_path(bundle, options):
+    ran = subprocess.run([bundle / "install.sh", "--no-systemd", *options], capture_output=True, text=True)
+    assert ran.returncode == 1
+    assert "--prefix must be" in ran.stderr
+
+
+def test_unknown_words_are_wrong_usage(prefix, bundle):
+    assert subprocess.run([bundle / "install.sh", "--frobnicate"], capture_output=True).returncode == 2
+    assert prefix.deploy("frobnicate").returncode == 2
+    assert prefix.deploy().returncode == 2
+
+
+def test_removed_it_leaves_its_configuration_for_the_next(bundle, alone, tmp_path):
+    other = Prefix(tmp_path / "prefix", alone)
+    assert other.install(changed(bundle, tmp_path / "a", "1-a")).returncode == 0
+    used = other.path / "current/etc/vm.toml"
+    used.write_text(used.read_text().replace("threshold = 0.5", "threshold = 0.6"))
+    uninstall = [other.path / "current/bundle/uninstall.sh"]
+    assert subprocess.run(uninstall, capture_output=True).returncode == 0
+    assert {each.name for each in other.path.iterdir()} <= {"left", ".lock"}
+    assert other.install(changed(bundle, tmp_path / "b", "2-b")).returncode == 0
+    assert "threshold = 0.6" in used.read_text()
+    assert subprocess.run([*uninstall, "--purge"], capture_output=True).returncode == 0
+    assert not other.path.exists()
