@@ -39,14 +39,12 @@ def unpacked(path, folder):
 
 
 def changed(bundle, folder, release, files=(), **manifest):
-    """Another bundle, of another release: some files replaced, (old, new) replaced in others, sums made good again."""
+    """Another bundle, of another release: some files new, or made anew from their text; its sums are right again."""
     shutil.copytree(bundle, folder, copy_function=os.link)
     for name, content in dict(files).items():
         path = folder / name
-        if isinstance(content, tuple):
-            text = path.read_text()
-            assert content[0] in text
-            content = text.replace(*content)
+        if callable(content):
+            content = content(path.read_text())
         path.unlink(missing_ok=True)
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
     entries = json.loads((folder / "manifest.json").read_text()) | {"release": release} | manifest

@@ -1,0 +1,281 @@
+"""The real bundle on a robot with systemd and no network: installed, watched, upgraded, and upgraded badly in every way.
+
+After each bad upgrade, and each kill, the release that runs must be whole and well.
+"""
+
+import json
+import os
+import subprocess
+import time
+
+import pytest
+
+from .bundles import changed
+from .robots import booted
+
+pytestmark = pytest.mark.slow
+
+CURRENT = "/opt/vm-embedded/current"
+DEPLOY = "/usr/local/bin/vm-deploy"
+IMPATIENT = ("healthy_s = 30", "healthy_s = 8")
+
+
+class Team:
+    """Who brings bundles to a robot."""
+
+    def __init__(self, robot, bundle, folder):
+        self.robot, self._bundle, self._folder = robot, bundle, folder
+
+    def bring(self, release, files=(), **manifest):
+        """A bundle on the robot, and the command that installs it."""
+        folder = changed(self._bundle, self._folder / release, release, files, **manifest)
+        there = self.robot.root / "var/tmp" / release
+        subprocess.run(["cp", "-r", folder, there], check=True)
+        return "/bin/sh", f"/var/tmp/{release}/install.sh"
+
+    def configured(self, *changes):
+        """vm.toml with some text replaced."""
+        text = (self._bundle / "etc" / "vm.toml").read_text()
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        return {"etc/vm.toml": text}
+
+    def link(self, name):
+        return os.readlink(self.robot.root / "opt/vm-embedded" / name).removeprefix("releases/")
+
+    def status(self):
+        """What the detector says of itself, or nothing."""
+        command = [f"{CURRENT}/venv/bin/vm-detect", "--status", "--status-socket", "/run/vm-detect/vm-detect.sock"]
+        _, said = self.robot.run(*command, check=False)
+        return json.loads(said) if said.startswith("{") else {"state": said}
+
+    def check(self, *releases):
+        """One of these releases is current and whole, and one of them runs and is well."""
+        current = self.link("current")
+        assert current in releases
+        assert (self.robot.root / "opt/vm-embedded/releases" / current / "complete").exists()
+        deadline = time.monotonic() + 60.0
+        while (found := self.status())["state"] != "ok":
+            assert time.monotonic() < deadline, (found, self.journal())
+            time.sleep(0.3)
+        assert self.robot.run("systemctl", "is-active", "vm-detect.service")[1].strip() == "active"
+        _, running = self.robot.run("sh", "-c", "cat /proc/$(systemctl show -P MainPID vm-detect)/cmdline | tr '\\0' ' '")
+        assert any(f"/releases/{each}/" in running for each in releases)
+        return current
+
+    def journal(self):
+        return self.robot.run("journalctl", "--unit", "vm-detect", "--lines", "15", "--no-pager", check=False)[1]
+
+
+@pytest.fixture(scope="module")
+def team(bundle, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("robot")
+    with booted(folder) as robot:
+        found = Team(robot, bundle, folder)
+        assert robot.run("ip", "route")[1] == ""
+        began = time.monotonic()
+        robot.run(*found.bring("1-first"))
+        print(f"installed in {time.monotonic() - began:.1f} s")
+        yield found
+
+
+def test_it_is_watched_and_says_what_it_sees(team):
+    team.check("1-first")
+    script = "import socket; s = socket.socket(1); s.connect('/run/vm-detect/lines.sock'); print(s.makefile().readline())"
+    _, line = team.robot.run("python3", "-c", script)
+    assert json.loads(line)["type"] in ("frame", "state")
+    deadline = time.monotonic() + 30.0
+    while not (team.status().get("last") or {}).get("detections"):
+        assert time.monotonic() < deadline
+    properties = team.robot.run("systemctl", "show", "vm-detect", "-p", "Type,WatchdogUSec,StatusText,NRestarts")[1]
+    assert "Type=notify" in properties
+    assert "WatchdogUSec=10s" in properties
+    assert "StatusText=ok" in properties
+    assert team.robot.run("systemctl", "is-enabled", "vm-detect")[1].strip() == "enabled"
+    assert '"event": "ready"' in team.journal()
+
+
+def test_it_listens_on_no_network_and_is_nobody(team):
+    assert not team.robot.run("ss", "--listening", "--no-header", "--tcp", "--udp")[1]
+    _, said = team.robot.run("sh", "-c", "cat /proc/$(systemctl show -P MainPID vm-detect)/status")
+    fields = dict(line.split(":\t", 1) for line in said.splitlines() if ":\t" in line)
+    assert fields["Uid"].split()[0] != "0"
+    assert int(fields["CapEff"], 16) == 0
+    assert fields["NoNewPrivs"] == "1"
+    assert int(fields["VmRSS"].split()[0]) < 200 * 1024
+
+
+def test_one_that_hangs_is_started_again(team):
+    team.check("1-first")
+    team.robot.run("systemctl", "kill", "--kill-whom=main", "--signal", "STOP", "vm-detect")
+    deadline = time.monotonic() + 60.0
+    while "NRestarts=0" in team.robot.run("systemctl", "show", "vm-detect", "-p", "NRestarts")[1]:
+        assert time.monotonic() < deadline
+        time.sleep(0.5)
+    team.check("1-first")
+
+
+def test_upgraded_and_back(team):
+    _, said = team.robot.run(*team.bring("2-second"))
+    assert "2-second is in use" in said
+    team.check("2-second")
+    team.robot.run(DEPLOY, "rollback")
+    team.check("1-first")
+    _, said = team.robot.run(DEPLOY, "status")
+    assert "current   1-first" in said
+    assert "previous  2-second" in said
+    assert "detector  ok" in said
+
+
+BLIND = [
+    ('source = "synthetic"', 'source = "/dev/video99"'),
+    ('# lens = "lens.yaml"', 'lens = { projection = "rectilinear", focal_length = 500.0, fov = 2.0 }'),
+    ("# height =", "height = 0.8"),
+    IMPATIENT,
+]
+
+
+@pytest.mark.parametrize(
+    ("release", "changes", "words"),
+    [
+        ("8-blind", BLIND, ["camera_lost", "going back to 1-first"]),
+        ("8-slow", [("budget_ms = 0", "budget_ms = 0.01"), IMPATIENT], ["degraded", "budget", "going back to 1-first"]),
+        ("8-typo", [("fps = 0", "fsp = 0")], ["fsp", "nothing has changed"]),
+    ],
+)
+def test_a_configuration_that_does_no_good_is_taken_back(team, release, changes, words):
+    before = team.check("1-first")
+    status, said = team.robot.run(*team.bring(release, team.configured(*changes)), check=False)
+    assert status == 1
+    for word in words:
+        assert word in said, said
+    assert team.check(before)
+    assert team.link("previous") == "2-second"
+    assert sorted(os.listdir(team.robot.root / "opt/vm-embedded/releases")) == ["1-first", "2-second"]  # noqa: PTH208
+
+
+def test_a_model_that_is_none_changes_nothing(team):
+    status, said = team.robot.run(*team.bring("7-model", {"etc/model.onnx": b"\0" * 5000}), check=False)
+    assert status == 1
+    assert "nothing has changed" in said
+    team.check("1-first")
+
+
+def test_another_machine_is_refused(team):
+    status, said = team.robot.run(*team.bring("7-machine", machine="aarch64"), check=False)
+    assert status == 1
+    assert "aarch64" in said
+    team.check("1-first")
+
+
+def test_a_disk_that_fills_changes_nothing(team):
+    memory = str(team.robot.root.parent)
+    install = team.bring("7-disk", {"requirements.txt": _from_scratch}, disk_mib="1")
+    used = int(subprocess.run(["df", "-Pm", memory], capture_output=True, text=True).stdout.split("\n")[1].split()[2])
+    subprocess.run(["mount", "-o", f"remount,size={used + 60}m", memory], check=True)
+    try:
+        status, said = team.robot.run(*install, check=False)
+    finally:
+        subprocess.run(["mount", "-o", "remount,size=3000m", memory], check=True)
+    assert status == 1
+    assert "No space left" in said
+    assert "nothing has changed" in said
+    team.check("1-first")
+
+
+STEPS = ["copying", "installing packages", "testing the model", "switching", "starting", "watching"]
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_killed_at_any_step_the_old_or_the_new_release_runs(team, step):
+    before = team.check("1-first")
+    release = f"3-{step.split()[0]}"
+    with team.robot.start("sh", "-c", 'echo $$; exec "$@"', "sh", *team.bring(release)) as process:
+        number = process.stdout.readline().strip()
+        for line in process.stdout:
+            if line.startswith(step):
+                break
+        else:
+            pytest.fail(f"it never came to {step}")
+        team.robot.run("kill", "-KILL", number)
+        process.stdout.read()
+        process.wait()
+    current = team.check("1-first", release)
+    assert current == before or step in STEPS[3:]
+    if current == release:
+        assert "on trial" in team.robot.run(DEPLOY, "status")[1]
+        # What was never seen to be well goes when it fails.
+        team.robot.run("rm", f"{CURRENT}/etc/model.onnx")
+        team.robot.run("systemctl", "kill", "--kill-whom=main", "--signal", "KILL", "vm-detect")
+        deadline = time.monotonic() + 60.0
+        while team.link("current") != "1-first":
+            assert time.monotonic() < deadline, team.journal()
+            time.sleep(0.3)
+    else:
+        team.robot.run("flock", "/opt/vm-embedded/.lock", f"{CURRENT}/bundle/vm-deploy", "settle", check=False)
+        team.robot.run(DEPLOY, "settle")
+    team.check("1-first")
+
+
+def _model_command(team, model, signature=None):
+    team.robot.root.joinpath("var/tmp/new.onnx").write_bytes(model)
+    beside = team.robot.root.joinpath("var/tmp/new.onnx.sig")
+    beside.unlink(missing_ok=True)
+    if signature is not None:
+        beside.write_bytes(signature)
+    return team.robot.run(DEPLOY, "model", "/var/tmp/new.onnx", check=False)
+
+
+def test_a_model_alone_is_exchanged_while_it_runs(team, bundle):
+    team.check("1-first")
+    before = team.status()
+    network = (team.robot.root / "opt/vm-embedded/current/venv/lib/python3.11/site-packages/vm_embedded/models")
+    status, said = _model_command(team, (network / "ball-9x4.onnx").read_bytes())
+    assert status == 0, said
+    now = team.status()
+    assert now["model_sha256"] != before["model_sha256"]
+    assert now["counts"]["frames"] > before["counts"]["frames"], "it was started again"
+    status, said = _model_command(team, b"no network")
+    assert status == 1
+    assert "nothing has changed" in said
+    assert team.status()["model_sha256"] == now["model_sha256"]
+
+
+def test_with_a_key_only_signed_models_are_taken(team, bundle, tmp_path):
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", tmp_path / "key"], check=True)
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", tmp_path / "other"], check=True)
+    used = team.robot.root / "opt/vm-embedded/current/etc/vm.toml"
+    before = used.read_text()
+    used.write_text(before.replace('signer = ""', f'signer = "{(tmp_path / "key.pub").read_text().strip()}"'))
+    (tmp_path / "new.onnx").write_bytes((bundle / "etc" / "model.onnx").read_bytes())
+    signatures = {}
+    for key in ("key", "other"):
+        sign = ["ssh-keygen", "-q", "-Y", "sign", "-f", tmp_path / key, "-n", "vm-embedded", tmp_path / "new.onnx"]
+        subprocess.run(sign, check=True, capture_output=True)
+        signatures[key] = (tmp_path / "new.onnx.sig").read_bytes()
+        (tmp_path / "new.onnx.sig").unlink()
+    model = (tmp_path / "new.onnx").read_bytes()
+    try:
+        for signature, words in ((None, "is missing"), (signatures["other"], "not signed"), (b"", "not signed")):
+            status, said = _model_command(team, model, signature)
+            assert status == 1
+            assert words in said
+        status, said = _model_command(team, model, signatures["key"])
+        assert status == 0, said
+    finally:
+        used.write_text(before)
+    team.check("1-first")
+
+
+def test_removed_nothing_is_left_but_the_configuration(team):
+    team.robot.run(f"{CURRENT}/bundle/uninstall.sh")
+    assert team.robot.run("systemctl", "is-active", "vm-detect", check=False)[1].strip() == "inactive"
+    assert not (team.robot.root / "etc/systemd/system/vm-detect.service").exists()
+    assert {each.name for each in (team.robot.root / "opt/vm-embedded").iterdir()} <= {"left", ".lock"}
+
+
+def _from_scratch(text):
+    """Requirements that no release shares."""
+    return text.replace("packaging==", "packaging ==")
+
