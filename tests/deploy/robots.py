@@ -1,4 +1,4 @@
-"""A robot without internet: a real Debian with a real systemd, which is this machine's own, of which nothing is changed.
+"""A robot without internet: a real Debian with a real systemd, this machine's own, of which nothing is changed.
 
 The root of this machine lies under a layer in memory, systemd-nspawn starts its systemd in that, with no network but
 its own loopback, and commands enter its namespaces.
@@ -25,14 +25,16 @@ class Robot:
     def __init__(self, leader, root):
         self._leader, self.root = leader, root
 
-    def _entering(self, words):
-        enter = ["nsenter", "--target", str(self._leader), "--mount", "--uts", "--ipc", "--net", "--pid", "--cgroup"]
-        return [*enter, "--", *map(str, words)]
+    @property
+    def entering(self):
+        """Words before a command that is to run in it."""
+        into = ["--mount", "--uts", "--ipc", "--net", "--pid", "--cgroup"]
+        return ["nsenter", "--target", str(self._leader), *into, "--"]
 
     def start(self, *words):
         """A command in it, begun."""
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "stdin": subprocess.DEVNULL}
-        return subprocess.Popen(self._entering(words), env=ENVIRONMENT, text=True, **pipes)
+        return subprocess.Popen([*self.entering, *map(str, words)], env=ENVIRONMENT, text=True, **pipes)
 
     def run(self, *words, check=True, seconds=300.0):
         """A command in it, done: what it said, status first."""

@@ -181,7 +181,9 @@ def test_only_one_is_at_work_at_a_time(prefix, bundle, tmp_path):
     assert "at work" in ran.stderr
 
 
-@pytest.mark.parametrize("options", [["--prefix", "relative"], ["--prefix", "/a b"], ["--prefix", ""], ["--prefix", "/"]])
+@pytest.mark.parametrize(
+    "options", [["--prefix", "relative"], ["--prefix", "/a b"], ["--prefix", ""], ["--prefix", "/"]]
+)
 def test_a_prefix_must_be_a_plain_path(bundle, options):
     ran = subprocess.run([bundle / "install.sh", "--no-systemd", *options], capture_output=True, text=True)
     assert ran.returncode == 1

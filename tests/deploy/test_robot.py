@@ -60,7 +60,9 @@ class Team:
             assert time.monotonic() < deadline, (found, self.journal())
             time.sleep(0.3)
         assert self.robot.run("systemctl", "is-active", "vm-detect.service")[1].strip() == "active"
-        _, running = self.robot.run("sh", "-c", "cat /proc/$(systemctl show -P MainPID vm-detect)/cmdline | tr '\\0' ' '")
+        _, running = self.robot.run(
+            "sh", "-c", "cat /proc/$(systemctl show -P MainPID vm-detect)/cmdline | tr '\\0' ' '"
+        )
         assert any(f"/releases/{each}/" in running for each in releases)
         return current
 
@@ -82,7 +84,9 @@ def team(bundle, tmp_path_factory):
 
 def test_it_is_watched_and_says_what_it_sees(team):
     team.check("1-first")
-    script = "import socket; s = socket.socket(1); s.connect('/run/vm-detect/lines.sock'); print(s.makefile().readline())"
+    script = (
+        "import socket; s = socket.socket(1); s.connect('/run/vm-detect/lines.sock'); print(s.makefile().readline())"
+    )
     _, line = team.robot.run("python3", "-c", script)
     assert json.loads(line)["type"] in ("frame", "state")
     deadline = time.monotonic() + 30.0
@@ -230,7 +234,7 @@ def _model_command(team, model, signature=None):
 def test_a_model_alone_is_exchanged_while_it_runs(team, bundle):
     team.check("1-first")
     before = team.status()
-    network = (team.robot.root / "opt/vm-embedded/current/venv/lib/python3.11/site-packages/vm_embedded/models")
+    network = team.robot.root / "opt/vm-embedded/current/venv/lib/python3.11/site-packages/vm_embedded/models"
     status, said = _model_command(team, (network / "ball-9x4.onnx").read_bytes())
     assert status == 0, said
     now = team.status()
@@ -278,4 +282,3 @@ def test_removed_nothing_is_left_but_the_configuration(team):
 def _from_scratch(text):
     """Requirements that no release shares."""
     return text.replace("packaging==", "packaging ==")
-

@@ -216,3 +216,19 @@ def test_a_length_is_a_number_or_its_text(metres):
 def test_what_is_no_length_is_refused_by_value(value):
     with pytest.raises(InputError, match=re.escape(repr(value)[:20])):
         length(value)
+
+
+KEY = "ssh-ed25519 AAAAC3NzaC1lZDI1NTE5AAAAIHUIVGyk+Y3q5gJGRmdb2XkJYJEv1vZ3l5Y5sQ4c1a9k"
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"), [("", ""), (KEY, KEY), (f"{KEY} somebody@somewhere", KEY), (f"  {KEY}\t", KEY)]
+)
+def test_a_signer_is_a_key_without_its_comment(write, given, kept):
+    assert read_configuration(write(f'[deploy]\nsigner = "{given.strip()}"\n')).deploy.signer == kept
+
+
+@pytest.mark.parametrize("given", ["ssh-rsa AAAA", "ssh-ed25519", KEY[:-4], KEY[:-1] + "*", "AAAA"])
+def test_a_signer_that_is_no_key_is_refused(write, given):
+    with pytest.raises(InputError, match=r"line 2.*signer must be an Ed25519 public key"):
+        read_configuration(write(f'[deploy]\nsigner = "{given}"\n'))
