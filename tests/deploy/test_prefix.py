@@ -1,4 +1,4 @@
-"""The real bundle under a prefix, without a network and without systemd: installed, run, upgraded, and upgraded badly."""
+"""The real bundle under a prefix, without network and systemd: installed, run, upgraded, and upgraded badly."""
 
 import json
 import os
@@ -40,7 +40,7 @@ class Prefix:
         return subprocess.run(list(map(str, command)), capture_output=True, text=True)
 
     def link(self, name):
-        return os.readlink(self.path / name).removeprefix("releases/") if (self.path / name).is_symlink() else None
+        return (self.path / name).readlink().name
 
     def releases(self):
         return {each.name for each in (self.path / "releases").iterdir()}

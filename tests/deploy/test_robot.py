@@ -1,4 +1,4 @@
-"""The real bundle on a robot with systemd and no network: installed, watched, upgraded, and upgraded badly in every way.
+"""The real bundle on a robot with systemd and no network: installed, watched, upgraded well and badly.
 
 After each bad upgrade, and each kill, the release that runs must be whole and well.
 """
@@ -10,13 +10,19 @@ import time
 
 import pytest
 
-from .bundles import changed
+from .bundles import CHECKOUT, changed
 from .robots import booted
 
 pytestmark = pytest.mark.slow
 
 CURRENT = "/opt/vm-embedded/current"
 DEPLOY = "/usr/local/bin/vm-deploy"
+READER = """
+import socket
+lines = socket.socket(socket.AF_UNIX)
+lines.connect("/run/vm-detect/lines.sock")
+print(lines.makefile().readline())
+"""
 IMPATIENT = ("healthy_s = 30", "healthy_s = 8")
 
 
@@ -42,7 +48,7 @@ class Team:
         return {"etc/vm.toml": text}
 
     def link(self, name):
-        return os.readlink(self.robot.root / "opt/vm-embedded" / name).removeprefix("releases/")
+        return (self.robot.root / "opt/vm-embedded" / name).readlink().name
 
     def status(self):
         """What the detector says of itself, or nothing."""
@@ -60,11 +66,13 @@ class Team:
             assert time.monotonic() < deadline, (found, self.journal())
             time.sleep(0.3)
         assert self.robot.run("systemctl", "is-active", "vm-detect.service")[1].strip() == "active"
-        _, running = self.robot.run(
-            "sh", "-c", "cat /proc/$(systemctl show -P MainPID vm-detect)/cmdline | tr '\\0' ' '"
-        )
+        running = self.own("cmdline")
         assert any(f"/releases/{each}/" in running for each in releases)
         return current
+
+    def own(self, name):
+        """What the kernel knows of the detector's process."""
+        return self.robot.run("sh", "-c", f"cat /proc/$(systemctl show -P MainPID vm-detect)/{name}")[1]
 
     def journal(self):
         return self.robot.run("journalctl", "--unit", "vm-detect", "--lines", "15", "--no-pager", check=False)[1]
@@ -84,10 +92,7 @@ def team(bundle, tmp_path_factory):
 
 def test_it_is_watched_and_says_what_it_sees(team):
     team.check("1-first")
-    script = (
-        "import socket; s = socket.socket(1); s.connect('/run/vm-detect/lines.sock'); print(s.makefile().readline())"
-    )
-    _, line = team.robot.run("python3", "-c", script)
+    _, line = team.robot.run("python3", "-c", READER)
     assert json.loads(line)["type"] in ("frame", "state")
     deadline = time.monotonic() + 30.0
     while not (team.status().get("last") or {}).get("detections"):
@@ -102,8 +107,7 @@ def test_it_is_watched_and_says_what_it_sees(team):
 
 def test_it_listens_on_no_network_and_is_nobody(team):
     assert not team.robot.run("ss", "--listening", "--no-header", "--tcp", "--udp")[1]
-    _, said = team.robot.run("sh", "-c", "cat /proc/$(systemctl show -P MainPID vm-detect)/status")
-    fields = dict(line.split(":\t", 1) for line in said.splitlines() if ":\t" in line)
+    fields = dict(line.split(":\t", 1) for line in team.own("status").splitlines() if ":\t" in line)
     assert fields["Uid"].split()[0] != "0"
     assert int(fields["CapEff"], 16) == 0
     assert fields["NoNewPrivs"] == "1"
@@ -277,6 +281,27 @@ def test_removed_nothing_is_left_but_the_configuration(team):
     assert team.robot.run("systemctl", "is-active", "vm-detect", check=False)[1].strip() == "inactive"
     assert not (team.robot.root / "etc/systemd/system/vm-detect.service").exists()
     assert {each.name for each in (team.robot.root / "opt/vm-embedded").iterdir()} <= {"left", ".lock"}
+
+
+def test_deployed_from_a_workstation_in_one_command(team, bundle_file, tmp_path):
+    """With an ssh that enters the robot's namespaces instead of going over a network."""
+    enter = " ".join(team.robot.entering)
+    strip = 'while [ "${1#-}" != "$1" ]; do shift; done'
+    fakes = {
+        "ssh": f'{strip}\nshift\nexec {enter} sh -c "$*"',
+        "scp": f'{strip}\nexec cp "$1" "{team.robot.root}/${{2#*:}}"',
+    }
+    for name, text in fakes.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    path = {"PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    command = ["sh", CHECKOUT / "deploy" / "deploy.sh", bundle_file, "somebody@robot"]
+    ran = subprocess.run(command, env=os.environ | path, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert "unit      active" in ran.stdout
+    assert "detector  ok" in ran.stdout
+    assert '"detections"' in ran.stdout
+    assert not list((team.robot.root / "var/tmp").glob("vm-embedded.*"))
 
 
 def _from_scratch(text):
