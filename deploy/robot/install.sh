@@ -177,10 +177,7 @@ fi
 
 mkdir -p "$PREFIX/releases" || fail "can't write $PREFIX"
 lock
-if [ -e "$PREFIX/trial" ]; then
-    say "an earlier install.sh was cut off"
-    back
-fi
+settled
 case $(linked current) in
 "$release" | "$release"+*)
     say "$release is in use already"

@@ -87,6 +87,7 @@ forgotten() { # by the system: unit, rule and command
 
 well() { # STATE: whether the detector is ok in time, or at least no worse than the state that it was in before
     limit=$(setting healthy_s)
+    limit=${limit:-30}
     end=$(($(date +%s) + ${limit%%.*}))
     good=0 found=
     while [ "$(date +%s)" -lt "$end" ]; do
@@ -146,6 +147,15 @@ back() { # to the release before the one on trial
         point current ""
         rm -f "$PREFIX/trial"
     fi
+}
+
+settled() { # what an install.sh that was cut off left on trial: it stays if it is well by now
+    [ -e "$PREFIX/trial" ] || return 0
+    say "an earlier install.sh was cut off"
+    case $(if supervised && booted; then state; else say ok; fi) in
+    ok*) rm -f "$PREFIX/trial" ;;
+    *) back ;;
+    esac
 }
 
 prune() { # remove releases that are neither current nor previous

@@ -91,6 +91,7 @@ def _running(root, log):
         process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=written, stderr=subprocess.STDOUT, start_new_session=True
         )
+    leaders = []
     try:
         deadline = time.monotonic() + 30.0
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
@@ -100,5 +101,7 @@ def _running(root, log):
             time.sleep(0.05)
         yield int(leaders[0])
     finally:
-        process.send_signal(signal.SIGKILL)
+        for each in leaders:  # with the first of its processes all others of the robot end
+            os.kill(int(each), signal.SIGKILL)
+        process.kill()
         process.wait()
