@@ -67,8 +67,8 @@ checked_machine() {
     libc=$(getconf GNU_LIBC_VERSION 2>/dev/null || :)
     wanted=$(field glibc "$manifest")
     [ "$(printf '%s\n%s\n' "$wanted" "${libc#* }" | sort -V | head -n 1)" = "$wanted" ] ||
-        fail "this bundle needs glibc $wanted or newer, and here is ${libc:-none}: make bundle with a lower TARGET," \
-            "as manylinux_2_17_$machine"
+        fail "this bundle needs glibc $wanted or newer, and here is ${libc:-none}: make bundle with a TARGET" \
+            "like manylinux_2_17_$machine-$(field python "$manifest"); see README.md"
     if [ "$machine" = x86_64 ]; then
         grep -q -w sse4_2 /proc/cpuinfo || fail "this processor has no SSE 4.2, which numpy needs (x86-64-v2)"
         grep -q -w avx2 /proc/cpuinfo || say "note: this processor has no AVX2; the network takes several times as long"
