@@ -35,15 +35,16 @@ lint: .venv/dev ## style and types
 	$(BIN)/mypy
 
 bundle: .venv/bundle ## all that a robot needs, in one file: make bundle [MODEL=model.onnx] [CONFIG=vm.toml] [TARGET=linux_x86_64-cp311]
-	$(BIN)/python deploy/bundle.py --target $(TARGET) $(if $(MODEL),--model $(MODEL)) $(if $(CONFIG),--config $(CONFIG))
+	$(BIN)/python deploy/bundle.py --target $(TARGET) $(if $(MODEL),--model '$(MODEL)') $(if $(CONFIG),--config '$(CONFIG)')
 
 BUNDLE = dist/vm-embedded-robot-$(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' vm_embedded/__init__.py)-$(TARGET).tar.gz
 
 deb: bundle ## the same as a Debian package
 	$(BIN)/python deploy/debian.py $(BUNDLE)
 
-deploy: bundle ## bundle, copy, install, and show what it sees: make deploy ROBOT=user@host [MODEL=] [CONFIG=] [TARGET=]
+deploy: ## bundle, copy, install, and show what it sees: make deploy ROBOT=user@host [MODEL=] [CONFIG=] [TARGET=]
 	@test -n "$(ROBOT)" || { echo 'make deploy needs ROBOT=user@host'; exit 1; }
+	@$(MAKE) bundle
 	sh deploy/deploy.sh $(BUNDLE) $(ROBOT)
 
 logs: ## what happens on a robot: make logs ROBOT=user@host

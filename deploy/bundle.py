@@ -1,7 +1,7 @@
 """make bundle: all that a robot without internet needs for a release, in one file.
 
-The same inputs, target and commit give the same bytes: versions and hashes of packages are those of deploy/robot.txt,
-times are the commit's, and nothing depends on who packs, or where.
+The same inputs, target and commit give the same bytes, whoever packs, and where: versions and hashes of packages are
+those of deploy/robot.txt, times are the commit's, and the tools that pack are those of deploy/constraints.txt.
 """
 
 from __future__ import annotations
@@ -167,6 +167,8 @@ def configured(configuration: Path | None, model: str | None) -> dict[str, bytes
     text = _renamed(text, "model", MODEL)
     if isinstance(table.get("lens"), str):
         lens = configuration.parent / table["lens"]
+        if lens.name in (CONFIGURATION, MODEL):
+            raise InputError(f"the lens file {lens} can't be called {lens.name} in a bundle")
         files[lens.name] = lens.read_bytes()
         text = _renamed(text, "lens", lens.name)
     return {CONFIGURATION: text.encode(), **files}
@@ -204,11 +206,10 @@ def bundle(target: Target, configuration: Path | None, model: str | None, wheels
     release = f"{__version__}-{hashlib.sha256(_sums(files)).hexdigest()[:8]}"
     files["manifest.json"] = (json.dumps(_manifest(target, origin, release, files), indent=1) + "\n").encode()
     files["SHA256SUMS"] = _sums(files)
-    name = f"{NAME}-{__version__}-{target.name}"
-    path = dist / f"{name}.tar.gz"
+    path = dist / f"{NAME}-{__version__}-{target.name}.tar.gz"
     dist.mkdir(parents=True, exist_ok=True)
     with written_beside(path) as part:
-        part.write_bytes(_packed(name, files, origin.time))
+        part.write_bytes(_packed(f"{NAME}-{release}-{target.name}", files, origin.time))
     return path
 
 

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tarfile
 import tempfile
+from datetime import UTC, datetime
 from email.utils import formatdate
 from pathlib import Path
 
@@ -29,7 +30,9 @@ if [ "$1" = configure ]; then /{LIBRARY}/install.sh; fi
 """
 PRERM = f"""#!/bin/sh
 set -e
-if [ "$1" = remove ]; then /{LIBRARY}/uninstall.sh --prefix /opt/vm-embedded; fi
+if [ "$1" = remove ] && [ -e /opt/vm-embedded/supervisor ]; then
+    /{LIBRARY}/uninstall.sh --prefix /opt/vm-embedded
+fi
 """
 POSTRM = """#!/bin/sh
 set -e
@@ -51,7 +54,8 @@ def package(bundle: Path) -> Path:
         (root / "usr/lib").mkdir(parents=True)
         shutil.move(unpacked, root / LIBRARY)
         manifest = json.loads((root / LIBRARY / "manifest.json").read_text())
-        version = manifest["release"].replace("-", "+")
+        number, content_hash = manifest["release"].split("-")
+        version = f"{number}+{datetime.fromtimestamp(time, UTC):%Y%m%d%H%M%S}.{content_hash}"
         _documents(root / "usr/share/doc" / NAME, version, time)
         content = sorted(each for each in root.rglob("*") if each.is_file())
         sums = [f"{hashlib.md5(each.read_bytes()).hexdigest()}  {each.relative_to(root)}\n" for each in content]

@@ -2,15 +2,11 @@
 # From this workstation to a robot that answers ssh: copy a bundle, install it, and show what it sees.
 set -eu
 
-case $# in
-0 | 1)
-    echo "usage: deploy.sh BUNDLE.tar.gz USER@HOST [OPTION OF install.sh ...]" >&2
+if [ $# != 2 ]; then
+    echo "usage: deploy.sh BUNDLE.tar.gz USER@HOST" >&2
     exit 2
-    ;;
-esac
+fi
 bundle=$1 robot=$2
-shift 2
-name=$(basename "$bundle" .tar.gz)
 [ -r "$bundle" ] || { echo "deploy.sh: can't read $bundle: make bundle" >&2; exit 1; }
 terminal=-T
 if [ -t 0 ]; then terminal=-t; fi # for sudo, which may ask for a password
@@ -20,14 +16,15 @@ on_robot() { ssh "$terminal" "$robot" "$@"; }
 
 folder=$(ssh -T "$robot" 'mktemp -d /var/tmp/vm-embedded.XXXXXX')
 trap 'ssh -T "$robot" "rm -rf $folder" || :' EXIT
+trap 'exit 1' INT TERM HUP
 echo "copying $bundle to $robot"
 if command -v rsync >/dev/null && ssh -T "$robot" 'command -v rsync' >/dev/null; then
     rsync --partial --progress "$bundle" "$robot:$folder/bundle.tar.gz"
 else
     scp -q "$bundle" "$robot:$folder/bundle.tar.gz"
 fi
-ssh -T "$robot" "tar -xzf $folder/bundle.tar.gz -C $folder"
+ssh -T "$robot" "tar -xzf $folder/bundle.tar.gz -C $folder && rm $folder/bundle.tar.gz"
 # shellcheck disable=SC2016 # the robot asks itself who it is
 root='if [ "$(id -u)" = 0 ]; then s=; else s=sudo; fi; $s'
-on_robot "$root sh $folder/$name/install.sh $*"
+on_robot "$root sh $folder/*/install.sh"
 on_robot "$root /opt/vm-embedded/vm-deploy status"

@@ -17,6 +17,8 @@ from .mesh import RUNS, Mesh
 from .onnx_file import ModelFile
 from .settings import Settings
 
+onnxruntime.disable_telemetry_events()  # builds that report to their makers would do so from a robot, too
+
 RUNTIME_VERSION: str = onnxruntime.__version__
 
 _RUNTIME_ERRORS = (

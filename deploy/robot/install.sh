@@ -9,54 +9,68 @@ PREFIX=/opt/vm-embedded
 SUPERVISOR=
 DRY=
 OWN_MIB=32 # of a release that shares its packages with the one before
+TOOLS="awk cat chmod cmp cut df find flock getconf grep mv readlink sed sha256sum sort"
 
 # shellcheck source=deploy/robot/releases.sh
 . "$HERE/releases.sh"
 
 usage() {
     cat <<END
-usage: install.sh [--prefix DIR] [--no-systemd] [--dry-run]
+usage: install.sh [--prefix DIR] [--systemd | --no-systemd] [--dry-run]
 
   --prefix DIR   where releases go; default $PREFIX
+  --systemd      as a service: the default, unless the last one was installed otherwise
   --no-systemd   install the program only; the one who starts it restarts it
   --dry-run      check everything, change nothing
 
-Exit status: 0 the release is in use; 1 it is not, and nothing has changed; 2 wrong usage.
+Exit status: 0 the release is in use; 1 it is not, and the one before goes on; 2 wrong usage.
 END
+}
+
+misused() {
+    printf 'install.sh: %s\n' "$*" >&2
+    usage >&2
+    exit 2
 }
 
 while [ $# -gt 0 ]; do
     case $1 in
     --prefix)
-        PREFIX=${2-}
-        shift $(($# > 1))
+        [ $# -gt 1 ] || misused "--prefix needs a folder"
+        PREFIX=$2
+        shift
         ;;
     --prefix=*) PREFIX=${1#*=} ;;
+    --systemd) SUPERVISOR=systemd ;;
     --no-systemd) SUPERVISOR=none ;;
     --dry-run) DRY=1 ;;
     -h | --help)
         usage
         exit 0
         ;;
-    *)
-        printf 'install.sh: unknown option %s\n' "$1" >&2
-        usage >&2
-        exit 2
-        ;;
+    *) misused "unknown option $1" ;;
     esac
     shift
 done
+while [ "${PREFIX%/}" != "$PREFIX" ]; do PREFIX=${PREFIX%/}; done
 case $PREFIX in
-/*[!A-Za-z0-9/._+-]* | [!/]* | / | "") fail "--prefix must be an absolute path of letters, digits and ._+-/, not $PREFIX" ;;
+"" | [!/]* | *[!A-Za-z0-9/._+-]*) misused "--prefix must be an absolute path of letters, digits and ._+-/, not '$PREFIX'" ;;
 esac
-PREFIX=${PREFIX%/}
 
 manifest=$HERE/manifest.json
-release=$(field release "$manifest")
 
-checked_hashes() {
+checked_files() {
     say "checking hashes"
-    (cd "$HERE" && sha256sum --check --quiet SHA256SUMS) || fail "the bundle is damaged: copy it again"
+    for each in $TOOLS; do
+        command -v "$each" >/dev/null || fail "there is no $each: install it (coreutils, util-linux, diffutils)"
+    done
+    cd "$HERE"
+    wrong=$(sha256sum -c SHA256SUMS 2>&1 | grep -v ': OK$' || :)
+    [ -z "$wrong" ] || fail "the bundle is damaged, copy it again: $wrong"
+    listed=$(sed 's/^[0-9a-f]*  //' SHA256SUMS | sort)
+    found=$(find . -type f ! -path ./SHA256SUMS | sed 's|^\./||' | sort)
+    [ "$listed" = "$found" ] || fail "the bundle's folder has files that are not of it: unpack it into an empty one"
+    cd - >/dev/null
 }
 
 checked_machine() {
@@ -73,24 +87,24 @@ checked_machine() {
         grep -q -w sse4_2 /proc/cpuinfo || fail "this processor has no SSE 4.2, which numpy needs (x86-64-v2)"
         grep -q -w avx2 /proc/cpuinfo || say "note: this processor has no AVX2; the network takes several times as long"
     fi
-    for each in sha256sum flock readlink df sed mv; do
-        command -v $each >/dev/null || fail "there is no $each: install it (coreutils, util-linux)"
-    done
 }
 
 found_python() { # the interpreter that the bundle is for
     wanted=$(field python "$manifest")
     for python in "python3.${wanted#cp3}" python3; do
         seen=$("$python" -c 'import sys, venv; print("cp%d%d" % sys.version_info[:2])' 2>/dev/null) || continue
-        [ "$seen" != "$wanted" ] || { command -v "$python"; return; }
+        [ "$seen" != "$wanted" ] || { command -v "$python" && return; }
     done
     fail "this bundle is for Python 3.${wanted#cp3}, and here is $(python3 --version 2>&1 || echo none): make bundle" \
         "TARGET=linux_$(field machine "$manifest")-cp3XX"
 }
 
-checked_space() {
+checked_folder() {
     folder=$PREFIX
     while [ ! -d "$folder" ]; do folder=$(dirname "$folder"); done
+    [ -w "$folder" ] || fail "can't write $folder: be root, or give another --prefix"
+    [ ! -e "$PREFIX/releases" ] || [ -e "$PREFIX/supervisor" ] || fail "$PREFIX has a folder releases that is not of this" \
+        "program: give another --prefix"
     free=$(df -Pk "$folder" | awk 'NR == 2 { print int($4 / 1024) }')
     needed=$(field disk_mib "$manifest")
     if alike; then needed=$OWN_MIB; fi
@@ -98,40 +112,39 @@ checked_space() {
 }
 
 chosen_supervisor() {
-    [ -z "$SUPERVISOR" ] || return 0
-    SUPERVISOR=$(cat "$PREFIX/supervisor" 2>/dev/null || echo systemd)
-    [ "$SUPERVISOR" != systemd ] || systemctl --version >/dev/null 2>&1 || fail "there is no systemd: use --no-systemd"
-    [ "$SUPERVISOR" != systemd ] || [ "$(id -u)" = 0 ] || fail "be root, or use --no-systemd"
+    [ -n "$SUPERVISOR" ] || SUPERVISOR=$(cat "$PREFIX/supervisor" 2>/dev/null || echo systemd)
+    [ "$SUPERVISOR" = systemd ] || return 0
+    systemctl --version >/dev/null 2>&1 || fail "there is no systemd: use --no-systemd"
+    [ "$(id -u)" = 0 ] || fail "be root, or use --no-systemd"
 }
 
-kept() { # FILE: of the configuration in use, if nobody but this robot has changed it; see deploy/README.md
-    for used in "$PREFIX/current" "$PREFIX/left"; do
-        [ -d "$used/etc" ] || continue
-        [ -e "$used/etc/$1" ] || return 0
-        if cmp -s "$used/bundle/etc/$1" "$HERE/etc/$1" || [ ! -e "$HERE/etc/$1" ]; then
-            cp -p "$used/etc/$1" "$target/etc/$1"
-        elif ! cmp -s "$used/etc/$1" "$used/bundle/etc/$1" && ! cmp -s "$used/etc/$1" "$HERE/etc/$1"; then
-            cp -p "$used/etc/$1" "$target/etc/$1.of-${release}"
-            say "note: the bundle brings a new $1; the robot's own is kept as $PREFIX/current/etc/$1.of-${release}"
-        fi
-        return 0
-    done
+kept() { # FOLDER FILE: of the configuration in use, if the bundles have the same; see deploy/README.md
+    if cmp -s "$1/bundle/etc/$2" "$HERE/etc/$2" || [ ! -e "$HERE/etc/$2" ]; then
+        cp "$1/etc/$2" "$target/etc/$2"
+    elif ! cmp -s "$1/etc/$2" "$1/bundle/etc/$2" && ! cmp -s "$1/etc/$2" "$HERE/etc/$2"; then
+        cp "$1/etc/$2" "$target/etc/$2.of-$release"
+        say "note: the bundle brings a new $2; the robot's own is kept as $PREFIX/current/etc/$2.of-$release"
+    fi
 }
 
 unpacked() {
     say "copying"
     rm -rf "$target"
     mkdir -p "$target/bundle" "$target/etc"
-    (cd "$HERE" && find . -path ./wheels -prune -o -type f -print) | while read -r each; do
+    sed 's/^[0-9a-f]*  //; /^wheels\//d' "$HERE/SHA256SUMS" | while read -r each; do
         mkdir -p "$target/bundle/$(dirname "$each")"
-        cp -p "$HERE/$each" "$target/bundle/$each"
+        cp "$HERE/$each" "$target/bundle/$each"
     done
-    cp -p "$HERE"/etc/* "$target/etc/"
-    for used in "$PREFIX/current" "$PREFIX/left"; do
-        [ -d "$used/etc" ] || continue
-        for each in "$used"/etc/*; do kept "${each##*/}"; done
-        break
+    cp "$HERE/SHA256SUMS" "$target/bundle/"
+    cp "$HERE"/etc/* "$target/etc/"
+    used=$PREFIX/current
+    [ -d "$used/etc" ] || used=$PREFIX/left
+    for each in "$used"/etc/*; do
+        if [ -f "$each" ]; then kept "$used" "${each##*/}"; fi
     done
+    # Whoever unpacked it, and with whatever umask: the detector reads it, and only who installs may change it.
+    chmod -R u=rwX,go=rX "$target"
+    if [ "$(id -u)" = 0 ]; then chown -R 0:0 "$target"; fi
 }
 
 others() { grep -v '^vm_embedded==' "$1/requirements.txt"; } # packages of other projects, with their hashes
@@ -165,21 +178,25 @@ abandoned() { # the new release, before it was ever in use
     fail "nothing has changed"
 }
 
-checked_hashes
+checked_files
 checked_machine
 python=$(found_python)
-checked_space
+checked_folder
 chosen_supervisor
+release=$(field release "$manifest")
 if [ -n "$DRY" ]; then
     say "would install $release into $PREFIX/releases with $python (supervisor: $SUPERVISOR)"
     exit 0
 fi
 
-mkdir -p "$PREFIX/releases" || fail "can't write $PREFIX"
-lock
+mkdir -p "$PREFIX" || fail "can't write $PREFIX"
+lock 0
+[ -e "$PREFIX/supervisor" ] || written supervisor "$SUPERVISOR"
+mkdir -p "$PREFIX/releases"
 settled
 case $(linked current) in
 "$release" | "$release"+*)
+    if supervised && booted; then systemctl is-active --quiet "$UNIT" || start || fail "$release does not start"; fi
     say "$release is in use already"
     exit 0
     ;;
@@ -199,13 +216,13 @@ touch "$target/complete"
 sync
 trap - EXIT
 
-printf '%s\n' "$SUPERVISOR" >"$PREFIX/supervisor"
+if supervised && [ "$SUPERVISOR" = none ]; then forgotten; fi
+written supervisor "$SUPERVISOR"
 ln -sfn current/bundle/vm-deploy "$PREFIX/vm-deploy"
 if ! activate "$release"; then
     rm -rf "$target"
     exit 1
 fi
-if supervised; then systemctl enable --quiet "$UNIT"; fi
 rm -rf "$PREFIX/left"
 prune
 say "$release is in use"

@@ -4,8 +4,9 @@ set -eu
 umask 022
 
 HERE=$(cd "$(dirname "$0")" && pwd -P)
-PREFIX=${HERE%%/releases/*}
+PREFIX=/opt/vm-embedded
 PURGE=
+if [ -e "$HERE/../complete" ]; then PREFIX=${HERE%/releases/*}; fi # it is the one of a release
 
 # shellcheck source=deploy/robot/releases.sh
 . "$HERE/releases.sh"
@@ -19,7 +20,6 @@ usage: uninstall.sh [--prefix DIR] [--purge]
 END
 }
 
-[ "$PREFIX" != "$HERE" ] || PREFIX=/opt/vm-embedded
 while [ $# -gt 0 ]; do
     case $1 in
     --prefix)
@@ -40,12 +40,11 @@ while [ $# -gt 0 ]; do
     esac
     shift
 done
-[ -d "$PREFIX/releases" ] || [ -d "$PREFIX/left" ] || fail "nothing is installed at $PREFIX"
+PREFIX=${PREFIX%/}
+[ -e "$PREFIX/supervisor" ] || [ -e "$PREFIX/left/etc/vm.toml" ] || fail "nothing is installed at $PREFIX"
 
-lock
-if supervised; then
-    forgotten
-fi
+lock 0
+if supervised; then forgotten; fi
 if [ -d "$PREFIX/current/etc" ]; then
     rm -rf "$PREFIX/.left.new"
     mkdir -p "$PREFIX/.left.new/bundle"
@@ -54,7 +53,8 @@ if [ -d "$PREFIX/current/etc" ]; then
     rm -rf "$PREFIX/left"
     mv "$PREFIX/.left.new" "$PREFIX/left"
 fi
-rm -rf "$PREFIX/current" "$PREFIX/previous" "$PREFIX/trial" "$PREFIX/vm-deploy" "$PREFIX/supervisor" "$PREFIX/releases"
+rm -rf "$PREFIX/current" "$PREFIX/previous" "$PREFIX/trial" "$PREFIX/vm-deploy"
+if [ -e "$PREFIX/supervisor" ]; then rm -rf "$PREFIX/releases" "$PREFIX/supervisor"; fi
 if [ -n "$PURGE" ]; then
     rm -rf "$PREFIX/left" "$PREFIX/.lock"
     rmdir "$PREFIX" 2>/dev/null || :

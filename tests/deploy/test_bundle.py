@@ -23,7 +23,9 @@ def test_everything_a_robot_needs_is_in_it_and_nothing_else(bundle, bundle_file)
         *("install.sh", "uninstall.sh", "vm-deploy", "vm-detect.service", "vm-detect-rollback.service"),
         *("etc/vm.toml", "etc/model.onnx"),
     }
-    assert bundle.name == f"vm-embedded-robot-{vm_embedded.__version__}-linux_x86_64-cp311"
+    assert bundle_file.name == f"vm-embedded-robot-{vm_embedded.__version__}-linux_x86_64-cp311.tar.gz"
+    release = json.loads((bundle / "manifest.json").read_text())["release"]
+    assert bundle.name == f"vm-embedded-robot-{release}-linux_x86_64-cp311"
     assert bundle_file.stat().st_size < 120e6
 
 
@@ -91,6 +93,15 @@ def test_what_is_wrong_is_said(tmp_path, options, words):
     for word in words:
         assert word in ran.stderr, ran.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_a_lens_does_not_take_the_place_of_the_configuration(tmp_path):
+    (tmp_path / "lenses").mkdir()
+    (tmp_path / "lenses" / "vm.toml").write_text('projection = "rectilinear"\nfocal_length = 420.0\nfov = 2.0\n')
+    (tmp_path / "robot.toml").write_text('lens = "lenses/vm.toml"\n')
+    ran = bundle_command("--dist", tmp_path / "dist", "--config", tmp_path / "robot.toml")
+    assert ran.returncode == 1
+    assert "can't be called vm.toml" in ran.stderr
 
 
 def test_a_configuration_with_an_unknown_entry_is_refused(tmp_path):

@@ -181,19 +181,61 @@ def test_only_one_is_at_work_at_a_time(prefix, bundle, tmp_path):
     assert "at work" in ran.stderr
 
 
-@pytest.mark.parametrize(
-    "options", [["--prefix", "relative"], ["--prefix", "/a b"], ["--prefix", ""], ["--prefix", "/"]]
-)
-def test_a_prefix_must_be_a_plain_path(bundle, options):
-    ran = subprocess.run([bundle / "install.sh", "--no-systemd", *options], capture_output=True, text=True)
-    assert ran.returncode == 1
+@pytest.mark.parametrize("path", ["relative", "/a b", "", "/", "//"])
+def test_a_prefix_must_be_a_plain_path(bundle, path):
+    ran = subprocess.run([bundle / "install.sh", "--no-systemd", "--prefix", path], capture_output=True, text=True)
+    assert ran.returncode == 2
     assert "--prefix must be" in ran.stderr
+
+
+def test_a_folder_of_releases_that_is_not_ours_is_left_alone(bundle, tmp_path):
+    theirs = tmp_path / "theirs" / "releases" / "thesis.txt"
+    theirs.parent.mkdir(parents=True)
+    theirs.write_text("years of work")
+    inside = changed(bundle, theirs.parent / "bundle", "1-bundle")
+    for command in ([inside / "uninstall.sh"], [inside / "uninstall.sh", "--prefix", theirs.parents[1], "--purge"]):
+        ran = subprocess.run(command, capture_output=True, text=True)
+        assert ran.returncode == 1
+        assert "nothing is installed" in ran.stderr
+    ran = subprocess.run([bundle / "install.sh", "--no-systemd", "--prefix", theirs.parents[1]], capture_output=True)
+    assert ran.returncode == 1
+    assert theirs.read_text() == "years of work"
+
+
+def test_files_that_are_not_of_the_bundle_are_noticed(prefix, bundle, tmp_path):
+    (changed(bundle, tmp_path / "other", "9-other") / "etc" / "left-lens.yaml").write_text("")
+    ran = prefix.install(tmp_path / "other")
+    assert ran.returncode == 1
+    assert "not of it" in ran.stderr
+
+
+def test_an_unwritable_place_is_said(bundle):
+    ran = subprocess.run(
+        [bundle / "install.sh", "--no-systemd", "--prefix", "/proc/vm"], capture_output=True, text=True
+    )
+    assert ran.returncode == 1
+    assert "can't write" in ran.stderr
 
 
 def test_unknown_words_are_wrong_usage(prefix, bundle):
     assert subprocess.run([bundle / "install.sh", "--frobnicate"], capture_output=True).returncode == 2
     assert prefix.deploy("frobnicate").returncode == 2
     assert prefix.deploy().returncode == 2
+
+
+def test_everybody_reads_what_only_root_changes(bundle, alone, tmp_path):
+    other = Prefix(tmp_path / "prefix", [])
+    careful = changed(bundle, tmp_path / "careful", "1-careful")
+    for each in careful.rglob("*"):
+        if "wheels" not in str(each):
+            each.chmod(0o700 if each.is_dir() else each.stat().st_mode & 0o700 | 0o020)
+    assert other.install(careful).returncode == 0
+    for each in (other.path / "current").resolve().rglob("*"):
+        if "venv" not in str(each):
+            mode = each.stat().st_mode
+            assert mode & 0o022 == 0, each
+            assert mode & 0o004, each
+    assert (other.path / ".lock").stat().st_mode & 0o077 == 0
 
 
 def test_removed_it_leaves_its_configuration_for_the_next(bundle, alone, tmp_path):

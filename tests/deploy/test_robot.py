@@ -39,6 +39,19 @@ class Team:
         subprocess.run(["cp", "-r", folder, there], check=True)
         return "/bin/sh", f"/var/tmp/{release}/install.sh"
 
+    def install_until(self, step, *install, signal="KILL"):
+        """Run install.sh, and end it when it says that it comes to a step."""
+        with self.robot.start("sh", "-c", 'echo $$; exec "$@"', "sh", *install) as process:
+            number = process.stdout.readline().strip()
+            for line in process.stdout:
+                if line.startswith(step):
+                    break
+            else:
+                pytest.fail(f"it never came to {step}")
+            self.robot.run("kill", f"-{signal}", number)
+            process.stdout.read()
+            process.wait()
+
     def configured(self, *changes):
         """vm.toml with some text replaced."""
         text = (self._bundle / "etc" / "vm.toml").read_text()
@@ -153,12 +166,12 @@ BLIND = [
     ],
 )
 def test_a_configuration_that_does_no_good_is_taken_back(team, release, changes, words):
-    before = team.check("1-first")
+    team.check("1-first")
     status, said = team.robot.run(*team.bring(release, team.configured(*changes)), check=False)
     assert status == 1
     for word in words:
         assert word in said, said
-    assert team.check(before)
+    team.check("1-first")
     assert team.link("previous") == "2-second"
     assert sorted(os.listdir(team.robot.root / "opt/vm-embedded/releases")) == ["1-first", "2-second"]  # noqa: PTH208
 
@@ -199,16 +212,7 @@ STEPS = ["copying", "installing packages", "testing the model", "switching", "st
 def test_killed_at_any_step_the_old_or_the_new_release_runs(team, step):
     before = team.check("1-first")
     release = f"3-{step.split()[0]}"
-    with team.robot.start("sh", "-c", 'echo $$; exec "$@"', "sh", *team.bring(release)) as process:
-        number = process.stdout.readline().strip()
-        for line in process.stdout:
-            if line.startswith(step):
-                break
-        else:
-            pytest.fail(f"it never came to {step}")
-        team.robot.run("kill", "-KILL", number)
-        process.stdout.read()
-        process.wait()
+    team.install_until(step, *team.bring(release))
     current = team.check("1-first", release)
     assert current == before or step in STEPS[3:]
     if current == release:
@@ -221,13 +225,44 @@ def test_killed_at_any_step_the_old_or_the_new_release_runs(team, step):
             assert time.monotonic() < deadline, team.journal()
             time.sleep(0.3)
     else:
-        team.robot.run("flock", "/opt/vm-embedded/.lock", f"{CURRENT}/bundle/vm-deploy", "settle", check=False)
-        team.robot.run(DEPLOY, "settle")
+        team.robot.run(DEPLOY, "settle")  # waits for what the dead one had begun
+    team.check("1-first")
+    assert not (team.robot.root / "opt/vm-embedded/trial").exists()
+
+
+def test_killed_on_the_way_back_it_is_gone_on_with(team):
+    slow = team.configured(("budget_ms = 0", "budget_ms = 0.01"), IMPATIENT)
+    team.install_until("going back", *team.bring("4-back", slow))
+    assert (team.robot.root / "opt/vm-embedded/trial").exists()
+    team.robot.run(DEPLOY, "settle")
+    team.check("1-first")
+    assert not (team.robot.root / "opt/vm-embedded/trial").exists()
+
+
+def test_it_goes_back_even_if_nobody_listens_any_more(team):
+    slow = team.configured(("budget_ms = 0", "budget_ms = 0.01"), IMPATIENT)
+    install = " ".join(team.bring("4-alone", slow))
+    team.robot.run("sh", "-c", f"{install} 2>&1 | sed /watching/q")
+    team.robot.run(DEPLOY, "settle")  # waits for it
+    team.check("1-first")
+    assert not (team.robot.root / "opt/vm-embedded/releases/4-alone").exists()
+
+
+def test_hung_up_on_it_goes_back(team):
+    team.install_until("watching", *team.bring("4-hup"), signal="HUP")
+    team.check("1-first")
+    assert not (team.robot.root / "opt/vm-embedded/trial").exists()
+
+
+def test_one_that_was_stopped_is_started_by_the_same_bundle(team):
+    team.robot.run("systemctl", "stop", "vm-detect")
+    assert "in use already" in team.robot.run("/bin/sh", "/var/tmp/1-first/install.sh")[1]
     team.check("1-first")
 
 
 def _model_command(team, model, signature=None):
     team.robot.root.joinpath("var/tmp/new.onnx").write_bytes(model)
+    team.robot.root.joinpath("var/tmp/new.onnx").chmod(0o600)
     beside = team.robot.root.joinpath("var/tmp/new.onnx.sig")
     beside.unlink(missing_ok=True)
     if signature is not None:
@@ -247,6 +282,11 @@ def test_a_model_alone_is_exchanged_while_it_runs(team, bundle):
     status, said = _model_command(team, b"no network")
     assert status == 1
     assert "nothing has changed" in said
+    team.robot.root.joinpath("var/tmp/new.onnx").write_bytes((network / "ball-5x4.onnx").read_bytes())
+    exchanged = f"while ! [ -e {CURRENT}/etc/.old.onnx ]; do sleep 0.01; done"
+    interrupted = f"{DEPLOY} model /var/tmp/new.onnx & {exchanged}; kill -HUP $!; wait $!"
+    assert "going back to the old model" in team.robot.run("sh", "-c", interrupted, check=False)[1]
+    team.check("1-first")
     assert team.status()["model_sha256"] == now["model_sha256"]
 
 
