@@ -91,11 +91,19 @@ checked_machine() {
 
 found_python() { # the interpreter that the bundle is for
     wanted=$(field python "$manifest")
-    for python in "python3.${wanted#cp3}" python3; do
-        seen=$("$python" -c 'import sys, venv; print("cp%d%d" % sys.version_info[:2])' 2>/dev/null) || continue
-        [ "$seen" != "$wanted" ] || { command -v "$python" && return; }
+    for each in "/usr/bin/python3.${wanted#cp3}" "python3.${wanted#cp3}" python3; do
+        seen=$("$each" -c 'import sys, venv; print("cp%d%d %s" % (*sys.version_info[:2], sys.executable))' 2>/dev/null) ||
+            continue
+        case "$SUPERVISOR $seen" in
+        "systemd $wanted /root/"* | "systemd $wanted /home/"*) ;; # which the unit can't read
+        *" $wanted "*)
+            say "${seen#* }"
+            return
+            ;;
+        esac
     done
-    fail "this bundle is for Python 3.${wanted#cp3}, and here is $(python3 --version 2>&1 || echo none): make bundle" \
+    fail "this bundle is for Python 3.${wanted#cp3}, and here is $(python3 --version 2>&1 || echo none) (one in a" \
+        "home does not count for a service): make bundle" \
         "TARGET=linux_$(field machine "$manifest")-cp3XX"
 }
 
@@ -180,9 +188,9 @@ abandoned() { # the new release, before it was ever in use
 
 checked_files
 checked_machine
+chosen_supervisor
 python=$(found_python)
 checked_folder
-chosen_supervisor
 release=$(field release "$manifest")
 if [ -n "$DRY" ]; then
     say "would install $release into $PREFIX/releases with $python (supervisor: $SUPERVISOR)"

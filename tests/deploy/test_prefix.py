@@ -209,14 +209,6 @@ def test_files_that_are_not_of_the_bundle_are_noticed(prefix, bundle, tmp_path):
     assert "not of it" in ran.stderr
 
 
-def test_an_unwritable_place_is_said(bundle):
-    ran = subprocess.run(
-        [bundle / "install.sh", "--no-systemd", "--prefix", "/proc/vm"], capture_output=True, text=True
-    )
-    assert ran.returncode == 1
-    assert "can't write" in ran.stderr
-
-
 def test_unknown_words_are_wrong_usage(prefix, bundle):
     assert subprocess.run([bundle / "install.sh", "--frobnicate"], capture_output=True).returncode == 2
     assert prefix.deploy("frobnicate").returncode == 2

@@ -248,8 +248,8 @@ def test_it_goes_back_even_if_nobody_listens_any_more(team):
     assert not (team.robot.root / "opt/vm-embedded/releases/4-alone").exists()
 
 
-def test_hung_up_on_it_goes_back(team):
-    team.install_until("watching", *team.bring("4-hup"), signal="HUP")
+def test_told_to_stop_it_goes_back(team):
+    team.install_until("watching", *team.bring("4-term"), signal="TERM")
     team.check("1-first")
     assert not (team.robot.root / "opt/vm-embedded/trial").exists()
 
@@ -284,7 +284,7 @@ def test_a_model_alone_is_exchanged_while_it_runs(team, bundle):
     assert "nothing has changed" in said
     team.robot.root.joinpath("var/tmp/new.onnx").write_bytes((network / "ball-5x4.onnx").read_bytes())
     exchanged = f"while ! [ -e {CURRENT}/etc/.old.onnx ]; do sleep 0.01; done"
-    interrupted = f"{DEPLOY} model /var/tmp/new.onnx & {exchanged}; kill -HUP $!; wait $!"
+    interrupted = f"{DEPLOY} model /var/tmp/new.onnx & {exchanged}; kill -TERM $!; wait $!"
     assert "going back to the old model" in team.robot.run("sh", "-c", interrupted, check=False)[1]
     team.check("1-first")
     assert team.status()["model_sha256"] == now["model_sha256"]
