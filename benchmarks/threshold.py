@@ -3,7 +3,7 @@
     python -m benchmarks.threshold build/networks/ball-best data/soccer
 
 Answers are computed once; each combination of settings then judges them. Prints recall, precision, F1 and false balls a
-picture, best F1 first.
+picture, best F1 first, and those of the default settings last.
 """
 
 from __future__ import annotations
@@ -89,7 +89,10 @@ def main() -> None:
         outcome = scored(pictures, subject, settings).ranking(0.5).at()
         rows.append((outcome.f1, threshold, inside, around, outcome))
     print(f"{len(pictures)} pictures\nthreshold min_inside max_around    F1 recall precision false/picture  an hour")
-    for f1, threshold, inside, around, outcome in sorted(rows, key=lambda row: -row[0])[:20]:
+    best = sorted(rows, key=lambda row: -row[0])[:20]
+    usual = Settings()
+    default = [row for row in rows if row[1:4] == (usual.threshold, usual.min_inside, usual.max_around)]
+    for f1, threshold, inside, around, outcome in [*best, *default]:
         hourly = FRAMES_AN_HOUR * outcome.false_per_picture
         print(
             f"{threshold:9.2f} {inside:10.2f} {around:10.2f} {f1:.3f} {outcome.recall:6.3f} {outcome.precision:9.3f} "
