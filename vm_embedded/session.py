@@ -6,6 +6,11 @@ import os
 from dataclasses import replace
 
 import numpy as np
+
+# Builds from 1.29 on report to their makers over the network, and keep an identifier on disk, unless told not to before
+# they are loaded.
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
+
 import onnxruntime
 from onnxruntime.capi import onnxruntime_pybind11_state as states
 
@@ -16,8 +21,6 @@ from .manifest import SelfTest
 from .mesh import RUNS, Mesh
 from .onnx_file import ModelFile
 from .settings import Settings
-
-onnxruntime.disable_telemetry_events()  # builds that report to their makers would do so from a robot, too
 
 RUNTIME_VERSION: str = onnxruntime.__version__
 
