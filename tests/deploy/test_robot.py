@@ -190,6 +190,19 @@ def test_another_machine_is_refused(team):
     team.check("1-first")
 
 
+def test_a_damaged_wheel_changes_nothing(team):
+    install = team.bring("7-damaged")
+    (wheel,) = (team.robot.root / "var/tmp/7-damaged/wheels").glob("numpy-*.whl")
+    with wheel.open("r+b") as file:
+        file.seek(wheel.stat().st_size // 2)
+        file.write(b"damaged")
+    status, said = team.robot.run(*install, check=False)
+    assert status == 1
+    assert "the bundle is damaged" in said
+    assert wheel.name in said
+    team.check("1-first")
+
+
 def test_a_disk_that_fills_changes_nothing(team):
     memory = str(team.robot.root.parent)
     install = team.bring("7-disk", {"requirements.txt": _from_scratch}, disk_mib="1")
