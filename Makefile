@@ -27,7 +27,7 @@ demo: .venv/runtime ## find the balls in the frames of the repository
 
 test: lint ## lint, types and tests
 	$(BIN)/python deploy/bundle.py --download
-	$(BIN)/python -m pytest --numprocesses $$(( $$(nproc) * 3 / 2 )) --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 lint: .venv/dev ## style and types
 	$(BIN)/ruff check .

@@ -314,7 +314,7 @@ def test_a_recording_that_is_being_written_and_reads_that_hang_do_not_delay_the_
     source, kept = tmp_path / "script.toml", tmp_path / "recordings"
     source.write_text('faults = [{ kind = "hang", at = 8.0, seconds = 100.0 }]\n')
     large = ("--camera-width", 1280, "--camera-height", 960, "--recorder-folder", kept)
-    retry = ("--camera-lost-ms", 200, "--camera-open-ms", 200, "--camera-retry-ms", 10)
+    retry = ("--camera-lost-ms", 500, "--camera-open-ms", 5000, "--camera-retry-ms", 10)
     with running(tmp_path, "--camera", f"fault:{source}", *large, *retry) as found:
         found.wait(lambda: len(found.frames) > 3)
         found.wait_for_state("camera_lost")
