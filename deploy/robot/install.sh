@@ -95,8 +95,7 @@ found_python() { # the interpreter that the bundle is for
         seen=$("$each" -c 'import sys, venv; print("cp%d%d %s" % (*sys.version_info[:2], sys.executable))' 2>/dev/null) ||
             continue
         case "$SUPERVISOR $seen" in
-        "systemd $wanted /root/"* | "systemd $wanted /home/"*) ;; # which the unit can't read
-        *" $wanted "*)
+        "none $wanted "* | "systemd $wanted /usr/"* | "systemd $wanted /opt/"*) # a service can't read homes
             say "${seen#* }"
             return
             ;;
