@@ -23,8 +23,8 @@ import numpy as np
 from vm_embedded import Detector, Orientation, Settings
 from vm_embedded.bench import cold, machine, measure, rss_mib, sgemm_rate, walk
 from vm_embedded.cache import MeshCache
-from vm_embedded.layout import laid_out
-from vm_embedded.mesh import Mesh, ring_mesh
+from vm_embedded.layouts import laid_out
+from vm_embedded.mesh import Mesh
 from vm_embedded.onnx_file import ModelFile
 from vm_embedded.projection import project
 from vm_embedded.shipped import DEFAULT, SHIPPED, model_path
@@ -64,8 +64,8 @@ class Models:
 def mesh_on_screen(detector: Detector, frame: Frame) -> Mesh:
     """The points of a frame, of a mesh at its own height."""
     manifest = detector.manifest
-    mesh = ring_mesh(
-        manifest.mesh_shape, frame.orientation.height, manifest.intersections, manifest.max_distance, manifest.mesh
+    mesh = manifest.model.build(
+        manifest.mesh_shape, frame.orientation.height, manifest.intersections, manifest.max_distance
     )
     seen = project(mesh, frame.orientation.level, frame.lens.for_image(frame.size), frame.size)
     return mesh.part(np.flatnonzero(seen.on_screen))

@@ -7,7 +7,6 @@ user sets.
 
 from __future__ import annotations
 
-import math
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
@@ -17,10 +16,11 @@ import numpy as np
 
 from .arrays import Floats, Mask
 from .footprint import Levels, levels_of
-from .layout import Layout, laid_out
+from .layout import Layout
+from .layouts import laid_out
 from .lens import Lens, Size
 from .manifest import Manifest
-from .mesh import Mesh, ring_mesh
+from .mesh import Mesh
 from .orientation import Orientation, rotation_z
 from .projection import may_be_on_screen
 from .settings import Settings
@@ -97,21 +97,13 @@ class MeshCache:
         return View(kept.layout, kept.levels, height, orientation.level, rotation_z(orientation.yaw))
 
     def mesh_height(self, height: float) -> float:
-        """Height [m] of the mesh that serves a camera height [m].
-
-        The number of rings across an object is proportional to the shape's spacing, so heights whose spacings form a
-        geometric series with ratio (1 + t / k)^2 leave no height farther than t rings from its mesh.
-        """
+        """Height [m] of the mesh that serves a camera height [m], within the tolerance of the settings."""
         tolerance, k = self.settings.height_tolerance, self.manifest.intersections
-        spacing = float(self.shape.spacing(height))
-        if tolerance == 0.0:
-            return height
-        step = 2.0 * math.log1p(tolerance / k)
-        return self.shape.height_of(math.exp(step * round(math.log(spacing) / step)))
+        return self.manifest.model.mesh_height(self.shape, height, k, tolerance)
 
     def _build(self, height: float) -> Mesh:
         manifest = self.manifest
-        return ring_mesh(self.shape, height, manifest.intersections, manifest.max_distance, manifest.mesh)
+        return manifest.model.build(self.shape, height, manifest.intersections, manifest.max_distance)
 
     def _prepare(self, height: float, pitch: int, roll: int, lens: Lens, size: Size) -> Prepared:
         """What orientations of this bucket can bring on screen.

@@ -19,7 +19,6 @@ from .relative import make_relative
 from .sampling import checked_image, sample
 from .session import Session
 from .settings import Settings
-from .shapes import shape_named
 from .shipped import model_path
 
 
@@ -38,7 +37,7 @@ class Detector:
         self.manifest = model.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         self.session = Session(model, self.settings)
         self.cache = MeshCache(self.manifest, self.settings)
-        self.shape = shape_named(self.manifest.shape, self.manifest.object_radius)
+        self.shape = self.manifest.object_shape
 
     @classmethod
     def from_file(cls, path: str | Path, settings: Settings | None = None) -> Detector:
@@ -64,7 +63,9 @@ class Detector:
         lens = lens.for_image(size)
         with _timed(timing, "mesh"):
             view = self.cache.view(orientation, lens, size)
-            rings = self._rings(orientation.height, view.mesh_height)
+            rings = self.manifest.model.rings(
+                self.cache.shape, view.mesh_height, self.manifest.intersections, self.shape, orientation.height
+            )
         layout = view.layout
         with _timed(timing, "project"):
             projected = project(layout, view.rotation, lens, size)
@@ -102,10 +103,6 @@ class Detector:
             threshold=self.settings.threshold,
             timing_ms=timing,
         )
-
-    def _rings(self, height: float, mesh_height: float) -> float:
-        """Mesh rings that cross an object, seen from `height` [m] through a mesh made for `mesh_height` [m]."""
-        return self.manifest.intersections * float(self.shape.spacing(height) / self.cache.shape.spacing(mesh_height))
 
 
 @contextmanager

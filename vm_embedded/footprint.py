@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import Floats
-from .shapes import Shape
+from .shape import Shape
 
 Levels = tuple[npt.NDArray[np.intp], ...]
 """Of each picture, the whole one first and then each half as large as the one before, the points that it colors."""

@@ -14,12 +14,14 @@ import numpy as np
 
 from .arrays import Indices, Singles
 from .errors import InputError, ModelError, unknown
-from .mesh import RING_NEIGHBORS
+from .mesh import MeshModel
+from .mesh_models import MESH_MODELS
 from .relative import COLORINGS
-from .shapes import SHAPES, Shape, shape_named
+from .shape import Shape
+from .shapes import SHAPES, shape_named
 
 METADATA_KEY = "visual_mesh"
-FORMAT_VERSION = 4
+FORMAT_VERSION = 5
 
 KINDS = ("object", "upright", "area", "background")
 """What a class is. object: has the mesh's shape and is located. upright, area: points with bearings. background."""
@@ -27,8 +29,9 @@ KINDS = ("object", "upright", "area", "background")
 EDGES = ("hard", "same")
 """Where a missing neighbor leads. hard: to the off-screen point, whose input is -1. same: to the point itself."""
 
-LAYOUTS = ("plain", "runs")
-"""How the network takes its points. plain: as rows. runs: as columns, ring by ring; see layout.py."""
+LAYOUTS = ("plain", "runs", "lattice")
+"""How the network takes its points. plain: as rows. runs: as columns, ring by ring. lattice: as a picture; see
+layout.py."""
 
 POINT_SAMPLINGS = ("bilinear", "footprint")
 """What color a point has. bilinear: of its place, between four pixels. footprint: of its surroundings; footprint.py."""
@@ -53,11 +56,15 @@ class ObjectClass:
 
 @dataclass(frozen=True, eq=False)
 class SelfTest:
-    """A small graph and its answer: points (n + 1, 3), neighbors (n + 1, N), probabilities (n + 1, C)."""
+    """A small graph and its answer: points (n + 1, 3), neighbors (n + 1, N), probabilities (n + 1, C).
+
+    cells (n, 2): of points on a lattice their columns and rows, as in Mesh, else None.
+    """
 
     points: Singles
     neighbors: Indices
     probabilities: Singles
+    cells: Indices | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Nested lists, with as many digits as the check needs."""
@@ -65,6 +72,7 @@ class SelfTest:
             "points": np.round(self.points.astype(float), 4).tolist(),
             "neighbors": self.neighbors.tolist(),
             "probabilities": np.round(self.probabilities.astype(float), 6).tolist(),
+            "cells": None if self.cells is None else self.cells.tolist(),
         }
 
     @classmethod
@@ -75,6 +83,7 @@ class SelfTest:
                 np.array(data["points"], dtype=np.float32),
                 np.array(data["neighbors"], dtype=np.int32),
                 np.array(data["probabilities"], dtype=np.float32),
+                None if data["cells"] is None else np.array(data["cells"], dtype=np.int32).reshape(-1, 2),
             )
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise ModelError(f"self-test in the model file can't be read: {error}") from error
@@ -85,6 +94,10 @@ class SelfTest:
             raise ModelError("self-test in the model file has arrays of different lengths")
         if test.neighbors.size and not 0 <= test.neighbors.min() <= test.neighbors.max() < rows:
             raise ModelError("self-test in the model file has neighbors that are no points")
+        if test.cells is not None:
+            most = abs(test.cells).max(initial=0)
+            if len(test.cells) != rows - 1 or most > 1000 or len(np.unique(test.cells, axis=0)) != rows - 1:
+                raise ModelError("self-test in the model file has cells that are no places of its points")
         return test
 
 
@@ -92,13 +105,14 @@ class SelfTest:
 class Manifest:
     """What the runtime must know to build the mesh and read the answers of a network.
 
-    shape: circle or sphere. radius: the object's radius that the mesh is made for [m]. object_radius: that of the
-    real object [m]. any_radius: whether the network knows objects of any radius, so that the mesh is made for the real
-    one's, whatever it is. intersections: rings across an object of `radius`. mesh: ring4, ring6 or ring8. max_distance
-    of the mesh [m]. edge: one of EDGES. classes: in the order of the network's outputs. layout: one of LAYOUTS; runs
-    needs edge hard. operations: multiplications and additions for each point. channels, scale: a point's input is its
-    color in this order, times scale. sampling: one of POINT_SAMPLINGS. colors: one of COLORINGS. provenance: who made
-    it from what. Raises ModelError for values that this runtime does not know.
+    shape: one of SHAPES. radius: the object's radius that the mesh is made for [m]. object_radius: that of the real
+    object [m]. object_height: of a cylinder [m], else 0. any_radius: whether the network knows objects of any radius,
+    so that the mesh is made for the real one's, whatever it is. intersections: rings across an object of `radius`.
+    mesh: one of MESH_MODELS. max_distance of the mesh [m]. edge: one of EDGES. classes: in the order of the network's
+    outputs. layout: one of LAYOUTS; runs and lattice need edge hard. operations: multiplications and additions for each
+    point. channels, scale: a point's input is its color in this order, times scale. sampling: one of POINT_SAMPLINGS.
+    colors: one of COLORINGS. provenance: who made it from what. Raises ModelError for values that this runtime does not
+    know.
     """
 
     shape: str
@@ -109,6 +123,7 @@ class Manifest:
     max_distance: float
     edge: str
     classes: tuple[ObjectClass, ...]
+    object_height: float = 0.0
     any_radius: bool = False
     self_test: SelfTest | None = None
     layout: str = "plain"
@@ -122,7 +137,7 @@ class Manifest:
     def __post_init__(self) -> None:
         choices = {
             "shape": tuple(SHAPES),
-            "mesh": tuple(RING_NEIGHBORS),
+            "mesh": tuple(MESH_MODELS),
             "edge": EDGES,
             "layout": LAYOUTS,
             "channels": ("rgb",),
@@ -132,12 +147,15 @@ class Manifest:
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
                 raise ModelError(unknown(f"{name} in the model's manifest", getattr(self, name), allowed))
-        if self.layout == "runs" and self.edge != "hard":
-            raise ModelError(f"layout runs needs edge hard; for edge {self.edge} there is layout plain")
+        if self.layout != "plain" and self.edge != "hard":
+            raise ModelError(f"layout {self.layout} needs edge hard; for edge {self.edge} there is layout plain")
+        if self.layout == "lattice" and MESH_MODELS[self.mesh].steps is None:
+            raise ModelError(f"layout lattice is for grids, whose neighbors are fixed steps away; {self.mesh} is none")
         for name in ("radius", "object_radius", "intersections", "max_distance", "scale"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= _LARGEST:
                 raise ModelError(f"{name} in the model's manifest must be a number above 0, not {value!r}")
+        self._check_shape()
         if isinstance(self.operations, bool) or not isinstance(self.operations, int) or self.operations < 0:
             raise ModelError(f"operations in the model's manifest must be a whole number, not {self.operations!r}")
         if not isinstance(self.any_radius, bool):
@@ -147,6 +165,20 @@ class Manifest:
         names = [each.name for each in self.classes]
         if not names or len(set(names)) != len(names):
             raise ModelError(f"classes in the model's manifest must be one or more different names, not {names}")
+
+    def _check_shape(self) -> None:
+        tall = self.object_height
+        if isinstance(tall, bool) or not isinstance(tall, int | float) or not 0 <= tall <= _LARGEST:
+            raise ModelError(f"object_height in the model's manifest must be a number of at least 0, not {tall!r}")
+        if (self.shape == "cylinder") != (tall > 0):
+            raise ModelError(f"a cylinder has an object_height and no other shape has, but {self.shape} has {tall:g} m")
+        if self.mesh != "wall6":
+            return
+        if self.shape != "cylinder" or self.sampling != "bilinear" or any(e.kind == "object" for e in self.classes):
+            raise ModelError(
+                "mesh wall6 is for shape cylinder, sampling bilinear and classes of other kinds than object: "
+                "points above the horizon tell of a direction, not of a place on the plane"
+            )
 
     def used_for(self, object_radius: float | None, max_distance: float | None) -> Manifest:
         """The manifest for real objects of a radius [m] and a mesh that reaches so far [m]; None for what it says."""
@@ -168,12 +200,22 @@ class Manifest:
     @property
     def neighbors(self) -> int:
         """Neighbors of each point, N."""
-        return RING_NEIGHBORS[self.mesh]
+        return self.model.neighbors
+
+    @property
+    def model(self) -> MeshModel:
+        """How points are placed and linked."""
+        return MESH_MODELS[self.mesh]
 
     @property
     def mesh_shape(self) -> Shape:
         """The shape that the mesh is made for."""
-        return shape_named(self.shape, self.radius)
+        return shape_named(self.shape, self.radius, self.object_height)
+
+    @property
+    def object_shape(self) -> Shape:
+        """The shape of the real object."""
+        return shape_named(self.shape, self.object_radius, self.object_height)
 
     def as_json(self) -> str:
         """The manifest as it stands in the model file."""

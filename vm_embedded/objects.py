@@ -22,7 +22,7 @@ from .manifest import ObjectClass
 from .mesh import Graph
 from .projection import Projection, along, to_camera
 from .settings import Settings
-from .shapes import Shape, tangents
+from .shape import Shape, tangents
 
 _MOST_CLUSTERS = 100
 """Clusters that are looked at, largest first: a frame of noise must not cost a second."""

@@ -16,9 +16,10 @@ from onnxruntime.capi import onnxruntime_pybind11_state as states
 
 from .arrays import Mask, Singles
 from .errors import ModelError, one_line
-from .layout import Layout, laid_out
+from .layout import Layout
+from .layouts import laid_out
 from .manifest import SelfTest
-from .mesh import RUNS, Mesh
+from .mesh import Mesh
 from .onnx_file import ModelFile
 from .settings import Settings
 
@@ -78,7 +79,7 @@ class Session:
 
     def answer(self, test: SelfTest) -> Singles:
         """Probabilities (n, C) of an example's points."""
-        mesh = Mesh(np.zeros((len(test.points) - 1, 3)), test.neighbors)
+        mesh = Mesh(np.zeros((len(test.points) - 1, 3)), test.neighbors, test.cells)
         # The example's missing neighbors are the off-screen point, whatever the network was trained with.
         layout = laid_out(mesh, replace(self.model.manifest, edge="hard"))
         points = layout.points()
@@ -92,6 +93,8 @@ class Session:
             return
         if test.neighbors.shape[1] != self.model.manifest.neighbors:
             raise ModelError(f"{self.model.path}: self-test is for {test.neighbors.shape[1]} neighbors a point")
+        if self.model.manifest.layout == "lattice" and test.cells is None:
+            raise ModelError(f"{self.model.path}: self-test does not say where its points lie in the lattice")
         answer, expected = self.answer(test), test.probabilities[:-1]
         if answer.shape != expected.shape:
             raise ModelError(f"{self.model.path}: self-test answered in shape {answer.shape}")
@@ -108,7 +111,9 @@ class Session:
         expected = {"points": ("tensor(float)", [3]), "probabilities": ("tensor(float)", [len(manifest.classes)])}
         if manifest.layout == "plain":
             expected["neighbors"] = ("tensor(int32)", [manifest.neighbors])
+        elif manifest.layout == "runs":
+            expected["columns"] = ("tensor(int64)", [len(manifest.model.runs)])
         else:
-            expected["columns"] = ("tensor(int64)", [len(RUNS[manifest.mesh])])
+            expected["shown"] = ("tensor(bool)", [])
         if found != expected:
             raise ModelError(f"{self.model.path}: its inputs and outputs are {found}, its manifest asks for {expected}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,12 +13,14 @@ import vm_embedded
 from vm_embedded.arrays import Indices, Singles
 from vm_embedded.errors import ModelError
 from vm_embedded.files import written_beside
+from vm_embedded.grids import lattice_neighbors
 from vm_embedded.manifest import Manifest, SelfTest
 from vm_embedded.onnx_file import ModelFile
 from vm_embedded.session import Session
 from vm_embedded.settings import Settings
 
 from .checkpoint import Checkpoint
+from .lattice_graph import lattice_graph
 from .network import Network
 from .plain_graph import plain_graph
 from .runs_graph import runs_graph
@@ -48,13 +51,13 @@ def fastest_layout(checkpoint: Checkpoint) -> str:
 def build(network: Network | SecondLook, manifest: Manifest) -> bytes:
     """The bytes of an ONNX model in the manifest's layout: stock operators, the neighbor indices an input.
 
-    Raises ModelError for a second look in another layout than runs.
+    Raises ModelError for a second look in another layout than runs, and for a layout that the mesh can't have.
     """
     if manifest.layout == "runs":
         return runs_graph(network, manifest)
     if isinstance(network, SecondLook):
         raise ModelError(f"a network with a second look is written in layout runs, not {manifest.layout}")
-    return plain_graph(network, manifest)
+    return lattice_graph(network, manifest) if manifest.layout == "lattice" else plain_graph(network, manifest)
 
 
 def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) -> float:
@@ -65,15 +68,14 @@ def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) 
     """
     layout = layout or fastest_layout(checkpoint)
     network = checkpoint.network.eval()
-    test = _example(network, points=12, seed=0)
     provenance = {**checkpoint.manifest.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"}
     manifest = replace(
         checkpoint.manifest,
         layout=layout,
         operations=network.operations,
-        self_test=test,
         provenance=provenance,
     )
+    manifest = replace(manifest, self_test=_example(network, manifest, points=12, seed=0))
     content = build(network, manifest)
     difference = largest_difference(content, network, manifest)
     if not difference <= LARGEST_DIFFERENCE:
@@ -90,18 +92,28 @@ def largest_difference(content: bytes, network: Network | SecondLook, manifest: 
     session = Session(ModelFile(Path("the new model"), content, replace(manifest, self_test=None), ""), Settings())
     worst = 0.0
     for seed, points in enumerate(_CHECKED_POINTS):
-        test = _example(network, points, seed)
+        test = _example(network, manifest, points, seed)
         worst = max(worst, float(np.abs(session.answer(test) - test.probabilities[:-1]).max()))
     return worst
 
 
-def _example(network: Network | SecondLook, points: int, seed: int) -> SelfTest:
-    """Random colors on a random graph of `points` points, rounded as the manifest does, and torch's answer."""
+def _example(network: Network | SecondLook, manifest: Manifest, points: int, seed: int) -> SelfTest:
+    """Random colors on a random graph of `points` points, rounded as the manifest does, and torch's answer.
+
+    For layout lattice the graph is a random part of a square of it.
+    """
     random = np.random.default_rng(seed)
     colors: Singles = np.full((points + 1, 3), -1.0, dtype=np.float32)
     colors[:-1] = np.round(random.random((points, 3)), 4)
     neighbors: Indices = random.integers(0, points + 1, (points + 1, network.shape.neighbors)).astype(np.int32)
     neighbors[-1] = points
+    cells: Indices | None = None
+    if manifest.layout == "lattice":
+        assert manifest.model.steps is not None  # the graph is written
+        side = math.ceil(math.sqrt(1.5 * points))
+        chosen = np.sort(random.choice(side * side, points, replace=False))
+        cells = np.stack([chosen % side, chosen // side], axis=1).astype(np.int32)
+        neighbors = lattice_neighbors(cells, manifest.model.steps)
     with torch.inference_mode():
         answer = network(torch.from_numpy(colors), torch.from_numpy(neighbors)).numpy()
-    return SelfTest(colors, neighbors, answer)
+    return SelfTest(colors, neighbors, answer, cells)

@@ -21,7 +21,7 @@ from torch import nn
 from vm_embedded.errors import InputError, VisualMeshError, one_line, unknown
 from vm_embedded.files import written_beside
 from vm_embedded.manifest import Manifest, ObjectClass
-from vm_embedded.mesh import RING_NEIGHBORS
+from vm_embedded.mesh_models import MESH_MODELS
 
 from .checkpoint import Checkpoint
 from .network import Dense, GraphConvolution, Network, SeparableConvolution
@@ -91,9 +91,9 @@ def read_reference(path: str | Path, overrides: Overrides) -> Checkpoint:
 
 def _checkpoint(data: Mapping[str, Any], overrides: Overrides, provenance: dict[str, str]) -> Checkpoint:
     geometry, model = data["geometry"], str(data["mesh"]).lower()
-    if model not in RING_NEIGHBORS:
-        raise InputError(unknown("mesh", model, RING_NEIGHBORS))
-    network = _network(data["network"], RING_NEIGHBORS[model])
+    if model not in MESH_MODELS:
+        raise InputError(unknown("mesh", model, MESH_MODELS))
+    network = _network(data["network"], MESH_MODELS[model].neighbors)
     radius = float(geometry["radius"]) if overrides.radius is None else overrides.radius
     intersections = float(geometry["intersections"])
     if intersections < 1.0 and overrides.intersections is None:

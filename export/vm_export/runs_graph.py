@@ -11,13 +11,13 @@ import numpy as np
 
 from vm_embedded.arrays import Floats
 from vm_embedded.manifest import METADATA_KEY, Manifest
-from vm_embedded.mesh import RUNS, SELF
+from vm_embedded.mesh import SELF, Runs
 
 from .column_layers import column_layers
 from .graph import FLOAT, INT64, Graph
 from .network import Network
 from .second_look import SecondLook
-from .second_look_graph import Groups, second_look
+from .second_look_graph import second_look
 
 
 def runs_graph(network: Network | SecondLook, manifest: Manifest) -> bytes:
@@ -27,7 +27,7 @@ def runs_graph(network: Network | SecondLook, manifest: Manifest) -> bytes:
     float32.
     """
     graph = Graph()
-    groups = RUNS[manifest.mesh]
+    groups = manifest.model.runs
 
     def convolve(name: str, x: str, kernel: Floats) -> str:
         return _along_runs(graph, name, x, kernel, groups)
@@ -45,7 +45,7 @@ def runs_graph(network: Network | SecondLook, manifest: Manifest) -> bytes:
     )
 
 
-def _along_runs(graph: Graph, name: str, x: str, kernel: Floats, groups: Groups) -> str:
+def _along_runs(graph: Graph, name: str, x: str, kernel: Floats, groups: Runs) -> str:
     """Sums (outputs, m) of a convolution over x (inputs, m)."""
     outputs, _, inputs = kernel.shape
     # In memory x, x and x without its last three columns, row after row. Cut into rows one shorter than x, each row

@@ -8,18 +8,15 @@ from __future__ import annotations
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.layout import GAP
-from vm_embedded.mesh import SELF
+from vm_embedded.mesh import SELF, Runs
+from vm_embedded.runs_layout import GAP
 
 from .column_layers import Convolve, column_layers
 from .graph import FLOAT, INT64, Graph
 from .second_look import Gate, SecondLook
 
-Groups = tuple[tuple[int, ...], ...]
-"""Neighbors that follow each other in memory (mesh.RUNS)."""
 
-
-def second_look(graph: Graph, network: SecondLook, answers: str, convolve: Convolve, groups: Groups) -> str:
+def second_look(graph: Graph, network: SecondLook, answers: str, convolve: Convolve, groups: Runs) -> str:
     """Write what comes after the first network's `answers` (C, m); return the probabilities (C, m).
 
     convolve: a convolution over all slots.
@@ -57,7 +54,7 @@ def _worth(graph: Graph, gate: Gate, answers: str, convolve: Convolve, places: i
     return worth
 
 
-def _part(graph: Graph, worth: str, groups: Groups) -> tuple[str, str]:
+def _part(graph: Graph, worth: str, groups: Runs) -> tuple[str, str]:
     """The slots (k,) of the part's points, the off-screen point first, and the places (N + 1 times k,) in it where each
     of them finds itself and its neighbors, those of the same kind together."""
     one = graph.constant("look.one", [1])
@@ -88,7 +85,7 @@ def _part(graph: Graph, worth: str, groups: Groups) -> tuple[str, str]:
     return slots, graph.node("Reshape", [places, graph.constant("look.places.shape", [-1])], "look.places")
 
 
-def _places(groups: Groups) -> tuple[np.ndarray, np.ndarray]:
+def _places(groups: Runs) -> tuple[np.ndarray, np.ndarray]:
     """Of each place of a kernel, self first: its group, and how far it is from the group's middle."""
     found = {
         0 if neighbor == SELF else 1 + neighbor: (number, shift)

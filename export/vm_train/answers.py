@@ -18,7 +18,8 @@ from vm_embedded.arrays import Floats, Singles
 from vm_embedded.detections import Detection
 from vm_embedded.detector import Detector
 from vm_embedded.errors import InputError
-from vm_embedded.layout import Layout, PlainLayout, laid_out
+from vm_embedded.layout import Layout, PlainLayout
+from vm_embedded.layouts import laid_out
 from vm_embedded.manifest import Manifest
 from vm_embedded.mesh import Mesh
 from vm_embedded.objects import Scene, find_objects
@@ -27,7 +28,6 @@ from vm_embedded.orientation import Orientation, rotation_z
 from vm_embedded.projection import Projection
 from vm_embedded.session import Session
 from vm_embedded.settings import Settings
-from vm_embedded.shapes import shape_named
 from vm_export.grid import VISUAL, Grid
 
 from .graphs import OFF_SCREEN, color, plane_distances, seen_points
@@ -178,7 +178,7 @@ def scene_of(picture: Picture, shown: Projection[Mesh], manifest: Manifest) -> S
     """Where objects are sought among the points of a picture's own mesh."""
     height, width = picture.labels.shape
     orientation = _orientation(picture)
-    shape = shape_named(manifest.shape, manifest.object_radius)
+    shape = manifest.object_shape
     above = orientation.height
     return Scene(
         shape=shape,
@@ -189,5 +189,5 @@ def scene_of(picture: Picture, shown: Projection[Mesh], manifest: Manifest) -> S
         size=(width, height),
         projected=shown,
         order=np.arange(len(shown), dtype=np.int32),
-        rings=manifest.intersections * float(shape.spacing(above) / manifest.mesh_shape.spacing(above)),
+        rings=manifest.model.rings(manifest.mesh_shape, above, manifest.intersections, shape, above),
     )

@@ -10,7 +10,7 @@ from typing import Any
 from vm_embedded.entries import check_entries, number, one_of, share
 from vm_embedded.errors import InputError
 from vm_embedded.manifest import KINDS, POINT_SAMPLINGS, Manifest, ObjectClass
-from vm_embedded.mesh import RING_NEIGHBORS
+from vm_embedded.mesh_models import MESH_MODELS
 from vm_embedded.relative import COLORINGS
 from vm_embedded.shapes import SHAPES
 from vm_export.grid import GRIDS, Grid
@@ -108,6 +108,7 @@ class MeshSettings:
 
     shape: str = one_of(tuple(SHAPES), "sphere", "shape of the object")
     radius: float = number(0.095, "radius of the object, for which the mesh is made", "m", (1e-3, 100.0))
+    object_height: float = number(0.0, "height of a cylinder; of all other shapes 0", "m", (0.0, 100.0))
     radius_of: str = one_of(
         ("all", "scene"),
         "all",
@@ -115,7 +116,7 @@ class MeshSettings:
         "from the sceneX.json that vm-synth wrote: one network then suits balls of any size",
     )
     intersections: float = number(4.0, "rings that cross an object, the paper's k", "", (0.1, 100.0))
-    model: str = one_of(tuple(RING_NEIGHBORS), "ring6", "which points are neighbors")
+    model: str = one_of(tuple(MESH_MODELS), "ring6", "how points are placed and linked (docs/meshes.md)")
     sampling: str = one_of(
         POINT_SAMPLINGS,
         "bilinear",
@@ -138,7 +139,7 @@ class MeshSettings:
 
     def __post_init__(self) -> None:
         check_entries(self)
-        if self.grid == "hexagonal" and RING_NEIGHBORS[self.model] != 6:
+        if self.grid == "hexagonal" and MESH_MODELS[self.model].neighbors != 6:
             raise InputError(f"a hexagonal grid has six neighbors, as model ring6, not {self.model}")
 
 
@@ -188,6 +189,7 @@ class TrainConfiguration:
             shape=mesh.shape,
             radius=mesh.radius,
             object_radius=mesh.radius,
+            object_height=mesh.object_height,
             intersections=mesh.intersections,
             mesh=mesh.model,
             max_distance=mesh.max_distance,
@@ -213,5 +215,5 @@ class TrainConfiguration:
             len(self.classes.colors),
             network.activation,
             kind=network.kind,
-            neighbors=RING_NEIGHBORS[self.mesh.model],
+            neighbors=MESH_MODELS[self.mesh.model].neighbors,
         )

@@ -14,7 +14,7 @@ from vm_embedded.footprint import alike, levels_of
 from vm_embedded.lens import Lens, Size
 from vm_embedded.lens_file import LensFile
 from vm_embedded.manifest import Manifest
-from vm_embedded.mesh import Mesh, ring_mesh
+from vm_embedded.mesh import Mesh
 from vm_embedded.projection import Projection, along, project
 from vm_embedded.relative import make_relative
 from vm_embedded.sampling import sample
@@ -63,9 +63,7 @@ def seen_points(lens: LensFile, size: Size, manifest: Manifest, grid: Grid = VIS
     orientation = lens.orientation
     assert orientation is not None  # read_picture has seen to it
     fitted = lens.lens.for_image(size)
-    mesh = ring_mesh(
-        manifest.mesh_shape, orientation.height, manifest.intersections, manifest.max_distance, manifest.mesh
-    )
+    mesh = manifest.model.build(manifest.mesh_shape, orientation.height, manifest.intersections, manifest.max_distance)
     mesh = _ahead(mesh, orientation.level, fitted, size)
     if grid.kind == "visual":
         return project(mesh, orientation.level, fitted, size).visible

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from vm_embedded.arrays import Floats, Mask, Number, frozen
 from vm_embedded.errors import InputError
 from vm_embedded.lens import Equisolid, Lens, Size
-from vm_embedded.mesh import Mesh, ring_mesh
+from vm_embedded.mesh import Mesh
+from vm_embedded.mesh_models import build_mesh
 from vm_embedded.orientation import Orientation
 from vm_embedded.projection import project
 from vm_embedded.shapes import Sphere
@@ -187,7 +188,7 @@ def _projected(rays: Floats, camera: Camera) -> tuple[Floats, Mask]:
 
 
 def _rings_on_screen(camera: Camera, ball: Sphere, intersections: float) -> Mesh:
-    mesh = ring_mesh(ball, camera.orientation.height, intersections, _MAX_DISTANCE)
+    mesh = build_mesh(ball, camera.orientation.height, intersections, _MAX_DISTANCE)
     visible = project(mesh, camera.orientation.level, camera.lens, camera.size).visible.graph
     if len(visible) == 0:
         raise InputError("the camera shows nothing of the Visual Mesh")

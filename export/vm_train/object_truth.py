@@ -14,7 +14,7 @@ import numpy as np
 from vm_embedded.arrays import Floats, Mask
 from vm_embedded.errors import InputError
 from vm_embedded.manifest import Manifest
-from vm_embedded.shapes import Shape, shape_named
+from vm_embedded.shape import Shape
 from vm_synth.outlines import outline, polygon_area
 
 from .overlaps import TrueObject, coverage
@@ -74,7 +74,7 @@ def true_objects(picture: Picture, scene: SceneTruth | None, manifest: Manifest)
     Of class ball it is what the scene says, with its whole outline, if there is a scene. Of all others each connected
     piece of the mask is an object of the manifest's size, which stands where the mean ray through it meets the plane.
     """
-    shape = shape_named(manifest.shape, manifest.object_radius)
+    shape = manifest.object_shape
     found: dict[str, list[TrueObject]] = {}
     for number, each in enumerate(manifest.classes):
         if each.kind != "object":

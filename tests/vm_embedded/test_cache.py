@@ -9,7 +9,7 @@ from vm_embedded.cache import MeshCache
 from vm_embedded.errors import GeometryError
 from vm_embedded.lens import Equidistant, Equisolid, Rectilinear
 from vm_embedded.manifest import LAYOUTS, Manifest, ObjectClass
-from vm_embedded.mesh import ring_mesh
+from vm_embedded.mesh_models import build_mesh
 from vm_embedded.orientation import Orientation
 from vm_embedded.projection import project
 from vm_embedded.settings import Settings
@@ -38,7 +38,7 @@ def manifest(**changes):
 def built(cache, height):
     """The whole mesh for a height, without the cache."""
     facts = cache.manifest
-    return ring_mesh(facts.mesh_shape, height, facts.intersections, facts.max_distance, facts.mesh)
+    return build_mesh(facts.mesh_shape, height, facts.intersections, facts.max_distance, facts.mesh)
 
 
 def assert_same_as_without(cache, orientation, lens, size):

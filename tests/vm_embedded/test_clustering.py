@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.clustering import clusters, graph_diameter, wider_than
-from vm_embedded.mesh import Mesh, ring_mesh
+from vm_embedded.mesh import Mesh
+from vm_embedded.mesh_models import build_mesh
 from vm_embedded.shapes import Sphere
 
 from .strategies import reals, seeds
@@ -104,7 +105,7 @@ def test_every_positive_point_is_in_exactly_one_cluster(graph):
 
 @given(reals(0.3, 1.5), reals(0.05, 0.6), seeds)
 def test_clusters_of_a_ring_mesh_are_its_connected_components(height, share, seed):
-    mesh = ring_mesh(Sphere(0.1), height, 2.0, 1.5)
+    mesh = build_mesh(Sphere(0.1), height, 2.0, 1.5)
     members = np.flatnonzero(np.random.default_rng(seed).random(len(mesh)) < share)
     found = clusters(mesh, members)
     assert sorted(part.tolist() for part in found) == sorted(plain_components(mesh.neighbors, members))
@@ -133,7 +134,7 @@ def test_points_linked_through_a_negative_one_are_not_connected():
 
 
 def test_nothing_positive_is_no_cluster():
-    mesh = ring_mesh(Sphere(0.1), 0.8, 1.0, 1.0)
+    mesh = build_mesh(Sphere(0.1), 0.8, 1.0, 1.0)
     nothing = np.array([], dtype=np.intp)
     assert clusters(mesh, nothing) == []
     assert clusters(linked(np.zeros((1, 6), dtype=np.int32)), nothing) == []
@@ -158,7 +159,7 @@ def test_the_diameter_of_a_chain_is_its_length(count, closed, seed):
     assert graph_diameter(linked(neighbors), np.arange(count), limit=100) == expected
 
 
-MESH = ring_mesh(Sphere(0.1), 0.8, 4.0, 2.0)
+MESH = build_mesh(Sphere(0.1), 0.8, 4.0, 2.0)
 
 
 def disk(width, random):

@@ -13,15 +13,21 @@ from onnx import helper
 import vm_embedded
 from tests.drawn_scenes import CHECKPOINT, FOLDER, IMAGES, MODEL
 from vm_embedded import Detector, GeometryError, InputError, ModelError, Orientation, Settings, read_lens_file
-from vm_embedded.layout import PlainLayout, RunsLayout, laid_out
-from vm_embedded.manifest import LAYOUTS, METADATA_KEY
+from vm_embedded.layout import PlainLayout
+from vm_embedded.layouts import laid_out
+from vm_embedded.manifest import METADATA_KEY
 from vm_embedded.mesh import Mesh
+from vm_embedded.mesh_models import MESH_MODELS
 from vm_embedded.onnx_file import read_model
+from vm_embedded.runs_layout import RunsLayout
 from vm_embedded.sources import read_image
 from vm_export.checkpoint import Checkpoint
 from vm_export.onnx_graph import export
 
-in_both_layouts = pytest.mark.parametrize("layout", LAYOUTS)
+RING_LAYOUTS = ("plain", "runs")
+"""Layouts of a network for rings."""
+
+in_both_layouts = pytest.mark.parametrize("layout", RING_LAYOUTS)
 
 
 @pytest.fixture(scope="module")
@@ -33,9 +39,9 @@ def detector():
 def models(tmp_path_factory):
     """The drawn frames' network in every layout."""
     folder = tmp_path_factory.mktemp("models")
-    for layout in LAYOUTS:
+    for layout in RING_LAYOUTS:
         export(Checkpoint.load(CHECKPOINT), folder / f"{layout}.onnx", layout)
-    return {layout: folder / f"{layout}.onnx" for layout in LAYOUTS}
+    return {layout: folder / f"{layout}.onnx" for layout in RING_LAYOUTS}
 
 
 def frame(index=0):
@@ -215,7 +221,7 @@ def test_a_self_test_of_another_mesh_is_refused(models, layout, width, tmp_path)
 
 @in_both_layouts
 def test_a_network_with_other_inputs_than_its_manifest_is_refused(models, layout, tmp_path):
-    (other,) = set(LAYOUTS) - {layout}
+    (other,) = set(RING_LAYOUTS) - {layout}
     for entries in ({"mesh": "ring8"}, {"layout": other}):
         with pytest.raises(ModelError, match="inputs and outputs"):
             Detector.from_file(changed(tmp_path / "model.onnx", claim(**entries), models[layout]))
@@ -260,7 +266,7 @@ def small_mesh():
 @in_both_layouts
 def test_neighbors_out_of_range_are_an_error_and_not_a_crash(models, layout):
     session = Detector.from_file(models[layout]).session
-    broken = Broken(small_mesh(), "hard") if layout == "plain" else BrokenRuns(small_mesh(), "ring6")
+    broken = Broken(small_mesh(), "hard") if layout == "plain" else BrokenRuns(small_mesh(), MESH_MODELS["ring6"].runs)
     points = broken.points()
     points[:] = 0.0
     with pytest.raises(ModelError, match="can't run"):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.footprint import alike, levels_of
-from vm_embedded.mesh import ring_mesh
+from vm_embedded.mesh_models import build_mesh
 from vm_embedded.sampling import SAMPLINGS, checked_image, sample
 from vm_embedded.shapes import Sphere
 
@@ -15,7 +15,7 @@ spheres = st.builds(Sphere, st.floats(0.03, 0.12))
 
 @given(spheres, st.floats(0.4, 2.0), st.floats(2.0, 6.0), st.floats(50.0, 3000.0))
 def test_levels_follow_the_distance_between_rings(shape, height, intersections, scale):
-    mesh = ring_mesh(shape, height, intersections, 5.0)
+    mesh = build_mesh(shape, height, intersections, 5.0)
     levels = levels_of(mesh.rays, shape, height, intersections, scale)
     assert sorted(np.concatenate(levels).tolist()) == list(range(len(mesh)))
     inclination = np.arccos(np.clip(-mesh.rays[:, 2], -1.0, 1.0))

@@ -1,4 +1,4 @@
-"""Both layouts give the same answers, torch's, and runs lie where they say they do."""
+"""All layouts give the same answers, torch's, and runs lie where they say they do."""
 
 import math
 from pathlib import Path
@@ -10,13 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vm_embedded.cache import MeshCache
-from vm_embedded.layout import PlainLayout, RunsLayout, laid_out
+from vm_embedded.layout import PlainLayout
+from vm_embedded.layouts import laid_out
 from vm_embedded.lens import Equisolid, Rectilinear
 from vm_embedded.manifest import LAYOUTS, Manifest, ObjectClass
-from vm_embedded.mesh import RING_NEIGHBORS, RUNS, SELF, Mesh, ring_mesh
+from vm_embedded.mesh import SELF, Mesh
+from vm_embedded.mesh_models import MESH_MODELS, build_mesh
 from vm_embedded.onnx_file import ModelFile
 from vm_embedded.orientation import Orientation
 from vm_embedded.projection import project
+from vm_embedded.runs_layout import RunsLayout
 from vm_embedded.session import Session
 from vm_embedded.settings import Settings
 from vm_embedded.shapes import Circle, Sphere
@@ -29,7 +32,10 @@ from .strategies import SIZE, random_direction, reals, rotation, seeds
 LARGEST_LOGIT = 2.0
 """Beyond it a probability has too few digits to tell its logit to 1e-5."""
 
-models = st.sampled_from(sorted(RING_NEIGHBORS))
+MODELS = ["ring4", "ring6", "ring8", "cap6", "xygrid4", "xmgrid6", "xygrid8"]
+"""Of every arrangement and number of neighbors one; those with equal neighbors are laid out alike."""
+
+models = st.sampled_from(MODELS)
 kinds = st.sampled_from(["convolution", "separable", "dense"])
 activations = st.sampled_from(sorted(ACTIVATIONS))
 heads = st.sampled_from(
@@ -41,7 +47,7 @@ heads = st.sampled_from(
 def network_shapes(draw, model):
     first = Layer(draw(st.sampled_from(["convolution", "separable"])), draw(st.integers(1, 8)), draw(activations))
     inner = draw(st.lists(st.builds(Layer, kinds, st.integers(1, 8), activations), max_size=4))
-    return NetworkShape((first, *inner, Layer(draw(kinds), *draw(heads))), RING_NEIGHBORS[model])
+    return NetworkShape((first, *inner, Layer(draw(kinds), *draw(heads))), MESH_MODELS[model].neighbors)
 
 
 def network_of(shape, seed):
@@ -95,7 +101,7 @@ def ring_meshes(draw, model):
     """A mesh and which of its points some camera sees: of the whole mesh, or of what a bucket holds."""
     random = np.random.default_rng(draw(seeds))
     shape, height = draw(st.sampled_from([Sphere(0.1), Circle(0.1)])), draw(reals(0.4, 1.2))
-    mesh = ring_mesh(shape, height, draw(reals(0.5, 2.5)), draw(reals(0.3, 2.5)), model)
+    mesh = build_mesh(shape, height, draw(reals(0.5, 2.5)), draw(reals(0.3, 2.5)), model)
     pitch, roll = draw(st.sampled_from(sorted(VIEWS.values())))
     focal = draw(reals(120.0, 500.0))
     lens = draw(st.sampled_from([Equisolid(focal_length=focal, fov=2.6), Rectilinear(focal_length=focal, fov=2.0)]))
@@ -158,13 +164,18 @@ def _centered(logits):
     return logits - logits.mean(axis=1, keepdims=True)
 
 
+def layouts_of(mesh):
+    """The layouts that there are for a mesh."""
+    return [layout for layout in LAYOUTS if layout != "lattice" or mesh.cells is not None]
+
+
 def assert_same_answers(network, model, mesh, on_screen, seed):
-    """Plain, runs and torch agree on the logits of every point on screen."""
+    """All layouts that there are for the mesh, and torch, agree on the logits of every point on screen."""
     head = network.shape.layers[-1].activation
     colors = np.random.default_rng(seed).random((len(mesh), 3))
     expected = tamed(network, torch_logits(network, mesh, colors, on_screen))
     found = {}
-    for layout in LAYOUTS:
+    for layout in layouts_of(mesh):
         probabilities, arranged = answers(session_of(network, model, layout), mesh, colors, on_screen)
         assert probabilities.shape == (len(arranged.slots), network.shape.classes)
         found[layout] = logits_of(probabilities[arranged.places][on_screen], head)
@@ -174,54 +185,55 @@ def assert_same_answers(network, model, mesh, on_screen, seed):
         np.testing.assert_allclose(copies, first, atol=1e-6, err_msg="a copy of a point has another answer")
     np.testing.assert_allclose(found["runs"], found["plain"], rtol=0, atol=1e-5)
     reference = expected if head == "sigmoid" else _centered(expected)
-    for layout in LAYOUTS:
+    for layout in found:
         np.testing.assert_allclose(found[layout], reference, rtol=0, atol=1e-5, err_msg=layout)
 
 
 @given(st.data(), models, seeds)
-def test_both_layouts_give_the_same_answers_on_any_graph(data, model, seed):
+def test_all_layouts_give_the_same_answers_on_any_graph(data, model, seed):
     network = network_of(data.draw(network_shapes(model)), seed)
-    mesh = data.draw(random_meshes(RING_NEIGHBORS[model]))
+    mesh = data.draw(random_meshes(MESH_MODELS[model].neighbors))
     assert_same_answers(network, model, mesh, data.draw(masks(len(mesh))), seed)
 
 
 @given(st.data(), models, seeds)
-def test_both_layouts_give_the_same_answers_on_ring_meshes(data, model, seed):
+def test_all_layouts_give_the_same_answers_on_ring_meshes(data, model, seed):
     network = network_of(data.draw(network_shapes(model)), seed)
     mesh, seen = data.draw(ring_meshes(model))
     assert_same_answers(network, model, mesh, data.draw(masks(len(mesh), seen)), seed)
 
 
-WHOLE = {model: ring_mesh(Sphere(0.1), 0.8, 1.5, 2.0, model) for model in RING_NEIGHBORS}
+WHOLE = {model: build_mesh(Sphere(0.1), 0.8, 1.5, 2.0, model) for model in MODELS}
+PAIRS = [(model, layout) for model in MODELS for layout in LAYOUTS if layout != "lattice" or MESH_MODELS[model].steps]
 
 
 @pytest.mark.parametrize("head", [(2, "softmax"), (3, "softmax"), (5, "softmax"), (2, "sigmoid")], ids=str)
 @pytest.mark.parametrize("activation", sorted(ACTIVATIONS))
-@pytest.mark.parametrize("model", sorted(RING_NEIGHBORS))
-def test_both_layouts_give_the_same_answers_with_every_activation_and_head(model, activation, head):
+@pytest.mark.parametrize("model", MODELS)
+def test_all_layouts_give_the_same_answers_with_every_activation_and_head(model, activation, head):
     layers = (
         Layer("convolution", 6, activation),
         Layer("separable", 5, activation),
         Layer("dense", 4, activation),
         Layer("convolution", *head),
     )
-    network = network_of(NetworkShape(layers, RING_NEIGHBORS[model]), 3)
+    network = network_of(NetworkShape(layers, MESH_MODELS[model].neighbors), 3)
     mesh = WHOLE[model]
     assert_same_answers(network, model, mesh, np.random.default_rng(1).random(len(mesh)) < 0.9, 1)
 
 
-@pytest.mark.parametrize("model", sorted(RING_NEIGHBORS))
+@pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("count", [0, 1])
 @pytest.mark.parametrize("shown", [False, True])
-def test_both_layouts_take_a_mesh_of_no_point_or_of_one(model, count, shown):
-    network = network_of(NetworkShape.uniform(3, 4, 3, neighbors=RING_NEIGHBORS[model]), 0)
+def test_all_layouts_take_a_mesh_of_no_point_or_of_one(model, count, shown):
+    network = network_of(NetworkShape.uniform(3, 4, 3, neighbors=MESH_MODELS[model].neighbors), 0)
     mesh = WHOLE[model].part(np.arange(count))
     assert_same_answers(network, model, mesh, np.full(count, shown), 0)
 
 
-@pytest.mark.parametrize("model", sorted(RING_NEIGHBORS))
-def test_both_layouts_take_a_frame_in_which_nothing_is_on_screen(model):
-    network = network_of(NetworkShape.uniform(3, 4, 2, neighbors=RING_NEIGHBORS[model]), 0)
+@pytest.mark.parametrize("model", MODELS)
+def test_all_layouts_take_a_frame_in_which_nothing_is_on_screen(model):
+    network = network_of(NetworkShape.uniform(3, 4, 2, neighbors=MESH_MODELS[model].neighbors), 0)
     assert_same_answers(network, model, WHOLE[model], np.zeros(len(WHOLE[model]), dtype=bool), 0)
 
 
@@ -233,7 +245,7 @@ def test_a_layout_is_used_for_one_frame_after_the_other(data, model, seed):
     mesh, seen = data.draw(ring_meshes(model))
     colors = np.random.default_rng(seed).random((2, len(mesh), 3)).astype(np.float32)
     shown = [data.draw(masks(len(mesh), seen)) for _ in range(2)]
-    for layout in LAYOUTS:
+    for layout in layouts_of(mesh):
         session = session_of(network, model, layout)
         arranged = laid_out(mesh, session.model.manifest)
         points = arranged.points()
@@ -249,7 +261,7 @@ def test_a_layout_is_used_for_one_frame_after_the_other(data, model, seed):
 @given(st.data(), models, seeds)
 def test_the_edge_policy_same_links_what_is_off_screen_to_the_point_itself(data, model, seed):
     network = network_of(data.draw(network_shapes(model)), seed)
-    mesh = data.draw(random_meshes(RING_NEIGHBORS[model]))
+    mesh = data.draw(random_meshes(MESH_MODELS[model].neighbors))
     on_screen = data.draw(masks(len(mesh)))
     colors = np.random.default_rng(seed).random((len(mesh), 3))
     kept = np.flatnonzero(on_screen)
@@ -268,8 +280,8 @@ def test_the_edge_policy_same_links_what_is_off_screen_to_the_point_itself(data,
 
 
 def assert_laws_of_runs(mesh, model):
-    n, groups = len(mesh), RUNS[model]
-    layout = RunsLayout(mesh, model)
+    n, groups = len(mesh), MESH_MODELS[model].runs
+    layout = RunsLayout(mesh, groups)
     slots, places, m = layout.slots, layout.places, len(layout.slots)
 
     np.testing.assert_array_equal(slots[places], np.arange(n))
@@ -301,7 +313,7 @@ def assert_laws_of_runs(mesh, model):
 
 @given(st.data(), models)
 def test_groups_of_any_graph_lie_where_columns_say(data, model):
-    assert_laws_of_runs(data.draw(random_meshes(RING_NEIGHBORS[model])), model)
+    assert_laws_of_runs(data.draw(random_meshes(MESH_MODELS[model].neighbors)), model)
 
 
 @given(st.data(), models, seeds)
@@ -312,10 +324,10 @@ def test_groups_of_ring_meshes_lie_where_columns_say(data, model, seed):
     assert_laws_of_runs(mesh.part(np.random.default_rng(seed).permutation(len(mesh))), model)
 
 
-@pytest.mark.parametrize("model", sorted(RING_NEIGHBORS))
+@pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("shape", [Sphere(0.1), Circle(0.1)], ids=lambda shape: type(shape).__name__)
 def test_groups_of_whole_rings_lie_where_columns_say(model, shape):
-    layout = assert_laws_of_runs(ring_mesh(shape, 0.8, 3.0, 2.0, model), model)
+    layout = assert_laws_of_runs(build_mesh(shape, 0.8, 3.0, 2.0, model), model)
     nadir = layout.places[0]
     assert layout.original[nadir]
     assert layout.slots[nadir] == 0
@@ -338,8 +350,7 @@ def arrays_of(layout):
     return [*named, layout.columns if isinstance(layout, RunsLayout) else layout._neighbors]
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("model", sorted(RING_NEIGHBORS))
+@pytest.mark.parametrize(("model", "layout"), PAIRS)
 def test_what_a_layout_holds_is_read_only_and_counted(layout, model):
     arranged = laid_out(WHOLE[model], manifest_of(model, layout))
     for array in arrays_of(arranged):
@@ -351,15 +362,14 @@ def test_what_a_layout_holds_is_read_only_and_counted(layout, model):
     assert 0 <= held - arranged.nbytes <= 100  # a number for each group is too little to count
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("model", sorted(RING_NEIGHBORS))
+@pytest.mark.parametrize(("model", "layout"), PAIRS)
 def test_rays_are_column_by_column_in_memory(layout, model):
     """As of every mesh; each frame's projection goes through them by columns."""
     for mesh in (WHOLE[model], WHOLE[model].part(np.arange(50, 250))):
         assert laid_out(mesh, manifest_of(model, layout)).rays.T.flags.c_contiguous
 
 
-@pytest.mark.parametrize("model", sorted(RING_NEIGHBORS))
+@pytest.mark.parametrize("model", MODELS)
 def test_plain_is_the_mesh_as_it_is(model):
     layout = laid_out(WHOLE[model], manifest_of(model))
     assert isinstance(layout, PlainLayout)
@@ -370,19 +380,19 @@ def test_plain_is_the_mesh_as_it_is(model):
     assert layout.original.all()
 
 
-@pytest.mark.parametrize("model", sorted(RING_NEIGHBORS))
+@pytest.mark.parametrize("model", MODELS)
 def test_every_neighbor_and_the_point_itself_are_in_exactly_one_group(model):
-    together = sorted(each for group in RUNS[model] for each in group)
-    assert together == [SELF, *range(RING_NEIGHBORS[model])]
-    assert RUNS[model][0][1] == SELF
-    assert all(1 <= len(group) <= 3 for group in RUNS[model])
+    together = sorted(each for group in MESH_MODELS[model].runs for each in group)
+    assert together == [SELF, *range(MESH_MODELS[model].neighbors)]
+    assert MESH_MODELS[model].runs[0][1] == SELF
+    assert all(1 <= len(group) <= 3 for group in MESH_MODELS[model].runs)
 
 
-@pytest.mark.parametrize("model", sorted(RING_NEIGHBORS))
+@pytest.mark.parametrize("model", MODELS)
 def test_what_feeds_take_is_what_they_leave_but_for_colors_off_screen(model):
     """The network's inputs are contiguous, of the types that its file asks for, and in range whatever is on screen."""
     random = np.random.default_rng(2)
-    for layout in LAYOUTS:
+    for layout in layouts_of(WHOLE[model]):
         arranged = laid_out(WHOLE[model], manifest_of(model, layout))
         m = len(arranged.slots)
         on_screen = np.append(random.random(len(WHOLE[model])) < 0.7, False)[arranged.slots]
@@ -396,12 +406,16 @@ def test_what_feeds_take_is_what_they_leave_but_for_colors_off_screen(model):
         if layout == "plain":
             assert set(feeds) == {"points", "neighbors"}
             assert feeds["neighbors"].dtype == np.int32
-            assert feeds["neighbors"].shape == (m + 1, RING_NEIGHBORS[model])
+            assert feeds["neighbors"].shape == (m + 1, MESH_MODELS[model].neighbors)
             assert 0 <= feeds["neighbors"].min() <= feeds["neighbors"].max() <= m
             np.testing.assert_array_equal(points[-1], [-1.0] * 3)
+            continue
+        np.testing.assert_array_equal(arranged.colors(points)[~on_screen], -1.0)
+        if layout == "lattice":
+            assert set(feeds) == {"points", "shown"}
+            np.testing.assert_array_equal(feeds["shown"].reshape(-1), on_screen)
         else:
             assert set(feeds) == {"points", "columns"}
             assert feeds["columns"].dtype == np.int64
-            assert feeds["columns"].shape == (len(RUNS[model]), m)
-            assert 0 <= feeds["columns"].min() <= feeds["columns"].max() < len(RUNS[model]) * (m - 1)
-            np.testing.assert_array_equal(arranged.colors(points)[~on_screen], -1.0)
+            assert feeds["columns"].shape == (len(MESH_MODELS[model].runs), m)
+            assert 0 <= feeds["columns"].min() <= feeds["columns"].max() < len(MESH_MODELS[model].runs) * (m - 1)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from vm_embedded.lens import Equidistant, Equisolid, Rectilinear
 from vm_embedded.lens_file import read_lens_file
 from vm_embedded.lens_opencv import BrownLens, FisheyeLens
-from vm_embedded.mesh import ring_mesh
+from vm_embedded.mesh_models import build_mesh
 from vm_embedded.orientation import Orientation
 from vm_embedded.projection import may_be_on_screen, project, to_camera
 from vm_embedded.shapes import Sphere
@@ -82,7 +82,7 @@ def test_only_some_points_are_those_that_are_on_screen_too(lens, orientation, se
 
 @given(lenses(), orientations(0.3, 1.5), sizes)
 def test_projected_points_keep_their_links_on_screen(lens, orientation, size):
-    mesh = ring_mesh(Sphere(0.1), orientation.height, 2.0, 3.0)
+    mesh = build_mesh(Sphere(0.1), orientation.height, 2.0, 3.0)
     visible = project(mesh, orientation.rotation, lens, size).visible
     kept = np.flatnonzero(on_screen(mesh.rays, orientation.rotation, lens, size))
     np.testing.assert_array_equal(visible.graph.neighbors, mesh.part(kept).neighbors)
@@ -98,7 +98,7 @@ def test_all_four_pixels_around_a_point_are_in_the_picture(lens, orientation, se
 
 @given(lenses(strength=0.2), orientations(), reals(-math.pi, math.pi))
 def test_turning_camera_and_mesh_together_changes_no_pixel(lens, orientation, yaw):
-    mesh = ring_mesh(Sphere(0.1), 1.0, 1.0, 2.0)
+    mesh = build_mesh(Sphere(0.1), 1.0, 1.0, 2.0)
     turn = rotation([0.0, 0.0, yaw])
     turned = project(
         type(mesh)(np.asfortranarray(mesh.rays @ turn.T), mesh.neighbors), turn @ orientation.rotation, lens, SIZE
@@ -187,7 +187,7 @@ def test_a_small_slack_keeps_little_more_than_is_on_screen(lens):
 
 
 def test_a_camera_that_looks_at_the_sky_has_no_points():
-    mesh = ring_mesh(Sphere(0.1), 0.8, 4.0, 5.0)
+    mesh = build_mesh(Sphere(0.1), 0.8, 4.0, 5.0)
     lens = Rectilinear(focal_length=600.0, fov=1.2)
     projected = project(mesh, Orientation.from_roll_pitch(0.8, pitch=-1.2).rotation, lens, SIZE)
     assert not projected.on_screen.any()

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError, InputError
-from vm_embedded.shapes import SHAPES, Circle, Sphere, shape_named, tangents
+from vm_embedded.shape import tangents
+from vm_embedded.shapes import SHAPES, Circle, Sphere, shape_named
 
 from .strategies import random_direction, reals, seeds
 

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError, ModelError
 from vm_embedded.manifest import EDGES, LAYOUTS, Manifest, ObjectClass
-from vm_embedded.mesh import RING_NEIGHBORS
+from vm_embedded.mesh_models import MESH_MODELS
 from vm_embedded.onnx_file import read_model
 from vm_embedded.session import Session
 from vm_embedded.settings import Settings as RuntimeSettings
@@ -30,7 +30,7 @@ from vm_export.reference import Overrides, read_reference, write_reference
 
 COMMAND = Path(sys.executable).parent / "vm-export"
 
-in_both_layouts = pytest.mark.parametrize("layout", LAYOUTS)
+in_all_layouts = pytest.mark.parametrize("layout", LAYOUTS)
 
 
 def manifest(classes=("ball", "environment"), mesh="ring6", **changes):
@@ -49,7 +49,7 @@ def manifest(classes=("ball", "environment"), mesh="ring6", **changes):
 
 def checkpoint(seed=0, shape=None, mesh="ring6"):
     torch.manual_seed(seed)
-    shape = shape or NetworkShape.uniform(3, 4, 2, neighbors=RING_NEIGHBORS[mesh])
+    shape = shape or NetworkShape.uniform(3, 4, 2, neighbors=MESH_MODELS[mesh].neighbors)
     return Checkpoint(Network(shape).eval(), manifest([f"class{i}" for i in range(shape.classes)], mesh))
 
 
@@ -72,11 +72,11 @@ def network_shapes(draw):
     return NetworkShape((first, *inner, last), draw(st.sampled_from([4, 6, 8])))
 
 
-@in_both_layouts
+@in_all_layouts
 @given(shape=network_shapes(), seed=st.integers(0, 1000))
 @settings(max_examples=25)
 def test_every_network_gives_the_same_answers_in_onnx_runtime(layout, shape, seed):
-    mesh = {value: key for key, value in RING_NEIGHBORS.items()}[shape.neighbors]
+    mesh = f"{'xygrid' if layout == 'lattice' else 'ring'}{shape.neighbors}"
     made = checkpoint(seed, shape, mesh)
     facts = replace(made.manifest, layout=layout)
     content = onnx_graph.build(made.network, facts)
@@ -94,13 +94,13 @@ def test_graph_convolution_is_the_matrix_product_of_the_convention():
     np.testing.assert_allclose(layer(x, Neighborhood(neighbors)).detach().numpy(), expected, atol=1e-5)
 
 
-DOMAINS = {"plain": {""}, "runs": {"", "ai.onnx.ml"}}
+DOMAINS = {"plain": {""}, "runs": {"", "ai.onnx.ml"}, "lattice": {""}}
 """Where each layout's operators come from: the standard, and its part for machine learning on tables."""
 
 
-@in_both_layouts
+@in_all_layouts
 def test_the_file_describes_itself_and_is_one_file_of_stock_operators(layout, tmp_path):
-    made = checkpoint()
+    made = checkpoint(mesh="xmgrid6" if layout == "lattice" else "ring6")
     difference = onnx_graph.export(made, tmp_path / "model.onnx", layout)
     assert difference < 1e-4
     assert [path.name for path in tmp_path.iterdir()] == ["model.onnx"]
@@ -138,14 +138,14 @@ def test_a_layout_that_there_is_not_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@in_both_layouts
+@in_all_layouts
 def test_the_same_checkpoint_gives_the_same_bytes(layout, tmp_path):
     for name in ("a", "b"):
         onnx_graph.export(checkpoint(3), tmp_path / name, layout)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
-@in_both_layouts
+@in_all_layouts
 def test_a_graph_that_differs_from_torch_is_not_written(layout, tmp_path, monkeypatch):
     other = onnx_graph.build(checkpoint(5).network, manifest(("class0", "class1"), layout=layout))
     monkeypatch.setattr(onnx_graph, "build", lambda network, manifest: other)
@@ -333,7 +333,9 @@ def test_command_writes_one_file_where_the_portable_layout_is_the_fastest(tmp_pa
     assert read_model(tmp_path / "model.onnx").manifest.layout == "plain"
 
 
-@pytest.mark.parametrize(("layout", "mesh"), [("plain", "ring4"), ("runs", "ring8")])
+@pytest.mark.parametrize(
+    ("layout", "mesh"), [("plain", "ring4"), ("runs", "ring8"), ("lattice", "nmgrid8"), ("runs", "cap6")]
+)
 def test_command_writes_one_file_in_the_layout_that_it_is_told(layout, mesh, tmp_path):
     checkpoint(mesh=mesh).save(tmp_path / "model.pt")
     done = run(tmp_path / "model.pt", "--layout", layout)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from tests.vm_export.test_export import manifest
 from vm_embedded.errors import InputError, ModelError
-from vm_embedded.layout import laid_out
-from vm_embedded.mesh import RING_NEIGHBORS, ring_mesh
+from vm_embedded.layouts import laid_out
+from vm_embedded.mesh_models import MESH_MODELS, build_mesh
 from vm_embedded.onnx_file import ModelFile, read_model
 from vm_embedded.session import Session
 from vm_embedded.settings import Settings as RuntimeSettings
@@ -70,7 +70,7 @@ def test_the_first_answers_where_the_second_does_not_and_the_second_sees_its_par
 
 
 @given(
-    mesh=st.sampled_from(sorted(RING_NEIGHBORS)),
+    mesh=st.sampled_from(["ring4", "ring6", "ring8", "cap6", "xmgrid8"]),
     height=st.floats(0.3, 1.5),
     shown=st.floats(0.1, 1.0),
     share=st.floats(0.0, 1.0),
@@ -86,7 +86,7 @@ def test_onnx_runtime_gives_the_same_answers_on_real_meshes(
 ):
     """Whatever part of the picture is worth it, from none to all of it, and whatever part of the mesh is on screen."""
     facts = manifest([f"class{each}" for each in range(classes)], mesh, max_distance=3.0, layout="runs")
-    points = ring_mesh(facts.mesh_shape, height, 4.0, 3.0, mesh)
+    points = build_mesh(facts.mesh_shape, height, 4.0, 3.0, mesh)
     random = np.random.default_rng(seed)
     on_screen = np.abs(points.rays[:, 1]) < shown
     part = points.part(np.flatnonzero(on_screen))
@@ -94,7 +94,7 @@ def test_onnx_runtime_gives_the_same_answers_on_real_meshes(
     colors[:-1] = random.random((len(part), 3))
     neighbors = torch.tensor(part.neighbors)
 
-    shape = {"neighbors": RING_NEIGHBORS[mesh], "classes": classes, "head": head, "activation": activation}
+    shape = {"neighbors": MESH_MODELS[mesh].neighbors, "classes": classes, "head": head, "activation": activation}
     made = second_look(Gate(0.5, rings, (0, classes - 1)), seed, **shape)
     first = made.first(torch.from_numpy(colors), neighbors)[:-1, list(made.gate.classes)].detach().numpy()
     levels = np.sort(first.max(axis=1))  # a gate between two points' answers, so that no rounding decides

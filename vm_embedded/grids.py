@@ -1,0 +1,183 @@
+"""Meshes on a lattice: every neighbor is a fixed step away, and there is no ring to close.
+
+A lattice counts objects along two axes of the plane, u and v, in steps of 1 / k. With c the height of the object's
+center and g = h - c, a point of the plane at the height c has the coordinates
+XY: x = g tan(phi(u)), y = g tan(phi(v));
+XM: x = g tan(phi(u)), y = h' tan(phi(v, h' + c)) with h' = sqrt(g^2 + x^2): the slice through the camera that holds y;
+NM: both at once, x = h'' tan(phi(u, h'' + c)) with h'' = sqrt(g^2 + y^2), and y as in XM.
+"""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from .arrays import Floats, Indices, Mask, frozen
+from .errors import GeometryError
+from .mesh import SELF, Mesh, MeshModel
+from .shape import Shape
+
+_STEPS = {
+    4: ((-1, 0), (0, 1), (1, 0), (0, -1)),
+    6: ((-1, 0), (-1, 1), (0, 1), (1, 0), (1, -1), (0, -1)),
+    8: ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1)),
+}
+_RUNS = {
+    4: ((0, SELF, 2), (1,), (3,)),
+    6: ((0, SELF, 3), (1, 2), (5, 4)),
+    8: ((0, SELF, 4), (1, 2, 3), (7, 6, 5)),
+}
+_ROW = math.sqrt(0.75)
+"""Distance of the rows of a six-neighbor lattice, in steps."""
+
+_ROUNDS = 100
+"""Most rounds until both coordinates of an NM point agree; they take about ten."""
+
+KINDS = ("xy", "xm", "nm")
+
+
+class Grid(MeshModel):
+    """A lattice of one of KINDS, row by row, as far as it hangs together with the point below the camera.
+
+    Neighbors, as columns and rows: `steps`. A six-neighbor lattice has axial coordinates: u = (n + m / 2) / k and
+    v = sqrt(3) / 2 m / k.
+    """
+
+    steps: tuple[tuple[int, int], ...]
+
+    def __init__(self, kind: str, neighbors: int) -> None:
+        self.kind = kind
+        self.neighbors = neighbors
+        self.runs = _RUNS[neighbors]
+        self.steps = _STEPS[neighbors]
+
+    def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
+        shape.spacing(height)  # raises GeometryError for a height without a mesh
+        lean, row = (0.5, _ROW) if self.neighbors == 6 else (0.0, 1.0)
+        border = _border(self.kind, shape, height, max_distance) * intersections
+        rows = math.floor(border[:, 1].max() / row) + 1
+        columns = math.floor(border[:, 0].max() + lean * rows) + 2
+        if (2 * rows + 1) * (2 * columns + 1) > 10**8:
+            raise GeometryError(
+                f"a lattice out to {max_distance:g} m has over 1e8 places with {intersections:g} steps across an object"
+            )
+        # All four quarters are alike, so one is computed, in places of its own: half columns in every second row.
+        half = np.arange(0, 2 * math.floor(border[:, 0].max()) + 5, dtype=np.int32)
+        place = np.stack(np.meshgrid(half, np.arange(rows + 1, dtype=np.int32)), axis=2).reshape(-1, 2)
+        place = place[(place[:, 0] - (place[:, 1] if lean else 0)) % 2 == 0]
+        place = place[_within(place * (0.5, row), border)]
+        u, v = (place * (0.5, row) / intersections).T
+        x, y = _position(self.kind, u, v, shape, height)
+        near = np.hypot(x, y) <= max_distance
+        place, x, y = place[near], x[near], y[near]
+
+        index = np.full((rows + 1, len(half)), -1, dtype=np.int32)
+        index[place[:, 1], place[:, 0]] = np.arange(len(place), dtype=np.int32)
+        m, n = (axis.reshape(-1) for axis in np.mgrid[-rows : rows + 1, -columns : columns + 1].astype(np.int32))
+        halves = 2 * n + (m if lean else 0)
+        inside = np.flatnonzero(np.abs(halves) < len(half))
+        m, n, halves = m[inside], n[inside], halves[inside]
+        quarter = index[np.abs(m), np.abs(halves)]
+        shown = quarter >= 0
+        m, n, halves, quarter = m[shown], n[shown], halves[shown], quarter[shown]
+        linked = _together(n, m, self.neighbors)
+        m, n, halves, quarter = m[linked], n[linked], halves[linked], quarter[linked]
+
+        rays = np.empty((len(n), 3), order="F")
+        rays[:, 0] = np.sign(halves) * x[quarter]
+        rays[:, 1] = np.sign(m) * y[quarter]
+        rays[:, 2] = shape.center_height - height
+        rays /= np.sqrt(rays[:, 0] ** 2 + rays[:, 1] ** 2 + rays[:, 2] ** 2)[:, None]
+        cells = np.stack([n - n.min(), m - m.min()], axis=1).astype(np.int32)
+        return Mesh(frozen(rays), frozen(lattice_neighbors(cells, self.steps)), frozen(cells))
+
+
+def _position(kind: str, u: Floats, v: Floats, shape: Shape, height: float) -> tuple[Floats, Floats]:
+    """Coordinates x and y (n,) [m] at the height of the object's center, u and v (n,) >= 0 objects out."""
+    c = shape.center_height
+    g = height - c
+
+    def across(n: Floats, other: Floats | float) -> Floats:
+        """Coordinate n objects out, in the slice through the camera that is `other` [m] away."""
+        slant = np.hypot(g, other)
+        return np.asarray(slant * np.tan(shape.phi(n, slant + c)))
+
+    x = across(u, 0.0)
+    if kind == "xy":
+        return x, across(v, 0.0)
+    y = across(v, x)
+    if kind == "xm":
+        return x, y
+    # Each round halves the way at least: a slice's coordinate hardly depends on the slice where it is far out itself.
+    open_ = np.arange(len(u))
+    for _ in range(_ROUNDS):
+        new_x = across(u[open_], y[open_])
+        new_y = across(v[open_], new_x)
+        off = np.maximum(np.abs(new_x - x[open_]), np.abs(new_y - y[open_])) > 1e-12 * (g + new_x + new_y)
+        x[open_], y[open_] = new_x, new_y
+        open_ = open_[off]
+        if len(open_) == 0:
+            return x, y
+    raise GeometryError(f"the two slices of an NM grid do not meet for {shape} at {height:g} m")
+
+
+def _border(kind: str, shape: Shape, height: float, max_distance: float) -> Floats:
+    """Points (m, 2) of a quarter circle of that radius [m] around the camera's foot, as u and v."""
+    c = shape.center_height
+    angle = np.linspace(0.0, np.pi / 2.0, 721)
+    x, y = max_distance * np.cos(angle), max_distance * np.sin(angle)
+
+    def counted(along: Floats, other: Floats | float) -> Floats:
+        slant = np.hypot(height - c, other)
+        return np.asarray(shape.n(np.arctan2(along, slant), slant + c))
+
+    u = counted(x, y if kind == "nm" else 0.0)
+    v = counted(y, 0.0 if kind == "xy" else x)
+    return np.stack([u, v], axis=1)
+
+
+def _within(places: Floats, border: Floats) -> Mask:
+    """Which places (n, 2) lie within a border (m, 2) from the first axis to the second, or up to two steps beyond."""
+    width, height = (math.ceil(each) + 3 for each in border.max(axis=0))
+    outline = np.concatenate([[[0.0, 0.0]], border, [[0.0, border[-1, 1]]]])
+    inside = np.zeros((height, width), dtype=np.uint8)
+    cv2.fillPoly(inside, [np.rint(outline).astype(np.int32)], 1)
+    inside = cv2.dilate(inside, np.ones((5, 5), dtype=np.uint8))
+    nearest = np.minimum(np.rint(places).astype(np.intp), (width - 1, height - 1))
+    return np.asarray(inside[nearest[:, 1], nearest[:, 0]] > 0)
+
+
+def _together(n: Indices, m: Indices, neighbors: int) -> Mask:
+    """Which of the cells in columns n and rows m hang together with the cell (0, 0), by links to so many neighbors."""
+    row = m - m.min()
+    if neighbors == 6:
+        # In half columns neighbors in other rows touch at corners; those in a row touch what is put between them.
+        column = 2 * n + m
+        column = column - column.min()
+        present = np.zeros((row.max() + 1, column.max() + 3), dtype=np.uint8)
+        present[row, column] = 1
+        present[:, 1:-1] |= present[:, :-2] & present[:, 2:]
+    else:
+        column = n - n.min()
+        present = np.zeros((row.max() + 1, column.max() + 1), dtype=np.uint8)
+        present[row, column] = 1
+    _, label = cv2.connectedComponents(present, connectivity=4 if neighbors == 4 else 8)
+    labels = label[row, column]
+    return np.asarray(labels == labels[(n == 0) & (m == 0)])
+
+
+def lattice_neighbors(cells: Indices, steps: tuple[tuple[int, int], ...]) -> Indices:
+    """Neighbors (n + 1, N) of cells (n, 2) at fixed steps (N, 2)."""
+    missing = len(cells)
+    width, height = cells.max(axis=0) + 3
+    flat = (cells[:, 1] + 1) * width + cells[:, 0] + 1
+    index = np.full(width * height, missing, dtype=np.int32)
+    index[flat] = np.arange(missing, dtype=np.int32)
+    neighbors: npt.NDArray[np.int32] = np.empty((missing + 1, len(steps)), dtype=np.int32)
+    for column, (right, up) in enumerate(steps):
+        neighbors[:missing, column] = index[flat + up * width + right]
+    neighbors[missing] = missing
+    return neighbors

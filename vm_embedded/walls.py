@@ -1,0 +1,88 @@
+"""A mesh for upright cylinders of any height: as many points on a goal post as high as the camera, near and far.
+
+Rings need the end of an object's shadow on the plane, and what reaches the camera's height has none: all rings would
+fall on the horizon. So an object is sampled where it stands, on its own surface. Walls around the camera, at distances
+that form a geometric series, carry k rows of points from the plane to the object's top, and k points across the object
+in each row. A direction may lie on several walls. On the wall at its own distance an object covers all rows from the
+first to the last, and on the others it has the wrong width or ends in the wrong row.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .arrays import Floats, frozen
+from .cylinder import Cylinder
+from .errors import GeometryError
+from .grids import Grid
+from .mesh import Mesh, MeshModel, polar
+from .shape import Shape
+
+NEAREST = 0.3
+"""Distance [m] at which the first wall begins to serve."""
+
+
+class Walls(MeshModel):
+    """Walls around the camera, the nearest first, each from its lowest row to its highest.
+
+    Neighbors as those of a six-neighbor lattice: left, top-left, top-right, right, bottom-right, bottom-left.
+    """
+
+    neighbors = 6
+    runs = Grid("xy", 6).runs
+
+    def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
+        if not isinstance(shape, Cylinder):
+            raise GeometryError(f"walls are for cylinders, not for a {type(shape).__name__.lower()}")
+        if not (math.isfinite(height) and height > 0):
+            raise GeometryError(f"camera height must be above 0 m, not {height} m")
+        rows = round(intersections)
+        distances = wall_distances(intersections, max_distance)
+        if shape.radius >= NEAREST:
+            raise GeometryError(f"walls begin at {NEAREST:g} m, so a cylinder of {shape.radius:g} m radius has no room")
+        theta = 2.0 * np.arcsin(shape.radius / distances)
+        counts = np.ceil(2.0 * np.pi * intersections / theta - 1e-9).astype(np.int32)
+        up = (np.arange(rows) + 0.5) / rows * shape.object_height - height  # over the camera [m]
+
+        pieces, links, first = [], [], 0
+        for distance, count in zip(distances.tolist(), counts.tolist(), strict=True):
+            row, place = (axis.reshape(-1) for axis in np.mgrid[:rows, :count].astype(np.int32))
+            pieces.append(polar(np.arctan2(distance, -up[row]), 2.0 * np.pi * (place + 0.5 * row) / count))
+            links.append((row, place, count, first))
+            first += rows * count
+        neighbors = np.full((first + 1, self.neighbors), first, dtype=np.int32)
+        for row, place, count, start in links:
+            for column, (right, above) in enumerate(Grid("xy", 6).steps):
+                to_row, to_place = row + above, (place + right) % count
+                there = (to_row >= 0) & (to_row < rows)
+                neighbors[start : start + len(row), column] = np.where(there, start + to_row * count + to_place, first)
+        return Mesh(frozen(np.asfortranarray(np.concatenate(pieces))), frozen(neighbors))
+
+    def mesh_height(self, shape: Shape, height: float, intersections: float, tolerance: float) -> float:
+        """Rows are shape.object_height / k apart, and move by as much as the camera."""
+        assert isinstance(shape, Cylinder)
+        step = 2.0 * tolerance * shape.object_height / intersections
+        return height if step == 0.0 else max(round(height / step), 1) * step
+
+    def rings(self, made_for: Shape, mesh_height: float, intersections: float, seen: Shape, height: float) -> float:
+        """Always k: objects are sampled where they stand."""
+        return intersections
+
+
+def wall_distances(intersections: float, max_distance: float) -> Floats:
+    """Distances (m,) of walls [m], from the nearest to the farthest.
+
+    Seen against a wall at w, an object at d is k w / d points wide. So a wall serves distances from w / (1 + 1 / k) to
+    w / (1 - 1 / k), and the next one begins where it ends. Raises GeometryError for fewer than 2 intersections, or if
+    all is nearer than the first wall.
+    """
+    if intersections < 2.0:
+        raise GeometryError(f"walls need at least 2 intersections, not {intersections:g}")
+    if max_distance <= NEAREST:
+        raise GeometryError(f"walls begin at {NEAREST:g} m; a maximum distance of {max_distance:g} m leaves none")
+    share = (intersections + 1.0) / (intersections - 1.0)
+    walls = math.ceil(math.log(max_distance / NEAREST) / math.log(share))
+    borders = np.geomspace(NEAREST, max_distance, walls + 1)
+    return np.asarray(2.0 * borders[:-1] * borders[1:] / (borders[:-1] + borders[1:]))
