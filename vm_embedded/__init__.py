@@ -7,9 +7,12 @@ from .lens import Equidistant, Equisolid, Lens, Rectilinear
 from .lens_file import read_lens_file
 from .lens_opencv import BrownLens, FisheyeLens
 from .orientation import Orientation
+from .planes import GROUND, Plane, Pose
 from .settings import Settings
+from .views import Sighting, View, detect_views
 
 __all__ = [
+    "GROUND",
     "BrownLens",
     "ClassPoints",
     "Detection",
@@ -23,9 +26,14 @@ __all__ = [
     "Lens",
     "ModelError",
     "Orientation",
+    "Plane",
+    "Pose",
     "Rectilinear",
     "Settings",
+    "Sighting",
+    "View",
     "VisualMeshError",
+    "detect_views",
     "read_lens_file",
 ]
 

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from .arrays import Floats, frozen
+from .arrays import Floats, Indices, frozen
 from .cylinder import Cylinder
 from .errors import GeometryError
 from .grids import Grid
@@ -40,10 +40,7 @@ class Walls(MeshModel):
             raise GeometryError(f"camera height must be above 0 m, not {height} m")
         rows = round(intersections)
         distances = wall_distances(intersections, max_distance)
-        if shape.radius >= NEAREST:
-            raise GeometryError(f"walls begin at {NEAREST:g} m, so a cylinder of {shape.radius:g} m radius has no room")
-        theta = 2.0 * np.arcsin(shape.radius / distances)
-        counts = np.ceil(2.0 * np.pi * intersections / theta - 1e-9).astype(np.int32)
+        counts = wall_counts(shape, intersections, max_distance)
         up = (np.arange(rows) + 0.5) / rows * shape.object_height - height  # over the camera [m]
 
         pieces, links, first = [], [], 0
@@ -86,3 +83,11 @@ def wall_distances(intersections: float, max_distance: float) -> Floats:
     walls = math.ceil(math.log(max_distance / NEAREST) / math.log(share))
     borders = np.geomspace(NEAREST, max_distance, walls + 1)
     return np.asarray(2.0 * borders[:-1] * borders[1:] / (borders[:-1] + borders[1:]))
+
+
+def wall_counts(shape: Shape, intersections: float, max_distance: float) -> Indices:
+    """How many points a row of each wall has (m,). Raises GeometryError for an object too thick for the first one."""
+    if shape.radius >= NEAREST:
+        raise GeometryError(f"walls begin at {NEAREST:g} m, so a cylinder of {shape.radius:g} m radius has no room")
+    theta = 2.0 * np.arcsin(shape.radius / wall_distances(intersections, max_distance))
+    return np.ceil(2.0 * np.pi * intersections / theta - 1e-9).astype(np.int32)

@@ -18,7 +18,7 @@ from .strategies import SIZE, lenses, orientations, random_direction, reals, rot
 
 LENS = Equisolid(focal_length=300.0, fov=2.2)
 
-in_both_layouts = pytest.mark.parametrize("layout", LAYOUTS)
+in_all_layouts = pytest.mark.parametrize("layout", LAYOUTS)
 
 
 def manifest(**changes):
@@ -27,7 +27,7 @@ def manifest(**changes):
         "radius": 0.1,
         "object_radius": 0.1,
         "intersections": 2.0,
-        "mesh": "ring6",
+        "mesh": "xmgrid6" if changes.get("layout") == "lattice" else "ring6",
         "max_distance": 3.0,
         "edge": "hard",
         "classes": (ObjectClass("ball", "object"),),
@@ -80,7 +80,7 @@ def within(bucket, random):
 AHEAD = (Settings(), 0.8, 0.0, 0.4)
 
 
-@in_both_layouts
+@in_all_layouts
 @given(buckets(), lenses(), seeds)
 @example(AHEAD, Equisolid(focal_length=100.0, fov=2.0 * math.pi), 0)
 @example(AHEAD, Equidistant(focal_length=60.0, fov=2.0 * math.pi), 0)
@@ -95,7 +95,7 @@ def test_a_bucket_never_changes_an_answer(layout, bucket, lens, seed):
 BROAD = (Settings(roll_step=0.5, pitch_step=0.5), 1.0, 0.0, 0.0)
 
 
-@in_both_layouts
+@in_all_layouts
 @given(buckets(), lenses(), seeds)
 @example(BROAD, Equisolid(focal_length=127.0, fov=1.0, distortion=(-1e-6, 0.0)), 0)
 def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(layout, bucket, lens, seed):
@@ -108,7 +108,7 @@ def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(layout, b
         assert_same_as_without(cache, rough, lens, SIZE)
 
 
-@in_both_layouts
+@in_all_layouts
 @pytest.mark.parametrize("stretch", [1.0 - 4.9e-4, 1.0 + 4.9e-4])
 @pytest.mark.parametrize("fov", [0.2, 0.8, 1.6])
 def test_a_bucket_never_changes_an_answer_of_rotations_that_are_a_little_too_long_or_short(fov, stretch, layout):
@@ -149,7 +149,7 @@ def test_heights_share_few_meshes(tolerance, seed):
     assert all(cache.mesh_height(height) == pytest.approx(height, rel=1e-9) for height in found)
 
 
-@in_both_layouts
+@in_all_layouts
 @given(orientations(0.3, 1.5))
 def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(layout, orientation):
     cache = MeshCache(manifest(layout=layout), Settings(height_tolerance=0.0))
@@ -160,7 +160,7 @@ def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(layou
     assert_same_as_without(cache, orientation, LENS, SIZE)
 
 
-@in_both_layouts
+@in_all_layouts
 @pytest.mark.parametrize("tolerance", [0.0, 0.5])
 def test_a_camera_that_looks_at_the_sky_has_no_points(tolerance, layout):
     cache = MeshCache(manifest(layout=layout), Settings(height_tolerance=tolerance))
@@ -194,14 +194,14 @@ def test_hits_and_misses_are_counted():
     assert cache.misses == 4
 
 
-@in_both_layouts
+@in_all_layouts
 def test_a_hit_gives_the_same_layout(layout):
     cache = MeshCache(manifest(layout=layout), Settings())
     ahead = Orientation.from_roll_pitch(0.8, pitch=0.4)
     assert cache.view(ahead, LENS, SIZE).layout is cache.view(ahead, LENS, SIZE).layout
 
 
-@in_both_layouts
+@in_all_layouts
 def test_nbytes_is_what_is_held(layout):
     cache = MeshCache(manifest(layout=layout), Settings())
     first = cache.view(Orientation.from_roll_pitch(0.8, pitch=0.4), LENS, SIZE)
@@ -227,7 +227,7 @@ def test_the_least_recently_used_mesh_goes_first():
     assert cache.nbytes == sizes[0] + sizes[1]
 
 
-@in_both_layouts
+@in_all_layouts
 @given(st.lists(st.integers(0, 5), min_size=1, max_size=20), reals(0.0, 0.6))
 def test_the_memory_limit_is_obeyed_and_changes_no_answer(layout, order, cache_mib):
     cache = MeshCache(manifest(layout=layout), Settings(cache_mib=cache_mib))
