@@ -1,0 +1,76 @@
+"""A network trained on another mesh than rings is exported and run, from commands as a user types them."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.vm_train.drawn import CLASSES, draw_set
+
+SMALL = """
+[mesh]
+radius = 0.07
+max_distance = 3.0
+[network]
+depth = 3
+width = 4
+[training]
+epochs = 1
+batch = 4
+"""
+UPRIGHT = """
+[mesh]
+shape = "cylinder"
+radius = 0.07
+object_height = 1.0
+model = "wall6"
+max_distance = 3.0
+"""
+KINDS = CLASSES.replace('"object"', '"upright"')
+
+
+def run(program, *arguments):
+    done = subprocess.run(
+        [sys.executable, "-m", program, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=240,
+        env={**os.environ, "OMP_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""},
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    return draw_set(tmp_path_factory.mktemp("drawn"), 12)
+
+
+@pytest.mark.parametrize(
+    ("model", "layouts"),
+    [
+        ("cap6", ("plain", "runs")),
+        ("xmgrid8", ("runs", "lattice")),
+        ("wall6", ("plain", "runs")),
+    ],
+)
+def test_trained_exported_and_run(model, layouts, data, tmp_path):
+    """Every layout of the file gives the same answers on the pictures."""
+    text = KINDS + UPRIGHT + SMALL[SMALL.index("[network]") :] if model == "wall6" else CLASSES + SMALL
+    (tmp_path / "train.toml").write_text(text)
+    common = ("--config", tmp_path / "train.toml", "--workers", 1, "--threads", 1, "--set", f"mesh.model={model}")
+    run("vm_train", data, "-o", tmp_path / "run", *common)
+    answers = []
+    for layout in layouts:
+        file = tmp_path / f"{layout}.onnx"
+        run("vm_export.cli", tmp_path / "run/model.pt", "-o", file, "--layout", layout)
+        shown = run("vm_embedded.cli", "--model", file, "--camera", data, "--threshold", 0.2, "--emit-points", "field")
+        answers.append([json.loads(line) for line in shown.splitlines()])
+    assert len(answers[0]) == 12
+    assert sum(each["points"] for each in answers[0]) > 1000
+    for other in answers[1:]:
+        for one, again in zip(answers[0], other, strict=True):
+            assert one["points"] == again["points"]
+            assert one["detections"] == again["detections"]
