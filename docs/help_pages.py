@@ -15,6 +15,7 @@ from vm_embedded import doctor_cli as doctor
 from vm_embedded.configuration import Configuration
 from vm_embedded.sections import documented
 from vm_export import cli as export
+from vm_mesh import cli as mesh
 from vm_synth import cli as synth
 from vm_synth.configuration import SceneConfiguration
 from vm_train import evaluate_cli as evaluate
@@ -33,7 +34,7 @@ def page() -> str:
         "# Command line\n\nMade from the programs' own help texts; every program also prints them with `--help`.\n"
     ]
     robot = (detect.parser(), doctor.parser(), bench.parser(), export.parser())
-    workstation = (each for program in (synth, train, evaluate) for each in program.parsers().values())
+    workstation = (each for program in (synth, train, evaluate, mesh) for each in program.parsers().values())
     for parser in (*robot, *workstation):
         parts.append(f"## {parser.prog}\n\n{parser.description}\n")
         for group in parser._action_groups:

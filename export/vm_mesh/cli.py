@@ -57,7 +57,7 @@ def _parser(command: str, description: str) -> argparse.ArgumentParser:
             choices=tuple(MESH_MODELS),
             action="append",
             metavar="NAME",
-            help=f"{', '.join(MESH_MODELS)}; " + ("repeatable, default all that fit" if many else "default ring6"),
+            help="mesh model; " + ("repeatable, default all that fit the shape" if many else "default ring6"),
         )
     what = made.add_argument_group("what the mesh is made for")
     what.add_argument("--network", metavar="FILE", help="take all of it from a network (.onnx), or one of the package")

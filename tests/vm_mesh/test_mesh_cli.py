@@ -1,0 +1,163 @@
+"""vm-mesh as a user types it, and the figures that it prints against formulas."""
+
+import json
+import math
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from vm_embedded.cylinder import Cylinder
+from vm_embedded.mesh_models import MESH_MODELS
+from vm_embedded.shapes import Circle, Sphere
+from vm_mesh.cli import main
+from vm_mesh.made_mesh import MadeMesh, Plan
+from vm_mesh.quality import links_of, on_object
+from vm_mesh.ranges import extent, range_of
+
+DEMO = Path(__file__).parents[1] / "fixtures/demo"
+LENS, IMAGE = DEMO / "lens0000000.yaml", DEMO / "image0000000.jpg"
+SMALL = ("--max-distance", "3", "--intersections", "3")
+
+
+def run(capsys, *arguments, code=0):
+    assert main([str(each) for each in arguments]) == code
+    done = capsys.readouterr()
+    assert "Traceback" not in done.err
+    return done.err if code else done.out
+
+
+def test_help_and_unknown_commands_as_a_process():
+    def call(*arguments):
+        return subprocess.run([sys.executable, "-m", "vm_mesh", *arguments], capture_output=True, text=True)
+
+    listed = call("--help")
+    assert listed.returncode == 0
+    assert all(name in listed.stdout for name in ("show", "quality", "range", "compare"))
+    assert call().returncode == 2
+    wrong = call("qualty")
+    assert wrong.returncode == 2
+    assert "'quality'" in wrong.stderr
+
+
+@pytest.mark.parametrize("model", sorted(set(MESH_MODELS) - {"wall6"}))
+def test_show_draws_every_model(model, tmp_path, capsys):
+    file = tmp_path / "mesh.png"
+    run(capsys, "show", "--model", model, *SMALL, "--object", 0, "--object", 1, "-o", file)
+    picture = cv2.imread(str(file))
+    assert (picture < 128).any(axis=2).sum() > 500  # points and links
+    orange = (picture[:, :, 2].astype(int) - picture[:, :, 0] > 40).sum()
+    assert orange > 100  # objects
+
+
+def test_show_draws_walls_by_direction_and_not_on_the_ground(tmp_path, capsys):
+    post = ("--model", "wall6", "--shape", "cylinder", "--radius", 0.05, "--object-height", 1.8, *SMALL)
+    run(capsys, "show", *post, "-o", tmp_path / "walls.svg")
+    assert "<svg" in (tmp_path / "walls.svg").read_text()
+    assert "directions" in run(capsys, "show", *post, "--view", "ground", "-o", tmp_path / "x.png", code=1)
+
+
+def test_show_draws_on_a_picture(tmp_path, capsys):
+    file = tmp_path / "mesh.png"
+    run(capsys, "show", "--network", "ball-5x4", "--image", IMAGE, "--lens", LENS, "-o", file)
+    drawn, picture = cv2.imread(str(file)), cv2.imread(str(IMAGE))
+    again = cv2.resize(picture, drawn.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+    changed = np.abs(drawn.astype(int) - again).max(axis=2) > 25
+    horizon = drawn.shape[0] // 5
+    assert changed[-horizon:].mean() > 0.01  # the mesh is on the ground
+    assert changed[: horizon // 2].mean() < 0.01  # and not in the sky
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("show", "-o", "mesh.bmp"), r"\.png or \.svg"),
+        (("show", "-o", "nowhere/mesh.png"), "nowhere"),
+        (("show", "--image", IMAGE, "-o", "mesh.png"), "--lens"),
+        (("show", "--model", "ring6", "--model", "cap6", "-o", "mesh.png"), "one"),
+        (("quality", "--radius", "-1"), "radius"),
+        (("quality", "--height", "0.1"), "height"),
+        (("quality", "--distance", "-1"), "distances"),
+        (("quality", "--shape", "cylinder"), "cylinder"),
+        (("quality", "--object-height", "2"), "sphere"),
+        (("range",), "--lens"),
+        (("range", "--lens", "nowhere.yaml"), "nowhere"),
+        (("range", "--lens", LENS, "--size", "640*512"), "640x512"),
+        (("compare", "--lens", LENS), "--size"),
+        (("compare", "--network", "ball-6x4"), "ball"),
+    ],
+)
+def test_mistakes_are_named(arguments, message, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert re.search(message, run(capsys, *arguments, code=1))
+    assert not list(tmp_path.iterdir())
+
+
+def test_quality_writes_what_it_prints(tmp_path, capsys):
+    shown = run(
+        capsys, "quality", "--model", "ring6", "--model", "cap6", *SMALL, "--distance", 1, "--distance", 0.5,
+        "-o", tmp_path / "q.png", "--json", tmp_path / "q.json",
+    )  # fmt: skip
+    found = json.loads((tmp_path / "q.json").read_text())
+    assert set(found) == {"ring6", "cap6"}
+    assert found["ring6"]["on_object"]["distances"] == [0.5, 1.0]
+    for model in found:
+        assert f"0.50 m {found[model]['on_object']['mean'][0]:.2f}" in shown
+    assert (tmp_path / "q.png").stat().st_size > 10_000
+
+
+def test_compare_leaves_out_models_that_do_not_fit(capsys):
+    shown = run(capsys, "compare", "--shape", "cylinder", "--radius", 0.05, "--object-height", 1.8, *SMALL)
+    assert "wall6" in shown
+    assert "ring6" not in shown
+    shown = run(capsys, "compare", "--lens", LENS, "--size", "640x512", *SMALL)
+    assert "wall6" not in shown
+    assert all(model in shown for model in set(MESH_MODELS) - {"wall6"})
+
+
+def test_range_says_where_a_step_is_a_pixel(capsys):
+    shown = run(capsys, "range", "--lens", LENS, "--intersections", 8)
+    worth = float(re.search(r"beyond ([\d.]+) m", shown).group(1))
+    rows = [line.split() for line in shown.splitlines() if re.match(r" +\d", line)]
+    assert all((float(row[2]) < 1.0) == (float(row[0]) > worth) for row in rows)
+
+
+@pytest.mark.parametrize("shape", [Circle(0.1), Sphere(0.1), Cylinder(0.1, 0.4), Cylinder(0.05, 1.8)], ids=str)
+def test_extent_is_what_the_outline_spans(shape):
+    plan = Plan(shape, 1.0, 4.0, 10.0)
+    for distance in (0.5, 1.0, 3.0, 8.0):
+        center = np.array([distance, 0.0, shape.center_height - 1.0])
+        outline = shape.outline(center, 1.0, 2000)
+        across = np.arctan2(outline[:, 1], outline[:, 0])
+        up = np.arctan2(outline[:, 2], np.hypot(outline[:, 0], outline[:, 1]))
+        found = extent(plan, np.array([distance]))[0]
+        assert found[1] == pytest.approx(np.ptp(up), rel=2e-2)
+        if isinstance(shape, Cylinder):  # as a bearing; of the others as an angle in space
+            assert found[0] == pytest.approx(np.ptp(across), rel=1e-2)
+
+
+def test_worth_is_infinite_for_a_camera_of_any_fineness():
+    plan = Plan(Sphere(0.1), 1.0, 1.0, 10.0)
+    assert range_of(plan, 1e9, np.array([1.0])).worth == math.inf
+    assert range_of(plan, 1e-3, np.array([1.0])).worth == 0.0
+
+
+def test_links_of_a_lattice_in_its_middle_are_one_step_and_even_angles():
+    """Straight below the camera an XY lattice of six neighbors is a regular hexagonal one."""
+    links = links_of(MadeMesh.build("xygrid6", Plan(Sphere(0.02), 1.0, 4.0, 1.0)), 0.0, 0.05)
+    assert links.radial.mean == pytest.approx(1.0, abs=0.05)
+    assert links.cyclic.mean == pytest.approx(1.0, abs=0.05)
+    assert links.angular.mean == pytest.approx(60.0, abs=0.1)
+    assert links.angular.deviation < 2.0
+
+
+def test_points_on_an_object_are_as_many_as_k_says():
+    for model in ("ring6", "cap6", "xmgrid4"):
+        found = on_object(MadeMesh.build(model, Plan(Sphere(0.095), 1.0, 6.0, 6.0)), np.array([1.0, 2.0]))
+        assert found.mean == pytest.approx(6.0, abs=0.5)
+        assert (found.low <= found.mean).all()
+        assert (found.mean <= found.high).all()
