@@ -14,7 +14,7 @@ import pytest
 from .bundles import CHECKOUT, changed
 from .robots import booted
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 CURRENT = "/opt/vm-embedded/current"
 DEPLOY = "/usr/local/bin/vm-deploy"

@@ -80,7 +80,7 @@ def well_between(found, faults):
     return well
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_hundred_faults_in_any_order_leave_nothing_behind(tmp_path):
     text = "[random]\ncount = 200\nseed = 7\nfirst = 4.0\nshortest = 0.1\nlongest = 0.4\npause = 0.85\n"
     source = script(tmp_path / "script.toml", text)
