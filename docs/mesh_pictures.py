@@ -184,7 +184,7 @@ def tall():
             axes.annotate(f"{away:g} m", (around, 62.0), ha="center", fontsize=8, color=OBJECT)
             chosen = np.abs(bearing - around) < 14.0
             if made is walls:
-                serving = np.argmin(np.abs(wall_distances(4.0, 10.0) / away - 1.0))
+                serving = np.argmin(np.abs(wall_distances(POST, 4.0, 10.0) / away - 1.0))
                 chosen &= made.walls == serving
             axes.plot(bearing[chosen], elevation[chosen], ".", color=RING if made is ring else OURS, markersize=1.5)
         axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle="--")
@@ -228,7 +228,7 @@ def across(made: MadeMesh, distances):
     bearings = np.linspace(0.5, 1.4, 7)
     found = np.zeros((2, len(distances), len(bearings)))
     for i, away in enumerate(distances.tolist()):
-        serving = np.argmin(np.abs(wall_distances(4.0, 10.0) / away - 1.0))
+        serving = np.argmin(np.abs(wall_distances(POST, 4.0, 10.0) / away - 1.0))
         for j, around in enumerate(bearings.tolist()):
             near = np.abs(bearing - around) < 1.1 * np.arcsin(POST.radius / away)
             kept = np.flatnonzero(near if made.walls is None else near & (made.walls == serving))

@@ -80,12 +80,12 @@ def test_points_pixels_and_probabilities_are_the_reference_s(shared, points, ind
 def steps_from(sources, shared, index, rays):
     """Graph steps (n,) of each point on screen from the nearest of `sources`."""
     from vm_embedded.lens_file import read_lens_file
-    from vm_embedded.mesh import ring_mesh
+    from vm_embedded.mesh import build_mesh
     from vm_embedded.projection import project
     from vm_embedded.shapes import Sphere
 
     file = read_lens_file(shared / f"reference/images/lens{index:07d}.yaml")
-    mesh = ring_mesh(Sphere(0.0949996), file.orientation.height, 6, 20.0)
+    mesh = build_mesh(Sphere(0.0949996), file.orientation.height, 6, 20.0)
     projected = project(mesh, file.orientation.rotation, file.lens, (1280, 1024)).visible
     np.testing.assert_allclose(projected.graph.rays, rays, atol=1e-12)
     neighbors = projected.graph.neighbors

@@ -34,14 +34,11 @@ class Walls(MeshModel):
     runs = Grid("xy", 6).runs
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
-        if not isinstance(shape, Cylinder):
-            raise GeometryError(f"walls are for cylinders, not for a {type(shape).__name__.lower()}")
-        if not (math.isfinite(height) and height > 0):
-            raise GeometryError(f"camera height must be above 0 m, not {height} m")
+        tall = _checked(shape, height).object_height
         rows = round(intersections)
-        distances = wall_distances(intersections, max_distance)
+        distances = wall_distances(shape, intersections, max_distance)
         counts = wall_counts(shape, intersections, max_distance)
-        up = (np.arange(rows) + 0.5) / rows * shape.object_height - height  # over the camera [m]
+        up = (np.arange(rows) + 0.5) / rows * tall - height  # over the camera [m]
 
         pieces, links, first = [], [], 0
         for distance, count in zip(distances.tolist(), counts.tolist(), strict=True):
@@ -58,36 +55,47 @@ class Walls(MeshModel):
         return Mesh(frozen(np.asfortranarray(np.concatenate(pieces))), frozen(neighbors))
 
     def mesh_height(self, shape: Shape, height: float, intersections: float, tolerance: float) -> float:
-        """Rows are shape.object_height / k apart, and move by as much as the camera."""
-        assert isinstance(shape, Cylinder)
-        step = 2.0 * tolerance * shape.object_height / intersections
-        return height if step == 0.0 else max(round(height / step), 1) * step
+        """Rows are object_height / k apart, and move by as much as the camera."""
+        step = 2.0 * tolerance * _checked(shape, height).object_height / intersections
+        return height if step == 0.0 else max(round(height / step) * step, 0.5 * step)
 
     def rings(self, made_for: Shape, mesh_height: float, intersections: float, seen: Shape, height: float) -> float:
         """Always k: objects are sampled where they stand."""
         return intersections
 
 
-def wall_distances(intersections: float, max_distance: float) -> Floats:
+def _checked(shape: Shape, height: float) -> Cylinder:
+    """The shape as the cylinder that it is. Raises GeometryError for other shapes, and for what is no camera height."""
+    if not isinstance(shape, Cylinder):
+        raise GeometryError(f"walls are for cylinders, not for a {type(shape).__name__.lower()}")
+    if not (math.isfinite(height) and height > 0):
+        raise GeometryError(f"camera height must be above 0 m, not {height} m")
+    return shape
+
+
+def wall_distances(shape: Shape, intersections: float, max_distance: float) -> Floats:
     """Distances (m,) of walls [m], from the nearest to the farthest.
 
-    Seen against a wall at w, an object at d is k w / d points wide. So a wall serves distances from w / (1 + 1 / k) to
-    w / (1 - 1 / k), and the next one begins where it ends. Raises GeometryError for fewer than 2 intersections, or if
-    all is nearer than the first wall.
+    An object at d fills the angle 2 a(d) = 2 asin(r / d), and k a(d) / a(w) points of the wall at w. So a wall serves
+    angles from 1 - 1 / k to 1 + 1 / k of its own, and the next one begins where it ends. A row is rounded up to whole
+    points, which makes objects wider by up to a(d) / pi points; the upper end leaves room for that.
+
+    Raises GeometryError for fewer than 2 intersections, an object too thick for the first wall, or if all is nearer.
     """
     if intersections < 2.0:
         raise GeometryError(f"walls need at least 2 intersections, not {intersections:g}")
     if max_distance <= NEAREST:
         raise GeometryError(f"walls begin at {NEAREST:g} m; a maximum distance of {max_distance:g} m leaves none")
-    share = (intersections + 1.0) / (intersections - 1.0)
-    walls = math.ceil(math.log(max_distance / NEAREST) / math.log(share))
-    borders = np.geomspace(NEAREST, max_distance, walls + 1)
-    return np.asarray(2.0 * borders[:-1] * borders[1:] / (borders[:-1] + borders[1:]))
+    if shape.radius >= NEAREST:
+        raise GeometryError(f"walls begin at {NEAREST:g} m, so a cylinder of {shape.radius:g} m radius has no room")
+    widest, narrowest = (math.asin(shape.radius / each) for each in (NEAREST, max_distance))
+    low, high = 1.0 - 1.0 / intersections, 1.0 + (1.0 - widest / math.pi) / intersections
+    walls = math.ceil(math.log(widest / narrowest) / math.log(high / low))
+    borders = np.geomspace(widest, narrowest, walls + 1)
+    return np.asarray(shape.radius / np.sin(np.sqrt(borders[:-1] / high * borders[1:] / low)))
 
 
 def wall_counts(shape: Shape, intersections: float, max_distance: float) -> Indices:
-    """How many points a row of each wall has (m,). Raises GeometryError for an object too thick for the first one."""
-    if shape.radius >= NEAREST:
-        raise GeometryError(f"walls begin at {NEAREST:g} m, so a cylinder of {shape.radius:g} m radius has no room")
-    theta = 2.0 * np.arcsin(shape.radius / wall_distances(intersections, max_distance))
+    """How many points a row of each wall has (m,). Raises GeometryError as wall_distances does."""
+    theta = 2.0 * np.arcsin(shape.radius / wall_distances(shape, intersections, max_distance))
     return np.ceil(2.0 * np.pi * intersections / theta - 1e-9).astype(np.int32)

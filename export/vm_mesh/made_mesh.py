@@ -61,6 +61,6 @@ class MadeMesh:
         """Distance (n,) [m] from the camera's foot to the object that each point is meant for."""
         plan, rays = self.plan, self.mesh.rays
         if self.walls is not None:
-            return np.asarray(wall_distances(plan.intersections, plan.max_distance)[self.walls])
+            return np.asarray(wall_distances(plan.shape, plan.intersections, plan.max_distance)[self.walls])
         down = np.maximum(-rays[:, 2], 1e-9)
         return np.asarray(np.hypot(rays[:, 0], rays[:, 1]) / down * (plan.height - plan.shape.center_height))

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.mesh import Mesh
 from vm_embedded.mesh_models import MESH_MODELS, build_mesh
-from vm_embedded.shapes import Circle, Sphere
+from vm_embedded.shapes import Circle, Cylinder, Sphere
 
+from .brute_force import plain_mesh, reached
 from .strategies import reals, seeds
 
 CASES = [
@@ -21,68 +22,10 @@ CASES = [
     (Circle(0.1), 0.8, 4.0, 2.03),
     (Circle(0.3), 0.5, 2.5, 5.9),
     (Circle(0.05), 1.5, 1.0, 2.03),
+    (Cylinder(0.05, 0.4), 0.8, 4.0, 2.9),
+    (Cylinder(0.2, 0.7), 1.2, 5.5, 6.0),
 ]
 MODELS = ["ring4", "ring6", "ring8"]
-
-
-def plain_rings(shape, height, k, max_distance):
-    """phi and number of points of each ring, one formula after the other; the ball's and the circle's own."""
-    r = shape.radius
-    rings = [(0.0, 1)]
-    for i in range(1, 10**6):
-        n = i / k
-        if isinstance(shape, Sphere):
-            tangent = math.sinh(-n * math.log(1.0 - 2.0 * r / height))
-            sine = r / ((height - r) * tangent)
-        else:
-            tangent = 2.0 * n * r / height
-            sine = r / (height * tangent)
-        if not height * tangent < max_distance:
-            return rings
-        theta = 2.0 * math.pi / (1.0 + 2.0 * n) if n <= 0.5 else 2.0 * math.asin(sine)
-        rings.append((math.atan(tangent), math.ceil(k * 2.0 * math.pi / theta - 1e-9)))
-    raise AssertionError("rings without end")
-
-
-def plain_mesh(shape, height, k, max_distance, width):
-    """Rays and neighbors, point by point."""
-    rings = plain_rings(shape, height, k, max_distance)
-    starts = [0]
-    for _, count in rings:
-        starts.append(starts[-1] + count)
-    missing = starts[-1]
-    rays, rows = [], []
-    for i, (phi, count) in enumerate(rings):
-        has_next = i + 1 < len(rings)
-        after = rings[i + 1][1] if has_next else 1
-        before = rings[i - 1][1]
-        for j in range(count):
-            t = 2.0 * math.pi * j / count
-            rays.append((math.cos(t) * math.sin(phi), math.sin(t) * math.sin(phi), -math.cos(phi)))
-            if i == 0:
-                rows.append([1 + int(m * after / width) if has_next else missing for m in range(width)])
-                continue
-            f = j / count
-
-            def outwards(position, i=i, after=after, has_next=has_next):
-                return starts[i + 1] + position % after if has_next else missing
-
-            def inwards(position, i=i, before=before):
-                return starts[i - 1] + position % before
-
-            left, right = starts[i] + (j - 1) % count, starts[i] + (j + 1) % count
-            top, bottom = outwards(math.floor(f * after + 0.5)), inwards(math.floor(f * before + 0.5))
-            top_left, top_right = outwards(int(f * after)), outwards(int(f * after) + 1)
-            bottom_left, bottom_right = inwards(int(f * before)), inwards(int(f * before) + 1)
-            rows.append(
-                {
-                    4: [left, top, right, bottom],
-                    6: [left, top_left, top_right, right, bottom_right, bottom_left],
-                    8: [left, top_left, top, top_right, right, bottom_right, bottom, bottom_left],
-                }[width]
-            )
-    rows.append([missing] * width)
-    return np.array(rays), np.array(rows)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -176,14 +119,7 @@ def test_a_ring_is_closed_and_at_one_depth(case):
 
 @given(meshes(models=("ring6",)))
 def test_every_ring6_mesh_is_connected(case):
-    mesh = case[0]
-    reached = np.zeros(len(mesh) + 1, dtype=bool)
-    front = np.array([0])
-    while len(front):
-        reached[front] = True
-        ahead = np.unique(mesh.neighbors[front])
-        front = ahead[~reached[ahead] & (ahead < len(mesh))]
-    assert reached[:-1].all()
+    assert reached(case[0]).all()
 
 
 @given(meshes(models=("ring6",)))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from vm_embedded.lens import Equisolid, Rectilinear
 from vm_embedded.manifest import ObjectClass
-from vm_embedded.mesh import ring_mesh
+from vm_embedded.mesh_models import build_mesh
 from vm_embedded.objects import Scene, find_objects
 from vm_embedded.orientation import Orientation
 from vm_embedded.projection import Projection, project, to_camera
@@ -27,7 +27,7 @@ def scene_at(height=0.9, pitch=0.6, shape=None, mesh_shape=None, lens=None):
     mesh_shape = mesh_shape or shape
     lens = lens or Equisolid(focal_length=500.0, fov=2.6)
     orientation = Orientation.from_roll_pitch(height, 0.05, pitch)
-    projected = project(ring_mesh(mesh_shape, height, K, 8.0), orientation.level, lens, SIZE)
+    projected = project(build_mesh(mesh_shape, height, K, 8.0), orientation.level, lens, SIZE)
     rings = K * float(shape.spacing(height) / mesh_shape.spacing(height))
     order = np.arange(len(projected), dtype=np.int32)
     return Scene(shape, height, orientation.level, np.eye(3), lens, SIZE, projected, order, rings)

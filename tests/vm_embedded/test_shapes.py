@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.shape import tangents
-from vm_embedded.shapes import SHAPES, Circle, Sphere, shape_named
+from vm_embedded.shapes import SHAPES, Circle, Cylinder, Sphere, shape_named
 
 from .strategies import random_direction, reals, seeds
 
@@ -16,10 +16,16 @@ clearances = reals(1.05, 30.0)
 """Height of the camera in units of the least height that has a mesh."""
 
 
+def least_height(shape):
+    """Height [m] that a camera must be above; of a circle just a length."""
+    return shape.object_height if isinstance(shape, Cylinder) else 2.0 * shape.radius
+
+
 @st.composite
-def shapes_and_heights(draw, kinds=(Circle, Sphere)):
-    shape = draw(st.sampled_from(kinds))(draw(radii))
-    return shape, 2.0 * shape.radius * draw(clearances)
+def shapes_and_heights(draw, kinds=(Circle, Sphere, Cylinder)):
+    kind, radius = draw(st.sampled_from(kinds)), draw(radii)
+    shape = kind(radius, draw(reals(0.05, 2.0))) if kind is Cylinder else kind(radius)
+    return shape, least_height(shape) * draw(clearances)
 
 
 def reachable(shape, height):
@@ -55,6 +61,9 @@ def test_phi_follows_the_conventions(case, n):
     n = min(n, reachable(shape, height))
     if isinstance(shape, Sphere):
         expected = math.atan(math.sinh(-n * math.log(1.0 - 2.0 * shape.radius / height)))
+    elif isinstance(shape, Cylinder):
+        top = shape.object_height
+        expected = math.atan(2.0 * shape.radius / top * (math.exp(-n * math.log(1.0 - top / height)) - 1.0))
     else:
         expected = math.atan(2.0 * n * shape.radius / height)
     assert float(shape.phi(n, height)) == pytest.approx(expected, rel=1e-12)
@@ -148,7 +157,7 @@ def test_intersection_ratio_follows_the_conventions(radius, clearance, mesh_clea
 def test_intersection_ratio_is_the_number_of_objects_that_one_object_covers(case, mesh_clearance, n):
     """Seen from another height an object spans from n to n + ratio of the mesh that was made for the first."""
     shape, height = case
-    mesh_height = 2.0 * shape.radius * mesh_clearance
+    mesh_height = least_height(shape) * mesh_clearance
     near, far = (shape.phi(each, height) for each in (n, n + 1.0))
     covered = float(shape.n(far, mesh_height) - shape.n(near, mesh_height))
     assert covered == pytest.approx(shape.intersection_ratio(height, mesh_height), rel=1e-4)
@@ -181,6 +190,10 @@ def test_outline_is_unit_rays_that_touch_the_object(case):
     np.testing.assert_allclose(np.linalg.norm(rays, axis=1), 1.0, atol=1e-12)
     if isinstance(shape, Sphere):
         away = np.linalg.norm(np.cross(rays, center), axis=1)
+    elif isinstance(shape, Cylinder):  # each touches the upper circle or the lower one
+        ends = [center[2] + end * shape.center_height for end in (1.0, -1.0)]
+        away = [np.linalg.norm(rays[:, :2] * (end / rays[:, 2:]) - center[:2], axis=1) for end in ends]
+        away = np.where(np.abs(away[0] - shape.radius) < np.abs(away[1] - shape.radius), *away)
     else:
         away = np.linalg.norm(rays * (center[2] / rays[:, 2:]) - center, axis=1)
     np.testing.assert_allclose(away, shape.radius, rtol=1e-6)
@@ -249,7 +262,7 @@ def test_tangents_are_unit_vectors_at_right_angles(seed):
 @pytest.mark.parametrize("kind", SHAPES.values())
 def test_a_radius_that_is_no_length_is_refused(kind, radius):
     with pytest.raises(GeometryError, match="radius"):
-        kind(radius)
+        kind(radius, 1.0) if kind is Cylinder else kind(radius)
 
 
 @pytest.mark.parametrize("height", [0.2, 0.1, 0.0, -1.0, math.nan, math.inf])
@@ -278,6 +291,19 @@ def test_one_bad_height_of_many_is_refused():
 @pytest.mark.parametrize(("name", "kind"), [("circle", Circle), ("sphere", Sphere), ("Sphere", Sphere)])
 def test_a_shape_is_found_by_its_name(name, kind):
     assert shape_named(name, 0.1) == kind(0.1)
+
+
+@pytest.mark.parametrize("name", ["cylinder", "Cylinder"])
+def test_a_cylinder_is_found_with_its_height(name):
+    assert shape_named(name, 0.05, 1.8) == Cylinder(0.05, 1.8)
+    with pytest.raises(GeometryError, match="height of a cylinder"):
+        shape_named(name, 0.05)
+
+
+@pytest.mark.parametrize("name", ["circle", "sphere"])
+def test_only_a_cylinder_has_a_height(name):
+    with pytest.raises(InputError, match=rf"only a cylinder has a height.*a {name} no 1\.8 m"):
+        shape_named(name, 0.05, 1.8)
 
 
 def test_an_unknown_shape_names_the_nearest():

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from vm_embedded.lens import Equidistant, Equisolid, Rectilinear
 from vm_embedded.lens_file import LensFile
 from vm_embedded.manifest import Manifest, ObjectClass
-from vm_embedded.mesh import ring_mesh
+from vm_embedded.mesh_models import build_mesh
 from vm_embedded.orientation import Orientation
 from vm_embedded.projection import project
 from vm_train.graphs import seen_points
@@ -41,7 +41,7 @@ LENSES = [
 def test_seen_points_are_those_of_the_mesh_that_are_on_screen(lens, height, roll, pitch, yaw):
     orientation = Orientation.from_roll_pitch(height, roll, pitch, yaw)
     seen = seen_points(LensFile(lens, orientation), SIZE, MANIFEST)
-    mesh = ring_mesh(MANIFEST.mesh_shape, height, MANIFEST.intersections, MANIFEST.max_distance)
+    mesh = build_mesh(MANIFEST.mesh_shape, height, MANIFEST.intersections, MANIFEST.max_distance)
     whole = project(mesh, orientation.level, lens, SIZE).visible
     assert np.array_equal(seen.graph.rays, whole.graph.rays)
     assert np.array_equal(seen.graph.neighbors, whole.graph.neighbors)

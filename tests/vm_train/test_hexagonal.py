@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
 from vm_embedded.lens import Equisolid, Rectilinear
-from vm_embedded.mesh import ring_mesh
+from vm_embedded.mesh_models import build_mesh
 from vm_embedded.orientation import Orientation
 from vm_embedded.projection import project
 from vm_embedded.shapes import Sphere
@@ -80,7 +80,7 @@ def test_no_place_of_the_picture_is_further_than_a_spacing_from_a_point(size, co
 def test_columns_lie_in_the_picture_where_ring6_has_them():
     orientation = Orientation.from_roll_pitch(0.9, pitch=0.6)
     lens = Rectilinear(focal_length=400.0, fov=2.0, size=SIZE)
-    shown = project(ring_mesh(Sphere(0.075), 0.9, 4, 20.0), orientation.level, lens, SIZE).visible
+    shown = project(build_mesh(Sphere(0.075), 0.9, 4, 20.0), orientation.level, lens, SIZE).visible
     ahead = np.flatnonzero(np.linalg.norm(shown.pixels - [320.0, 240.0], axis=1) < 60.0)
     steps = shown.pixels[shown.graph.neighbors[ahead]] - shown.pixels[ahead, None]
     mean = steps.mean(axis=0)

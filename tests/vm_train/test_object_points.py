@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.lens import Equisolid
-from vm_embedded.mesh import ring_mesh
+from vm_embedded.mesh_models import build_mesh
 from vm_embedded.orientation import Orientation
 from vm_embedded.shapes import Sphere
 from vm_train.figures import new_figure, save_figure
@@ -62,14 +62,14 @@ def test_a_ray_hits_a_ball_if_it_comes_nearer_to_its_center_than_its_radius(radi
 @given(radii, heights, intersections, reals(0.0, 8.0))
 def test_as_many_rings_cross_a_ball_as_wanted_within_one_at_every_distance(radius, height, k, distance):
     ball = Sphere(radius)
-    mesh = ring_mesh(ball, height, k, 10.0 + 30.0 * radius / (height - 2.0 * radius) * 10.0)
+    mesh = build_mesh(ball, height, k, 10.0 + 30.0 * radius / (height - 2.0 * radius) * 10.0)
     assert abs(rings_across(mesh, ball, height, distance) - k) <= 1
 
 
 @given(radii, heights, st.integers(3, 6), reals(0.5, 5.0))
 def test_the_visual_mesh_has_about_the_same_number_of_points_on_a_ball_at_every_distance(radius, height, k, distance):
     ball = Sphere(radius)
-    mesh = ring_mesh(ball, height, k, 5.0 * height / (height - 2.0 * radius) + 1.0)
+    mesh = build_mesh(ball, height, k, 5.0 * height / (height - 2.0 * radius) + 1.0)
     counts = points_on_ball(mesh.rays, ball, height, distance)
     assert FULL * (k - 1) ** 2 - 1 <= counts.min()
     assert counts.max() <= FULL * (k + 1) ** 2 + 1
@@ -82,7 +82,7 @@ def test_below_the_camera_early_widths_give_about_twice_the_points_and_ours_no_m
     ball = Sphere(radius)
 
     def mean(shape):
-        rays = ring_mesh(shape, height, k, 1.5).rays
+        rays = build_mesh(shape, height, k, 1.5).rays
         places = radius * np.linspace(0.0, 0.5, 11)
         return np.mean([points_on_ball(rays, ball, height, place).mean() for place in places.tolist()])
 
