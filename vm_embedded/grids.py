@@ -56,43 +56,45 @@ class Grid(MeshModel):
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         shape.spacing(height)  # raises GeometryError for a height without a mesh
-        lean, row = (0.5, _ROW) if self.neighbors == 6 else (0.0, 1.0)
+        x, y = self._quarter(shape, height, intersections, max_distance)
+        rows, halves = (size - 1 for size in x.shape)
+        m, half = (axis.astype(np.int32) for axis in np.mgrid[-rows : rows + 1, -halves : halves + 1])
+        shown = np.isfinite(x[np.abs(m), np.abs(half)])
+        m, half = m[shown], half[shown]
+        n = (half - m) // 2 if self.neighbors == 6 else half // 2
+        linked = _together(n, m, self.neighbors)
+        m, n, half = m[linked], n[linked], half[linked]
+
+        rays = np.empty((len(n), 3), order="F")
+        rays[:, 0] = np.sign(half) * x[np.abs(m), np.abs(half)]
+        rays[:, 1] = np.sign(m) * y[np.abs(m), np.abs(half)]
+        rays[:, 2] = shape.center_height - height
+        rays /= np.sqrt(rays[:, 0] ** 2 + rays[:, 1] ** 2 + rays[:, 2] ** 2)[:, None]
+        cells = np.stack([n - n.min(), m - m.min()], axis=1)
+        return Mesh(frozen(rays), frozen(lattice_neighbors(cells, self.steps)), frozen(cells))
+
+    def _quarter(self, shape: Shape, height: float, intersections: float, max_distance: float) -> tuple[Floats, Floats]:
+        """x and y [m] of the quarter of the lattice that both are positive in, and all others are mirror images of.
+
+        (rows, half columns); NaN where no point is. Raises GeometryError for more places than memory has.
+        """
+        six = self.neighbors == 6
+        row = _ROW if six else 1.0
         border = _border(self.kind, shape, height, max_distance) * intersections
-        rows = math.floor(border[:, 1].max() / row) + 1
-        columns = math.floor(border[:, 0].max() + lean * rows) + 2
-        if (2 * rows + 1) * (2 * columns + 1) > 10**8:
+        halves, rows = (math.floor(each) + 2 for each in border.max(axis=0) * (2.0, 1.0 / row))
+        if 4 * rows * halves > 10**8:
             raise GeometryError(
                 f"a lattice out to {max_distance:g} m has over 1e8 places with {intersections:g} steps across an object"
             )
-        # All four quarters are alike, so one is computed, in places of its own: half columns in every second row.
-        half = np.arange(0, 2 * math.floor(border[:, 0].max()) + 5, dtype=np.int32)
-        place = np.stack(np.meshgrid(half, np.arange(rows + 1, dtype=np.int32)), axis=2).reshape(-1, 2)
-        place = place[(place[:, 0] - (place[:, 1] if lean else 0)) % 2 == 0]
-        place = place[_within(place * (0.5, row), border)]
-        u, v = (place * (0.5, row) / intersections).T
+        m, half = (axis.reshape(-1) for axis in np.mgrid[:rows, :halves].astype(np.int32))
+        places = np.stack([0.5 * half, row * m], axis=1)
+        tried = np.flatnonzero(((half - m if six else half) % 2 == 0) & _within(places, border))
+        u, v = (places[tried] / intersections).T
         x, y = _position(self.kind, u, v, shape, height)
-        near = np.hypot(x, y) <= max_distance
-        place, x, y = place[near], x[near], y[near]
-
-        index = np.full((rows + 1, len(half)), -1, dtype=np.int32)
-        index[place[:, 1], place[:, 0]] = np.arange(len(place), dtype=np.int32)
-        m, n = (axis.reshape(-1) for axis in np.mgrid[-rows : rows + 1, -columns : columns + 1].astype(np.int32))
-        halves = 2 * n + (m if lean else 0)
-        inside = np.flatnonzero(np.abs(halves) < len(half))
-        m, n, halves = m[inside], n[inside], halves[inside]
-        quarter = index[np.abs(m), np.abs(halves)]
-        shown = quarter >= 0
-        m, n, halves, quarter = m[shown], n[shown], halves[shown], quarter[shown]
-        linked = _together(n, m, self.neighbors)
-        m, n, halves, quarter = m[linked], n[linked], halves[linked], quarter[linked]
-
-        rays = np.empty((len(n), 3), order="F")
-        rays[:, 0] = np.sign(halves) * x[quarter]
-        rays[:, 1] = np.sign(m) * y[quarter]
-        rays[:, 2] = shape.center_height - height
-        rays /= np.sqrt(rays[:, 0] ** 2 + rays[:, 1] ** 2 + rays[:, 2] ** 2)[:, None]
-        cells = np.stack([n - n.min(), m - m.min()], axis=1).astype(np.int32)
-        return Mesh(frozen(rays), frozen(lattice_neighbors(cells, self.steps)), frozen(cells))
+        x[np.hypot(x, y) > max_distance] = np.nan
+        found = np.full((2, rows * halves), np.nan)
+        found[:, tried] = x, y
+        return found[0].reshape(rows, halves), found[1].reshape(rows, halves)
 
 
 def _position(kind: str, u: Floats, v: Floats, shape: Shape, height: float) -> tuple[Floats, Floats]:
