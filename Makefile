@@ -6,14 +6,13 @@ DEMO := tests/fixtures/demo
 OUT ?= data/train
 COUNT ?= 8000
 SEED ?= 1
-COMPARED ?= build/compare
 SCENES ?= export/vm_synth/polyhaven.toml
 NETWORKS := ball-5x4 ball-9x4 ball-best
 BUILD ?= build/networks
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
 
-.PHONY: help setup demo test lint bundle deb deploy logs lock bench bench-synth bench-train data networks test-data score compare choices fixtures docs clean
+.PHONY: help setup demo test lint bundle deb deploy logs lock bench bench-synth bench-train data networks test-data score choices fixtures docs clean
 .DELETE_ON_ERROR:
 
 help: ## what can be made
@@ -89,10 +88,6 @@ bench-synth: .venv/synth ## measure vm-synth: make bench-synth HDRI=folder-of-ma
 
 bench-train: .venv/dev ## measure vm-train: make bench-train DATA=folder-of-pictures (5 minutes)
 	$(BIN)/python -m benchmarks.training $(DATA)
-
-compare: .venv/dev ## compare selections and meshes: make compare DATA=set HELD_OUT=set-of-other-maps [COMPARED=build/compare] (an hour)
-	$(BIN)/python -m benchmarks.comparison $(DATA) $(HELD_OUT) $(COMPARED)
-	$(BIN)/python -m benchmarks.comparison_report
 
 choices: .venv/dev ## what each choice of a training brings: make choices [TEST=data/test], after networks and test-data (hours)
 	$(BIN)/python -m benchmarks.choices data/soccer $(TEST)/field build/choices
