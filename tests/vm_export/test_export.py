@@ -30,6 +30,9 @@ from vm_export.reference import Overrides, read_reference, write_reference
 
 COMMAND = Path(sys.executable).parent / "vm-export"
 
+MESHES = {"plain": "ring6", "runs": "ring6", "lattice": "xmgrid6"}
+"""A mesh for each layout."""
+
 in_all_layouts = pytest.mark.parametrize("layout", LAYOUTS)
 
 
@@ -100,7 +103,7 @@ DOMAINS = {"plain": {""}, "runs": {"", "ai.onnx.ml"}, "lattice": {""}}
 
 @in_all_layouts
 def test_the_file_describes_itself_and_is_one_file_of_stock_operators(layout, tmp_path):
-    made = checkpoint(mesh="xmgrid6" if layout == "lattice" else "ring6")
+    made = checkpoint(mesh=MESHES[layout])
     difference = onnx_graph.export(made, tmp_path / "model.onnx", layout)
     assert difference < 1e-4
     assert [path.name for path in tmp_path.iterdir()] == ["model.onnx"]
@@ -141,17 +144,17 @@ def test_a_layout_that_there_is_not_is_refused(tmp_path):
 @in_all_layouts
 def test_the_same_checkpoint_gives_the_same_bytes(layout, tmp_path):
     for name in ("a", "b"):
-        onnx_graph.export(checkpoint(3), tmp_path / name, layout)
+        onnx_graph.export(checkpoint(3, mesh=MESHES[layout]), tmp_path / name, layout)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
 @in_all_layouts
 def test_a_graph_that_differs_from_torch_is_not_written(layout, tmp_path, monkeypatch):
-    other = onnx_graph.build(checkpoint(5).network, manifest(("class0", "class1"), layout=layout))
+    other = onnx_graph.build(checkpoint(5).network, manifest(("class0", "class1"), MESHES[layout], layout=layout))
     monkeypatch.setattr(onnx_graph, "build", lambda network, manifest: other)
     (tmp_path / "model.onnx").write_text("the file of before")
     with pytest.raises(ModelError, match="differ by"):
-        onnx_graph.export(checkpoint(4), tmp_path / "model.onnx", layout)
+        onnx_graph.export(checkpoint(4, mesh=MESHES[layout]), tmp_path / "model.onnx", layout)
     assert (tmp_path / "model.onnx").read_text() == "the file of before"
 
 
@@ -209,7 +212,7 @@ def test_reference_files_survive_a_round_trip(tmp_path):
     assert len(stored["network"][0][0]["weights"]) == 4 * 7
     read = read_reference(tmp_path / "model.yaml", Overrides(object_radius=0.075))
     assert read.manifest.classes == made.manifest.classes
-    test = onnx_graph._example(made.network, 50, 0)
+    test = onnx_graph._example(made.network, made.manifest, 50, 0)
     with torch.inference_mode():
         again = read.network(torch.from_numpy(test.points), torch.from_numpy(test.neighbors))
     np.testing.assert_allclose(again.numpy(), test.probabilities, atol=1e-5)
@@ -309,7 +312,7 @@ def test_command_writes_the_fastest_layout_and_the_portable_one_beside_it(tmp_pa
     both = [read_model(tmp_path / name) for name in ("model.onnx", "model.plain.onnx")]
     assert [each.manifest.layout for each in both] == ["runs", "plain"]
     assert replace(both[0].manifest, layout="plain").as_json() == both[1].manifest.as_json()
-    test = onnx_graph._example(made.network, 300, 1)
+    test = onnx_graph._example(made.network, made.manifest, 300, 1)
     for each in both:
         answer = Session(each, RuntimeSettings()).answer(test)
         np.testing.assert_allclose(answer, test.probabilities[:-1], atol=1e-5)
