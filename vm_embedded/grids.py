@@ -16,8 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import Floats, Indices, Mask, frozen
-from .errors import GeometryError
-from .mesh import SELF, Mesh, MeshModel
+from .mesh import SELF, Mesh, MeshModel, check_size
 from .shape import Shape
 
 _STEPS = {
@@ -33,8 +32,9 @@ _RUNS = {
 _ROW = math.sqrt(0.75)
 """Distance of the rows of a six-neighbor lattice, in steps."""
 
-_ROUNDS = 100
-"""Most rounds until both coordinates of an NM point agree; they take about ten."""
+_TURNS, _HALVINGS = 30, 60
+"""How often an NM point's coordinates are computed from each other in turns, about ten are needed; where that does not
+settle, as for thin cylinders, how often the interval of one is halved."""
 
 KINDS = ("xy", "xm", "nm")
 
@@ -81,11 +81,9 @@ class Grid(MeshModel):
         six = self.neighbors == 6
         row = _ROW if six else 1.0
         border = _border(self.kind, shape, height, max_distance) * intersections
+        across, along = border.max(axis=0).tolist()
+        check_size(across * along)
         halves, rows = (math.floor(each) + 2 for each in border.max(axis=0) * (2.0, 1.0 / row))
-        if 4 * rows * halves > 10**8:
-            raise GeometryError(
-                f"a lattice out to {max_distance:g} m has over 1e8 places with {intersections:g} steps across an object"
-            )
         m, half = (axis.reshape(-1) for axis in np.mgrid[:rows, :halves].astype(np.int32))
         places = np.stack([0.5 * half, row * m], axis=1)
         tried = np.flatnonzero(((half - m if six else half) % 2 == 0) & _within(places, border))
@@ -113,17 +111,23 @@ def _position(kind: str, u: Floats, v: Floats, shape: Shape, height: float) -> t
     y = across(v, x)
     if kind == "xm":
         return x, y
-    # Each round halves the way at least: a slice's coordinate hardly depends on the slice where it is far out itself.
-    open_ = np.arange(len(u))
-    for _ in range(_ROUNDS):
-        new_x = across(u[open_], y[open_])
-        new_y = across(v[open_], new_x)
-        off = np.maximum(np.abs(new_x - x[open_]), np.abs(new_y - y[open_])) > 1e-12 * (g + new_x + new_y)
-        x[open_], y[open_] = new_x, new_y
-        open_ = open_[off]
-        if len(open_) == 0:
-            return x, y
-    raise GeometryError(f"the two slices of an NM grid do not meet for {shape} at {height:g} m")
+    # A slice's coordinate hardly depends on the slice where it is far out itself, so turns settle nearly everywhere.
+    left = np.arange(len(u))
+    for _ in range(_TURNS):
+        new_x = across(u[left], y[left])
+        new_y = across(v[left], new_x)
+        off = np.maximum(np.abs(new_x - x[left]), np.abs(new_y - y[left])) > 1e-12 * (g + new_x + new_y)
+        x[left], y[left] = new_x, new_y
+        left = left[off]
+    # A coordinate shrinks as its slice moves away, so x lies between 0 and that of the slice below the camera.
+    low, high = np.zeros(len(left)), across(u[left], 0.0)
+    for _ in range(_HALVINGS if len(left) else 0):
+        middle = 0.5 * (low + high)
+        beyond = across(u[left], across(v[left], middle)) < middle
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    x[left] = 0.5 * (low + high)
+    y[left] = across(v[left], x[left])
+    return x, y
 
 
 def _border(kind: str, shape: Shape, height: float, max_distance: float) -> Floats:

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from .arrays import Indices, Singles
-from .errors import InputError, ModelError, unknown
+from .errors import GeometryError, InputError, ModelError, unknown
 from .mesh import MeshModel
 from .mesh_models import MESH_MODELS
 from .relative import COLORINGS
 from .shape import Shape
 from .shapes import SHAPES, shape_named
+from .walls import wall_counts
 
 METADATA_KEY = "visual_mesh"
 FORMAT_VERSION = 5
@@ -174,11 +175,20 @@ class Manifest:
             raise ModelError(f"a cylinder has an object_height and no other shape has, but {self.shape} has {tall:g} m")
         if self.mesh != "wall6":
             return
-        if self.shape != "cylinder" or self.sampling != "bilinear" or any(e.kind == "object" for e in self.classes):
-            raise ModelError(
-                "mesh wall6 is for shape cylinder, sampling bilinear and classes of other kinds than object: "
-                "points above the horizon tell of a direction, not of a place on the plane"
-            )
+        if self.shape != "cylinder":
+            raise ModelError(f"mesh wall6 is for shape cylinder, not {self.shape}")
+        if self.sampling != "bilinear":
+            raise ModelError(f"mesh wall6 has no footprints: its sampling is bilinear, not {self.sampling}")
+        for each in self.classes:
+            if each.kind == "object":
+                raise ModelError(
+                    f"mesh wall6 does not locate objects, so class {each.name!r} can't be of kind object, but "
+                    "upright or area"
+                )
+        try:
+            wall_counts(self.mesh_shape, self.intersections, self.max_distance)
+        except GeometryError as error:
+            raise ModelError(f"the model's manifest has no mesh: {error}") from error
 
     def used_for(self, object_radius: float | None, max_distance: float | None) -> Manifest:
         """The manifest for real objects of a radius [m] and a mesh that reaches so far [m]; None for what it says."""

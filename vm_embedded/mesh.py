@@ -21,6 +21,10 @@ Runs = tuple[tuple[int, ...], ...]
 """Neighbors that follow each other in memory, in groups of at most three; together all of a point's neighbors."""
 
 
+MOST_POINTS = 8_000_000
+"""Of a mesh: more than OpenCV samples at once, and more than a camera has pixels."""
+
+
 class Graph(Protocol):
     """n points that are linked."""
 
@@ -113,6 +117,15 @@ class MeshModel(ABC):
     def rings(self, made_for: Shape, mesh_height: float, intersections: float, seen: Shape, height: float) -> float:
         """Rings that cross the object `seen` from a height [m], of a mesh that was made for others."""
         return intersections * float(seen.spacing(height) / made_for.spacing(mesh_height))
+
+
+def check_size(points: float) -> None:
+    """Raise GeometryError for more points than a mesh may have, before they take memory."""
+    if not points <= MOST_POINTS:
+        raise GeometryError(
+            f"a mesh of {points:.3g} points is too large, {MOST_POINTS:g} are allowed: take fewer intersections, a "
+            "shorter maximum distance or a larger object"
+        )
 
 
 def polar(inclination: Floats, angle: Floats) -> Floats:

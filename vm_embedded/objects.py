@@ -34,7 +34,7 @@ _GRID = np.stack(np.meshgrid(np.linspace(-1.0, 1.0, 5), np.linspace(-1.0, 1.0, 5
 """Where the search for a center looks, in units of its reach."""
 
 _REACHES = (1.0, 0.3, 0.1)
-"""Reach of each round of the search, in object radii."""
+"""Reach of each round of the search, in object radii; upwards and downwards in half heights of what is taller."""
 
 _SCALES = np.geomspace(0.6, 1.8, 15)
 """Apparent sizes that are tried, as shares of the expected one."""
@@ -160,7 +160,8 @@ def _best_center(scene: Scene, center: Floats, near: Members, log_odds: Floats) 
     for reach in _REACHES:
         distance = float(np.linalg.norm(center))
         axis = center / distance
-        tried = axis + reach * scene.shape.radius / distance * (_GRID @ tangents(axis))
+        across, up = scene.shape.radius, max(scene.shape.radius, scene.shape.center_height)
+        tried = axis + reach / distance * ((_GRID * (across, up)) @ tangents(axis))
         centers = scene.shape.center_along(tried, scene.height)
         center = centers[int(np.argmax(_soft(scene.shape.offset(rays, centers, scene.height), scene) @ log_odds))]
     return center

@@ -17,7 +17,14 @@ import numpy.typing as npt
 from .arrays import Floats, frozen
 from .errors import GeometryError
 from .orientation import Orientation
-from .shape import tangents
+
+
+def _numbers(values: object) -> Floats:
+    """An array of what should be numbers. Raises GeometryError."""
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise GeometryError(f"{values!r} is not what should be numbers: {error}") from error
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +38,7 @@ class Pose:
     position: Floats
 
     def __post_init__(self) -> None:
-        position = np.array(self.position, dtype=np.float64)
+        position = _numbers(self.position)
         if position.shape != (3,) or not np.isfinite(position).all():
             raise GeometryError(f"a camera's position must be three finite numbers [m], not {self.position}")
         # An orientation's own checks of a rotation; its height does not matter here.
@@ -45,8 +52,8 @@ class Pose:
             matrix = np.asarray(hwc, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise GeometryError(f"Hwc must be 4 x 4 numbers: {error}") from error
-        if matrix.shape != (4, 4):
-            raise GeometryError(f"Hwc must be 4 x 4 numbers, not of shape {matrix.shape}")
+        if matrix.shape != (4, 4) or not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), atol=1e-6):
+            raise GeometryError("Hwc must be 4 x 4 numbers with 0, 0, 0, 1 as last row (is it transposed?)")
         return cls(matrix[:3, :3], matrix[:3, 3])
 
 
@@ -63,11 +70,7 @@ class Plane:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        try:
-            normal = np.array(self.normal, dtype=np.float64)
-            offset = float(self.offset)
-        except (TypeError, ValueError) as error:
-            raise GeometryError(f"plane {self.name!r} needs three numbers and one: {error}") from error
+        normal, offset = _numbers(self.normal), float(_numbers(self.offset).reshape(-1)[0])
         length = float(np.linalg.norm(normal)) if normal.shape == (3,) else math.nan
         if not (math.isfinite(length) and length > 1e-9 and math.isfinite(offset)):
             raise GeometryError(f"plane {self.name!r} needs a direction and an offset [m], not {self.normal}, {offset}")
@@ -78,28 +81,36 @@ class Plane:
     @classmethod
     def through(cls, name: str, point: Sequence[float], normal: Sequence[float]) -> Plane:
         """The plane through a point [m] of the world. Raises GeometryError."""
-        x, y, z = (float(each) for each in normal)
-        return cls(name, (x, y, z), float(np.dot((x, y, z), np.asarray(point, dtype=np.float64))))
+        place, direction = _numbers(point), _numbers(normal)
+        if place.shape != (3,) or direction.shape != (3,):
+            raise GeometryError(
+                f"plane {name!r} needs three numbers for its point and its normal, not {point}, {normal}"
+            )
+        x, y, z = direction.tolist()
+        return cls(name, (x, y, z), float(place @ direction))
 
     @classmethod
     def spotlight(cls, name: str, target: Sequence[float], camera: Sequence[float]) -> Plane:
         """The plane through `target` that faces a camera at `camera` [m]: the mesh's middle lies on the target, and
         objects are as dense in points there as the mesh makes them below a camera. Raises GeometryError if both are one
         point."""
-        toward = np.asarray(camera, dtype=np.float64) - np.asarray(target, dtype=np.float64)
+        here, there = _numbers(camera), _numbers(target)
+        if here.shape != (3,) or there.shape != (3,):
+            raise GeometryError(f"spotlight {name!r} needs three numbers for target and camera, not {target}, {camera}")
+        toward = here - there
         return cls.through(name, target, toward.tolist())
 
     @cached_property
     def axes(self) -> Floats:
         """World to plane frame (3, 3): its rows are two directions in the plane, and the normal.
 
-        A plane as level as the ground has the world's own x and y.
+        The first is the world's x as far as the plane allows, or its z where the plane is upright across x.
         """
         normal = np.array(self.normal)
-        if self.normal[2] > 1.0 - 1e-12:
-            return frozen(np.eye(3))
-        first, second = tangents(normal)
-        return frozen(np.stack([first, second, normal]))
+        along = np.eye(3)[0 if abs(self.normal[0]) < 0.99 else 2]
+        first = along - (along @ normal) * normal
+        first /= np.linalg.norm(first)
+        return frozen(np.stack([first, np.cross(normal, first), normal]))
 
     def seen_from(self, pose: Pose) -> Orientation:
         """The orientation of a camera over this plane. Raises GeometryError if the camera is not before the plane."""

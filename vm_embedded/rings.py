@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from .arrays import Floats, Indices, frozen
-from .mesh import SELF, Mesh, MeshModel, polar
+from .mesh import SELF, Mesh, MeshModel, check_size, polar
 from .shape import Shape
 
 _RUNS = {
@@ -44,6 +44,7 @@ def inclinations(shape: Shape, height: float, intersections: float, max_distance
     """phi (rings,) [rad] of each ring, the nadir first. Raises GeometryError for a height without a mesh."""
     shape.spacing(height)
     last = float(shape.n(math.atan(max_distance / height), height)) * intersections
+    check_size(last)
     # One ring more than the closed form gives, since its last digit may fall short; the rule itself decides.
     phi = shape.phi(np.arange(1, math.floor(last) + 2) / intersections, height)
     return np.append(0.0, phi[height * np.tan(phi) < max_distance])
@@ -52,8 +53,9 @@ def inclinations(shape: Shape, height: float, intersections: float, max_distance
 def ring_counts(shape: Shape, height: float, intersections: float, rings: int) -> Indices:
     """How many points each of so many rings has (rings,)."""
     theta = shape.theta(np.arange(1, rings) / intersections, height)
-    counts = np.ceil(2.0 * np.pi * intersections / theta - _CEIL_EPSILON).astype(np.int32)
-    return np.append(np.int32(1), counts)
+    counts = np.ceil(2.0 * np.pi * intersections / theta - _CEIL_EPSILON)
+    check_size(float(counts.sum()))
+    return np.append(np.int32(1), counts.astype(np.int32))
 
 
 def places(counts: Indices) -> tuple[Indices, Indices]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,58 +46,70 @@ def detect_views(
 ) -> tuple[Sighting, ...]:
     """What cameras, by their names, show on planes; the clearest first.
 
-    All use the detector's network and share its meshes. Two detections are one object if they are of one class and
-    either lie on the same plane less than a radius apart, or are seen by the same camera less than their angular radius
-    apart: then only one of two planes can be right. A camera that is not before a plane, or too near it for the mesh,
-    sees nothing on it.
+    All use the detector's network and share its meshes. Two detections of one class are one object if they lie on the
+    same plane less than a diameter apart and are of different cameras, or if one camera sees them on different planes
+    less than their angular radius apart: then only one of the planes can be right. The nearest are put together first,
+    and no object has two detections of one camera on one plane. Where planes disagree, that with the most confidence in
+    sum counts. A camera that is not before a plane, or too near it for the mesh, sees nothing on it.
 
     Raises InputError for no planes, planes of one name, or a picture that does not fit.
     """
     names = [each.name for each in planes]
     if not planes or len(set(names)) != len(names):
         raise InputError(f"planes must be one or more with different names, not {names}")
+    if not isinstance(views, Mapping):
+        raise InputError(f"views must be a table of cameras' names and views, not a {type(views).__name__}")
     found: list[Sighting] = []
     for camera, view in views.items():
         for plane in planes:
             found += _sightings(detector, camera, view, plane)
-    found.sort(key=lambda each: -each.detection.confidence)
-    objects: list[list[Sighting]] = []
-    for each in found:
-        same = next((group for group in objects if _same(group, each, detector.shape.radius)), None)
-        if same is None:
-            objects.append([each])
-        else:
-            same.append(each)
-    return tuple(_together(group) for group in objects)
+    pairs = []
+    for i, one in enumerate(found):
+        for j, other in enumerate(found[:i]):
+            apart = _apart(one, other, 2.0 * detector.shape.radius)
+            if apart < 1.0:
+                pairs.append((apart, i, j))
+    group_of = [[each] for each in range(len(found))]
+    for _, i, j in sorted(pairs):
+        one_group, other_group = group_of[i], group_of[j]
+        seen = [(found[each].camera, found[each].plane) for each in one_group + other_group]
+        if one_group is not other_group and len(set(seen)) == len(seen):
+            one_group += other_group
+            for each in other_group:
+                group_of[each] = one_group
+    groups = {id(each): each for each in group_of}.values()
+    together = [_together([found[each] for each in group]) for group in groups]
+    return tuple(sorted(together, key=lambda each: -each.detection.confidence))
 
 
-def _sightings(detector: Detector, camera: str, view: View, plane: Plane) -> Iterable[Sighting]:
+def _sightings(detector: Detector, camera: str, view: View, plane: Plane) -> Iterator[Sighting]:
     try:
         orientation = plane.seen_from(view.pose)
-        detections = detector.detect(view.image, orientation, view.lens)
+        detector.cache.mesh_height(orientation.height)
     except GeometryError:
         return
-    for each in detections:
+    for each in detector.detect(view.image, orientation, view.lens):
         position = plane.to_world(each.position[None], view.pose)[0]
         away = position - view.pose.position
         yield Sighting(camera, plane.name, each, position, away / np.linalg.norm(away))
 
 
-def _same(group: Sequence[Sighting], other: Sighting, radius: float) -> bool:
-    """Whether a sighting is of the object that a group is of."""
-    for each in group:
-        if each.detection.class_name != other.detection.class_name:
-            return False
-        if each.plane == other.plane and each.camera != other.camera:
-            if np.linalg.norm(each.position - other.position) < radius:
-                return True
-        elif each.camera == other.camera and each.plane != other.plane:
-            angle = float(np.arccos(np.clip(each.direction @ other.direction, -1.0, 1.0)))
-            if angle < max(each.detection.angular_radius, other.detection.angular_radius):
-                return True
-    return False
+def _apart(one: Sighting, other: Sighting, diameter: float) -> float:
+    """How far apart two sightings are, 1 being too far for one object."""
+    if one.detection.class_name != other.detection.class_name:
+        return math.inf
+    if one.camera != other.camera and one.plane == other.plane:
+        return float(np.linalg.norm(one.position - other.position)) / diameter
+    if one.camera == other.camera and one.plane != other.plane:
+        angle = math.acos(min(max(float(one.direction @ other.direction), -1.0), 1.0))
+        return angle / max(one.detection.angular_radius, other.detection.angular_radius)
+    return math.inf
 
 
 def _together(group: Sequence[Sighting]) -> Sighting:
-    first = group[0]
-    return Sighting(first.camera, first.plane, first.detection, first.position, first.direction, also=tuple(group[1:]))
+    """One sighting of several of the same object: the clearest on the plane that most speaks for, and the others."""
+    sums: dict[str, float] = {}
+    for each in group:
+        sums[each.plane] = sums.get(each.plane, 0.0) + each.detection.confidence
+    ordered = sorted(group, key=lambda each: (-sums[each.plane], -each.detection.confidence))
+    return replace(ordered[0], also=tuple(ordered[1:]))

@@ -17,7 +17,7 @@ from .arrays import Floats, Indices, frozen
 from .cylinder import Cylinder
 from .errors import GeometryError
 from .grids import Grid
-from .mesh import Mesh, MeshModel, polar
+from .mesh import Mesh, MeshModel, check_size, polar
 from .shape import Shape
 
 NEAREST = 0.3
@@ -90,12 +90,16 @@ def wall_distances(shape: Shape, intersections: float, max_distance: float) -> F
         raise GeometryError(f"walls begin at {NEAREST:g} m, so a cylinder of {shape.radius:g} m radius has no room")
     widest, narrowest = (math.asin(shape.radius / each) for each in (NEAREST, max_distance))
     low, high = 1.0 - 1.0 / intersections, 1.0 + (1.0 - widest / math.pi) / intersections
-    walls = math.ceil(math.log(widest / narrowest) / math.log(high / low))
-    borders = np.geomspace(widest, narrowest, walls + 1)
+    with np.errstate(divide="ignore", over="ignore"):
+        walls = np.ceil(np.log(np.float64(widest) / narrowest) / np.log(high / low))
+    check_size(float(walls))
+    borders = np.geomspace(widest, narrowest, int(walls) + 1)
     return np.asarray(shape.radius / np.sin(np.sqrt(borders[:-1] / high * borders[1:] / low)))
 
 
 def wall_counts(shape: Shape, intersections: float, max_distance: float) -> Indices:
     """How many points a row of each wall has (m,). Raises GeometryError as wall_distances does."""
     theta = 2.0 * np.arcsin(shape.radius / wall_distances(shape, intersections, max_distance))
-    return np.ceil(2.0 * np.pi * intersections / theta - 1e-9).astype(np.int32)
+    counts = np.ceil(2.0 * np.pi * intersections / theta - 1e-9)
+    check_size(float(counts.sum()) * intersections)
+    return counts.astype(np.int32)

@@ -31,6 +31,9 @@ from .second_look import SecondLook
 DEFAULT_CLASSES = ("ball", "goal", "line", "field", "environment")
 """The order of the authors' own networks, for files without a class_map and five outputs."""
 
+_MESHES = tuple(name for name in MESH_MODELS if name not in ("cap6", "wall6"))
+"""The reference's own."""
+
 _MAX_DISTANCE = 20.0
 """How far out [m] the reference's own configuration lets the mesh reach; its files don't say."""
 
@@ -91,8 +94,8 @@ def read_reference(path: str | Path, overrides: Overrides) -> Checkpoint:
 
 def _checkpoint(data: Mapping[str, Any], overrides: Overrides, provenance: dict[str, str]) -> Checkpoint:
     geometry, model = data["geometry"], str(data["mesh"]).lower()
-    if model not in MESH_MODELS:
-        raise InputError(unknown("mesh", model, MESH_MODELS))
+    if model not in _MESHES:
+        raise InputError(unknown("mesh", model, _MESHES))
     network = _network(data["network"], MESH_MODELS[model].neighbors)
     radius = float(geometry["radius"]) if overrides.radius is None else overrides.radius
     intersections = float(geometry["intersections"])
@@ -182,6 +185,11 @@ def write_reference(checkpoint: Checkpoint, path: str | Path) -> None:
     if (manifest.sampling, manifest.colors) != ("bilinear", "absolute"):
         kind = f"{manifest.sampling} points and {manifest.colors} colors"
         raise InputError(f"the reference's networks take bilinear points and absolute colors; this one takes {kind}")
+    if manifest.object_height or manifest.mesh not in _MESHES:
+        raise InputError(
+            f"the reference's format has no cylinders and no meshes but its own; this network is for {manifest.mesh}, "
+            f"shape {manifest.shape}"
+        )
     neighbors = network.shape.neighbors
     groups: list[list[dict[str, Any]]] = []
     for spec, layer in zip(network.shape.layers, network.layers, strict=True):

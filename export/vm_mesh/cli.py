@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,7 +13,7 @@ from vm_embedded.errors import VisualMeshError, unknown
 from vm_embedded.mesh_models import MESH_MODELS
 from vm_embedded.shapes import SHAPES
 
-EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
+EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 _EPILOG = "Exit status: 0 done, 1 not done (the reason is on standard error), 2 wrong usage."
 
@@ -64,9 +65,14 @@ def _parser(command: str, description: str) -> argparse.ArgumentParser:
     what.add_argument("--shape", choices=tuple(SHAPES), help="of the object; default sphere")
     what.add_argument("--radius", type=float, metavar="M", help="of the object [m]; default 0.095")
     what.add_argument("--object-height", type=float, metavar="M", help="of a cylinder [m]")
-    what.add_argument("--height", metavar="M", help="of the camera [m]; default the lens file's, or 1")
+    what.add_argument("--height", metavar="M", help="of the camera [m]; default that of --lens, or 1")
     what.add_argument("--intersections", type=float, metavar="K", help="points in a row across an object; default 4")
-    what.add_argument("--max-distance", type=float, metavar="M", help="how far out the mesh reaches [m]; default 10")
+    what.add_argument(
+        "--max-distance",
+        type=float,
+        metavar="M",
+        help="how far out the mesh reaches on the plane [m]; default 10",
+    )
     return made
 
 
@@ -96,6 +102,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except VisualMeshError as error:
         print(f"vm-mesh: {error}", file=sys.stderr)
         return EXIT_FAILED
+    except KeyboardInterrupt:
+        print("vm-mesh: stopped", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:  # who reads has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return EXIT_OK
 
 

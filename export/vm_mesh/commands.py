@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Callable
-from dataclasses import asdict, replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -48,11 +48,16 @@ def show(options: argparse.Namespace) -> None:
     if options.image is not None:
         if file is None:
             raise InputError("a picture needs the lens that took it; give --lens")
+        if file.orientation is None and (options.height is None or options.pitch is None):
+            raise InputError(f"{options.lens} does not say where the camera was; give --height and --pitch")
         orientation = _orientation(options, file, plan.height)
         figure = on_picture(made, read_image(options.image), file.lens, orientation)
     else:
         view = options.view or ("directions" if made.model == "wall6" else "ground")
-        reach = options.reach or (plan.max_distance if view == "directions" else min(2.0, plan.max_distance))
+        reach = plan.max_distance if view == "directions" else min(2.0, plan.max_distance)
+        if options.reach is not None:
+            reach = _positive("--reach", options.reach)
+        _distances(options.object or (), np.empty(0))
         figure = drawn(made, view, reach, tuple(options.object or ()))
     save_figure(figure, options.output)
     print(f"{options.output}: {made.model}, {len(made.mesh)} points")
@@ -60,12 +65,13 @@ def show(options: argparse.Namespace) -> None:
 
 def quality(options: argparse.Namespace) -> None:
     """Print, plot and write how evenly meshes sample."""
-    for path in (options.output,):
-        if path is not None:
-            _check_figure(path)
+    if options.output is not None:
+        _check_figure(options.output)
+    if options.json is not None:
+        check_writable(options.json)
     plan, _ = _plan(options, None)
     # Distances in no simple ratio to each other, closer together near the camera's foot, where meshes differ.
-    distances = _distances(options, plan.max_distance * 0.8 * np.linspace(0.0, 1.0, 60) ** 2)
+    distances = _distances(options.distance, plan.max_distance * 0.8 * np.linspace(0.0, 1.0, 60) ** 2)
     found = {model: _measured(MadeMesh.build(model, plan), distances) for model in _models(options, plan)}
     print(f"{plan.shape}, camera {plan.height:g} m high, k = {plan.intersections:g}, to {plan.max_distance:g} m")
     print("equivalent k on an object: mean (least to most over bearings); links in steps, angles in degrees")
@@ -92,7 +98,7 @@ def range_(options: argparse.Namespace) -> None:
     plan, _ = _plan(options, file)
     lens = file.lens if options.size is None else file.lens.for_image(_size(options.size))
     scale = lens.scale
-    distances = _distances(options, np.array([0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0]))
+    distances = _distances(options.distance, np.array([0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0]))
     found = range_of(plan, scale, distances)
     print(f"{plan.shape}, camera {plan.height:g} m high, lens with {scale:.0f} px/rad on its axis")
     print(f"a whole object has about {found.points:.0f} points at every distance (k = {plan.intersections:g})")
@@ -106,7 +112,9 @@ def range_(options: argparse.Namespace) -> None:
     else:
         print(f"beyond {found.worth:.1f} m the mesh is finer than the camera: larger distances are not worth it")
     if options.output is not None:
-        figure = range_figure(plan, range_of(plan, scale, np.geomspace(distances[0], distances[-1], 200)))
+        figure = range_figure(
+            plan, range_of(plan, scale, np.geomspace(max(distances[0], 0.01), max(distances[-1], 0.02), 200))
+        )
         save_figure(figure, options.output)
         print(f"{options.output}: written")
 
@@ -115,7 +123,10 @@ def compare(options: argparse.Namespace) -> None:
     """Print and write models side by side."""
     file = _lens_of(options)
     plan, _ = _plan(options, file)
-    distances = np.concatenate([np.linspace(0.0, 1.0, 11), np.linspace(1.0, 0.8 * plan.max_distance, 15)[1:]])
+    distances = 0.8 * plan.max_distance * np.linspace(0.0, 1.0, 25) ** 2
+    size = None if file is None else _size_of(options, file)
+    if options.json is not None:
+        check_writable(options.json)
     head = "model       points  on screen  build [ms]  k from    to  spread  link lengths  angles [deg]"
     print(
         f"{plan.shape}, camera {plan.height:g} m high, k = {plan.intersections:g}, to {plan.max_distance:g} m\n{head}"
@@ -123,8 +134,8 @@ def compare(options: argparse.Namespace) -> None:
     found: dict[str, Any] = {}
     for model in _models(options, plan):
         made = MadeMesh.build(model, plan)
-        curve, links = _measured(made, distances if model != "wall6" else distances[distances >= 0.3])
-        seen = None if file is None else _on_screen(made, options, file)
+        curve, links = _measured(made, distances)
+        seen = None if file is None or size is None else _on_screen(made, options, file, size)
         found[model] = _figures(curve, links) | {"points": len(made.mesh), "on_screen": seen, "build_ms": made.build_ms}
         spread = float(np.std(curve.mean))
         print(
@@ -152,12 +163,22 @@ def _plan(options: argparse.Namespace, file: LensFile | None) -> tuple[Plan, str
         given |= {name: getattr(manifest, name) for name in given}
         model = manifest.mesh
     chosen = {name: getattr(options, name) for name in given}
+    if chosen["shape"] not in (None, "cylinder"):
+        given["object_height"] = 0.0  # of the network's cylinder
     given |= {name: value for name, value in chosen.items() if value is not None}
     shape = shape_named(given["shape"], given["radius"], given["object_height"])
     height = 1.0 if file is None or file.orientation is None else file.orientation.height
     if options.height is not None:
         height = length(options.height)
-    return Plan(shape, height, given["intersections"], given["max_distance"]), model
+    plan = Plan(
+        shape,
+        _positive("--height", height),
+        _positive("--intersections", given["intersections"]),
+        _positive("--max-distance", given["max_distance"]),
+    )
+    if not isinstance(shape, Cylinder):
+        shape.spacing(height)  # raises GeometryError for a camera that is too low
+    return plan, model
 
 
 def _models(options: argparse.Namespace, plan: Plan) -> list[str]:
@@ -184,20 +205,27 @@ def _links_text(links: Links) -> str:
     return ", ".join(f"{name} {each.mean:.2f} +- {each.deviation:.2f}" for name, each in parts)
 
 
-def _on_screen(made: MadeMesh, options: argparse.Namespace, file: LensFile) -> int:
-    """How many points a camera sees."""
+def _size_of(options: argparse.Namespace, file: LensFile) -> Size:
+    """Size of the pictures [px]."""
     size = _size(options.size) if options.size is not None else file.lens.size
     if size is None:
         raise InputError("the lens file does not say how large its pictures are; give --size")
+    return size
+
+
+def _on_screen(made: MadeMesh, options: argparse.Namespace, file: LensFile, size: Size) -> int:
+    """How many points a camera sees."""
     orientation = _orientation(options, file, made.plan.height)
     return int(project(made.mesh, orientation.level, file.lens.for_image(size), size).on_screen.sum())
 
 
 def _orientation(options: argparse.Namespace, file: LensFile, height: float) -> Orientation:
-    if file.orientation is not None and options.pitch is None and options.roll is None:
-        return replace(file.orientation, height=height)
-    pitch, roll = (0.0 if each is None else angle(each) for each in (options.pitch, options.roll))
-    return Orientation.from_roll_pitch(height, roll, pitch)
+    pitch, roll = (0.0, 0.0) if file.orientation is None else (file.orientation.pitch, file.orientation.roll)
+    return Orientation.from_roll_pitch(
+        height,
+        roll if options.roll is None else angle(options.roll),
+        pitch if options.pitch is None else angle(options.pitch),
+    )
 
 
 def _lens_of(options: argparse.Namespace) -> LensFile | None:
@@ -206,18 +234,26 @@ def _lens_of(options: argparse.Namespace) -> LensFile | None:
 
 def _size(text: str) -> Size:
     width, cross, height = text.partition("x")
-    if not cross or not (width.isdigit() and height.isdigit()) or not (int(width) and int(height)):
+    sides = [int(each) if each.isascii() and each.isdigit() else 0 for each in (width, height)]
+    if not cross or not all(sides):
         raise InputError(f"size must be WIDTHxHEIGHT in pixels, as 640x512, not {text!r}")
-    return int(width), int(height)
+    return sides[0], sides[1]
 
 
-def _distances(options: argparse.Namespace, otherwise: Floats) -> Floats:
+def _distances(given: Sequence[float] | None, otherwise: Floats) -> Floats:
     """The distances asked for, in order, or others. Raises InputError for what is no distance."""
-    if not options.distance:
+    if not given:
         return otherwise
-    if not all(0.0 <= each < 1e6 for each in options.distance):
-        raise InputError(f"distances must be numbers of at least 0 m, not {options.distance}")
-    return np.array(sorted(options.distance))
+    if not all(0.0 <= each < 1e6 for each in given):
+        raise InputError(f"distances must be numbers of at least 0 m, not {list(given)}")
+    return np.array(sorted(given))
+
+
+def _positive(name: str, value: float) -> float:
+    """A finite number above 0. Raises InputError."""
+    if not (math.isfinite(value) and value > 0.0):
+        raise InputError(f"{name} must be a number above 0, not {value}")
+    return value
 
 
 def _check_figure(path: Path) -> None:
@@ -225,9 +261,18 @@ def _check_figure(path: Path) -> None:
     check_writable(path)
 
 
+def _without_nan(content: Any) -> Any:
+    """The same with None for what is no number: JSON has no NaN."""
+    if isinstance(content, dict):
+        return {key: _without_nan(each) for key, each in content.items()}
+    if isinstance(content, list):
+        return [_without_nan(each) for each in content]
+    return None if isinstance(content, float) and not math.isfinite(content) else content
+
+
 def _write(path: Path | None, content: Any) -> None:
     if path is None:
         return
     with written_beside(path) as part:
-        part.write_text(json.dumps(content, indent=1) + "\n")
+        part.write_text(json.dumps(_without_nan(content), indent=1, allow_nan=False) + "\n")
     print(f"{path}: written")

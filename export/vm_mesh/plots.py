@@ -26,15 +26,17 @@ def quality_figure(plan: Plan, curves: Sequence[tuple[str, OnObject]]) -> Figure
     axes.axhline(k, color="#999999", linewidth=0.8)
     for number, (model, curve) in enumerate(curves):
         color = _COLORS[number % len(_COLORS)]
-        axes.plot(curve.distances, curve.mean, color=color, linewidth=1.3, label=model)
-        axes.fill_between(curve.distances, curve.low, curve.high, color=color, alpha=0.15, linewidth=0)
+        style = ("-", "--", ":")[number // len(_COLORS) % 3]
+        axes.plot(curve.distances, curve.mean, style, color=color, linewidth=1.3, label=model)
+        if len(curves) <= 4:  # of more nobody sees whose it is
+            axes.fill_between(curve.distances, curve.low, curve.high, color=color, alpha=0.15, linewidth=0)
     axes.set_xlabel("distance of the object from the camera's foot [m]")
     axes.set_ylabel("equivalent k: mean, and range over bearings")
     axes.set_title(f"k = {k:g}, and one more or less; camera {plan.height:g} m high; {plan.shape}", fontsize=9)
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, 2.5 * k)
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, fontsize=9)
+    figure.legend(loc="outside right center", frameon=False, fontsize=9)
     return figure
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats
 from vm_embedded.cylinder import Cylinder
+from vm_embedded.walls import NEAREST
 
 from .made_mesh import MadeMesh
 
@@ -59,6 +60,8 @@ class Links:
 def on_object(made: MadeMesh, distances: Floats) -> OnObject:
     """The equivalent k on objects at distances (m,) [m] from the camera's foot."""
     plan, rays = made.plan, np.ascontiguousarray(made.mesh.rays)
+    if made.walls is not None:
+        distances = distances[distances >= NEAREST]
     turn = 2.0 * np.pi * (np.arange(BEARINGS) + 0.37) / BEARINGS
     found = np.empty((len(distances), BEARINGS))
     for row, distance in enumerate(distances.tolist()):

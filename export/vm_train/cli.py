@@ -90,7 +90,9 @@ def _on_request() -> Iterator[Callable[[], bool]]:
 
 
 def _configuration(options: argparse.Namespace) -> TrainConfiguration:
-    return read_sections(TrainConfiguration, options.config, overrides_of(options.set, "training.epochs=5"))
+    configuration = read_sections(TrainConfiguration, options.config, overrides_of(options.set, "training.epochs=5"))
+    _ = configuration.manifest  # raises ModelError for what fits no model file, before anything takes time
+    return configuration
 
 
 def _train(options: argparse.Namespace) -> int:

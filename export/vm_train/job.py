@@ -84,7 +84,8 @@ class Job:
         counts = job._counted()
         if not counts.any():
             raise InputError(
-                "no training picture has a labeled point: do the lens files fit the pictures, and [mesh] the object?"
+                "no training picture has a labeled point: do the lens files fit the pictures, and [mesh] the object? "
+                "(a camera below the top of a sphere or a cylinder sees no point of its mesh)"
             )
         job = replace(job, counts=counts)
         save(folder / "pictures.json", split)

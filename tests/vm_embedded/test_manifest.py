@@ -250,7 +250,12 @@ def test_provenance_that_is_no_table_is_refused(wrong):
         Manifest.from_json(changed(provenance=wrong))
 
 
-TEST = {"points": [[0.5, 0.5, 0.5], [-1, -1, -1]], "neighbors": [[1] * 6, [1] * 6], "probabilities": [[0.5], [0.5]]}
+TEST = {
+    "points": [[0.5, 0.5, 0.5], [-1, -1, -1]],
+    "neighbors": [[1] * 6, [1] * 6],
+    "probabilities": [[0.5], [0.5]],
+    "cells": None,
+}
 
 WRONG_TESTS = {
     "number": 5,
@@ -272,6 +277,8 @@ WRONG_TESTS = {
     "NaN neighbors": TEST | {"neighbors": [[math.nan] * 6, [1] * 6]},
     "infinite neighbors": TEST | {"neighbors": [[math.inf] * 6, [1] * 6]},
     "too many probabilities": TEST | {"probabilities": [[0.5]] * 3},
+    "too many cells": TEST | {"cells": [[0, 0], [1, 0]]},
+    "cells without end": TEST | {"cells": [[10**6, 0]]},
     "flat probabilities": TEST | {"probabilities": [0.5, 0.5]},
 }
 

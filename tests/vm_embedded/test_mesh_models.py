@@ -225,9 +225,28 @@ def test_a_camera_not_above_the_object_is_refused(model, shape, height):
         build_mesh(shape, height, 4.0, 3.0, model)
 
 
+@pytest.mark.parametrize("model", [*TWELVE, "cap6"])
+@pytest.mark.parametrize(("k", "reach"), [(1e300, 10.0), (2000.0, 10.0), (4.0, 1e300)])
+def test_a_mesh_that_fits_no_memory_is_refused(model, k, reach):
+    with pytest.raises(GeometryError, match="too large"):
+        build_mesh(Sphere(0.095), 1.0, k, reach, model)
+
+
+def test_an_nm_lattice_for_thin_cylinders_has_both_slices_where_they_should_be():
+    """There turns do not settle, and halving has to."""
+    post, height, k = Cylinder(0.05, 0.5), 0.6, 4.0
+    mesh = build_mesh(post, height, k, 3.0, "nmgrid4")
+    g, c = height - post.center_height, post.center_height
+    x, y = (mesh.rays[:, :2] * (g / -mesh.rays[:, 2:])).T
+    middle = mesh.cells[np.argmin(np.hypot(x, y))]
+    for along, other, cell in ((x, y, mesh.cells[:, 0] - middle[0]), (y, x, mesh.cells[:, 1] - middle[1])):
+        slant = np.hypot(g, other)
+        np.testing.assert_allclose(post.n(np.arctan2(along, slant), slant + c), cell / k, atol=1e-6)
+
+
 @pytest.mark.parametrize("model", GRIDS)
 def test_a_lattice_without_end_is_refused(model):
-    with pytest.raises(GeometryError, match="places"):
+    with pytest.raises(GeometryError, match="too large"):
         build_mesh(Circle(1e-4), 1.0, 10.0, 100.0, model)
 
 

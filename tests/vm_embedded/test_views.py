@@ -2,11 +2,12 @@
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from vm_embedded import GROUND, Detector, InputError, Plane, Pose, View, detect_views, read_lens_file
+from vm_embedded import GROUND, Detector, InputError, Plane, Pose, Sighting, View, detect_views, read_lens_file, views
 from vm_embedded.orientation import rotation_z
 from vm_embedded.sources import read_image
 
@@ -69,6 +70,7 @@ def test_of_two_planes_that_show_the_same_pixels_the_clearer_one_is_right(detect
     assert len(both) == len(alone)
     for each in both:
         assert all(each.detection.confidence >= other.detection.confidence for other in each.also)
+        assert {each.plane, *(other.plane for other in each.also)} <= {"ground", "a bit higher"}
     assert any(each.also for each in both)
 
 
@@ -97,3 +99,43 @@ def test_planes_need_different_names(detector):
     for planes in ([], [GROUND, GROUND]):
         with pytest.raises(InputError, match="different names"):
             detect_views(detector, {"head": view(0)}, planes)
+
+
+def sighting(camera, plane, confidence, position, angular_radius=0.03):
+    """A made-up one, seen from the world's origin at 1 m."""
+    detection = SimpleNamespace(class_name="ball", confidence=confidence, angular_radius=angular_radius)
+    away = np.array([*position, -0.9])
+    return Sighting(camera, plane, detection, np.array([*position, 0.1]), away / np.linalg.norm(away))
+
+
+def put_together(monkeypatch, *sightings):
+    """What detect_views makes of them."""
+    by_view = {}
+    for each in sightings:
+        by_view.setdefault((each.camera, each.plane), []).append(each)
+    monkeypatch.setattr(views, "_sightings", lambda _, camera, __, plane: by_view.get((camera, plane.name), []))
+    detector = SimpleNamespace(shape=SimpleNamespace(radius=0.1))
+    planes = [GROUND, Plane("table", offset=0.75)]
+    return detect_views(detector, {"left": None, "right": None}, planes)
+
+
+def test_two_cameras_that_agree_outweigh_the_clearest_detection(monkeypatch):
+    (seen,) = put_together(
+        monkeypatch,
+        sighting("left", "ground", 0.85, (3.0, 1.0)),
+        sighting("left", "table", 0.95, (3.01, 1.0)),
+        sighting("right", "ground", 0.9, (3.02, 1.0)),
+    )
+    assert (seen.camera, seen.plane, len(seen.also)) == ("right", "ground", 2)
+
+
+def test_touching_balls_stay_two_and_each_finds_its_nearest(monkeypatch):
+    seen = put_together(
+        monkeypatch,
+        sighting("left", "ground", 0.9, (3.0, 1.0)),
+        sighting("left", "ground", 0.8, (3.0, 1.2)),
+        sighting("right", "ground", 0.7, (3.0, 1.12)),
+    )
+    assert len(seen) == 2
+    (both,) = (each for each in seen if each.also)
+    assert both.position[1] == 1.2

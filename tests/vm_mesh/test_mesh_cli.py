@@ -89,6 +89,13 @@ def test_show_draws_on_a_picture(tmp_path, capsys):
         (("range", "--lens", LENS, "--size", "640*512"), "640x512"),
         (("compare", "--lens", LENS), "--size"),
         (("compare", "--network", "ball-6x4"), "ball"),
+        (("show", "--intersections", "1e300", "-o", "mesh.png"), "too large"),
+        (("show", "--reach", "nan", "-o", "mesh.png"), "--reach"),
+        (("show", "--object", "-1", "-o", "mesh.png"), "distances"),
+        (("range", "--lens", LENS, "--intersections", "nan"), "--intersections"),
+        (("range", "--lens", LENS, "--height", "0.1"), "height"),
+        (("compare", "--lens", LENS, "--size", "²x²"), "640x512"),
+        (("quality", "--json", "nowhere/q.json"), "nowhere"),
     ],
 )
 def test_mistakes_are_named(arguments, message, tmp_path, capsys, monkeypatch):
@@ -161,3 +168,21 @@ def test_points_on_an_object_are_as_many_as_k_says():
         assert found.mean == pytest.approx(6.0, abs=0.5)
         assert (found.low <= found.mean).all()
         assert (found.mean <= found.high).all()
+
+
+def test_a_picture_needs_a_pose(tmp_path, capsys):
+    lens = tmp_path / "lens.toml"
+    lens.write_text('projection = "rectilinear"\nfocal_length = 400.0\nfov = 2.0\n')
+    shown = ("show", "--image", IMAGE, "--lens", lens, "-o", tmp_path / "x.png")
+    assert "--height and --pitch" in run(capsys, *shown, code=1)
+    run(capsys, *shown, "--height", 0.7, "--pitch", "20deg")
+
+
+def test_figures_are_json_whatever_they_are(tmp_path, capsys):
+    run(capsys, "compare", "--max-distance", 0.01, "--json", tmp_path / "small.json")
+    json.loads((tmp_path / "small.json").read_text(), parse_constant=pytest.fail)
+
+
+def test_a_range_from_the_nadir_on_is_plotted(tmp_path, capsys):
+    run(capsys, "range", "--lens", LENS, "--distance", 0, "--distance", 5, "-o", tmp_path / "r.png")
+    assert (tmp_path / "r.png").exists()
