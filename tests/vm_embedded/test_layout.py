@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vm_embedded.cache import MeshCache
+from vm_embedded.lattice_layout import LatticeLayout
 from vm_embedded.layout import PlainLayout
 from vm_embedded.layouts import laid_out
 from vm_embedded.lens import Equisolid, Rectilinear
@@ -342,11 +343,14 @@ def test_few_slots_are_gaps_or_copies_of_a_camera_that_looks_ahead(seed, model, 
     layout = MeshCache(facts, Settings()).view(Orientation.from_roll_pitch(height, roll, pitch), lens, SIZE).layout
     points = len(layout.places)
     if points > 2000:
-        assert len(layout.slots) - points < 0.05 * points
+        # A row of a lattice is cut where the camera's view ends, and often again by its curved border.
+        assert len(layout.slots) - points < (0.1 if "grid" in model else 0.05) * points
 
 
 def arrays_of(layout):
     named = [layout.slots, layout.places, layout.original, layout.rays]
+    if isinstance(layout, LatticeLayout):
+        return named
     return [*named, layout.columns if isinstance(layout, RunsLayout) else layout._neighbors]
 
 
@@ -365,7 +369,7 @@ def test_what_a_layout_holds_is_read_only_and_counted(layout, model):
 @pytest.mark.parametrize(("model", "layout"), PAIRS)
 def test_rays_are_column_by_column_in_memory(layout, model):
     """As of every mesh; each frame's projection goes through them by columns."""
-    for mesh in (WHOLE[model], WHOLE[model].part(np.arange(50, 250))):
+    for mesh in (WHOLE[model], WHOLE[model].part(np.arange(50, 230))):
         assert laid_out(mesh, manifest_of(model, layout)).rays.T.flags.c_contiguous
 
 
