@@ -334,7 +334,14 @@ def test_groups_of_whole_rings_lie_where_columns_say(model, shape):
     assert layout.slots[nadir] == 0
 
 
-@given(seeds, models, st.sampled_from([Sphere(0.1), Circle(0.1)]), reals(0.5, 1.2), reals(0.1, 0.5), reals(-0.3, 0.3))
+@given(
+    seeds,
+    st.sampled_from([model for model in MODELS if "grid" not in model]),  # rows of a grid end oftener
+    st.sampled_from([Sphere(0.1), Circle(0.1)]),
+    reals(0.5, 1.2),
+    reals(0.1, 0.5),
+    reals(-0.3, 0.3),
+)
 def test_few_slots_are_gaps_or_copies_of_a_camera_that_looks_ahead(seed, model, shape, height, pitch, roll):
     random = np.random.default_rng(seed)
     kind = "sphere" if isinstance(shape, Sphere) else "circle"
@@ -343,8 +350,7 @@ def test_few_slots_are_gaps_or_copies_of_a_camera_that_looks_ahead(seed, model, 
     layout = MeshCache(facts, Settings()).view(Orientation.from_roll_pitch(height, roll, pitch), lens, SIZE).layout
     points = len(layout.places)
     if points > 2000:
-        # A row of a lattice is cut where the camera's view ends, and often again by its curved border.
-        assert len(layout.slots) - points < (0.1 if "grid" in model else 0.05) * points
+        assert len(layout.slots) - points < 0.05 * points
 
 
 def arrays_of(layout):
