@@ -382,6 +382,7 @@ def test_package_data_and_scripts_are_declared():
         "vm-synth",
         "vm-train",
         "vm-evaluate",
+        "vm-mesh",
     }
     assert [each.split(">")[0] for each in project["dependencies"]] == [
         "numpy",

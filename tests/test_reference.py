@@ -80,7 +80,7 @@ def test_points_pixels_and_probabilities_are_the_reference_s(shared, points, ind
 def steps_from(sources, shared, index, rays):
     """Graph steps (n,) of each point on screen from the nearest of `sources`."""
     from vm_embedded.lens_file import read_lens_file
-    from vm_embedded.mesh import build_mesh
+    from vm_embedded.mesh_models import build_mesh
     from vm_embedded.projection import project
     from vm_embedded.shapes import Sphere
 
