@@ -24,7 +24,7 @@ demo: .venv/runtime ## find the balls in the frames of the repository
 	@$(BIN)/vm-detect --camera $(DEMO) --save-overlay demo-out
 	@echo "Annotated pictures: $(CURDIR)/demo-out/"
 
-test: lint ## lint, types and tests; LONG=1 with those that take minutes: a day of faults, a booted robot
+test: lint ## lint, types and tests; LONG=1 with those that take minutes: 200 faults of a camera, a booted robot
 	$(BIN)/python deploy/bundle.py --download
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder $(if $(LONG),,-m 'not long')
 

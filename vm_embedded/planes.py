@@ -48,10 +48,7 @@ class Pose:
     @classmethod
     def from_hwc(cls, hwc: npt.ArrayLike) -> Pose:
         """From the 4 x 4 transform H_wc ("world from camera"). Raises GeometryError."""
-        try:
-            matrix = np.asarray(hwc, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise GeometryError(f"Hwc must be 4 x 4 numbers: {error}") from error
+        matrix = _numbers(hwc)
         if matrix.shape != (4, 4) or not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), atol=1e-6):
             raise GeometryError("Hwc must be 4 x 4 numbers with 0, 0, 0, 1 as last row (is it transposed?)")
         return cls(matrix[:3, :3], matrix[:3, 3])

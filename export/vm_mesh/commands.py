@@ -76,10 +76,9 @@ def quality(options: argparse.Namespace) -> None:
     print(f"{plan.shape}, camera {plan.height:g} m high, k = {plan.intersections:g}, to {plan.max_distance:g} m")
     print("equivalent k on an object: mean (least to most over bearings); links in steps, angles in degrees")
     for model, (curve, links) in found.items():
-        shown = np.linspace(0, len(distances) - 1, min(6, len(distances))).astype(int)
-        on = "  ".join(
-            f"{distances[i]:.2f} m {curve.mean[i]:.2f} ({curve.low[i]:.2f} to {curve.high[i]:.2f})" for i in shown
-        )
+        at = curve.distances  # of wall6 only those that it serves
+        shown = np.linspace(0, len(at) - 1, min(6, len(at))).astype(int)
+        on = "  ".join(f"{at[i]:.2f} m {curve.mean[i]:.2f} ({curve.low[i]:.2f} to {curve.high[i]:.2f})" for i in shown)
         print(f"{model:8s} {on}")
         print(f"{'':8s} {_links_text(links)}")
     if options.output is not None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats
 from vm_embedded.cylinder import Cylinder
+from vm_embedded.errors import InputError
 from vm_embedded.walls import NEAREST
 
 from .made_mesh import MadeMesh
@@ -58,10 +59,15 @@ class Links:
 
 
 def on_object(made: MadeMesh, distances: Floats) -> OnObject:
-    """The equivalent k on objects at distances (m,) [m] from the camera's foot."""
+    """The equivalent k on objects at distances (m,) [m] from the camera's foot; of wall6 at those that it serves.
+
+    Raises InputError if it serves none.
+    """
     plan, rays = made.plan, np.ascontiguousarray(made.mesh.rays)
     if made.walls is not None:
         distances = distances[distances >= NEAREST]
+        if len(distances) == 0:
+            raise InputError(f"wall6 begins at {NEAREST:g} m; give a greater --distance or --max-distance")
     turn = 2.0 * np.pi * (np.arange(BEARINGS) + 0.37) / BEARINGS
     found = np.empty((len(distances), BEARINGS))
     for row, distance in enumerate(distances.tolist()):

@@ -186,3 +186,12 @@ def test_figures_are_json_whatever_they_are(tmp_path, capsys):
 def test_a_range_from_the_nadir_on_is_plotted(tmp_path, capsys):
     run(capsys, "range", "--lens", LENS, "--distance", 0, "--distance", 5, "-o", tmp_path / "r.png")
     assert (tmp_path / "r.png").exists()
+
+
+def test_quality_of_walls_begins_where_they_do(tmp_path, capsys):
+    post = ("quality", "--shape", "cylinder", "--radius", 0.05, "--object-height", 1.8, *SMALL)
+    shown = run(capsys, *post, "--distance", 0, "--distance", 0.5, "--distance", 2, "--json", tmp_path / "q.json")
+    assert json.loads((tmp_path / "q.json").read_text())["wall6"]["on_object"]["distances"] == [0.5, 2.0]
+    assert "0.50 m" in shown
+    assert "0.00 m" not in shown
+    assert "0.3 m" in run(capsys, *post, "--distance", 0.1, code=1)
