@@ -24,12 +24,11 @@ from vm_embedded.errors import InputError, one_line
 from vm_embedded.files import written_beside
 from vm_export.network import Network
 
+from .descent import Descent
 from .graphs import Graph, together
 from .recipe import Recipe
 from .schedule import Item
 from .selection import class_totals, errors_of, hardness, selected
-
-_OPTIMIZERS: dict[str, Any] = {"adamw": torch.optim.AdamW, "adam": torch.optim.Adam, "sgd": torch.optim.SGD}
 
 
 @dataclass(frozen=True)
@@ -65,37 +64,27 @@ class Training:
         self._shares, self._device = shares, device
         self._weights = torch.from_numpy(weights.astype(np.float32)).to(device)
         self._graders = [each.to(device).eval() for each in graders]
-        options = {"momentum": 0.9} if recipe.optimizer == "sgd" else {}
-        self._optimizer: torch.optim.Optimizer = _OPTIMIZERS[recipe.optimizer](
-            network.parameters(), lr=recipe.rate, weight_decay=recipe.decay, **options
-        )
-        self._schedule: torch.optim.lr_scheduler.LRScheduler
-        if recipe.schedule == "one_cycle":
-            self._schedule = torch.optim.lr_scheduler.OneCycleLR(self._optimizer, recipe.rate, total_steps=total)
-        else:
-            self._schedule = torch.optim.lr_scheduler.ConstantLR(self._optimizer, factor=1.0, total_iters=0)
+        self._descent = Descent(self.network, recipe, total)
 
     def set_rate(self, rate: float) -> None:
         """The learning rate of the next step, where the schedule is constant."""
-        for group in self._optimizer.param_groups:
-            group["lr"] = rate
+        self._descent.rate = rate
 
     def step(self, items: Sequence[Item], graphs: Sequence[Graph]) -> Step:
         """Learn from the graphs of this process's part of a batch. Raises InputError if the loss is no number."""
-        rate = float(self._optimizer.param_groups[0]["lr"])
+        rate = self._descent.rate
         loss, weight, points = self._loss(items, graphs)
         weights = float(summed(torch.tensor(weight))) or 1.0
         mean = float(summed(loss.detach().cpu())) / weights
         if not math.isfinite(mean):
             raise InputError(f"the loss of step {self.done + 1} is no number: begin again with a lower training.rate")
-        self._optimizer.zero_grad()
+        self._descent.forget()
         if points:
             (loss / weights).backward()  # type: ignore[no-untyped-call]
         _sum_gradients(self.network)
         if self.recipe.clip:
             nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.clip)
-        self._optimizer.step()
-        self._schedule.step()
+        self._descent.step()
         self.done += 1
         return Step(self.done, mean, int(summed(torch.tensor(points))), rate)
 
@@ -148,8 +137,7 @@ class Training:
         state = {
             "done": self.done,
             "network": self.network.state_dict(),
-            "optimizer": self._optimizer.state_dict(),
-            "schedule": self._schedule.state_dict(),
+            "descent": self._descent.state_dict(),
             "more": dict(more),
         }
         content = io.BytesIO()  # on a full disk torch would fail in its own way
@@ -161,8 +149,7 @@ class Training:
         """Go on from a state that `read_state` read. Raises InputError if it is of another training."""
         try:
             self.network.load_state_dict(state["network"])
-            self._optimizer.load_state_dict(state["optimizer"])
-            self._schedule.load_state_dict(state["schedule"])
+            self._descent.load_state_dict(state["descent"])
             self.done = int(state["done"])
         except (RuntimeError, KeyError, ValueError, TypeError) as error:
             raise InputError(f"the state is of another training: {one_line(error)}") from error

@@ -21,6 +21,7 @@ WEIGHTS = np.array([1.5, 0.5])
 RECIPES = {
     "adamw": Recipe(epochs=3, batch=4),
     "sgd": Recipe(epochs=3, batch=2, optimizer="sgd", schedule="constant", loss="focal"),
+    "muon": Recipe(epochs=3, batch=4, optimizer="muon", rate=0.02),
     "mixed": Recipe(epochs=3, batch=4, precision="mixed", clip=0.0),
 }
 

@@ -1,0 +1,80 @@
+"""How weights follow their gradients: an optimizer, and a learning rate that changes from step to step.
+
+muon: matrices take steps of the same size in every direction that their gradient has (K. Jordan and others, 2024), so
+that the few channels of a small network all learn; biases follow adamw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+from torch import nn
+
+from .recipe import Recipe
+
+_MOMENTUM = 0.9  # of sgd
+
+
+class Descent:
+    """The optimizers of a network's weights, and their schedule of `total` steps."""
+
+    def __init__(self, network: nn.Module, recipe: Recipe, total: int) -> None:
+        self._optimizers = _optimizers(network, recipe)
+        self._schedules: list[torch.optim.lr_scheduler.LRScheduler] = []
+        if recipe.schedule == "one_cycle":
+            self._schedules = [
+                torch.optim.lr_scheduler.OneCycleLR(each, recipe.rate, total_steps=total) for each in self._optimizers
+            ]
+
+    @property
+    def rate(self) -> float:
+        """The learning rate of the next step."""
+        return float(self._optimizers[0].param_groups[0]["lr"])
+
+    @rate.setter
+    def rate(self, rate: float) -> None:
+        for optimizer in self._optimizers:
+            for group in optimizer.param_groups:
+                group["lr"] = rate
+
+    def forget(self) -> None:
+        """Set all gradients to none."""
+        for optimizer in self._optimizers:
+            optimizer.zero_grad()
+
+    def step(self) -> None:
+        """Let the weights follow their gradients, and the rate its schedule."""
+        for optimizer in self._optimizers:
+            optimizer.step()
+        for schedule in self._schedules:
+            schedule.step()
+
+    def state_dict(self) -> dict[str, Any]:
+        """All that going on needs."""
+        return {
+            "optimizers": [each.state_dict() for each in self._optimizers],
+            "schedules": [each.state_dict() for each in self._schedules],
+        }
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Go on from a state. Raises KeyError, ValueError or TypeError if it is of another descent."""
+        for optimizer, there in zip(self._optimizers, state["optimizers"], strict=True):
+            optimizer.load_state_dict(there)
+        for schedule, there in zip(self._schedules, state["schedules"], strict=True):
+            schedule.load_state_dict(there)
+
+
+def _optimizers(network: nn.Module, recipe: Recipe) -> list[torch.optim.Optimizer]:
+    weights, rate, decay = list(network.parameters()), recipe.rate, recipe.decay
+    if recipe.optimizer == "muon":
+        matrices = [each for each in weights if each.ndim == 2]
+        others = [each for each in weights if each.ndim != 2]
+        muon = torch.optim.Muon(matrices, lr=rate, weight_decay=decay)
+        return [muon, torch.optim.AdamW(others, lr=rate, weight_decay=decay)]
+    if recipe.optimizer == "sgd":
+        return [torch.optim.SGD(weights, lr=rate, momentum=_MOMENTUM, weight_decay=decay)]
+    if recipe.optimizer == "adam":
+        return [torch.optim.Adam(weights, lr=rate, weight_decay=decay)]
+    return [torch.optim.AdamW(weights, lr=rate, weight_decay=decay)]
