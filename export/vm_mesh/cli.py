@@ -40,11 +40,13 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
 
     far = _parser("range", "How many pixels and points fall on an object, and how far out a mesh is worth its points.")
     _add_camera(far)
+    _add_size(far)
     far.add_argument("--distance", type=float, action="append", metavar="M", help="distances [m]; default 0.5 to 20")
     far.add_argument("-o", "--output", type=Path, metavar="FILE", help="plot to write, .png or .svg")
 
     compare = _parser("compare", "Mesh models side by side: points, evenness, links, and the time to build them.")
     _add_camera(compare)
+    _add_size(compare)
     compare.add_argument("--json", type=Path, metavar="FILE", help="write all figures there")
     return {"show": show, "quality": quality, "range": far, "compare": compare}
 
@@ -78,9 +80,12 @@ def _parser(command: str, description: str) -> argparse.ArgumentParser:
 
 def _add_camera(group: Any) -> None:
     group.add_argument("--lens", type=Path, metavar="FILE", help="lens file; its orientation counts if it has one")
-    group.add_argument("--size", metavar="WxH", help="size of pictures [px]; default the picture's or the lens file's")
     group.add_argument("--pitch", metavar="ANGLE", help="angle of the optical axis below the horizon, as in 20deg")
     group.add_argument("--roll", metavar="ANGLE", help="lean of the camera to the right")
+
+
+def _add_size(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--size", metavar="WxH", help="size of pictures [px]; default the lens file's")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
