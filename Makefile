@@ -66,7 +66,7 @@ data: .venv/synth ## render a training set: make data HDRI=folder-of-maps [OUT=d
 	$(BIN)/vm-synth $(OUT) --count $(COUNT) --hdri $(HDRI) --seed $(SEED) --config $(SCENES)
 
 networks: .venv/dev ## the networks of the package, from seeds: make networks HDRI=folder-of-maps (hours)
-	$(MAKE) data OUT=data/soccer COUNT=2400 SEED=1 SCENES=export/vm_synth/soccer.toml
+	$(MAKE) data OUT=data/soccer COUNT=4000 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 
 vm_embedded/models/ball-best.onnx: vm_embedded/models/ball-5x4.onnx

@@ -16,7 +16,7 @@ from itertools import product
 from pathlib import Path
 
 SCENES = Path(__file__).parents[1] / "export" / "vm_synth" / "soccer.toml"
-FIELD_PICTURES, CLUTTER_PICTURES, GRID_PICTURES = 400, 100, 24
+FIELD_PICTURES, CLUTTER_PICTURES, GRID_PICTURES = 400, 400, 40
 LENSES = ("rectilinear", "equisolid", "equidistant")
 SIZES = ((640, 512), (1280, 1024))
 HEIGHTS = (0.4, 0.8, 1.2)
