@@ -118,7 +118,7 @@ def card(found: dict[str, Any], name: str) -> str:
     manifest = model.manifest
     configuration = tomllib.loads((NETWORKS / f"{name}.toml").read_text())
     depth, width = (configuration["network"][each] for each in ("depth", "width"))
-    activation = configuration["network"]["activation"]
+    activation = configuration["network"]["activation"].upper()
     first = "For what `ball-5x4` does not take for lawn: " if "second_look" in configuration else ""
     scores, clutter = (found["networks"][name][each] for each in SETS)
     ranges = table(
@@ -141,7 +141,7 @@ def card(found: dict[str, Any], name: str) -> str:
     return f"""# {name}
 
 Finds balls on a soccer field. {first}{depth} graph convolutions
-of {width} channels, {activation.upper()}; ring6 mesh with k = {manifest.intersections:g} out to {manifest.max_distance:g} m,
+of {width} channels, {activation}; ring6 mesh with k = {manifest.intersections:g} out to {manifest.max_distance:g} m,
 for balls of any radius (`--object-radius`,
 {manifest.object_radius:g} m if nothing is said). {kilobytes:.0f} kB. Classes: ball, other.
 
