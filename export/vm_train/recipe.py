@@ -38,7 +38,7 @@ class Recipe:
     optimizer: str = one_of(
         OPTIMIZERS,
         "adamw",
-        "how weights follow their gradients; sgd has momentum; muon wants about three times the rate of adamw",
+        "how weights follow their gradients; sgd has momentum; muon is for short trainings, at a rate of 0.007 to 0.02",
     )
     schedule: str = one_of(SCHEDULES, "one_cycle", "how the rate changes: up and down once, or not at all")
     decay: float = number(1e-4, "weight decay", "", (0.0, 1.0))
