@@ -1,0 +1,95 @@
+"""Networks in the reference's format: read, written, and refused with what is wrong."""
+
+import numpy as np
+import pytest
+import torch
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.vm_export.test_export import checkpoint, manifest
+from vm_embedded.errors import InputError
+from vm_export import onnx_graph
+from vm_export.checkpoint import Checkpoint
+from vm_export.network_shape import Layer, NetworkShape
+from vm_export.reference import Overrides, read_reference, write_reference
+
+
+def test_reference_files_survive_a_round_trip(tmp_path):
+    shape = NetworkShape(
+        (
+            Layer("convolution", 5, "selu"),
+            Layer("dense", 4, "tanh"),
+            Layer("separable", 3, "relu"),
+            Layer("convolution", 2, "softmax"),
+        )
+    )
+    made = Checkpoint(checkpoint(9, shape).network, manifest())
+    write_reference(made, tmp_path / "model.yaml")
+    stored = yaml.safe_load((tmp_path / "model.yaml").read_text())
+    assert [len(group) for group in stored["network"]] == [2, 1, 1]
+    assert len(stored["network"][0][0]["weights"]) == 4 * 7
+    read = read_reference(tmp_path / "model.yaml", Overrides(object_radius=0.075))
+    assert read.manifest.classes == made.manifest.classes
+    test = onnx_graph._example(made.network, made.manifest, 50, 0)
+    with torch.inference_mode():
+        again = read.network(torch.from_numpy(test.points), torch.from_numpy(test.neighbors))
+    np.testing.assert_allclose(again.numpy(), test.probabilities, atol=1e-5)
+
+
+def test_the_authors_file_survives_a_round_trip(shared, tmp_path):
+    source = shared / "reference/model.yaml"
+    write_reference(read_reference(source, Overrides(intersections=6.0)), tmp_path / "again.yaml")
+    before, after = (yaml.load(path.read_text(), yaml.CSafeLoader) for path in (source, tmp_path / "again.yaml"))
+    assert after["mesh"] == before["mesh"]
+    assert after["geometry"]["radius"] == before["geometry"]["radius"]
+    for old, new in zip(before["network"], after["network"], strict=True):
+        for a, b in zip(old, new, strict=True):
+            assert a["activation"] == b["activation"]
+            np.testing.assert_allclose(a["weights"], b["weights"], rtol=1e-6, atol=1e-6)
+            np.testing.assert_allclose(a["biases"], b["biases"], rtol=1e-6)
+
+
+def reference_file(path, **changes):
+    made = Checkpoint(checkpoint(2).network, manifest())
+    write_reference(made, path)
+    data = yaml.safe_load(path.read_text())
+    data.update(changes)
+    path.write_text(yaml.safe_dump(data))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"mesh": "RING7"}, "ring6"),
+        ({"geometry": {"shape": "CUBE", "radius": 0.1, "intersections": 4}}, "sphere"),
+        ({"geometry": {"shape": "SPHERE", "radius": 0.1, "intersections": 0.1}}, "--intersections"),
+        ({"geometry": {"shape": "SPHERE"}}, "radius"),
+        ({"network": []}, "convolution"),
+        ({"network": [[{"weights": [[1.0]], "biases": [0.0], "activation": "softmax"}]]}, "channels"),
+        ({"class_map": {"ball": 0, "field": 5}}, "--classes"),
+        ({"class_map": {"ball": 0, "penguin": 1}}, "penguin"),
+        ({"class_map": 3}, "--classes"),
+    ],
+)
+def test_wrong_reference_files_are_refused_with_what_is_wrong(tmp_path, changes, message):
+    with pytest.raises(InputError, match=message):
+        read_reference(reference_file(tmp_path / "model.yaml", **changes), Overrides())
+
+
+def test_a_network_that_reads_alpha_is_refused(tmp_path):
+    path = reference_file(tmp_path / "model.yaml")
+    data = yaml.safe_load(path.read_text())
+    data["network"][0][0]["weights"][3][0] = 0.5
+    path.write_text(yaml.safe_dump(data))
+    with pytest.raises(InputError, match="fourth input channel"):
+        read_reference(path, Overrides())
+
+
+@given(st.text(max_size=200))
+def test_random_text_is_no_reference_file(tmp_path_factory, text):
+    path = tmp_path_factory.mktemp("fuzz") / "model.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError):
+        read_reference(path, Overrides())
