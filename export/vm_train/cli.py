@@ -131,7 +131,9 @@ def _begin(options: argparse.Namespace, configuration: TrainConfiguration, here:
     parts = f"{training} for training, {len(split.validation)} for validation, {len(split.test)} for test"
     print(f"{options.data}: {len(good)} pictures: {parts}")
     unpacked = None if options.no_unpacked else options.unpacked or options.output / "unpacked"
-    job = Job.begin(options.output, options.data, configuration, split, unpacked, source, options.first)
+    job = Job.begin(
+        options.output, options.data, configuration, split, unpacked, source, options.first, options.teacher
+    )
     if job.points_a_picture < _FEW:
         print(
             f"vm-train: only {job.points_a_picture:.1f} points of a picture give gradients, as many of each class "

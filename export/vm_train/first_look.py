@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,14 +10,11 @@ import torch
 
 from vm_embedded.errors import InputError
 from vm_embedded.manifest import Manifest
-from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
 from vm_export.second_look import Gate, SecondLook
 
 from .graphs import Graph
-
-_ALIKE = ("shape", "radius", "intersections", "mesh", "classes", "any_radius", "sampling", "colors")
-"""What two networks must have in common to look at one mesh; how far out it reaches changes nothing near by."""
+from .trained import Trained
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,18 +31,13 @@ class FirstLook:
 
         above, rings: of the gate, which is for the classes that are objects.
         """
-        checkpoint = Checkpoint.load(path)
-        for name in _ALIKE:
-            there, here = getattr(checkpoint.manifest, name), getattr(manifest, name)
-            if there != here:
-                raise InputError(f"{path} was trained with another {name}: {there}, not {here}")
-        if checkpoint.network is not checkpoint.last or checkpoint.grid.kind != "visual":
-            raise InputError(f"{path} can't look first: it must be a single network on the Visual Mesh")
+        found = Trained.load(path, manifest)
+        if found.checkpoint.network is not found.checkpoint.last:
+            raise InputError(f"{path} can't look first: it has a second look itself")
         objects = tuple(at for at, each in enumerate(manifest.classes) if each.kind == "object")
         if not objects:
             raise InputError("a second look is for objects, and no class of [classes] is of that kind")
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-        return cls(checkpoint.last, Gate(above, rings, objects), digest)
+        return cls(found.checkpoint.last, Gate(above, rings, objects), found.sha256)
 
     @torch.no_grad()
     def part(self, graph: Graph) -> Graph:

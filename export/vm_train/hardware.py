@@ -72,6 +72,8 @@ def hardware(device: str, workers: int | None, threads: int | None) -> Iterator[
     torch.set_num_threads(threads or 1)
     # Sums whose order may change from run to run would make a resumed training another one.
     torch.use_deterministic_algorithms(True, warn_only=True)
+    # That would also write over all memory before it is used, which takes a quarter of a step of a large network.
+    torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
     if gpu:
         torch.cuda.set_device(local)
     if size > 1:

@@ -1,9 +1,9 @@
 """The folder of a training: everything that is needed to do it, and what came of it.
 
 train.toml: the configuration. pictures.json: which pictures are for what. run.json: the data, and the classes' numbers
-of points. first.pt: the network that looks first, if the new one is for a second look. state.pt: how far it is.
-log.jsonl and tensorboard: what happened. round1.pt, ...: the best network of each round. model.pt: the best of all, for
-vm-evaluate and vm-export.
+of points. first.pt: the network that looks first, if the new one is for a second look. teacher.pt: the one whose
+answers are learned, if there is one. state.pt: how far it is. log.jsonl and tensorboard: what happened. round1.pt, ...:
+the best network of each round. model.pt: the best of all, for vm-evaluate and vm-export.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ from .schedule import Batch, Item, schedule
 from .selection import class_shares
 from .split import Split, load, save
 from .streamed import Source, StreamedGraphs, StreamedItem, in_lanes
+from .trained import Trained
 from .unpacked import Unpacked
 
 _COUNTED = 300  # pictures of which classes are counted
 
-_FORMAT = 2
+_FORMAT = 3
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,8 @@ class Job:
     """What is to be done. data: the pictures' folder. counts (C,): points of each class in some training pictures.
 
     unpacked: where decoded pictures are kept, or None. source: where training pictures are streamed from, or None if
-    they are in the folder. first: the network that looks first, or None.
+    they are in the folder. first: the network that looks first, or None. teacher: the one whose answers are learned
+    beside the labels, or None.
     """
 
     folder: Path
@@ -57,6 +59,7 @@ class Job:
     unpacked: Path | None
     source: Source | None = None
     first: FirstLook | None = None
+    teacher: Trained | None = None
 
     @classmethod
     def begin(
@@ -68,19 +71,21 @@ class Job:
         unpacked: Path | None,
         source: Source | None = None,
         first: Path | None = None,
+        teacher: Path | None = None,
     ) -> Job:
-        """Write down a new training. first: checkpoint of the network that looks first.
+        """Write down a new training. first, teacher: checkpoints of the networks that have a part in it.
 
         Raises InputError, also if its folder holds a training already.
         """
         check_new(folder)
         looks_first = None if first is None else _first(first, configuration)
+        teaches = None if teacher is None else Trained.load(teacher, configuration.manifest)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
         none = np.zeros(len(configuration.classes.colors), dtype=np.int64)
-        job = cls(folder, data.resolve(), configuration, split, none, unpacked, source, looks_first)
+        job = cls(folder, data.resolve(), configuration, split, none, unpacked, source, looks_first, teaches)
         counts = job._counted()
         if not counts.any():
             raise InputError(
@@ -89,9 +94,10 @@ class Job:
             )
         job = replace(job, counts=counts)
         save(folder / "pictures.json", split)
-        if first is not None:
-            with written_beside(folder / "first.pt") as part:
-                part.write_bytes(first.read_bytes())
+        for name, path in (("first.pt", first), ("teacher.pt", teacher)):
+            if path is not None:
+                with written_beside(folder / name) as part:
+                    part.write_bytes(path.read_bytes())
         _write(folder / "train.toml", "\n".join(documented(configuration)))
         content = {
             "format": _FORMAT,
@@ -101,6 +107,7 @@ class Job:
             "configuration_sha256": job.configuration_sha256,
             "source": None if source is None else asdict(source),
             "first_sha256": None if looks_first is None else looks_first.sha256,
+            "teacher_sha256": None if teaches is None else teaches.sha256,
             "points": dict(zip(configuration.classes.colors, counts.tolist(), strict=True)),
         }
         _write(folder / "run.json", json.dumps(content, indent=1) + "\n")
@@ -117,6 +124,7 @@ class Job:
             counts = np.array(list(content["points"].values()), dtype=np.int64)
             data, kept, origin = Path(content["data"]), content["unpacked"], content["source"]
             sha256, first_sha256 = content["configuration_sha256"], content["first_sha256"]
+            teacher_sha256 = content["teacher_sha256"]
             source = None if origin is None else Source(**origin | {"shards": tuple(origin["shards"])})
         except OSError as error:
             raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
@@ -125,9 +133,11 @@ class Job:
         configuration = read_sections(TrainConfiguration, folder / "train.toml")
         unpacked = None if kept is None else folder / kept
         first = None if first_sha256 is None else _first(folder / "first.pt", configuration)
-        job = cls(folder, data, configuration, load(folder / "pictures.json"), counts, unpacked, source, first)
-        if first is not None and first.sha256 != first_sha256:
-            raise InputError(f"{folder / 'first.pt'} was changed since the training began: begin another one")
+        teacher = None if teacher_sha256 is None else Trained.load(folder / "teacher.pt", configuration.manifest)
+        job = cls(folder, data, configuration, load(folder / "pictures.json"), counts, unpacked, source, first, teacher)
+        for name, part, before in (("first.pt", first, first_sha256), ("teacher.pt", teacher, teacher_sha256)):
+            if part is not None and part.sha256 != before:
+                raise InputError(f"{folder / name} was changed since the training began: begin another one")
         if job.configuration_sha256 != sha256:
             raise InputError(
                 f"{folder / 'train.toml'} or pictures.json was changed since the training began: "
@@ -238,12 +248,13 @@ class Job:
             "configuration_sha256": self.configuration_sha256,
             "selection": recipe.selection,
             "loss": recipe.loss,
+            "teacher_sha256": "none" if self.teacher is None else self.teacher.sha256,
             "epochs": str(recipe.epochs),
             "seed": str(recipe.seed),
         }
 
 
-_FILES = ("train.toml", "pictures.json", "first.pt", "state.pt", "model.pt", "round1.pt", "log.jsonl")
+_FILES = ("train.toml", "pictures.json", "first.pt", "teacher.pt", "state.pt", "model.pt", "round1.pt", "log.jsonl")
 
 
 def check_new(folder: Path) -> None:

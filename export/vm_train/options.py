@@ -45,6 +45,12 @@ def parser() -> argparse.ArgumentParser:
         help="checkpoint (.pt) of a small network that looks first: the new one learns from, and is asked about, only "
         "what [second_look] says, and the model file holds both",
     )
+    made.add_argument(
+        "--teacher",
+        type=Path,
+        metavar="MODEL",
+        help="checkpoint (.pt) of a larger network: the new one learns its answers, too, as training.distillation says",
+    )
     made.add_argument("--strict", action="store_true", help="don't begin if any picture is at fault; default: skip it")
     add_stream(made)
     lists = made.add_argument_group(

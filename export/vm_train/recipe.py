@@ -54,6 +54,22 @@ class Recipe:
     balance: float = number(
         1.0, "if selection is weighed: from 0, every point counts the same, to 1, every class does", "", (0.0, 1.0)
     )
+    smoothing: float = number(
+        0.0, "share of a point's label that its neighbors' labels have, so that outlines are soft", "", (0.0, 1.0)
+    )
+    distillation: float = number(
+        0.5,
+        "share of the answers of vm-train --teacher in what is to be learned, the rest being labels",
+        "",
+        (0.0, 1.0),
+    )
+    averaging: float = number(
+        0.0,
+        "part of the averaged weights that a step keeps, 0.999 for a mean of about the last thousand; they are what is "
+        "validated and kept; 0: those of the last step are",
+        "",
+        (0.0, 0.999999),
+    )
     rounds: int = number(3, "networks trained one after the other, if selection is hard", "", (2, 10))
     patience: int = number(0, "epochs without a better validation after which a round ends; 0 for none", "", (0, 1e6))
     precision: str = one_of(PRECISIONS, "full", "mixed computes in bfloat16 where that is safe: faster on a GPU")

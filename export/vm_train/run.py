@@ -137,7 +137,8 @@ def _prepared(job: Job, hardware: Hardware, progress: Progress) -> Training:
     graders = [Checkpoint.load(job.round_path(each)).last for each in range(1, progress.round)]
     total = recipe.epochs * steps_an_epoch(recipe.looks * job.epoch, recipe.batch)
     shares, weights = class_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
-    training = Training(network, recipe, total, shares, weights, graders, hardware.device)
+    teacher = None if job.teacher is None else job.teacher.checkpoint.network
+    training = Training(network, recipe, total, shares, weights, graders, teacher, hardware.device)
     if job.state_path.exists():
         state = read_state(job.state_path)
         if state["more"]["round"] == progress.round:
@@ -191,7 +192,7 @@ def _validated(
         "torch": torch.__version__,
     }
     manifest = replace(job.configuration.manifest, provenance=provenance)
-    network = training.network if job.first is None else job.first.then(training.network)
+    network = training.result if job.first is None else job.first.then(training.result)
     checkpoint = Checkpoint(network, manifest, job.configuration.grid)
     checkpoint.save(job.round_path(progress.round))
     if score > best_ever:

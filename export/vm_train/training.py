@@ -13,11 +13,12 @@ import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
 from torch import distributed, nn
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from vm_embedded.arrays import Floats, Singles
 from vm_embedded.errors import InputError, one_line
@@ -29,6 +30,7 @@ from .graphs import Graph, together
 from .recipe import Recipe
 from .schedule import Item
 from .selection import class_totals, errors_of, hardness, selected
+from .targets import targets
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class Training:
 
     shares (C,): chance of each class's points to give gradients. weights (C,): how much each then counts. graders:
     networks of earlier rounds; points that they were wrong about are selected rather than others of their class.
-    device: where torch computes, "cpu" or "cuda".
+    teacher: whose answers are learned beside the labels. device: where torch computes, "cpu" or "cuda".
     """
 
     def __init__(
@@ -57,6 +59,7 @@ class Training:
         shares: Floats,
         weights: Floats,
         graders: Sequence[Network] = (),
+        teacher: nn.Module | None = None,
         device: str = "cpu",
     ) -> None:
         self.network = network.to(device).train()
@@ -64,7 +67,14 @@ class Training:
         self._shares, self._device = shares, device
         self._weights = torch.from_numpy(weights.astype(np.float32)).to(device)
         self._graders = [each.to(device).eval() for each in graders]
+        self._teacher = None if teacher is None else teacher.to(device).eval()
         self._descent = Descent(self.network, recipe, total)
+        self._average = _average_of(self.network, recipe.averaging) if recipe.averaging else None
+
+    @property
+    def result(self) -> Network:
+        """The network that answers: with averaged weights, if they are."""
+        return self.network if self._average is None else cast(Network, self._average.module)
 
     def set_rate(self, rate: float) -> None:
         """The learning rate of the next step, where the schedule is constant."""
@@ -85,6 +95,8 @@ class Training:
         if self.recipe.clip:
             nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.clip)
         self._descent.step()
+        if self._average is not None:
+            self._average.update_parameters(self.network)
         self.done += 1
         return Step(self.done, mean, int(summed(torch.tensor(points))), rate)
 
@@ -107,12 +119,26 @@ class Training:
         with torch.autocast(torch.device(self._device).type, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
             logits = self.network.logits(points, neighbors)
         labels = torch.from_numpy(np.where(chosen, graph.labels, -1).astype(np.int64)).to(self._device)
-        single = nn.functional.cross_entropy(logits[:-1].float(), labels, ignore_index=-1, reduction="none")
+        single = nn.functional.cross_entropy(
+            logits[:-1].float(), self._targets(graph, points, neighbors, labels), ignore_index=-1, reduction="none"
+        )
         if self.recipe.loss == "focal":
             # Not 0, where the gradient of a power below 1 is none.
             single = (-torch.expm1(-single)).clamp(min=1e-7) ** self.recipe.gamma * single
         weights = torch.where(labels >= 0, self._weights[labels], 0.0)
         return single @ weights, float(weights.sum()), int(chosen.sum())
+
+    @torch.no_grad()
+    def _targets(
+        self, graph: Graph, points: torch.Tensor, neighbors: torch.Tensor, chosen: torch.Tensor
+    ) -> torch.Tensor:
+        """What the selected points are to answer: their labels (n,), or probabilities (n, C)."""
+        recipe = self.recipe
+        if self._teacher is None and not recipe.smoothing:
+            return chosen
+        labels = torch.from_numpy(graph.labels.astype(np.int64)).to(self._device)
+        taught = None if self._teacher is None else self._teacher(points, neighbors)[:-1]
+        return targets(labels, self.network.shape.classes, neighbors, recipe.smoothing, taught, recipe.distillation)
 
     @torch.no_grad()
     def _chances(self, points: torch.Tensor, neighbors: torch.Tensor, graph: Graph) -> Floats:
@@ -129,7 +155,7 @@ class Training:
     def probabilities(self, graph: Graph) -> Singles:
         """The network's answers (n, C)."""
         points, neighbors = torch.from_numpy(graph.points), torch.tensor(graph.neighbors)
-        answers: Singles = self.network(points.to(self._device), neighbors.to(self._device))[:-1].cpu().numpy()
+        answers: Singles = self.result(points.to(self._device), neighbors.to(self._device))[:-1].cpu().numpy()
         return answers
 
     def save(self, path: Path, more: Mapping[str, Any]) -> None:
@@ -137,6 +163,7 @@ class Training:
         state = {
             "done": self.done,
             "network": self.network.state_dict(),
+            "average": None if self._average is None else self._average.state_dict(),
             "descent": self._descent.state_dict(),
             "more": dict(more),
         }
@@ -150,6 +177,8 @@ class Training:
         try:
             self.network.load_state_dict(state["network"])
             self._descent.load_state_dict(state["descent"])
+            if self._average is not None:
+                self._average.load_state_dict(state["average"])
             self.done = int(state["done"])
         except (RuntimeError, KeyError, ValueError, TypeError) as error:
             raise InputError(f"the state is of another training: {one_line(error)}") from error
@@ -180,6 +209,12 @@ def summed(value: torch.Tensor) -> torch.Tensor:
 def _meeting_place() -> str:
     """Device of tensors that processes exchange: nccl has only GPUs."""
     return "cuda" if distributed.get_backend() == "nccl" else "cpu"
+
+
+def _average_of(network: Network, decay: float) -> AveragedModel:
+    """A copy of a network whose weights become the mean of those it is given, older ones fading by `decay` a step."""
+    fading = get_ema_multi_avg_fn(decay)  # type: ignore[no-untyped-call]
+    return AveragedModel(network, multi_avg_fn=fading)
 
 
 def _sum_gradients(network: nn.Module) -> None:

@@ -25,7 +25,8 @@ def window_of(graph: Graph, share: float, objects: Sequence[int], random: np.ran
     """
     if share >= 1.0 or not len(graph):
         return graph
-    low, high = graph.pixels.min(axis=0), graph.pixels.max(axis=0)
+    across, down = graph.pixels.T  # numpy takes ten times as long for both at once
+    low, high = np.array([across.min(), down.min()]), np.array([across.max(), down.max()])
     size = share * (high - low)
     aim, place, *shift = random.random(4).tolist()
     shown = np.flatnonzero(np.isin(graph.labels, objects)) if aim < AIMED else np.empty(0, dtype=np.intp)
@@ -33,6 +34,7 @@ def window_of(graph: Graph, share: float, objects: Sequence[int], random: np.ran
     if len(shown):
         aimed = graph.pixels[shown[int(place * len(shown))]]
         first, last = np.maximum(aimed - size, low), np.minimum(aimed, high - size)
-    corner = first + np.array(shift) * (last - first)
-    inside = ((graph.pixels >= corner) & (graph.pixels <= corner + size)).all(axis=1)
+    left, top = corner = first + np.array(shift) * (last - first)
+    right, bottom = corner + size
+    inside = (across >= left) & (across <= right) & (down >= top) & (down <= bottom)
     return graph.part(np.flatnonzero(inside))

@@ -2,7 +2,6 @@
 
 import fcntl
 import json
-import os
 import re
 import shutil
 import signal
@@ -15,37 +14,10 @@ import cv2
 import pytest
 import torch
 
+from tests.vm_train.commands import COMMAND, SMALL, environment, run
 from tests.vm_train.drawn import CLASSES, draw_set
 from vm_export.checkpoint import Checkpoint
 from vm_train.log import read_log
-
-COMMAND = [sys.executable, "-m", "vm_train"]
-SMALL = """
-[mesh]
-radius = 0.07
-max_distance = 4.0
-[network]
-depth = 3
-width = 4
-[training]
-epochs = 3
-batch = 4
-selection = "hard"
-rounds = 2
-"""
-
-
-def environment():
-    return {**os.environ, "OMP_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""}
-
-
-def run(*arguments, code=0):
-    done = subprocess.run(
-        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=240, env=environment()
-    )
-    assert done.returncode == code, done.stderr
-    assert "Traceback" not in done.stderr
-    return done
 
 
 @pytest.fixture(scope="module")
@@ -412,43 +384,3 @@ def test_a_small_network_learns_to_find_the_balls_of_pictures_it_has_not_seen(co
     assert whole["truths"] >= 20
     assert whole["recall"] > 0.9
     assert whole["false_per_picture"] < 0.5
-
-
-def test_a_second_look_is_trained_on_what_the_first_passes_on(whole, data, configuration, tmp_path):
-    """Whether views are kept or not, and however it is stopped; the file holds both networks, and is evaluated."""
-    first = whole[0] / "model.pt"
-    settings = ("--config", configuration, "--set", "training.selection=all", "--set", "second_look.above=0.3")
-    arguments = (data, "--first", first, "--workers", 0, "--threads", 1, *settings)
-    done = run(*arguments, "-o", tmp_path / "run", "--set", "training.views=2")
-    assert "average precision" in done.stdout
-    made = Checkpoint.load(tmp_path / "run" / "model.pt")
-    there = Checkpoint.load(first).network.state_dict()
-    assert all(torch.equal(made.network.first.state_dict()[name], there[name]) for name in there)
-    assert (made.network.gate.above, made.network.gate.rings, made.network.gate.classes) == (0.3, 4, (0,))
-    seen = json.loads((tmp_path / "run" / "run.json").read_text())["points"]
-    everything = json.loads((whole[0] / "run.json").read_text())["points"]
-    assert 0 < sum(seen.values()) < sum(everything.values())
-
-    report = [
-        sys.executable,
-        "-m",
-        "vm_train.evaluate_cli",
-        tmp_path / "run" / "model.pt",
-        data,
-        "-o",
-        tmp_path / "report",
-    ]
-    subprocess.run([str(each) for each in report], check=True, capture_output=True, timeout=240, env=environment())
-
-    (tmp_path / "run" / "first.pt").write_bytes((whole[0] / "round1.pt").read_bytes())
-    refused = run("resume", tmp_path / "run", code=1)
-    assert "first.pt was changed since the training began" in refused.stderr
-
-
-def test_a_network_that_can_t_look_first_is_named(whole, data, configuration, tmp_path):
-    settings = ("--config", configuration, "--set", "mesh.radius=0.08")
-    refused = run(data, "-o", tmp_path / "run", "--first", whole[0] / "model.pt", *settings, code=1)
-    assert "was trained with another radius: 0.07, not 0.08" in refused.stderr
-    missing = run(data, "-o", tmp_path / "run", "--first", tmp_path / "no.pt", "--config", configuration, code=1)
-    assert "can't read" in missing.stderr
-    assert not (tmp_path / "run" / "run.json").exists()
