@@ -211,6 +211,7 @@ class Job:
             mesh.radius_of == "scene",
             self.configuration.training.window,
             self.first,
+            self.configuration.training.mirrored,
         )
         if self.unpacked is None:
             return Graphs(pictures, view)

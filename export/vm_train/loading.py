@@ -19,6 +19,7 @@ from .augmentation import Augmentation, blurred, moved, recolored
 from .first_look import FirstLook
 from .graphs import OFF_SCREEN, Graph, graph_of
 from .kept_views import KeptViews
+from .mirror import mirrored
 from .pictures import Classes, Picture, PictureFiles
 from .schedule import Batch, Item
 from .unpacked import Unpacked, read
@@ -31,6 +32,7 @@ class View:
 
     own_radius: the mesh is made for the radius of each picture's own ball, as its sceneX.json has it. window: share of
     width and height that augmented pictures are cut to. first: passes on what the network sees, or None for all.
+    mirrored: share of augmented pictures that are mirror images.
     """
 
     classes: Classes
@@ -40,6 +42,7 @@ class View:
     own_radius: bool = False
     window: float = 1.0
     first: FirstLook | None = None
+    mirrored: float = 0.0
 
     def manifest_for(self, files: PictureFiles) -> Manifest:
         """The manifest with the radius of a picture's own ball, if asked for. Raises InputError."""
@@ -67,7 +70,10 @@ class View:
         if self.manifest.colors == "relative":
             make_relative(colors)
         told = replace(graph, points=np.concatenate([colors, graph.points[-1:]]))
-        return self._passed(window_of(told, self.window, objects, random))
+        seen = window_of(told, self.window, objects, random)
+        if self.mirrored and random.random() < self.mirrored:  # where it is off, nothing more is drawn
+            seen = mirrored(seen, self.manifest.model)
+        return self._passed(seen)
 
     def _passed(self, graph: Graph) -> Graph:
         return graph if self.first is None else self.first.part(graph)

@@ -28,6 +28,7 @@ class Recipe:
         "",
         (0.05, 1.0),
     )
+    mirrored: float = number(0.0, "share of the looks that are at the picture's mirror image", "", (0.0, 1.0))
     views: int = number(
         0,
         "draws of pose, lens and sharpness that are kept for each picture, which is faster; 0: each look has its own",
