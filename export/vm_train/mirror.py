@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from vm_embedded.mesh import SELF, MeshModel
+from vm_embedded.mesh import MeshModel
 
 from .graphs import Graph
 
@@ -25,7 +25,7 @@ def mirrored_places(model: MeshModel) -> npt.NDArray[np.intp]:
     lattice ahead, so that its rows are what changes sides."""
     if model.steps is None:
         pairs = {here: there for run in model.runs for here, there in zip(run, reversed(run), strict=True)}
-        return np.array([pairs[place] for place in range(model.neighbors) if place != SELF])
+        return np.array([pairs[place] for place in range(model.neighbors)])
     slant = len(model.steps) == 6  # each row of such a lattice begins half a column later than the one before
     found = [model.steps.index((column + row if slant else column, -row)) for column, row in model.steps]
     return np.array(found)
