@@ -10,6 +10,7 @@ import torch
 
 from vm_embedded.errors import InputError
 from vm_embedded.manifest import Manifest
+from vm_export.grid import VISUAL
 from vm_export.network import Network
 from vm_export.second_look import Gate, SecondLook
 
@@ -31,7 +32,7 @@ class FirstLook:
 
         above, rings: of the gate, which is for the classes that are objects.
         """
-        found = Trained.load(path, manifest)
+        found = Trained.load(path, manifest, VISUAL)
         if found.checkpoint.network is not found.checkpoint.last:
             raise InputError(f"{path} can't look first: it has a second look itself")
         objects = tuple(at for at, each in enumerate(manifest.classes) if each.kind == "object")

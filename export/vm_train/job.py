@@ -79,7 +79,7 @@ class Job:
         """
         check_new(folder)
         looks_first = None if first is None else _first(first, configuration)
-        teaches = None if teacher is None else Trained.load(teacher, configuration.manifest)
+        teaches = None if teacher is None else _teacher(teacher, configuration)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -133,7 +133,7 @@ class Job:
         configuration = read_sections(TrainConfiguration, folder / "train.toml")
         unpacked = None if kept is None else folder / kept
         first = None if first_sha256 is None else _first(folder / "first.pt", configuration)
-        teacher = None if teacher_sha256 is None else Trained.load(folder / "teacher.pt", configuration.manifest)
+        teacher = None if teacher_sha256 is None else _teacher(folder / "teacher.pt", configuration)
         job = cls(folder, data, configuration, load(folder / "pictures.json"), counts, unpacked, source, first, teacher)
         for name, part, before in (("first.pt", first, first_sha256), ("teacher.pt", teacher, teacher_sha256)):
             if part is not None and part.sha256 != before:
@@ -283,6 +283,10 @@ def in_work(folder: Path) -> Iterator[None]:
 def _first(path: Path, configuration: TrainConfiguration) -> FirstLook:
     gate = configuration.second_look
     return FirstLook.load(path, configuration.manifest, gate.above, gate.rings)
+
+
+def _teacher(path: Path, configuration: TrainConfiguration) -> Trained:
+    return Trained.load(path, configuration.manifest, configuration.grid)
 
 
 def _named(unpacked: Path, folder: Path) -> str:

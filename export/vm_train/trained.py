@@ -9,6 +9,7 @@ from pathlib import Path
 from vm_embedded.errors import InputError
 from vm_embedded.manifest import Manifest
 from vm_export.checkpoint import Checkpoint
+from vm_export.grid import Grid
 
 _ALIKE = ("shape", "radius", "intersections", "mesh", "classes", "any_radius", "sampling", "colors")
 """What two networks must have in common to look at one mesh; how far out it reaches changes nothing near by."""
@@ -22,13 +23,13 @@ class Trained:
     sha256: str
 
     @classmethod
-    def load(cls, path: Path, manifest: Manifest) -> Trained:
-        """Read a checkpoint of a manifest's mesh and classes. Raises InputError."""
+    def load(cls, path: Path, manifest: Manifest, grid: Grid) -> Trained:
+        """Read a checkpoint of a manifest's mesh and classes, and of a grid. Raises InputError."""
         checkpoint = Checkpoint.load(path)
         for name in _ALIKE:
             there, here = getattr(checkpoint.manifest, name), getattr(manifest, name)
             if there != here:
                 raise InputError(f"{path} was trained with another {name}: {there}, not {here}")
-        if checkpoint.grid.kind != "visual":
-            raise InputError(f"{path} is not for the Visual Mesh, but for grid {checkpoint.grid.kind}")
+        if checkpoint.grid != grid:
+            raise InputError(f"{path} was trained with another grid: {checkpoint.grid}, not {grid}")
         return cls(checkpoint, hashlib.sha256(path.read_bytes()).hexdigest())

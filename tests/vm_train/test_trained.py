@@ -112,4 +112,7 @@ def test_a_teacher_of_another_mesh_is_refused(one, data, configuration, tmp_path
     settings = ("--config", configuration, "--set", "mesh.intersections=5")
     refused = run(data, "-o", tmp_path / "run", "--teacher", one / "model.pt", *settings, code=1)
     assert "was trained with another intersections: 4" in refused.stderr
+    flat = ("--config", configuration, "--set", "mesh.grid=hexagonal")
+    refused = run(data, "-o", tmp_path / "run", "--teacher", one / "model.pt", *flat, code=1)
+    assert "was trained with another grid: Grid(kind='visual', equal_at=0.0), not" in refused.stderr
     assert not (tmp_path / "run").exists()
