@@ -22,6 +22,10 @@ Convolve = Callable[[str, str, Floats], str]
 """Sums (outputs, m) of a convolution without its bias, from a name for its nodes, the name of what it takes (inputs, m)
 and a kernel (outputs, N + 1, inputs), self first."""
 
+_FLAT = -30.0
+"""Below it an exponential is counted as e^-30: less than a float32 near 1 can show, and far above the denormal numbers,
+with which a processor counts many times slower."""
+
 _SELU_ALPHA, _SELU_SCALE = 1.6732632423543772, 1.0507009873554805
 
 
@@ -92,7 +96,7 @@ def _activation(graph: Graph, name: str, activation: str, z: str) -> str:
         return graph.node(activation.capitalize(), [z], f"{name}.activation")
     corner = graph.constant(f"{activation}.corner", _ACTIVATIONS[activation].bias)
     straight = graph.node("Clip", [z, corner], f"{name}.straight")
-    below = graph.node("Clip", [z, "", corner], f"{name}.below")
+    below = graph.node("Clip", [z, graph.constant("flat", _FLAT), corner], f"{name}.below")
     curved = graph.node("Exp", [below], f"{name}.curved")
     return graph.node("Add", [straight, curved], f"{name}.activation")
 

@@ -11,9 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError, ModelError
+from vm_embedded.layouts import laid_out
 from vm_embedded.manifest import LAYOUTS, Manifest, ObjectClass
-from vm_embedded.mesh_models import MESH_MODELS
+from vm_embedded.mesh_models import MESH_MODELS, build_mesh
 from vm_embedded.onnx_file import read_model
+from vm_embedded.shapes import Sphere
 from vm_export import onnx_graph
 from vm_export.checkpoint import Checkpoint
 from vm_export.neighborhood import Neighborhood
@@ -74,6 +76,30 @@ def test_every_network_gives_the_same_answers_in_onnx_runtime(layout, shape, see
     facts = replace(made.manifest, layout=layout)
     content = onnx_graph.build(made.network, facts)
     assert onnx_graph.largest_difference(content, made.network, facts) < 1e-4
+
+
+@pytest.mark.parametrize("activation", ["elu", "selu"])
+@pytest.mark.parametrize("layout", ["runs", "lattice"])
+def test_far_below_zero_no_layer_makes_numbers_that_slow_a_processor_down(layout, activation):
+    mesh = MESHES[layout]
+    network = checkpoint(2, NetworkShape.uniform(3, 8, 2, activation=activation), mesh).network
+    with torch.no_grad():
+        for layer in network.typed_layers[:-1]:
+            layer.linear.bias -= torch.linspace(0, 110, 8)
+    facts = manifest(("class0", "class1"), mesh, layout=layout)
+    content = onnx_graph.build(network, facts)
+    assert onnx_graph.largest_difference(content, network, facts) < 1e-4
+
+    model = onnx.load_from_string(content)
+    made = [node.output[0] for node in model.graph.node if node.op_type in ("MatMul", "Exp", "Add")]
+    model.graph.output.extend(onnx.ValueInfoProto(name=name) for name in made)
+    laid = laid_out(build_mesh(Sphere(0.1), 0.5, 4.0, 10.0, mesh), facts)
+    points, shown = laid.points(), np.ones(len(laid.slots), dtype=bool)
+    laid.colors(points)[:] = np.random.default_rng(1).random((len(shown), 3))
+    session = onnxruntime.InferenceSession(model.SerializeToString())
+    for name, values in zip(made, session.run(made, laid.feeds(points, shown)), strict=True):
+        sizes = np.abs(values[values != 0])
+        assert not (sizes < np.finfo(np.float32).tiny).any(), name
 
 
 def test_graph_convolution_is_the_matrix_product_of_the_convention():
