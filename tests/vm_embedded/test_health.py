@@ -24,8 +24,10 @@ def test_frames_over_budget_at_the_median_of_fifteen_degrade_it(latencies, budge
 
 
 @given(latencies=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=14))
-def test_a_few_slow_frames_say_nothing(latencies):
-    assert answered(Health(1.0, 1e-9), latencies) == ("ok", "")
+def test_a_few_frames_say_nothing_of_a_budget(latencies):
+    for budget in (1e-9, 2.0):
+        assert answered(Health(1.0, budget), latencies) == ("starting", "timing the first 15 frames")
+    assert answered(Health(1.0), latencies) == ("ok", "")
 
 
 def test_without_a_budget_frames_may_take_any_time():
