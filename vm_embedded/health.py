@@ -64,8 +64,9 @@ class Health:
             return "degraded", last or "no frame was answered in time"
         if self._troubles:
             return "degraded", self._troubles[-1][1]
-        if len(self._latencies) < _TIMED and self.budget < math.inf:
-            return "starting", f"timing the first {_TIMED} frames"
-        if self._latencies and (latency := median(self._latencies)) > self.budget:
-            return "degraded", f"frames take {1e3 * latency:.1f} ms, the budget is {1e3 * self.budget:g} ms"
+        if self.budget < math.inf:
+            if len(self._latencies) < _TIMED:
+                return "starting", f"timing the first {_TIMED} frames"
+            if (latency := median(self._latencies)) > self.budget:
+                return "degraded", f"frames take {1e3 * latency:.1f} ms, the budget is {1e3 * self.budget:g} ms"
         return "ok", ""
