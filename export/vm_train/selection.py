@@ -39,7 +39,8 @@ def class_shares(rule: str, counts: npt.NDArray[np.int64], objects: Mask) -> Flo
 
 
 def class_weights(rule: str, counts: npt.NDArray[np.int64], balance: float) -> Floats:
-    """How much (C,) a selected point of each class counts, from the classes' numbers of points in the set (C,).
+    """How much (C,) a selected point of each class counts, from the classes' numbers (C,) of points in the set, which
+    has some.
 
     With rule weighed that is number ** -balance, so at balance 1 every class counts as much as any other, and 1 in the
     mean over all points. With every other rule it is 1.
