@@ -17,7 +17,7 @@ from vm_embedded.sections import documented
 from vm_export import cli as export
 from vm_mesh import cli as mesh
 from vm_synth import cli as synth
-from vm_synth.configuration import SceneConfiguration
+from vm_synth.scene.configuration import SceneConfiguration
 from vm_train import evaluate_cli as evaluate
 from vm_train import options as train
 from vm_train.configuration import TrainConfiguration

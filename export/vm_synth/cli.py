@@ -14,18 +14,18 @@ import cv2
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable, written_beside
 from vm_embedded.sections import documented, overrides_of, read_sections
+from vm_workstation.progress import Ticker
+from vm_workstation.stopping import stoppable
 
-from .configuration import SceneConfiguration
-from .dataset import Plan, digest, indices_in, is_done, shard_of
-from .environment import Environment, absent, find_maps
-from .inspection import indices_of, inspect
-from .llvm import find_llvm, load_mitsuba
-from .plots import load_matplotlib, plot
-from .progress import Ticker
-from .report import as_json, complaints, tables
-from .sheet import cell, chosen, read_shown, sheet
-from .stopping import stoppable
-from .workers import Done, Job, render_all
+from .dataset.contact_sheet import cell, chosen, read_shown, sheet
+from .dataset.files import Plan, digest, indices_in, is_done, shard_of
+from .dataset.inspection import indices_of, inspect
+from .dataset.plots import load_matplotlib, plot
+from .dataset.report import as_json, complaints, tables
+from .dataset.workers import Done, Job, render_all
+from .render.mitsuba import find_llvm, load_mitsuba
+from .scene.configuration import SceneConfiguration
+from .scene.environment import Environment, absent, find_maps
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 

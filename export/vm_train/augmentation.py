@@ -19,7 +19,7 @@ from vm_embedded.lens_file import LensFile
 from vm_embedded.lens_opencv import CalibratedLens
 from vm_embedded.orientation import Orientation
 from vm_synth.ranges import drawn
-from vm_synth.sensor import LUMINANCE
+from vm_synth.render.image_processing import LUMINANCE
 
 from .pictures import Picture
 

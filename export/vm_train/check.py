@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.files import check_writable, written_beside
-from vm_synth.progress import Ticker
-from vm_synth.report import summary
+from vm_synth.dataset.report import summary
+from vm_workstation.progress import Ticker
 
 from .inspection import Check as Check
 from .inspection import check as check

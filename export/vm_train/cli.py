@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable
 from vm_embedded.sections import documented, overrides_of, read_sections
-from vm_synth.progress import Ticker
-from vm_synth.stopping import stoppable
+from vm_workstation.progress import Ticker
+from vm_workstation.stopping import stoppable
 
 from . import check as checking
 from . import shards, tfrecord_import
@@ -211,7 +211,7 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _preview(options: argparse.Namespace) -> int:
-    from vm_synth.sheet import chosen
+    from vm_synth.dataset.contact_sheet import chosen
 
     from .pictures import read_picture
     from .preview import sheet, write_sheet

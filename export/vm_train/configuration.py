@@ -15,7 +15,7 @@ from vm_embedded.relative import COLORINGS
 from vm_embedded.shapes import SHAPES
 from vm_export.grid import GRIDS, Grid
 from vm_export.network_shape import ACTIVATIONS, NetworkShape
-from vm_synth.dataset import COLORS
+from vm_synth.dataset.files import COLORS
 
 from .augmentation import Augmentation
 from .pictures import Classes, Color

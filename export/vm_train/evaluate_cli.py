@@ -14,7 +14,7 @@ import vm_embedded
 from vm_embedded.configuration import read_configuration
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.settings import Settings
-from vm_synth.stopping import stoppable
+from vm_workstation.stopping import stoppable
 
 from .evaluate_options import parser as parser
 from .evaluate_options import parsers as parsers
@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _evaluate(options: argparse.Namespace) -> int:
     # Imported here, so that a machine without torch still gets help texts and one clear line.
-    from vm_synth.progress import Ticker
+    from vm_workstation.progress import Ticker
 
     from .evaluated_pictures import classes_of, pictures_of, usual_colors
     from .evaluation import Rules

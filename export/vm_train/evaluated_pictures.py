@@ -9,7 +9,7 @@ from pathlib import Path
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.manifest import Manifest
 from vm_embedded.sections import read_sections
-from vm_synth.dataset import COLORS
+from vm_synth.dataset.files import COLORS
 
 from .configuration import TrainConfiguration
 from .pictures import IMAGES, Classes, Color, PictureFiles, find_pictures

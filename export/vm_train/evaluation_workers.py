@@ -12,7 +12,7 @@ from pathlib import Path
 
 from vm_embedded.errors import VisualMeshError
 from vm_embedded.settings import Settings
-from vm_synth.worker_process import begin, shielded
+from vm_workstation.worker_process import begin, shielded
 
 from .answers import Subject, load_subject
 from .evaluation import Evaluation, Rules, evaluated

@@ -17,7 +17,7 @@ from vm_embedded.errors import VisualMeshError, unknown
 from vm_embedded.lens import Lens, RadialLens, Size
 from vm_embedded.lens_file import LensFile
 from vm_embedded.lens_opencv import CalibratedLens
-from vm_synth.worker_process import begin, shielded
+from vm_workstation.worker_process import begin, shielded
 
 from .picture_files import PictureFault, PictureFiles
 from .pictures import Classes, Labels, read_picture

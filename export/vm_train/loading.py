@@ -13,7 +13,7 @@ from vm_embedded.errors import GeometryError, InputError, VisualMeshError
 from vm_embedded.manifest import Manifest
 from vm_embedded.relative import make_relative
 from vm_export.grid import Grid
-from vm_synth.worker_process import begin, shielded
+from vm_workstation.worker_process import begin, shielded
 
 from .augmentation import Augmentation, blurred, moved, recolored
 from .first_look import FirstLook

@@ -15,7 +15,7 @@ from vm_embedded.arrays import Floats, Mask
 from vm_embedded.errors import InputError
 from vm_embedded.manifest import Manifest
 from vm_embedded.shape import Shape
-from vm_synth.outlines import outline, polygon_area
+from vm_synth.render.outlines import outline, polygon_area
 
 from .overlaps import TrueObject, coverage
 from .pictures import Picture

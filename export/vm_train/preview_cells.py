@@ -14,7 +14,7 @@ from vm_embedded.errors import GeometryError
 from vm_embedded.lens_file import LensFile
 from vm_embedded.manifest import Manifest
 from vm_export.grid import Grid
-from vm_synth.sheet import placed
+from vm_synth.dataset.contact_sheet import placed
 
 from .graphs import seen_points
 from .pictures import Color, Picture

@@ -12,7 +12,7 @@ from vm_embedded.arrays import Floats
 from vm_embedded.errors import InputError
 from vm_embedded.files import check_writable, written_beside
 from vm_export.network import Network
-from vm_synth.progress import Ticker
+from vm_workstation.progress import Ticker
 
 from .hardware import Hardware
 from .job import Job

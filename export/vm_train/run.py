@@ -17,7 +17,7 @@ import torch
 from vm_embedded.errors import InputError
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
-from vm_synth.progress import Ticker
+from vm_workstation.progress import Ticker
 
 from .hardware import Hardware
 from .job import Job

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
-from vm_synth.progress import Ticker
+from vm_workstation.progress import Ticker
 
 from .picture_files import PARTS, PictureFiles
 from .pictures import find_pictures

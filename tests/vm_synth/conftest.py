@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from vm_embedded.errors import InputError
-from vm_synth.configuration import SceneConfiguration
-from vm_synth.environment import Environment
+from vm_synth.scene.configuration import SceneConfiguration
+from vm_synth.scene.environment import Environment
 
 
 def sky(height=64):
@@ -37,7 +37,7 @@ def maps(tmp_path_factory):
 @pytest.fixture(scope="session")
 def tracer():
     """A tracer; skipped where Mitsuba or LLVM is missing."""
-    from vm_synth.tracer import Tracer
+    from vm_synth.render.tracer import Tracer
 
     try:
         return Tracer()

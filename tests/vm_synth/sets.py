@@ -3,13 +3,13 @@
 import cv2
 import numpy as np
 
-from vm_synth.camera import CameraRanges
-from vm_synth.configuration import CLASSES, GroundRanges, SceneConfiguration, TargetRanges, ThingRanges
-from vm_synth.dataset import Plan, write_picture
-from vm_synth.drawing import draw_scene
-from vm_synth.environment import Environment
-from vm_synth.outlines import outline
-from vm_synth.picture import UNLABELED, Picture
+from vm_synth.dataset.files import Plan, write_picture
+from vm_synth.render.outlines import outline
+from vm_synth.render.picture import UNLABELED, Picture
+from vm_synth.scene.camera import CameraRanges
+from vm_synth.scene.configuration import CLASSES, GroundRanges, SceneConfiguration, TargetRanges, ThingRanges
+from vm_synth.scene.draw_scene import draw_scene
+from vm_synth.scene.environment import Environment
 
 SIZE = (96, 64)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from vm_embedded.lens import Rectilinear
 from vm_embedded.orientation import Orientation
-from vm_synth.dataset import lens_text
+from vm_synth.dataset.files import lens_text
 
 SIZE = (160, 128)
 RADIUS = 0.07

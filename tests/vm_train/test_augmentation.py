@@ -15,17 +15,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.lens import Equidistant, Equisolid, Rectilinear
 from vm_embedded.lens_file import LensFile
 from vm_embedded.lens_opencv import BrownLens, FisheyeLens
-from vm_train.augmentation import (
-    OFF,
-    Augmentation,
-    Tone,
-    blurred,
-    moved,
-    recolored,
-    softened,
-    told_otherwise,
-    toned,
-)
+from vm_train.augmentation import OFF, Augmentation, Tone, blurred, moved, recolored, softened, told_otherwise, toned
 from vm_train.pictures import Picture
 
 SIZE = (96, 64)

@@ -14,7 +14,7 @@ from vm_embedded import Orientation
 from vm_embedded.errors import InputError
 from vm_embedded.lens import Equisolid
 from vm_embedded.manifest import Manifest, ObjectClass
-from vm_synth.dataset import lens_text
+from vm_synth.dataset.files import lens_text
 from vm_train.graphs import graph_of
 from vm_train.picture_files import PictureFault
 from vm_train.pictures import UNLABELED, Classes, find_pictures, read_picture

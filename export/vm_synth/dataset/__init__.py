@@ -1,0 +1,1 @@
+"""The folder of pictures that vm-synth writes, and its reports."""

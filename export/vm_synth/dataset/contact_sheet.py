@@ -1,0 +1,196 @@
+"""Contact sheets: pictures of a set, each above the same one with its classes tinted and the ball's true outline."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from vm_embedded.arrays import Floats, Image
+from vm_embedded.errors import InputError, VisualMeshError, one_line
+from vm_embedded.lens_file import read_lens_file
+from vm_embedded.sources import read_image
+
+from ..render.outlines import outline
+from .files import COLORS, file_of, read_truth
+
+OUTLINE = (255, 0, 255)
+"""RGB color of the ball's true outline."""
+
+_TINT, _CONTOUR = 0.16, 0.8  # how much of a class's color its area and its rim get
+_SMALL = 1.0 / 20.0  # balls of a smaller radius, in widths of the tile, are shown magnified too
+_INSET = 0.3  # widths of the tile
+_GAP, _LINE = 6, 16  # [px] between cells, and of a line of text
+_PAPER, _INK, _FAINT = (32, 32, 32), (235, 235, 235), (160, 160, 160)
+_LARGEST = 65500  # [px] that a JPEG can have
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A finished picture: image (h, w, 3) BGR, mask (h, w, 4) BGRA, truth, and the outline (n, 2) of its ball [px],
+    NaN where the lens does not see it, or None without a ball."""
+
+    index: int
+    image: Image
+    mask: Image
+    truth: dict[str, Any]
+    outline: Floats | None
+
+
+def read_shown(folder: Path, index: int) -> Shown:
+    """Read a picture and compute its ball's outline. Raises InputError naming the file at fault."""
+    image = read_image(file_of(folder, "image", index))
+    mask = read_image(file_of(folder, "mask", index), raw=True)
+    size = (image.shape[1], image.shape[0])
+    if mask.shape != (*image.shape[:2], 4):
+        raise InputError(f"{file_of(folder, 'mask', index)} is no mask for a picture of {size[0]} x {size[1]} px")
+    truth = read_truth(folder, index)
+    lens_path = file_of(folder, "lens", index)
+    lens = read_lens_file(lens_path)
+    if lens.orientation is None:
+        raise InputError(f"{lens_path} has no Hoc")
+    try:
+        ball = truth["ball"]
+        found = None
+        if ball is not None:
+            center, radius = np.array(ball["center"], dtype=np.float64), float(ball["radius"])
+            found = outline(lens.lens.for_image(size), lens.orientation, center, radius, size)
+        shown = Shown(index, image, mask, truth, found)
+        captions(shown)
+    except VisualMeshError:
+        raise
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{file_of(folder, 'scene', index)} is damaged: {one_line(error)}") from error
+    return shown
+
+
+def chosen(indices: Sequence[int], count: int, first: int | None = None, seed: int | None = None) -> list[int]:
+    """At most `count` of the sorted indices: those from `first` on, or by chance with a seed, else evenly spaced."""
+    if first is not None:
+        return [index for index in indices if index >= first][:count]
+    count = min(count, len(indices))
+    if seed is not None:
+        return sorted(int(each) for each in np.random.default_rng(seed).choice(indices, count, replace=False))
+    return [indices[round(place)] for place in np.linspace(0, len(indices) - 1, count)]
+
+
+def captions(shown: Shown) -> tuple[str, str]:
+    """Two lines on a picture: which it is, and its ball."""
+    ball = shown.truth["ball"]
+    head = f"{shown.index}  {shown.truth['map']}"
+    if ball is None:
+        return head, "no ball"
+    about = f"{ball['distance']:.2f} m, radius {ball['pixel_radius']:.1f} px, {100.0 * ball['visible']:.0f} % visible"
+    return head, about
+
+
+def tinted(image: Image, mask: Image) -> Image:
+    """A picture (h, w, 3) BGR with its classes' colors: light on areas, strong on their rims."""
+    found = image.astype(np.float32)
+    for name, color in COLORS.items():
+        if name == "environment":
+            continue
+        paint = np.array(color[::-1], dtype=np.float32)
+        area = ((mask[..., :3] == paint.astype(np.uint8)).all(axis=-1) & (mask[..., 3] > 0)).astype(np.uint8)
+        rim = area - cv2.erode(area, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)
+        if name in ("ball", "field"):
+            rim[:] = 0  # the ball has its outline, the field's rim is that of all others
+        strength = np.where(rim > 0, _CONTOUR, _TINT * area)[..., None].astype(np.float32)
+        found += strength * (paint - found)
+    return np.rint(found).astype(np.uint8)
+
+
+def cell(shown: Shown, width: int) -> Image:
+    """What the sheet shows of a picture (h, width, 3): the picture, the same with its truth, and two lines of text."""
+    height, full = shown.image.shape[:2]
+    zoom = width / full
+    size = (width, max(round(height * zoom), 1))
+    how = cv2.INTER_AREA if zoom < 1.0 else cv2.INTER_LINEAR
+    upper = cv2.resize(shown.image, size, interpolation=how)
+    lower = np.asarray(cv2.resize(tinted(shown.image, shown.mask), size, interpolation=how), dtype=np.uint8)
+    if shown.outline is not None:
+        _draw_outline(lower, placed(shown.outline, (0.0, 0.0), zoom))
+        _add_inset(lower, shown, zoom)
+    text = np.full((2 * _LINE + 4, width, 3), _PAPER, dtype=np.uint8)
+    for row, (line, color) in enumerate(zip(captions(shown), (_INK, _FAINT), strict=True)):
+        _write(text, line, (2, (row + 1) * _LINE - 3), color)
+    seam = np.full((1, width, 3), _PAPER, dtype=np.uint8)
+    return np.vstack([upper, seam, lower, text])
+
+
+def placed(pixels: Floats, corner: tuple[float, float], zoom: float) -> Floats:
+    """Pixels (n, 2) of a picture on its part that begins at the corner's outer edges [px], enlarged by a factor."""
+    return np.asarray((pixels + 0.5 - np.array(corner)) * zoom - 0.5)
+
+
+def _draw_outline(canvas: Image, pixels: Floats) -> None:
+    limit = 2.0 * max(canvas.shape[:2])
+    points = np.rint(np.clip(pixels, -limit, 2.0 * limit) * 16.0)
+    for start, end in zip(points, np.roll(points, -1, axis=0), strict=True):
+        if np.isfinite(start).all() and np.isfinite(end).all():
+            first, last = ((int(x), int(y)) for x, y in (start, end))
+            cv2.line(canvas, first, last, OUTLINE[::-1], 1, cv2.LINE_AA, shift=4)
+
+
+def _add_inset(canvas: Image, shown: Shown, zoom: float) -> None:
+    """Show a small ball magnified, without tints, in the corner that is farthest from it."""
+    assert shown.outline is not None
+    pixels = shown.outline[np.isfinite(shown.outline).all(axis=1)]
+    height, width = canvas.shape[:2]
+    side = min(round(_INSET * width), height // 2)
+    if not len(pixels):
+        return
+    middle, reach = (pixels.min(axis=0) + pixels.max(axis=0)) / 2.0, float(np.ptp(pixels, axis=0).max())
+    if reach * zoom > 2.0 * _SMALL * width:
+        return
+    span = max(2.2 * reach, 8.0)
+    corner = (float(middle[0] + 0.5 - span / 2.0), float(middle[1] + 0.5 - span / 2.0))
+    scale = side / span
+    shift = [0.5 * scale - 0.5 - corner[0] * scale, 0.5 * scale - 0.5 - corner[1] * scale]
+    matrix = np.array([[scale, 0.0, shift[0]], [0.0, scale, shift[1]]])
+    inset = np.asarray(
+        cv2.warpAffine(shown.image, matrix, (side, side), flags=cv2.INTER_NEAREST, borderValue=_PAPER), dtype=np.uint8
+    )
+    _draw_outline(inset, placed(shown.outline, corner, scale))
+    inset[[0, -1]] = inset[:, [0, -1]] = _INK
+    left = 0 if middle[0] * zoom > width / 2.0 else width - side
+    top = 0 if middle[1] * zoom > height / 2.0 else height - side
+    canvas[top : top + side, left : left + side] = inset
+
+
+def sheet(cells: Sequence[Image], columns: int, title: str) -> Image:
+    """Cells of one size (h, w, 3) in rows, under a title and what the colors mean. Raises InputError if too large."""
+    height, width = cells[0].shape[:2]
+    columns = min(columns, len(cells))
+    rows = math.ceil(len(cells) / columns)
+    head = _LINE + 2 * _GAP
+    size = (head + rows * (height + _GAP), _GAP + columns * (width + _GAP))
+    if max(size) > _LARGEST:
+        raise InputError(f"a sheet of {size[1]} x {size[0]} px is too large: show fewer pictures or smaller ones")
+    canvas = np.full((*size, 3), _PAPER, dtype=np.uint8)
+    place = _GAP + _write(canvas, title, (_GAP, head - _GAP - 3), _INK) + 3 * _GAP
+    legend = {name: COLORS[name] for name in ("field", "line", "goal", "robot", "ball")}
+    for name, color in {**legend, "true outline of the ball": OUTLINE}.items():
+        cv2.rectangle(canvas, (place, head - _GAP - 12), (place + 9, head - _GAP - 3), color[::-1], -1)
+        place += 14 + _write(canvas, name, (place + 14, head - _GAP - 3), _FAINT) + 2 * _GAP
+    for number, each in enumerate(cells):
+        row, column = divmod(number, columns)
+        top, left = head + row * (height + _GAP), _GAP + column * (width + _GAP)
+        canvas[top : top + height, left : left + width] = each
+    return canvas
+
+
+def _write(canvas: Image, text: str, at: tuple[int, int], color: tuple[int, int, int]) -> int:
+    """Write text from a point at its lower left on, shortened to what fits, and return how wide it is [px]."""
+    font, size = cv2.FONT_HERSHEY_SIMPLEX, 0.4
+    room = canvas.shape[1] - at[0]
+    text = text.encode("ascii", "replace").decode()
+    while len(text) > 2 and cv2.getTextSize(text, font, size, 1)[0][0] > room:
+        text = text.removesuffix("..")[:-1] + ".."
+    cv2.putText(canvas, text, at, font, size, color, 1, cv2.LINE_AA)
+    return int(cv2.getTextSize(text, font, size, 1)[0][0])

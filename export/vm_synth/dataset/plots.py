@@ -1,0 +1,141 @@
+"""Histograms of what a set of pictures holds."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vm_embedded.errors import InputError
+from vm_embedded.files import written_beside
+from vm_embedded.lens import Size
+
+from ..scene.configuration import CLASSES
+from .inspection import Facts
+from .report import categories, quantities
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_GREEN, _GRAY, _RED = "#2a7f62", "#9aa5b1", "#c0392b"
+_CLASS_COLORS = {"ball": "#d62728", "goal": "#e3c000", "line": "#c9c9c9", "field": "#2ca02c", "robot": "#3355dd"}
+
+_HISTOGRAMS = (
+    "camera height [m]",
+    "camera pitch [deg]",
+    "camera roll [deg]",
+    "ball distance [m]",
+    "ball radius [px]",
+    "ball visible [%]",
+)
+_UNEVEN = ("camera roll [deg]", "ball visible [%]")  # on a log scale
+_MOST = 14  # bars
+_DOT = 4000.0  # area of all dots together
+
+
+def load_matplotlib(path: Path) -> Any:
+    """matplotlib, set up to draw to a file. Raises InputError if it is not installed or can't write such a file."""
+    try:
+        import matplotlib
+    except ImportError as error:
+        raise InputError("--plots needs matplotlib: pip install 'vm-embedded[synth]'") from error
+    matplotlib.use("Agg")
+    from matplotlib.figure import Figure
+
+    known = Figure().canvas.get_supported_filetypes()
+    if path.suffix[1:].lower() not in known:
+        raise InputError(f"can't plot to {path}: its suffix must be one of {', '.join(sorted(known))}")
+    return matplotlib
+
+
+def plot(facts: Sequence[Facts], size: Size, title: str, path: Path) -> None:
+    """Write histograms of pictures of this size to a file. Raises InputError if it can't."""
+    load_matplotlib(path)
+    from matplotlib import pyplot
+
+    figure, grid = pyplot.subplots(3, 4, figsize=(14.0, 9.0), layout="constrained")
+    figure.suptitle(title, fontsize=11)
+    axes = list(grid.flat)
+    values, kinds = quantities(facts), categories(facts)
+    for each, name in zip(axes, _HISTOGRAMS, strict=False):
+        _histogram(each, values.get(name, []), name)
+    _places(axes[6], facts, size)
+    _shares(axes[7], values)
+    for each, whats in ((axes[8], ("ground", "lens")), (axes[9], ("ball", "other ball"))):
+        _bars(each, {f"{what}: {name}": n for what in whats for name, n in kinds[what].items()}, "pictures")
+    _bars(axes[10], dict(kinds["ball design"].most_common(_MOST)), _titled("balls of a design", kinds["ball design"]))
+    _map_use(axes[11], sorted(kinds["map"].values(), reverse=True))
+    for each in axes:
+        each.spines[["top", "right"]].set_visible(False)
+        each.tick_params(labelsize=8)
+    with written_beside(path) as part:
+        figure.savefig(part, dpi=110, format=path.suffix[1:].lower())
+    pyplot.close(figure)
+
+
+def _histogram(axes: Axes, values: Sequence[float], name: str) -> None:
+    axes.set_xlabel(name, fontsize=9)
+    axes.set_ylabel("pictures, log scale" if name in _UNEVEN else "pictures", fontsize=9)
+    if not values:
+        return _nothing(axes)
+    # A few balls at the rim of a rectilinear lens are endless; they stand in the last column.
+    shown = np.minimum(values, np.quantile(values, 0.995) if name == "ball radius [px]" else np.inf)
+    axes.hist(shown, bins=40, color=_GREEN, log=name in _UNEVEN)
+    median, (low, high) = float(np.median(values)), axes.get_xlim()
+    axes.axvline(median, color=_RED, linewidth=1.0)
+    side = "left" if median < (low + high) / 2.0 else "right"
+    place = axes.get_xaxis_transform()
+    axes.text(median, 1.0, f" median {median:.3g} ", color=_RED, fontsize=8, ha=side, transform=place)
+
+
+def _places(axes: Axes, facts: Sequence[Facts], size: Size) -> None:
+    balls = [each.ball for each in facts if each.ball is not None]
+    x, y = np.array([each.pixel for each in balls]).reshape(-1, 2).T
+    axes.scatter(x, y, s=_DOT / max(len(balls), 1), color=_GREEN)
+    axes.set_xlim(-0.5, size[0] - 0.5)
+    axes.set_ylim(size[1] - 0.5, -0.5)
+    axes.set_aspect("equal")
+    axes.set_xlabel("the balls' places in the picture [px]", fontsize=9)
+
+
+def _shares(axes: Axes, values: dict[str, list[float]]) -> None:
+    axes.set_xlabel("pixels, mean over all pictures [%]", fontsize=9)
+    means = {name: values.get(f"{name} pixels [%]", []) for name in (*CLASSES, "unlabeled")}
+    if not all(means.values()):
+        return _nothing(axes)
+    heights = [float(np.mean(each)) for each in means.values()]
+    bars = axes.barh(list(means), heights, color=[_CLASS_COLORS.get(name, _GRAY) for name in means])
+    shown = [100.0 * float(np.mean(np.array(each) > 0.0)) for each in means.values()]
+    labels = [f" {mean:.2g} %, in {share:.0f} % of pictures" for mean, share in zip(heights, shown, strict=True)]
+    axes.bar_label(bars, labels=labels, fontsize=7)
+    axes.set_xlim(0.0, 1.9 * max(heights))
+    axes.invert_yaxis()
+
+
+def _bars(axes: Axes, counts: dict[str, int], label: str) -> None:
+    axes.set_xlabel(label, fontsize=9)
+    if not counts:
+        return _nothing(axes)
+    bars = axes.barh(list(counts), list(counts.values()), color=_GREEN)
+    axes.bar_label(bars, labels=[f" {each}" for each in counts.values()], fontsize=7)
+    axes.set_xlim(0.0, 1.15 * max(counts.values()))
+    axes.invert_yaxis()
+
+
+def _titled(label: str, counts: Counter[str]) -> str:
+    return label if len(counts) <= _MOST else f"{label}, the {_MOST} commonest of {len(counts)}"
+
+
+def _map_use(axes: Axes, counts: Sequence[int]) -> None:
+    axes.bar(range(1, len(counts) + 1), counts, width=1.0, color=_GREEN)
+    axes.set_xlabel(f"{len(counts)} maps, by use", fontsize=9)
+    axes.set_ylabel("pictures", fontsize=9)
+
+
+def _nothing(axes: Axes) -> None:
+    axes.text(0.5, 0.5, "none", ha="center", transform=axes.transAxes, color=_GRAY)
+    axes.set_xticks([])
+    axes.set_yticks([])

@@ -1,0 +1,279 @@
+"""Ray tracing with Mitsuba 3: what rays from the camera meet, the light that comes back, and shadows on the plane.
+
+One scene is built once: two spheres with textures, one mesh of triangles for everything else, the plane, and the
+environment. For each picture its buffers are filled anew. All launches have fixed sizes, short ones are padded, so
+that Dr.Jit compiles each program once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from vm_embedded.arrays import Floats, Singles
+from vm_embedded.errors import InputError
+
+from ..balls.balls import paint
+from ..scene.environment import Environment
+from ..scene.scene import PlacedBall, Scene
+from .mitsuba import load_mitsuba
+
+_TEXTURE = 512  # rows of a ball's texture
+_LIGHT = (1024, 512)  # columns and rows of the environment that lights a scene
+_VERTICES, _TRIANGLES = 90_000, 60_000
+_BATCH = 1 << 17  # rays a launch
+_LIGHTS = 1 << 15  # entries of the table that lights are drawn from
+_SHADOW_RAYS = 48
+_BOUNCED = 0.1  # light in a full shadow that comes from the things around
+
+NOTHING, BALL, OTHER = -1, -2, -3
+"""What a ray can meet besides triangles, which have numbers from 0 on."""
+
+Hits = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """First surfaces that n rays meet: albedo (n, 3), normal (n, 3) and distance (n,) [m]; infinite if none."""
+
+    albedo: Singles
+    normal: Singles
+    depth: Singles
+
+
+class Tracer:
+    """Renders scenes of one process."""
+
+    def __init__(self) -> None:
+        self._mi = mi = load_mitsuba()
+        import drjit
+
+        self._dr = drjit
+        body = mi.Properties()
+        body["bsdf"] = mi.load_dict(
+            {
+                "type": "principled",
+                "base_color": {"type": "mesh_attribute", "name": "vertex_color"},
+                "roughness": {"type": "mesh_attribute", "name": "vertex_roughness"},
+                "specular": 0.4,
+            }
+        )
+        bodies = mi.Mesh("bodies", _VERTICES, _TRIANGLES, has_vertex_normals=True, props=body)
+        bodies.add_attribute("vertex_color", 3, np.zeros(3 * _VERTICES, np.float32))
+        bodies.add_attribute("vertex_roughness", 1, np.ones(_VERTICES, np.float32))
+        to_world = np.array([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
+        light = np.ones((_LIGHT[1], _LIGHT[0], 3), np.float32)
+        self._scene = mi.load_dict(
+            {
+                "type": "scene",
+                "env": {"type": "envmap", "bitmap": mi.Bitmap(light), "to_world": mi.ScalarTransform4f(to_world)},
+                "sun": {
+                    "type": "directional",
+                    "direction": [0.0, 0.0, -1.0],
+                    "irradiance": {"type": "rgb", "value": 1.0},
+                },
+                "plane": {
+                    "type": "rectangle",
+                    "to_world": mi.ScalarTransform4f().scale(200.0),
+                    "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.2, 0.2, 0.2]}},
+                },
+                "ball": _sphere(mi),
+                "other": _sphere(mi),
+                "bodies": bodies,
+            }
+        )
+        self._parameters = mi.traverse(self._scene)
+        shapes = [_numbers(drjit.reinterpret_array(mi.UInt32, mi.ShapePtr(each)))[0] for each in self._scene.shapes()]
+        self._meets = {
+            int(number): {"ball": BALL, "other": OTHER, "plane": NOTHING}.get(each.id(), 0)
+            for number, each in zip(shapes, self._scene.shapes(), strict=True)
+        }
+        self._integrator = mi.load_dict({"type": "path", "max_depth": 3, "rr_depth": 10})
+        self._lit_by = ""
+
+    def set(self, scene: Scene, environment: Environment) -> None:
+        """Fill the buffers with a scene. Raises InputError if it has more triangles than there is room for."""
+        p, mi = self._parameters, self._mi
+        for name, ball in (("ball", scene.ball), ("other", scene.other)):
+            self._set_ball(name, ball)
+        mesh = scene.mesh
+        if len(mesh.vertices) > _VERTICES or len(mesh.triangles) > _TRIANGLES:
+            raise InputError(
+                f"a scene of {len(mesh.triangles)} triangles and {len(mesh.vertices)} vertices is too large; there "
+                f"is room for {_TRIANGLES} and {_VERTICES}: lower the numbers of things in [things]"
+            )
+        p["bodies.vertex_positions"] = self._float(_padded(mesh.vertices, _VERTICES))
+        p["bodies.vertex_normals"] = self._float(_padded(mesh.normals, _VERTICES))
+        p["bodies.vertex_color"] = self._float(_padded(mesh.colors, _VERTICES))
+        p["bodies.vertex_roughness"] = self._float(_padded(mesh.roughness, _VERTICES, 1.0))
+        p["bodies.faces"] = mi.UInt32(_padded(mesh.triangles.astype(np.uint32), _TRIANGLES).ravel())
+        p["plane.bsdf.reflectance.value"] = mi.Color3f(*(self._opaque(each) for each in scene.ground_albedo))
+        if self._lit_by != environment.name:
+            self._lit_by = environment.name
+            light = environment.lighting(_LIGHT)
+            sky = np.concatenate([light.sky[:, -1:], light.sky, light.sky[:, :1]], axis=1)
+            p["env.data"] = mi.TensorXf(self._float(sky), sky.shape)
+            p["sun.irradiance.value"] = mi.Color3f(*(self._opaque(float(each)) for each in light.sun))
+            p["sun.to_world"] = self._transform(_facing(-light.toward_sun))
+            self._set_lights(environment)
+        p.update()
+
+    def _set_ball(self, name: str, ball: PlacedBall | None) -> None:
+        p, mi = self._parameters, self._mi
+        matrix = np.diag([1e-3, 1e-3, 1e-3, 1.0])
+        matrix[2, 3] = -100.0
+        if ball is not None:
+            matrix[:3, :3] = ball.radius * ball.attitude
+            matrix[:3, 3] = ball.center
+            texture = paint(ball.design, _TEXTURE)
+            p[f"{name}.bsdf.base_color.data"] = mi.TensorXf(self._float(texture), texture.shape)
+            p[f"{name}.bsdf.roughness.value"] = self._opaque(ball.design.roughness)
+            p[f"{name}.bsdf.specular"] = self._opaque(ball.design.specular)
+            p[f"{name}.bsdf.clearcoat.value"] = self._opaque(ball.design.clearcoat)
+        p[f"{name}.to_world"] = self._transform(matrix)
+
+    def _set_lights(self, environment: Environment) -> None:
+        """Draw a table of lights, each as often as it is bright on the plane."""
+        directions, irradiance = environment.lights
+        weight = irradiance.sum(axis=1, dtype=np.float64)
+        edges = np.cumsum(weight) / weight.sum()
+        chosen = np.minimum(np.searchsorted(edges, (np.arange(_LIGHTS) + 0.5) / _LIGHTS), len(weight) - 1)
+        self._light_directions = np.ascontiguousarray(directions[chosen])
+        self._light_colors = (irradiance[chosen] / weight[chosen, None]).astype(np.float32)
+
+    def meets(self, origin: Floats, rays: Singles) -> Hits:
+        """What each ray (n, 3) from the origin (3,) meets first: NOTHING, BALL, OTHER or a triangle's number (n,)."""
+        found = np.empty(len(rays), dtype=np.int32)
+        for part in _batches(len(rays)):
+            ray = self._ray(origin, rays[part])
+            hit = self._scene.ray_intersect_preliminary(ray, coherent=True)
+            shape = self._dr.reinterpret_array(self._mi.UInt32, hit.shape)
+            self._dr.eval(shape, hit.prim_index)
+            size = part.stop - part.start
+            shapes, triangles = _numbers(shape)[:size], _numbers(hit.prim_index)[:size]
+            what = np.full(size, NOTHING, dtype=np.int32)
+            for number, meaning in self._meets.items():
+                if meaning != NOTHING:
+                    here = shapes == number
+                    what[here] = triangles[here] if meaning == 0 else meaning
+            found[part] = what
+        return found
+
+    def radiance(self, origin: Floats, rays: Singles, together: int, seed: int) -> Singles:
+        """Light (n, 3) that comes back along the rays (n, 3), one path each.
+
+        So many rays, one after the other, belong to the same pixel; a power of 4. Their paths spread evenly.
+        """
+        mi = self._mi
+        evenly = mi.load_dict({"type": "ldsampler", "sample_count": together})
+        evenly.set_samples_per_wavefront(together)
+        found = np.empty((len(rays), 3), dtype=np.float32)
+        for number, part in enumerate(_batches(len(rays))):
+            sampler = evenly.clone()
+            sampler.seed(self._dr.opaque(mi.UInt32, (seed + 7919 * number) & 0xFFFFFFFF), _BATCH)
+            ray = mi.RayDifferential3f(self._ray(origin, rays[part]))
+            light, _, _ = self._integrator.sample(self._scene, sampler, ray)
+            found[part] = _numbers(self._dr.ravel(light)).reshape(-1, 3)[: part.stop - part.start]
+        return np.nan_to_num(found, copy=False, posinf=0.0, neginf=0.0)
+
+    def surfaces(self, origin: Floats, rays: Singles) -> Surfaces:
+        """What the rays (n, 3) show of the first surface that they meet."""
+        mi, dr = self._mi, self._dr
+        albedo, normal = np.empty((len(rays), 3), np.float32), np.empty((len(rays), 3), np.float32)
+        depth = np.empty(len(rays), np.float32)
+        for part in _batches(len(rays)):
+            ray = mi.RayDifferential3f(self._ray(origin, rays[part]))
+            met = self._scene.ray_intersect(ray)
+            color = met.bsdf(ray).eval_diffuse_reflectance(met, met.is_valid())
+            dr.eval(color, met.n, met.t)
+            size = part.stop - part.start
+            albedo[part] = _numbers(dr.ravel(color)).reshape(-1, 3)[:size]
+            normal[part] = _numbers(dr.ravel(met.sh_frame.n)).reshape(-1, 3)[:size]
+            depth[part] = _numbers(met.t)[:size]
+        return Surfaces(albedo, normal, depth)
+
+    def shadows(self, points: Floats, random: np.random.Generator) -> Singles:
+        """Share (n, 3) of the environment's light that reaches places (n, 2) of the plane past all things."""
+        mi, dr = self._mi, self._dr
+        result = np.empty((len(points), 3), dtype=np.float32)
+        for part in _batches(len(points)):
+            size = part.stop - part.start
+            origin = np.zeros((_BATCH, 3), dtype=np.float32)
+            origin[:size, :2] = points[part]
+            origin[:, 2] = 1e-3
+            places = mi.Point3f(*(self._float(column) for column in origin.T))
+            lit, full = np.zeros((size, 3), np.float32), np.zeros((size, 3), np.float32)
+            shift = random.random(size, dtype=np.float32)
+            for number in range(_SHADOW_RAYS):
+                stratum = (number + shift) / _SHADOW_RAYS
+                chosen = np.minimum((stratum * _LIGHTS).astype(np.intp), _LIGHTS - 1)
+                direction = np.zeros((_BATCH, 3), dtype=np.float32)
+                direction[:, 2] = 1.0
+                direction[:size] = self._light_directions[chosen]
+                ray = mi.Ray3f(places, mi.Vector3f(*(self._float(column) for column in direction.T)))
+                blocked = self._scene.ray_test(ray)
+                dr.eval(blocked)
+                color = self._light_colors[chosen]
+                full += color
+                lit += color * ~_numbers(blocked)[:size, None]
+            result[part] = lit / np.maximum(full, 1e-9)
+        return _BOUNCED + (1.0 - _BOUNCED) * result
+
+    def _ray(self, origin: Floats, rays: Singles) -> Any:
+        mi = self._mi
+        place = mi.Point3f(*(self._opaque(float(each)) for each in origin))
+        return mi.Ray3f(place, mi.Vector3f(*(self._float(column) for column in _padded(rays, _BATCH, 1.0).T)))
+
+    def _float(self, array: npt.NDArray[Any]) -> Any:
+        """A buffer of Dr.Jit's own; one over numpy's memory may be aligned otherwise, which compiles anew."""
+        buffer = self._mi.Float(np.ascontiguousarray(array, dtype=np.float32).ravel()) + self._opaque(0.0)
+        self._dr.eval(buffer)
+        return buffer
+
+    def _transform(self, matrix: Floats) -> Any:
+        transform = self._mi.AffineTransform4f(self._mi.ScalarTransform4f(matrix))
+        self._dr.make_opaque(transform)
+        return transform
+
+    def _opaque(self, value: float) -> Any:
+        return self._dr.opaque(self._mi.Float, value)
+
+
+def _sphere(mi: Any) -> dict[str, Any]:
+    texture = mi.Bitmap(np.full((_TEXTURE, 2 * _TEXTURE, 3), 0.5, np.float32))
+    return {
+        "type": "sphere",
+        "bsdf": {
+            "type": "principled",
+            "base_color": {"type": "bitmap", "bitmap": texture, "raw": True},
+            "roughness": 0.5,
+            "specular": 0.5,
+            "clearcoat": 0.1,
+        },
+    }
+
+
+def _numbers(array: Any) -> npt.NDArray[Any]:
+    return np.asarray(array.numpy())
+
+
+def _facing(direction: Floats) -> Floats:
+    """A transform (4, 4) that turns z to a direction (3,)."""
+    side = np.cross([1.0, 0.0, 0.0] if abs(direction[0]) < 0.9 else [0.0, 1.0, 0.0], direction)
+    side /= np.linalg.norm(side)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.column_stack([side, np.cross(direction, side), direction])
+    return matrix
+
+
+def _padded(array: npt.NDArray[Any], count: int, value: float = 0.0) -> npt.NDArray[Any]:
+    padded = np.full((count, *array.shape[1:]), value, dtype=array.dtype)
+    padded[: len(array)] = array
+    return padded
+
+
+def _batches(count: int) -> list[slice]:
+    return [slice(start, min(start + _BATCH, count)) for start in range(0, count, _BATCH)]

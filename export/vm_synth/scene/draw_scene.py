@@ -1,0 +1,100 @@
+"""Scenes drawn from the configuration's ranges."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vm_embedded.arrays import Floats
+from vm_embedded.lens import RadialLens
+from vm_embedded.orientation import Orientation
+
+from ..bodies.solids import joined
+from ..ranges import uniform
+from ..render.image_processing import draw_sensor
+from .camera import draw_lens, draw_orientation
+from .configuration import SceneConfiguration
+from .environment import Environment
+from .field import Field, draw_field
+from .placement import NEAREST, TRIES, Things, in_picture, pierces, placed
+from .scene import Scene
+
+
+def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environment: Environment) -> Scene:
+    """A scene under an environment map."""
+    lens = draw_lens(random, ranges.camera)
+    catcher = environment.floor is not None and random.random() < ranges.ground.photographed
+    radius = uniform(random, ranges.ball.radius)
+    missing = random.random() < ranges.ball.missing
+    orientation, spot = _view(random, ranges, lens, radius, environment.floor if catcher else None)
+    field = None if catcher else _field_around(random, ranges, np.zeros(2) if spot is None else spot, radius)
+
+    ball = None if missing or spot is None else placed(random, ranges, np.array([*spot, radius]), radius)
+    things = Things(random, ranges, lens, orientation, field, environment.floor if catcher else None)
+    if ball is not None:
+        things.keep_clear(ball.center[:2], radius)
+        if random.random() < ranges.ball.hidden:
+            things.add_between(ball.center[:2], radius)
+    other, label = things.other_ball(radius)
+    if field is not None and random.random() < ranges.field.goals:
+        things.add_goals(field)
+    things.add_all(radius)
+    bodies = [each for each in things.bodies if not (pierces(each, ball) or pierces(each, other))]
+    return Scene(
+        lens=lens,
+        size=ranges.camera.size,
+        orientation=orientation,
+        field=field,
+        ball_radius=radius,
+        ball=ball,
+        other=other,
+        other_label=label,
+        names=tuple(each.name for each in bodies),
+        counts=tuple(len(each.vertices) for each in bodies),
+        mesh=joined(bodies),
+        ground_albedo=field.grass if field else environment.ground,
+        sensor=draw_sensor(random, ranges.sensor),
+        seed=int(random.integers(1 << 31)),
+    )
+
+
+def _view(
+    random: np.random.Generator, ranges: SceneConfiguration, lens: RadialLens, radius: float, floor: float | None
+) -> tuple[Orientation, Floats | None]:
+    """A camera and a place (2,) for a ball that it sees, the ball's angular size or its distance being uniform; None
+    if many cameras saw none."""
+    for _ in range(TRIES):
+        orientation = draw_orientation(random, ranges.camera)
+        low, high = ranges.ball.distance
+        if floor is not None:
+            high = min(high, max(orientation.height - radius, 0.0) / math.tan(floor))
+        rise = max(orientation.height - radius, radius)  # a camera below the ball's top still sees it
+        largest, smallest = (
+            math.asin(radius / max(math.hypot(d, rise), 1.01 * radius)) for d in (min(low, high), high)
+        )
+        if ranges.ball.even and random.random() < ranges.ball.even:
+            distance = random.uniform(min(low, high), high)
+            angle = math.asin(radius / max(math.hypot(distance, rise), 1.01 * radius))
+        else:
+            angle = random.uniform(smallest, largest)
+            distance = math.sqrt(max((radius / math.sin(angle)) ** 2 - rise**2, 0.0))
+        heading = random.uniform(-np.pi, np.pi, 256)
+        spots = distance * np.stack([np.cos(heading), np.sin(heading)], axis=1)
+        depth = np.full(len(spots), radius - orientation.height)
+        rays = np.column_stack([spots, depth])
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        cut = 0.6 * angle if random.random() < ranges.ball.cut else -1.0 * angle
+        good = np.flatnonzero(in_picture(lens, ranges.camera.size, rays @ orientation.rotation, cut))
+        if len(good) and distance > NEAREST * (orientation.height < 4.0 * radius):
+            return orientation, spots[good[0]]
+    return orientation, None
+
+
+def _field_around(random: np.random.Generator, ranges: SceneConfiguration, spot: Floats, radius: float) -> Field:
+    """A field under the camera, and under the ball's place if it is large enough."""
+    for _ in range(TRIES):
+        field = draw_field(random, ranges.field)
+        if field.on_carpet(spot, 2.0 * radius):
+            break
+    return field

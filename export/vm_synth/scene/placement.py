@@ -1,0 +1,198 @@
+"""Where things stand: in the picture, on the ground, and not in each other's way."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vm_embedded.arrays import Floats, Mask
+from vm_embedded.lens import RadialLens, Size
+from vm_embedded.orientation import Orientation
+
+from ..balls.balls import draw_design
+from ..bodies.catalog import draw_carrier, draw_clutter, draw_distractor, draw_furniture, draw_person, draw_robot
+from ..bodies.clutter import pedestal
+from ..bodies.goals import goal
+from ..bodies.solids import Body
+from ..ranges import Range, log_uniform, uniform
+from .configuration import SceneConfiguration
+from .field import Field
+from .scene import PlacedBall
+
+TRIES = 60
+NEAREST = 0.12  # [m] between the camera's foot and things of the scene
+
+
+def in_picture(lens: RadialLens, size: Size, rays: Floats, margin: float) -> Mask:
+    """Which rays (n, 3) of the camera are in the picture or at most an angle `margin` [rad] beyond its edge."""
+    pixels = lens.project(rays, size)
+    center = np.array(size) / 2.0
+    with np.errstate(invalid="ignore"):
+        # The scale of the picture there, from a ray beside each.
+        beside = rays + 1e-3 * np.cross(rays, [0.3, 0.5, 0.8])
+        beside /= np.linalg.norm(beside, axis=1, keepdims=True)
+        scale = np.linalg.norm(lens.project(beside, size) - pixels, axis=1)
+        scale /= np.maximum(np.arccos(np.clip((beside * rays).sum(axis=1), -1.0, 1.0)), 1e-9)
+        inside = (np.abs(pixels - center) <= center - 0.5 + (margin * scale)[:, None]).all(axis=1)
+    return np.asarray(inside & lens.sees(rays))
+
+
+def placed(random: np.random.Generator, ranges: SceneConfiguration, center: Floats, radius: float) -> PlacedBall:
+    attitude, _ = np.linalg.qr(random.normal(size=(3, 3)))
+    attitude[:, 0] *= np.sign(np.linalg.det(attitude))
+    return PlacedBall(center, radius, attitude, draw_design(random, ranges.ball_design))
+
+
+class Things:
+    """The things of a scene while it is drawn."""
+
+    def __init__(
+        self,
+        random: np.random.Generator,
+        ranges: SceneConfiguration,
+        lens: RadialLens,
+        orientation: Orientation,
+        field: Field | None,
+        floor: float | None,
+    ) -> None:
+        self.bodies: list[Body] = []
+        self._random = random
+        self._ranges = ranges
+        self._lens = lens
+        self._orientation = orientation
+        self._field = field
+        self._farthest = ranges.things.distance[1]
+        if floor is not None:
+            self._farthest = min(self._farthest, orientation.height / math.tan(floor))
+        self._taken: list[tuple[Floats, float]] = [(np.zeros(2), NEAREST)]
+
+    def keep_clear(self, spot: Floats, radius: float) -> None:
+        """Nothing may stand within a radius [m] of a place (2,)."""
+        self._taken.append((spot, radius))
+
+    def add_all(self, ball_radius: float) -> None:
+        """Draw and place as many of each kind as configured."""
+        random, things, bodies = self._random, self._ranges.things, self._ranges.bodies
+        for _ in range(self._count(things.robots)):
+            self._add(draw_robot(random, bodies))
+        for _ in range(self._count(things.clutter)):
+            self._add(draw_clutter(random, bodies))
+        for _ in range(self._count(things.round_things)):
+            self._add(draw_distractor(random, bodies, ball_radius))
+        for _ in range(self._count(things.furniture)):
+            self._add(draw_furniture(random, bodies))
+        for _ in range(self._count(things.people)):
+            self._add(draw_person(random, bodies))
+        if random.random() < things.carrier:
+            carrier = draw_carrier(random, bodies, self._orientation.height)
+            if carrier is not None:
+                self.bodies.append(carrier.moved(self._orientation.yaw, (0.0, 0.0, 0.0)))
+
+    def add_goals(self, field: Field) -> None:
+        """Two goals, where their field has them."""
+        ranges = self._ranges.field
+        width, height = uniform(self._random, ranges.goal_width), uniform(self._random, ranges.goal_height)
+        for side in (-1.0, 1.0):
+            place = np.array(field.middle) + field.rotation @ np.array([side * field.length / 2.0, 0.0])
+            if np.linalg.norm(place) > 0.75 * width:
+                heading = field.heading + (math.pi if side > 0 else 0.0)
+                bodies = goal(self._random, min(width, 0.8 * field.width), height, 0.35 * width)
+                self.bodies += [each.moved(heading, (*place, 0.0)) for each in bodies]
+                self.keep_clear(place, 0.6 * width)
+
+    def add_between(self, spot: Floats, radius: float) -> None:
+        """A thing between the camera and the place (2,) of the ball, a little to its side."""
+        random = self._random
+        draw = (draw_robot, draw_clutter, draw_person, draw_furniture)[int(random.choice(4, p=[0.35, 0.4, 0.15, 0.1]))]
+        bodies = draw(random, self._ranges.bodies)
+        half = _reach(bodies)
+        distance = float(np.linalg.norm(spot))
+        ahead = np.array(spot) / max(distance, 1e-9)
+        near, far = NEAREST + half, distance - half - 0.7 * radius
+        if far <= near:
+            return
+        along = random.uniform(0.5 * (near + far), far)
+        aside = random.uniform(-1.0, 1.0) * (half + 0.8 * radius * along / distance)
+        self._put(bodies, along * ahead + aside * np.array([-ahead[1], ahead[0]]), half)
+
+    def other_ball(self, radius: float) -> tuple[PlacedBall | None, str]:
+        """A ball of another size on the plane, or one of the same size off it, and its label."""
+        random, ranges = self._random, self._ranges.ball
+        kind = random.random()
+        if kind < ranges.off_plane:
+            height = log_uniform(random, ranges.off_plane_height)
+            stand = pedestal(random, height, 2.0 * radius * random.uniform(1.2, 3.0))
+            spot = self._free(_reach(stand))
+            if spot is None:
+                return None, ranges.off_plane_label
+            if random.random() < 0.8:
+                self._put(stand, spot, _reach(stand))
+            self.keep_clear(spot, _reach(stand))
+            return placed(random, self._ranges, np.array([*spot, height + radius]), radius), ranges.off_plane_label
+        if kind < ranges.off_plane + ranges.wrong_size:
+            factor = uniform(random, ranges.larger if random.random() < 0.5 else ranges.smaller)
+            spot = self._free(factor * radius)
+            if spot is not None:
+                self.keep_clear(spot, factor * radius)
+                center = np.array([*spot, factor * radius])
+                return placed(random, self._ranges, center, factor * radius), "environment"
+        return None, "environment"
+
+    def _count(self, span: Range) -> int:
+        return int(self._random.integers(int(span[0]), int(span[1]) + 1))
+
+    def _add(self, bodies: list[Body]) -> None:
+        half = _reach(bodies)
+        spot = self._free(half)
+        if spot is not None:
+            self._put(bodies, spot, half)
+
+    def _put(self, bodies: list[Body], spot: Floats, half: float) -> None:
+        turn = self._random.uniform(-math.pi, math.pi)
+        self.bodies += [each.moved(turn, (*spot, 0.0)) for each in bodies]
+        self.keep_clear(spot, half)
+
+    def _free(self, half: float) -> Floats | None:
+        """A place (2,) in the picture with so much room [m] around it, or None."""
+        random = self._random
+        nearest = max(self._ranges.things.distance[0], NEAREST + 2.0 * half)  # else it fills the picture
+        if nearest >= self._farthest:
+            return None
+        for _ in range(TRIES):
+            distance = log_uniform(random, (nearest, self._farthest))
+            heading = random.uniform(-math.pi, math.pi)
+            spot = distance * np.array([math.cos(heading), math.sin(heading)])
+            if self._field is not None and not self._field.on_carpet(spot, min(half, 0.3)):
+                continue
+            ray = np.array([*spot, min(half, 0.3) - self._orientation.height])
+            ray = (ray / np.linalg.norm(ray)) @ self._orientation.rotation
+            seen = in_picture(self._lens, self._ranges.camera.size, ray[None], half / (2.0 * distance))[0]
+            if seen and all(np.linalg.norm(spot - other) > half + room for other, room in self._taken):
+                return spot
+        return None
+
+
+def pierces(body: Body, ball: PlacedBall | None) -> bool:
+    """Whether the surface of a body passes through a ball; touching it, as what it lies on does, is not enough."""
+    if ball is None:
+        return False
+    inner = 0.98 * ball.radius
+    if np.linalg.norm(np.maximum(np.maximum(body.low - ball.center, ball.center - body.high), 0.0)) > inner:
+        return False
+    corners = body.vertices[body.triangles] - ball.center
+    edges = np.roll(corners, -1, axis=1) - corners
+    share = -(corners * edges).sum(axis=-1) / np.maximum((edges**2).sum(axis=-1), 1e-18)
+    if np.linalg.norm(corners + np.clip(share, 0.0, 1.0)[..., None] * edges, axis=-1).min() < inner:
+        return True
+    # No edge does: a face may, where the foot of the perpendicular from the ball's center is within it.
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-18)
+    foot = (corners[:, 0] * normal).sum(axis=-1, keepdims=True) * normal
+    within = (np.cross(edges, foot[:, None] - corners) * normal[:, None]).sum(axis=-1) > 0.0
+    return bool((within.all(axis=-1) & (np.linalg.norm(foot, axis=-1) < inner)).any())
+
+
+def _reach(bodies: list[Body]) -> float:
+    """Largest horizontal distance [m] of bodies' vertices from the vertical through the origin."""
+    return max(float(np.hypot(each.vertices[:, 0], each.vertices[:, 1]).max()) for each in bodies)

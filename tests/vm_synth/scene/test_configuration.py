@@ -1,0 +1,319 @@
+"""scene.toml: what is written is what is read, and what is wrong is said by file, section and entry."""
+
+import math
+import re
+import tomllib
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import vm_synth
+from vm_embedded.entries import check_entries, number, one_of, share
+from vm_embedded.errors import InputError
+from vm_embedded.sections import documented, read_sections
+from vm_synth.bodies.solids import LABELS
+from vm_synth.ranges import drawn, log_uniform, some_of, uniform
+from vm_synth.scene.configuration import CLASSES, SceneConfiguration
+from vm_synth.scene.environment import MapRanges
+
+DEFAULT = SceneConfiguration()
+ENTRIES = [
+    pytest.param(section.name, entry, id=f"{section.name}.{entry.name}")
+    for section in fields(DEFAULT)
+    for entry in fields(getattr(DEFAULT, section.name))
+]
+
+
+def kind_of(entry):
+    """What an entry is, by its default."""
+    if "check" not in entry.metadata:
+        return None
+    if isinstance(entry.default, tuple):
+        return "names" if "allowed" in entry.metadata else "range"
+    return "name" if "allowed" in entry.metadata else "number"
+
+
+RANGES = [each for each in ENTRIES if kind_of(each.values[1]) == "range"]
+NUMBERS = [each for each in ENTRIES if kind_of(each.values[1]) == "number"]
+NAMES = [each for each in ENTRIES if kind_of(each.values[1]) == "names"]
+
+
+@pytest.fixture(scope="module")
+def write(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scene") / "scene.toml"
+
+    def written(text):
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return written
+
+
+def whole(entry):
+    return isinstance(entry.default, int)
+
+
+def between(entry):
+    """Numbers that an entry may be, or may span."""
+    low, high = entry.metadata["limits"]
+    return st.integers(low, high) if whole(entry) else st.floats(low, high)
+
+
+LENSES = st.fixed_dictionaries(
+    {"projection": st.just("equisolid"), "focal_length": st.floats(50.0, 1000.0), "fov": st.floats(0.5, 3.0)},
+    optional={"center": st.lists(st.floats(-50.0, 50.0), min_size=2, max_size=2)},
+)
+
+
+def values_of(entry):
+    metadata = entry.metadata
+    if entry.name == "held_out":
+        return st.lists(st.text(st.characters(exclude_categories=["Cs"]), max_size=8), max_size=3).map(tuple)
+    if entry.name == "floors":
+        return st.dictionaries(st.text(st.characters(exclude_categories=["Cs"]), max_size=8), st.floats(1.0, 80.0))
+    if entry.name == "lens":
+        return st.just({}) | LENSES
+    if kind_of(entry) == "range":
+        return st.tuples(between(entry), between(entry)).map(lambda ends: tuple(float(each) for each in sorted(ends)))
+    if kind_of(entry) == "number":
+        return between(entry)
+    if kind_of(entry) == "name":
+        return st.sampled_from(metadata["allowed"])
+    return st.lists(st.sampled_from(metadata["allowed"]), min_size=1, unique=True).map(tuple)
+
+
+@st.composite
+def configurations(draw):
+    """Two sections of any values, the others as they are."""
+    chosen = draw(st.lists(st.sampled_from(fields(SceneConfiguration)), min_size=1, max_size=2, unique=True))
+    sections = {}
+    for section in chosen:
+        kind = section.default_factory
+        sections[section.name] = kind(**{entry.name: draw(values_of(entry)) for entry in fields(kind)})
+    return SceneConfiguration(**sections)
+
+
+def test_the_documented_defaults_are_read_as_the_defaults(write):
+    assert read_sections(SceneConfiguration, write("\n".join(documented(DEFAULT)))) == DEFAULT
+    assert read_sections(SceneConfiguration, None) == DEFAULT
+    assert read_sections(SceneConfiguration, write("")) == DEFAULT
+
+
+@given(configurations())
+@settings(max_examples=30)
+def test_a_documented_configuration_is_read_as_it_was(write, configuration):
+    """To the last digit, whatever the maps are called."""
+    assert read_sections(SceneConfiguration, write("\n".join(documented(configuration)))) == configuration
+
+
+def test_every_entry_is_documented_by_a_line_of_its_own():
+    lines = list(documented(DEFAULT))
+    for section in fields(DEFAULT):
+        after = lines[lines.index(f"[{section.name}]") + 1 :]
+        own = after[: after.index("")]
+        assert [line.split(" = ")[0] for line in own[1::2]] == [each.name for each in fields(section.default_factory)]
+        assert all(line.startswith("# ") and len(line) > 4 for line in own[::2])
+
+
+@pytest.mark.parametrize(("section", "entry"), ENTRIES)
+def test_every_entry_says_what_it_is(section, entry):
+    text = entry.metadata["help"]
+    assert len(text) > 4
+    assert text == text.strip()
+    assert not text.endswith(".")
+
+
+UNITS = {
+    "m": "camera.height ball.radius ball.distance ball.off_plane_height things.distance field.length field.line_width "
+    "field.border field.goal_height field.goal_width bodies.clutter_size bodies.shoe_length bodies.furniture_size "
+    "bodies.robot_height bodies.person_height bodies.distractor_radius",
+    "deg": "camera.rectilinear_view camera.fisheye_view camera.pitch camera.steep_pitch camera.roll field.hue "
+    "maps.floors",
+    "px": "camera.picture_width camera.picture_height sensor.defocus sensor.motion sensor.fringe",
+}
+
+
+def test_lengths_and_angles_have_a_unit():
+    units = {each.id: each.values[1].metadata["unit"] for each in ENTRIES if "unit" in each.values[1].metadata}
+    for unit, names in UNITS.items():
+        assert {name for name, its in units.items() if its == unit} == set(names.split())
+
+
+def test_the_unit_and_the_limits_are_documented():
+    lines = list(documented(DEFAULT))
+    assert lines[lines.index("height = [0.3, 1.6]") - 1] == "# height over the plane [m]; 0.05 to 20"
+    assert lines[lines.index("missing = 0.1") - 1] == "# pictures without a ball; 0 to 1"
+    assert lines[lines.index('off_plane_label = "environment"') - 1].endswith(f"; of {', '.join(CLASSES)}")
+
+
+@pytest.mark.parametrize(("section", "entry"), RANGES + NUMBERS)
+def test_defaults_are_within_finite_limits(section, entry):
+    low, high = entry.metadata["limits"]
+    assert math.isfinite(low)
+    assert math.isfinite(high)
+    assert all(low <= each <= high for each in np.atleast_1d(entry.default))
+
+
+def test_what_things_count_as_are_classes():
+    assert set(LABELS) <= set(CLASSES)
+
+
+def test_the_shipped_configuration_is_readable_and_says_only_what_is_known_of_maps():
+    path = Path(vm_synth.__file__).parent / "polyhaven.toml"
+    found = read_sections(SceneConfiguration, path)
+    assert found.maps.held_out
+    assert found.maps.floors
+    assert found == SceneConfiguration(maps=found.maps)
+    assert list(tomllib.loads(path.read_text())) == ["maps"]
+
+
+@given(st.data())
+def test_a_range_is_taken_anywhere_within_its_limits(write, data):
+    section, entry = data.draw(st.sampled_from(RANGES)).values
+    low, high = data.draw(values_of(entry))
+    found = read_sections(SceneConfiguration, write(f"[{section}]\n{entry.name} = [{low!r}, {high!r}]\n"))
+    assert getattr(getattr(found, section), entry.name) == (low, high)
+
+
+def refused(write, section, name, value):
+    """The message with which a value of an entry is refused, after the name of file and section."""
+    path = write(f"[{section}]\n{name} = {value}\n")
+    with pytest.raises(InputError) as caught:
+        read_sections(SceneConfiguration, path)
+    message = str(caught.value)
+    start = f"configuration {path}, line 2: [{section}] "
+    assert message.startswith(start)
+    assert "\n" not in message
+    return message[len(start) :]
+
+
+BAD_RANGES = ["3", "true", '"0 to 1"', "[]", "[0.5]", "[0.5, 0.5, 0.5]", "{}", "[true, true]", '["a", "b"]']
+
+
+@pytest.mark.parametrize(("section", "entry"), RANGES)
+def test_a_bad_range_is_refused_by_entry(write, section, entry):
+    low, high = entry.metadata["limits"]
+    for value in (*BAD_RANGES, f"[{low}, nan]", f"[nan, {high}]", f"[{low}, inf]", f"[-inf, {high}]"):
+        assert refused(write, section, entry.name, value).startswith(f"{entry.name} must be ")
+    for value in (f"[{low}, {high + 1}]", f"[{low - 1}, {high}]"):
+        assert f"from {low:g} to {high:g}" in refused(write, section, entry.name, value)
+    assert f"{high:g} is above {low:g}" in refused(write, section, entry.name, f"[{high}, {low}]")
+
+
+@pytest.mark.parametrize(("section", "entry"), NUMBERS)
+def test_a_bad_number_is_refused_by_entry(write, section, entry):
+    low, high = entry.metadata["limits"]
+    bad = ["true", "false", '"1"', "[1, 1]", "nan", "inf", "-inf", f"{low - 1}", f"{high + 1}", "9" * 400]
+    for value in bad + ["100.0", "100.5"] * whole(entry):
+        message = refused(write, section, entry.name, value)
+        assert message.startswith(f"{entry.name} must be a {'whole ' if whole(entry) else ''}number from {low:g}")
+        assert message.endswith(f"not {tomllib.loads(f'v = {value}')['v']!r}")
+
+
+@pytest.mark.parametrize(("section", "entry"), NAMES)
+def test_bad_names_are_refused_by_entry(write, section, entry):
+    first = entry.metadata["allowed"][0]
+    for value in ("[]", f'"{first}"', "3", "true", "{}"):
+        assert refused(write, section, entry.name, value).startswith(f"{entry.name} must be a list of some of {first}")
+    for value in ("[3]", "[true]", "[[]]"):
+        assert refused(write, section, entry.name, value).startswith(f"unknown {entry.name} ")
+    message = refused(write, section, entry.name, f'["{first}x"]')
+    assert f"did you mean {first!r}?" in message or first.isupper()
+
+
+MESSAGES = {
+    "unknown section": ("[cammera]\n", r"unknown section 'cammera'; did you mean 'camera'\? .*allowed: maps, camera"),
+    "unknown entry": ("[camera]\nhight = [1, 2]\n", r"entry in \[camera\] 'hight'; did you mean 'height'\?"),
+    "entry of another section": ("[ball]\nturfs = ['felt']\n", r"unknown entry in \[ball\] 'turfs'"),
+    "entry at the top": ("height = [1, 2]\n", "unknown key 'height'"),
+    "section that is none": ("camera = 3\n", r"camera must be a section, \[camera\], not 3"),
+    "list of sections": ("[[camera]]\nsteep = 1\n", r"camera must be a section, \[camera\]"),
+    "one name of many": ("[ball]\noff_plane_label = 'rbot'\n", r"\[ball\] unknown off_plane_label 'rbot'.*'robot'"),
+    "no name": ("[ball]\noff_plane_label = ['robot']\n", r"\[ball\] unknown off_plane_label \['robot'\]"),
+    "held out by one name": ("[maps]\nheld_out = 'a'\n", r"\[maps\] held_out must be a list of names of maps, not 'a'"),
+    "held out by number": ("[maps]\nheld_out = [1]\n", r"\[maps\] held_out .*not \[1\]"),
+    "floors that are no table": ("[maps]\nfloors = 3\n", r"\[maps\] floors must be a table of maps and angles, not 3"),
+    "floor at the horizon": ("[maps.floors]\na = 0\n", r"\[maps\] the floor of map a .*from 1 to 80 deg, not 0"),
+    "floor in words": ("[maps.floors]\na = 'low'\n", r"\[maps\] the floor of map a .*not 'low'"),
+    "floor that is true": ("[maps.floors]\na = true\n", r"\[maps\] the floor of map a .*not True"),
+    "floor that is NaN": ("[maps.floors]\na = nan\n", r"\[maps\] the floor of map a .*not nan"),
+    "not TOML": ("[camera]\nheight = 1 to 2\n", "line 2"),
+    "entry twice": ("[camera]\nsteep = 0\nsteep = 1\n", "line 3"),
+}
+
+
+@pytest.mark.parametrize(("text", "says"), MESSAGES.values(), ids=MESSAGES)
+def test_what_is_wrong_is_said(write, text, says):
+    with pytest.raises(InputError, match=rf"configuration .*scene\.toml(, line 1|, line 2)?: .*{says}"):
+        read_sections(SceneConfiguration, write(text))
+
+
+def test_what_is_no_file_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"none\.toml: No such file"):
+        read_sections(SceneConfiguration, tmp_path / "none.toml")
+    with pytest.raises(InputError, match=re.escape(tmp_path.name)):
+        read_sections(SceneConfiguration, tmp_path)
+
+
+def test_a_binary_file_is_refused(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_bytes(bytes(range(256)))
+    with pytest.raises(InputError, match=r"scene\.toml"):
+        read_sections(SceneConfiguration, path)
+
+
+def test_floors_and_held_out_maps_are_read(write):
+    found = read_sections(SceneConfiguration, write('[maps]\nheld_out = ["a"]\n[maps.floors]\nb = 7\n"c d.1" = 7.5\n'))
+    assert found.maps == MapRanges(held_out=("a",), floors={"b": 7, "c d.1": 7.5})
+
+
+@dataclass(frozen=True)
+class Section:
+    span: tuple[float, float] = drawn(1.0, 2.0, "a range")
+    part: float = share(0.5, "a share")
+    count: int = number(3, "a number of things")
+    some: tuple[str, ...] = some_of(("a", "b"), "names", ("b",))
+    one: str = one_of(("a", "b"), "a", "a name")
+    plain: int = 5
+
+    def __post_init__(self):
+        check_entries(self)
+
+
+def test_a_section_makes_ranges_and_names_tuples_and_numbers_floats():
+    made = Section(span=[1, 2], part=1, count=4, some=["b", "a"], one="b", plain="anything")
+    assert made == Section((1.0, 2.0), 1.0, 4, ("b", "a"), "b", "anything")
+    assert [type(each) for each in (*made.span, made.part, made.count)] == [float, float, float, int]
+    assert Section().some == ("b",)
+
+
+@pytest.mark.parametrize(("value", "says"), [(-1.0, "of at least 0"), (math.nan, "of at least 0"), (None, "not None")])
+def test_an_entry_without_an_upper_limit_says_the_lower_one(value, says):
+    with pytest.raises(InputError, match=f"span must be a number .*{says}"):
+        Section(span=(value, 2.0))
+
+
+@pytest.mark.parametrize("value", [math.inf, 10**400], ids=["infinite", "of many digits"])
+def test_without_an_upper_limit_numbers_are_still_finite(value):
+    with pytest.raises(InputError, match="span must be a number of at least 0"):
+        Section(span=(1.0, value))
+
+
+@given(st.floats(0.0, 1e6), st.floats(0.0, 1e6), st.integers(0, 2**32 - 1))
+def test_draws_stay_in_their_range(one, other, seed):
+    low, high = sorted((one, other))
+    random = np.random.default_rng(seed)
+    assert all(low <= uniform(random, (low, high)) <= high for _ in range(5))
+    low, high = low + 1e-3, high + 1e-3
+    drawn = [log_uniform(random, (low, high)) for _ in range(5)]
+    assert all(low * (1 - 1e-12) <= each <= high * (1 + 1e-12) for each in drawn)
+
+
+def test_draws_are_spread_evenly_and_by_factors():
+    random = np.random.default_rng(0)
+    assert np.mean([uniform(random, (2.0, 4.0)) < 2.5 for _ in range(4000)]) == pytest.approx(0.25, abs=0.03)
+    assert np.mean([log_uniform(random, (0.1, 10.0)) < 1.0 for _ in range(4000)]) == pytest.approx(0.5, abs=0.03)
