@@ -26,8 +26,8 @@ import numpy as np
 
 from vm_embedded.lens_file import read_lens_file
 from vm_embedded.sections import read_sections
-from vm_train.configuration import TrainConfiguration
-from vm_train.split import Split
+from vm_train.data.split import Split
+from vm_train.learning.configuration import TrainConfiguration
 
 RESULTS = Path(__file__).with_name("choices.json")
 BASE = Path(__file__).parents[1] / "export" / "networks" / "ball-5x4.toml"
@@ -130,9 +130,9 @@ def trained(task: tuple[str, int, Path, Path]) -> Path:
     name, seed, data, out = task
     import torch
 
-    from vm_train.hardware import Hardware
-    from vm_train.job import Job
-    from vm_train.run import train
+    from vm_train.learning.hardware import Hardware
+    from vm_train.learning.rounds import train
+    from vm_train.learning.run_folder import Job
 
     torch.set_num_threads(1)
     folder = folder_of(out, name, seed)
@@ -158,7 +158,7 @@ def scored(model: Path, data: Path, out: Path, numbers: list[str]) -> dict[str, 
     """What vm-evaluate says of a network on some pictures of a folder."""
     if not (out / "scores.json").exists():
         out.mkdir(parents=True, exist_ok=True)
-        command = [sys.executable, "-m", "vm_train.evaluate_cli", str(model), str(data), "-o", str(out)]
+        command = [sys.executable, "-m", "vm_train.cli.evaluate", str(model), str(data), "-o", str(out)]
         listed = out / "numbers.txt"
         listed.write_text("\n".join(numbers) + "\n")
         command += ["--radius-of", "scene", "--workers", "1", "--list", str(listed)]

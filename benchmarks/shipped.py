@@ -18,13 +18,13 @@ import numpy as np
 
 from vm_embedded.settings import Settings
 from vm_embedded.shipped import DEFAULT, SHIPPED, model_path
-from vm_train.configuration import ClassTable
-from vm_train.evaluation import Evaluation, Rules
-from vm_train.evaluation_workers import Job, evaluate
-from vm_train.object_scores import ObjectScores
-from vm_train.oddities import Oddity
-from vm_train.oddity_pictures import drawn
-from vm_train.pictures import find_pictures
+from vm_train.data.pictures import find_pictures
+from vm_train.evaluation.evaluation import Evaluation, Rules
+from vm_train.evaluation.workers import Job, evaluate
+from vm_train.evaluation.worst_errors import Oddity
+from vm_train.evaluation.worst_pictures import drawn
+from vm_train.learning.configuration import ClassTable
+from vm_train.scores.object_scores import ObjectScores
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "shipped.json"

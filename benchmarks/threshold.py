@@ -24,14 +24,14 @@ from vm_embedded.manifest import Manifest
 from vm_embedded.objects import Scene, find_objects
 from vm_embedded.settings import Settings
 from vm_export.grid import VISUAL
-from vm_train.answers import Exact, load_subject, scene_of
-from vm_train.configuration import ClassTable
-from vm_train.evaluated_pictures import pictures_of
-from vm_train.graphs import color, seen_points
-from vm_train.object_scores import ObjectScores
-from vm_train.object_truth import read_scene, true_objects
-from vm_train.overlaps import TrueObject
-from vm_train.pictures import read_picture
+from vm_train.data.pictures import read_picture
+from vm_train.evaluation.answers import Exact, load_subject, scene_of
+from vm_train.evaluation.object_truth import read_scene, true_objects
+from vm_train.evaluation.picture_selection import pictures_of
+from vm_train.graphs.labeled_graph import color, seen_points
+from vm_train.learning.configuration import ClassTable
+from vm_train.scores.object_scores import ObjectScores
+from vm_train.scores.overlaps import TrueObject
 
 THRESHOLDS, INSIDES, AROUNDS = (0.5, 0.6, 0.7, 0.8, 0.9), (0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95), (0.25, 0.4)
 

@@ -22,16 +22,16 @@ import torch
 from vm_embedded.bench import machine
 from vm_embedded.sections import read_sections
 from vm_export.network import Network
-from vm_train.augmentation import OFF
-from vm_train.configuration import TrainConfiguration
-from vm_train.hardware import Hardware
-from vm_train.job import Job
-from vm_train.loading import Graphs
-from vm_train.pictures import find_pictures
-from vm_train.run import train
-from vm_train.schedule import Item
-from vm_train.split import Split
-from vm_train.training import Training
+from vm_train.data.pictures import find_pictures
+from vm_train.data.split import Split
+from vm_train.graphs.augmentation import OFF
+from vm_train.graphs.loading import Graphs
+from vm_train.graphs.schedule import Item
+from vm_train.learning.configuration import TrainConfiguration
+from vm_train.learning.hardware import Hardware
+from vm_train.learning.rounds import train
+from vm_train.learning.run_folder import Job
+from vm_train.learning.trainer import Training
 
 RESULTS = Path(__file__).with_name("training.json")
 PAGE = Path(__file__).parents[1] / "docs" / "training.md"

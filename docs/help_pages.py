@@ -18,9 +18,9 @@ from vm_export import cli as export
 from vm_mesh import cli as mesh
 from vm_synth import cli as synth
 from vm_synth.scene.configuration import SceneConfiguration
-from vm_train import evaluate_cli as evaluate
-from vm_train import options as train
-from vm_train.configuration import TrainConfiguration
+from vm_train.cli import evaluate
+from vm_train.cli import options as train
+from vm_train.learning.configuration import TrainConfiguration
 
 PAGE = Path(__file__).parent / "command-line.md"
 SCENE = Path(__file__).parent / "scene.toml"

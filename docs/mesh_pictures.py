@@ -15,8 +15,8 @@ from vm_embedded.walls import wall_distances
 from vm_mesh.made_mesh import MadeMesh, Plan
 from vm_mesh.pictures import draw_mesh
 from vm_mesh.quality import on_object
-from vm_train.figures import new_figure, save_figure
-from vm_train.object_points import EarlySphere
+from vm_train.evaluation.points_on_ball import EarlySphere
+from vm_workstation.plots import new_figure, save_figure
 
 FOLDER = Path(__file__).parent
 BALL = Sphere(0.095)

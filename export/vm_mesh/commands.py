@@ -26,7 +26,7 @@ from vm_embedded.projection import project
 from vm_embedded.shapes import shape_named
 from vm_embedded.shipped import model_path
 from vm_embedded.sources import read_image
-from vm_train.figures import check_figure_path, save_figure
+from vm_workstation.plots import check_figure_path, save_figure
 
 from .made_mesh import MadeMesh, Plan
 from .pictures import drawn, on_picture

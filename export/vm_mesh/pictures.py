@@ -13,7 +13,7 @@ from vm_embedded.lens import Lens
 from vm_embedded.mesh import Mesh
 from vm_embedded.orientation import Orientation
 from vm_embedded.projection import project
-from vm_train.figures import new_figure
+from vm_workstation.plots import new_figure
 
 from .made_mesh import MadeMesh
 

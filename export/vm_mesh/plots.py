@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from vm_train.figures import new_figure
+from vm_workstation.plots import new_figure
 
 from .made_mesh import Plan
 from .quality import OnObject

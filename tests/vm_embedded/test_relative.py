@@ -71,8 +71,8 @@ def test_a_picture_of_nothing_keeps_its_noise_small():
 def test_a_robot_gives_its_network_what_a_training_does(gain):
     """All points of a picture at its own pose, in a picture half as bright too."""
     from vm_export.grid import VISUAL
-    from vm_train.answers import Exact, _of_session
-    from vm_train.pictures import Picture
+    from vm_train.data.pictures import Picture
+    from vm_train.evaluation.answers import Exact, _of_session
 
     model = read_model(DRAWN / "ball.onnx")
     model = replace(model, manifest=replace(model.manifest, colors="relative", self_test=None))

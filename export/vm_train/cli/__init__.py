@@ -1,0 +1,1 @@
+"""The commands vm-train and vm-evaluate."""

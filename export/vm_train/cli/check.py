@@ -1,0 +1,172 @@
+"""vm-train check: what pictures hold as tables and for other programs, and which are at fault."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from itertools import groupby, pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vm_embedded.files import check_writable, written_beside
+from vm_synth.dataset.report import summary
+from vm_workstation.progress import Ticker
+
+from ..data.inspection import Check as Check
+from ..data.inspection import check as check
+from ..data.pictures import Classes, find_pictures
+
+EXIT_OK, EXIT_FAULTS = 0, 1
+
+_NAMED = 20
+"""Pictures at fault that are named, of each kind of fault."""
+
+_KINDS = {
+    "missing": "lack a file",
+    "damaged": "have a file that can't be read",
+    "size": "have masks of another size than the image",
+    "lens": "have lens files at fault",
+    "color": "have masks that are not of the classes' colors",
+}
+
+_EDGES = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+"""Of distances [m]."""
+
+
+def check_parser() -> argparse.ArgumentParser:
+    """The options of vm-train check DATA."""
+    made = argparse.ArgumentParser(
+        prog="vm-train check",
+        description="Read all pictures of a folder, or of the shards in it: what they show, and which are at fault. "
+        "Exit status 0 if all are sound, else 1.",
+    )
+    made.add_argument("data", type=Path, metavar="DATA", help="folder of imageX.jpg or .png, maskX.png, lensX.yaml")
+    made.add_argument("--config", type=Path, metavar="FILE", help="train.toml with the classes; default vm-synth's")
+    made.add_argument("--workers", type=_positive, metavar="N", help="processes that read; default all cores")
+    made.add_argument("--json", type=Path, metavar="FILE", help="all findings, and all faults by number")
+    made.add_argument("--strict", action="store_true", help="also exit with 1 if no picture shows one of the classes")
+    return made
+
+
+def _positive(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
+    return int(text)
+
+
+def run_check(options: argparse.Namespace, classes: Classes, objects: Sequence[str] = ()) -> int:
+    """Check as the options say and return the exit status. objects: classes whose distances are told.
+
+    Raises InputError if there are no pictures, or the findings can't be written.
+    """
+    if options.json is not None:
+        check_writable(options.json)
+    pictures = find_pictures(options.data)
+    workers = len(os.sched_getaffinity(0)) if options.workers is None else options.workers
+    ticker = Ticker(len(pictures), "vm-train")
+    try:
+        found = check(pictures, classes, workers, ticker.count, objects)
+    finally:
+        ticker.end()
+    print("\n".join(tables(found)))
+    if options.json is not None:
+        with written_beside(options.json) as part:
+            part.write_text(json.dumps(as_json(found), indent=1) + "\n", encoding="utf-8")
+    for line in complaints(found):
+        print(f"vm-train: {line}", file=sys.stderr)
+    return EXIT_FAULTS if found.faults or (options.strict and found.absent) else EXIT_OK
+
+
+def tables(found: Check) -> Iterator[str]:
+    """Lines of a report."""
+    yield f"{found.count} pictures, {len(found.faults)} of them at fault"
+    if not found.facts:
+        return
+    count = len(found.facts)
+    sizes = {f"{width} x {height} px": number for (width, height), number in found.sizes.most_common()}
+    for name, numbers in (("size", sizes), ("lens", dict(found.lenses.most_common()))):
+        yield f"{name:<6}" + ", ".join(f"{each} {n} ({100.0 * n / count:.1f} %)" for each, n in numbers.items())
+    yield ""
+    quantities = _quantities(found)
+    rows = [[name, *(f"{each:.2f}" for each in numbers.values())] for name, numbers in quantities.items()]
+    yield from _aligned([["", *next(iter(quantities.values()))], *rows])
+    yield ""
+    total = sum(width * height * n for (width, height), n in found.sizes.items())
+    shown = found.shown
+    rows = [
+        [name, str(shown[name]), f"{100.0 * shown[name] / count:.1f}", f"{100.0 * pixels / total:.3f}"]
+        for name, pixels in found.pixels.items()
+    ]
+    unlabeled = 100.0 * sum(each.unlabeled for each in found.facts) / total
+    yield from _aligned([["class", "pictures", "[%]", "pixels [%]"], *rows, ["unlabeled", "", "", f"{unlabeled:.3f}"]])
+    distances = _distances(found)
+    if distances:
+        yield ""
+        yield from _aligned([["objects at [m]", *distances], ["", *(str(each) for each in distances.values())]])
+
+
+def _quantities(found: Check) -> dict[str, dict[str, float]]:
+    """Least, median, largest and so on of what differs from picture to picture."""
+    values = {
+        "camera height [m]": [each.height for each in found.facts],
+        "camera pitch [deg]": [math.degrees(each.pitch) for each in found.facts],
+        "camera roll [deg]": [math.degrees(each.roll) for each in found.facts],
+        "focal length [px]": [each.focal_length for each in found.facts],
+        "field of view [deg]": [math.degrees(each.fov) for each in found.facts],
+    }
+    return {name: summary(each) for name, each in values.items()}
+
+
+def _distances(found: Check) -> dict[str, int]:
+    """How many things of object classes are how far away; none if distances were not measured."""
+    distances = [each for facts in found.facts for each in facts.distances]
+    if not distances:
+        return {}
+    counts, _ = np.histogram(distances, [*_EDGES, 1e300, np.inf])
+    names = [*(f"{low:g}-{high:g}" for low, high in pairwise(_EDGES)), f"over {_EDGES[-1]:g}", "no plane"]
+    return dict(zip(names, counts.tolist(), strict=True))
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Lines of a table, its first column flush left and the others flush right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for first, *others in rows:
+        cells = [first.ljust(widths[0]), *(each.rjust(n) for each, n in zip(others, widths[1:], strict=True))]
+        yield "  ".join(cells).rstrip()
+
+
+def as_json(found: Check) -> dict[str, Any]:
+    """All findings for other programs."""
+    return {
+        "count": found.count,
+        "good": len(found.good),
+        "faults": [asdict(each) for each in found.faults],
+        "absent": found.absent,
+        "pixels": found.pixels | {"unlabeled": sum(each.unlabeled for each in found.facts)},
+        "pictures": found.shown,
+        "sizes": {f"{width}x{height}": count for (width, height), count in found.sizes.most_common()},
+        "lenses": dict(found.lenses.most_common()),
+        "quantities": _quantities(found) if found.facts else {},
+        "distances": _distances(found),
+    }
+
+
+def complaints(found: Check) -> list[str]:
+    """Lines on what is at fault; none if all is well."""
+    lines = []
+    order = list(_KINDS)
+    for kind, some in groupby(sorted(found.faults, key=lambda each: order.index(each.kind)), lambda each: each.kind):
+        faults = list(some)
+        lines.append(f"{len(faults)} of {found.count} pictures {_KINDS[kind]}")
+        lines += [f"  {each.text}" for each in faults[:_NAMED]]
+        if len(faults) > _NAMED:
+            lines.append(f"  and {len(faults) - _NAMED} more; vm-train check --json names all")
+    lines += [f"no picture shows class {name}: is its color in masks the right one?" for name in found.absent]
+    return lines

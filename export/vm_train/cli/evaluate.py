@@ -1,0 +1,187 @@
+"""vm-evaluate: how good a network is, over points and objects, by distance."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, fields, replace
+from typing import TYPE_CHECKING, Any
+
+import vm_embedded
+from vm_embedded.configuration import read_configuration
+from vm_embedded.errors import InputError, VisualMeshError
+from vm_embedded.settings import Settings
+from vm_workstation.stopping import stoppable
+
+from .evaluate_options import parser as parser
+from .evaluate_options import parsers as parsers
+from .evaluate_options import points_parser
+
+if TYPE_CHECKING:
+    from ..evaluation.answers import Subject
+    from ..evaluation.evaluation import Evaluation
+
+EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run vm-evaluate and return its exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        with stoppable():
+            if given[:1] == ["points"]:
+                return _points(points_parser().parse_args(given[1:]))
+            return _evaluate(parser().parse_args(given))
+    except ImportError as error:
+        missing = error.name or str(error)
+        print(f"vm-evaluate: {missing} is not installed; run: pip install 'vm-embedded[train]'", file=sys.stderr)
+    except VisualMeshError as error:
+        print(f"vm-evaluate: {' '.join(str(error).split())}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("vm-evaluate: stopped", file=sys.stderr)
+        sys.stdout.flush()
+        os._exit(EXIT_INTERRUPTED)  # the workers end with this process, which else might wait for them in vain
+    return EXIT_FAILED
+
+
+def _evaluate(options: argparse.Namespace) -> int:
+    # Imported here, so that a machine without torch still gets help texts and one clear line.
+    from vm_workstation.plots import new_figure
+    from vm_workstation.progress import Ticker
+
+    from ..evaluation.evaluation import Rules
+    from ..evaluation.files import points_on_object, write_evaluation
+    from ..evaluation.picture_selection import classes_of, pictures_of, usual_colors
+    from ..evaluation.report import lines
+    from ..evaluation.workers import Job, evaluate
+
+    settings = _settings(options)
+    pictures = pictures_of(options.data, options.list, options.part)
+    rules = Rules(options.radius_of, options.min_radius, options.strict)
+    if options.output.exists() and not options.output.is_dir():
+        raise InputError(f"can't write to {options.output}: it is no folder")
+    new_figure(1.0, 1.0)  # better no plots now than after an hour
+    subject = _subject(options, settings)
+    classes = classes_of(subject.manifest, usual_colors(options.model, options.list), options.color)
+    job = Job(options.model, settings, options.as_robot, classes, rules)
+    ticker = Ticker(len(pictures), "vm-evaluate")
+    try:
+        result = evaluate(job, subject, pictures, options.workers or len(os.sched_getaffinity(0)), ticker.count)
+    finally:
+        ticker.end()
+    for path, fault in result.faults.items():
+        print(f"vm-evaluate: skipped {path}: {fault}", file=sys.stderr)
+    if not result.views:
+        raise InputError("no picture could be evaluated")
+    about = _about(options, settings, subject, job.classes.colors)
+    about["notes"] = _notes(options, settings, subject, result)
+    figure, about["camera"] = points_on_object(result.views, job.classes, subject.manifest, subject.grid)
+    scores = write_evaluation(options.output, result, about, settings.threshold, figure)
+    print(lines(scores))
+    for note in about["notes"]:
+        print(f"vm-evaluate: {note}", file=sys.stderr)
+    print(f"\n{options.output / 'report.html'}: written, with scores.json, tables and plots beside it")
+    return EXIT_OK
+
+
+def _subject(options: argparse.Namespace, settings: Settings) -> Subject:
+    from ..evaluation.answers import load_subject
+
+    if options.radius_of == "scene" and (options.as_robot or settings.object_radius is not None):
+        raise InputError(
+            "--radius-of scene gives each picture a mesh of its own, so neither --as-robot nor "
+            "--object-radius goes with it"
+        )
+    return load_subject(options.model, settings, options.as_robot)
+
+
+def _settings(options: argparse.Namespace) -> Settings:
+    configured = read_configuration(options.config).detector if options.config else Settings()
+    given = {each.name: getattr(options, each.name) for each in fields(Settings)}
+    if given["format"] not in (None, "bgr"):
+        raise InputError(f"--format {given['format']} is for a robot's camera; pictures of a folder are read as bgr")
+    chosen = {name: value for name, value in given.items() if value is not None}
+    return replace(configured, **{**chosen, "format": "bgr"})
+
+
+def _about(options: argparse.Namespace, settings: Settings, subject: Subject, colors: Any) -> dict[str, Any]:
+    """What was evaluated, on what and how, for scores.json."""
+    manifest, grid = subject.manifest, subject.grid
+    return {
+        "made_by": f"vm-evaluate {vm_embedded.__version__}",
+        "model": {
+            "file": options.model.name,
+            "sha256": subject.sha256,
+            "classes": [f"{each.name} ({each.kind})" for each in manifest.classes],
+            "shape": manifest.shape,
+            "radius": manifest.radius,
+            "object_radius": manifest.object_radius,
+            "intersections": manifest.intersections,
+            "mesh": manifest.mesh,
+            "max_distance": manifest.max_distance,
+            "grid": grid.kind + (f", equal at {grid.equal_at:g} m" if grid.equal_at else ""),
+            **{f"provenance {key}": value for key, value in manifest.provenance.items()},
+        },
+        "data": {
+            "folders": [str(each) for each in options.data],
+            "list": None if options.list is None else str(options.list),
+            "part": options.part if options.list is not None and options.list.suffix == ".json" else None,
+            "colors": [f"{name} {list(map(list, each))}" for name, each in colors.items()],
+        },
+        "rules": {"radius_of": options.radius_of, "min_radius": options.min_radius, "as_robot": options.as_robot},
+        "settings": asdict(settings),
+    }
+
+
+def _notes(options: argparse.Namespace, settings: Settings, subject: Subject, result: Evaluation) -> list[str]:
+    """What a reader of the scores should know."""
+    notes = []
+    if subject.grid.kind != "visual":
+        notes.append(
+            f"A network of a {subject.grid.kind} grid has scores of points only: objects are found in the Visual Mesh."
+        )
+    radius = settings.object_radius or subject.manifest.object_radius
+    if options.radius_of == "all" and any(abs(each - radius) > 0.02 * radius for each in result.radii):
+        low, high = min(result.radii), max(result.radii)
+        found = f"radii from {low:.3f} to {high:.3f} m" if high > low else f"a radius of {low:.3f} m"
+        notes.append(
+            f"Balls in these pictures have {found}, and the fit is for {radius:g} m. --radius-of scene gives each "
+            "picture mesh and fit for its own ball."
+        )
+    if options.radius_of == "scene":
+        notes.append("Mesh and fit are for the radius of each picture's own ball.")
+    return notes
+
+
+def _points(options: argparse.Namespace) -> int:
+    from vm_embedded.files import check_writable
+    from vm_embedded.orientation import Orientation
+    from vm_embedded.shapes import Sphere
+    from vm_workstation.plots import check_figure_path, save_figure
+
+    from ..evaluation.points_on_ball import DISTANCES, PAPER_CAMERA, Camera, points_over_distance
+    from ..evaluation.points_on_ball_plot import points_figure
+
+    check_figure_path(options.output)
+    check_writable(options.output)
+    pose = Orientation.from_roll_pitch(options.height, pitch=math.radians(options.pitch))
+    camera = Camera(pose, PAPER_CAMERA.lens, PAPER_CAMERA.size)
+    ball = Sphere(options.radius)
+    curves = points_over_distance(camera, ball, options.intersections, DISTANCES[::2], options.equal_at, options.early)
+    title = (
+        f"camera {options.height:g} m high, {options.pitch:g} degrees down, "
+        f"{camera.size[0]} x {camera.size[1]} px; ball of radius {options.radius:g} m"
+    )
+    save_figure(points_figure(curves, title), options.output)
+    for curve in curves:
+        shown = ", ".join(f"{curve.at(each)[0]:.1f} at {each:g} m" for each in (1.0, 2.0, 5.0, 10.0))
+        print(f"{curve.mesh:9s}  k = {curve.intersections:g}, {curve.count} points on screen, on the ball {shown}")
+    print(f"{options.output}: written")
+    return EXIT_OK
+
+
+if __name__ == "__main__":
+    sys.exit(main())

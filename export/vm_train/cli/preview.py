@@ -1,0 +1,155 @@
+"""A contact sheet of augmentation: pictures with the points that a network gets, as training sees them, and each entry
+by itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import Field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from vm_embedded.arrays import Image, Singles
+from vm_embedded.errors import InputError
+from vm_embedded.files import written_beside
+from vm_embedded.manifest import Manifest
+from vm_export.grid import Grid
+
+from ..data.pictures import Picture
+from ..graphs.augmentation import Augmentation, Tone, blurred, moved, recolored, softened, told_otherwise, toned
+from .preview_cells import CIRCLES, GAP, add_circles, cell, legend, middle, padded, point_colors, scaled, with_points
+
+_DEVIATIONS = 2.0  # of errors of the camera, shown as their ends
+_TRUE, _TOLD = (190, 190, 190), (255, 150, 0)  # RGB colors of circles
+_LARGEST = 65500  # [px] that a JPEG can have
+
+
+def sheet(
+    pictures: Sequence[Picture],
+    manifest: Manifest,
+    grid: Grid,
+    augmentation: Augmentation,
+    seed: int,
+    versions: int = 5,
+    width: int = 320,
+) -> Image:
+    """A row for each picture: as it is, then `versions` of it as training may see them. BGR (h, w, 3).
+
+    Dots are points that a network with this manifest and grid gets, in the colors of their classes, thinned out where
+    they are dense. Rows below show the first picture with one entry at a time at both of its ends; errors of the
+    camera end at two standard deviations. width: of each image [px]. Raises InputError if there is no picture, or a
+    lens does not fit its image or sees none of it.
+    """
+    if not pictures:
+        raise InputError("there are no pictures to show")
+    columns = versions + 1
+    rows = [legend([each.name for each in manifest.classes], point_colors(manifest), columns * (width + GAP))]
+    for number, picture in enumerate(pictures):
+        cells = [cell(with_points(picture, manifest, grid, width), "as it is")]
+        for version in range(versions):
+            random = np.random.default_rng([seed, 3, version, number])
+            told = moved(picture, augmentation, random)
+            soft = blurred(told, augmentation, random)
+            made = _with_colors(soft, recolored(_colors(soft.image), augmentation, random))
+            cells.append(cell(with_points(made, manifest, grid, width), _camera_error(picture, told)))
+        rows.append(np.hstack(cells))
+    alone = [_both_ends(pictures[0], entry, augmentation, seed, width) for entry in _switched_on(augmentation)]
+    if alone:
+        meters = ", ".join(f"{each:g}" for each in CIRCLES)
+        names = [f"true circles of {meters} m on the plane", "those that a network is told of"]
+        rows.append(legend(names, [_TRUE, _TOLD], columns * (width + GAP)))
+    rows += [np.hstack(alone[start : start + columns]) for start in range(0, len(alone), columns)]
+    return np.vstack([padded(row, len(row), rows[0].shape[1]) for row in rows])
+
+
+def write_sheet(path: Path, image: Image) -> None:
+    """Write a sheet as .jpg or .png. Raises InputError if that can't be done."""
+    if path.suffix.lower() not in (".jpg", ".jpeg", ".png"):
+        raise InputError(f"can't write {path}: a sheet is a .jpg or a .png")
+    if max(image.shape) > _LARGEST:
+        size = f"{image.shape[1]} x {image.shape[0]} px"
+        raise InputError(f"a sheet of {size} is too large: show fewer pictures or smaller ones")
+    with written_beside(path) as part:
+        part.write_bytes(cv2.imencode(path.suffix.lower(), image)[1].tobytes())
+
+
+def _switched_on(augmentation: Augmentation) -> list[Field[Any]]:
+    """Entries that change anything, but for shares of pictures."""
+    entries = [each for each in fields(augmentation) if not each.name.endswith("_share")]
+    return [each for each in entries if getattr(augmentation, f"{each.name}_share", getattr(augmentation, each.name))]
+
+
+def _both_ends(picture: Picture, entry: Field[Any], augmentation: Augmentation, seed: int, width: int) -> Image:
+    """Two cells: a picture changed by one entry alone, as far as that goes down and up."""
+    cells = []
+    for value in _ends(entry.name, getattr(augmentation, entry.name)):
+        made = _changed(picture, entry.name, value, np.random.default_rng([seed, 4]))
+        image = made.image
+        if entry.name in ("noise", "blur", "jpeg"):  # which are lost in a smaller picture
+            image = middle(image, width)
+        canvas = scaled(image, width)
+        if made.lens is not picture.lens:
+            for lens, color in ((picture.lens, _TRUE), (made.lens, _TOLD)):
+                add_circles(canvas, lens, picture.image.shape, color)
+        cells.append(cell(canvas, f"{entry.name} {value:.3g} {entry.metadata['unit']}"))
+    return np.vstack(cells)
+
+
+def _ends(name: str, entry: Any) -> tuple[float, float]:
+    """What an entry of Augmentation changes at least and at most."""
+    match name:
+        case "height" | "focal_length":
+            return math.exp(-_DEVIATIONS * entry), math.exp(_DEVIATIONS * entry)
+        case "tilt" | "center":
+            return -_DEVIATIONS * entry, _DEVIATIONS * entry
+        case "hue":
+            return -entry, entry
+        case "noise":
+            return entry / 2.0, entry
+        case "blur" | "jpeg":
+            low, high = entry
+            return low, high
+    return 1.0 / (1.0 + entry), 1.0 + entry
+
+
+def _changed(picture: Picture, name: str, value: float, random: np.random.Generator) -> Picture:
+    """A picture with one change, named as its entry."""
+    match name:
+        case "height":
+            return told_otherwise(picture, height=value)
+        case "focal_length":
+            return told_otherwise(picture, focal_length=value)
+        case "tilt":
+            return told_otherwise(picture, tilt=(0.0, math.radians(value)))
+        case "center":
+            return told_otherwise(picture, center=(value, 0.0))
+        case "blur":
+            return replace(picture, image=softened(picture.image, blur=value))
+        case "jpeg":
+            return replace(picture, image=softened(picture.image, jpeg=round(value)))
+    tone = replace(Tone(), **{name: value})
+    return _with_colors(picture, toned(_colors(picture.image), tone, random))
+
+
+def _colors(image: Image) -> Singles:
+    """Colors (h * w, 3), RGB from 0 to 1, of an image (h, w, 3) BGR."""
+    return np.asarray(image[..., ::-1].reshape(-1, 3) / np.float32(255.0), dtype=np.float32)
+
+
+def _with_colors(picture: Picture, colors: Singles) -> Picture:
+    """The picture with colors (h * w, 3), RGB from 0 to 1."""
+    levels = np.rint(colors * np.float32(255.0)).astype(np.uint8)
+    return replace(picture, image=levels.reshape(picture.image.shape)[..., ::-1])
+
+
+def _camera_error(picture: Picture, told: Picture) -> str:
+    """How another camera differs from a picture's own."""
+    true, other = picture.lens.orientation, told.lens.orientation
+    assert true is not None
+    assert other is not None
+    turn = cv2.Rodrigues(other.rotation @ true.rotation.T)[0]
+    tilt = math.degrees(float(np.linalg.norm(turn)))
+    return f"height {100.0 * (other.height / true.height - 1.0):+.1f} %, tilt {tilt:.1f} deg"

@@ -1,0 +1,148 @@
+"""Cells of a preview: a picture with mesh points or circles on the plane, and a line of text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from vm_embedded.arrays import Floats, Image
+from vm_embedded.errors import GeometryError
+from vm_embedded.lens_file import LensFile
+from vm_embedded.manifest import Manifest
+from vm_export.grid import Grid
+from vm_synth.dataset.contact_sheet import placed
+
+from ..data.pictures import Color, Picture
+from ..graphs.labeled_graph import seen_points
+
+GAP = 6
+"""Between cells [px]."""
+
+CIRCLES = (1.0, 2.0, 4.0, 8.0)
+"""Radii of circles around the camera's foot [m]."""
+
+_BACKGROUND = (150, 150, 150)
+_PALETTE = (
+    (255, 40, 40),
+    (255, 230, 0),
+    (255, 255, 255),
+    (0, 230, 70),
+    (60, 130, 255),
+    (255, 80, 255),
+    (0, 230, 230),
+    (255, 150, 0),
+)
+"""RGB colors of all other classes, in order; those of masks may be as dark as the picture."""
+
+_STRENGTH = 0.7  # how much of its class's color a point gets
+_SPACING = 4  # [px] of the sheet, a square of which shows one point of a class
+_LINE = 16  # [px] of text
+_CROSS = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
+_PAPER, _INK, _FAINT = (32, 32, 32), (235, 235, 235), (160, 160, 160)
+
+
+def scaled(image: Image, width: int) -> Image:
+    """A copy of an image of another width [px]."""
+    height, full = image.shape[:2]
+    how = cv2.INTER_AREA if width < full else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(image, (width, max(round(height * width / full), 1)), interpolation=how))
+
+
+def middle(image: Image, width: int) -> Image:
+    """The part of an image around its middle that is at most `width` wide, in the image's proportions."""
+    height, full = image.shape[:2]
+    columns = min(width, full)
+    rows = max(round(height * columns / full), 1)
+    top, left = (height - rows) // 2, (full - columns) // 2
+    return image[top : top + rows, left : left + columns]
+
+
+def with_points(picture: Picture, manifest: Manifest, grid: Grid, width: int) -> Image:
+    """A picture of another width with the points that a network gets; none for a camera too low for a mesh."""
+    canvas = scaled(picture.image, width)
+    height, full = picture.labels.shape
+    try:
+        pixels = seen_points(picture.lens, (full, height), manifest, grid).pixels
+    except GeometryError:
+        return canvas
+    columns, rows = np.rint(pixels).astype(np.intp).T
+    x, y = _places(pixels, full, canvas)
+    labels = picture.labels[rows, columns]
+    first = np.unique(np.stack([x // _SPACING, y // _SPACING, labels]), axis=1, return_index=True)[1]
+    x, y, labels = x[first], y[first], labels[first]
+    for column, (each, color) in enumerate(zip(manifest.classes, point_colors(manifest), strict=True)):
+        here = labels == column
+        for right, down in _CROSS if each.kind == "object" else _CROSS[:1]:
+            _dot(canvas, x[here] + right, y[here] + down, color)
+    return canvas
+
+
+def _dot(canvas: Image, x: npt.NDArray[np.intp], y: npt.NDArray[np.intp], color: Color) -> None:
+    inside = (x >= 0) & (x < canvas.shape[1]) & (y >= 0) & (y < canvas.shape[0])
+    x, y = x[inside], y[inside]
+    found = canvas[y, x] * (1.0 - _STRENGTH) + np.array(color[::-1]) * _STRENGTH
+    canvas[y, x] = np.rint(found).astype(np.uint8)
+
+
+def add_circles(canvas: Image, lens: LensFile, shape: tuple[int, ...], color: Color) -> None:
+    """Circles on the plane around the camera's foot, as a camera with images of this shape (h, w, 3) sees them."""
+    assert lens.orientation is not None
+    size = (shape[1], shape[0])
+    around = np.linspace(0.0, 2.0 * math.pi, 2000)
+    circle = np.stack([np.cos(around), np.sin(around), np.zeros_like(around)], axis=1)
+    rays = np.concatenate([radius * circle for radius in CIRCLES]) - (0.0, 0.0, lens.orientation.height)
+    rays = rays / np.linalg.norm(rays, axis=1, keepdims=True) @ lens.orientation.rotation
+    fitted = lens.lens.for_image(size)
+    pixels = fitted.project(rays, size)[fitted.sees(rays)]
+    inside = ((pixels >= 0.0) & (pixels <= np.array(size) - 1.0)).all(axis=1)
+    x, y = _places(pixels[inside], size[0], canvas)
+    canvas[y, x] = color[::-1]
+
+
+def _places(pixels: Floats, full: int, canvas: Image) -> npt.NDArray[np.intp]:
+    """Pixels (n, 2) of an image `full` wide as columns and rows (2, n) of a canvas that shows it."""
+    x, y = np.rint(placed(pixels, (0.0, 0.0), canvas.shape[1] / full)).astype(np.intp).T
+    return np.stack([np.clip(x, 0, canvas.shape[1] - 1), np.clip(y, 0, canvas.shape[0] - 1)])
+
+
+def cell(image: Image, caption: str) -> Image:
+    """An image above a line of text, with a gap to its right."""
+    text = np.full((_LINE + 4, image.shape[1], 3), _PAPER, dtype=np.uint8)
+    _write(text, caption, (2, _LINE - 3), _INK)
+    return padded(np.vstack([image, text]), len(image) + len(text), image.shape[1] + GAP)
+
+
+def point_colors(manifest: Manifest) -> list[Color]:
+    """The RGB color of each class's points."""
+    colors: list[Color] = []
+    for each in manifest.classes:
+        shown = len(colors) - colors.count(_BACKGROUND)
+        colors.append(_BACKGROUND if each.kind == "background" else _PALETTE[shown % len(_PALETTE)])
+    return colors
+
+
+def legend(names: Sequence[str], colors: Sequence[Color], width: int) -> Image:
+    """A line of text that says what colors mean."""
+    line = np.full((_LINE + 2 * GAP, width, 3), _PAPER, dtype=np.uint8)
+    place, base = GAP, len(line) - GAP - 3
+    for name, color in zip(names, colors, strict=True):
+        cv2.rectangle(line, (place, base - 9), (place + 9, base), color[::-1], cv2.FILLED)
+        place += 14 + _write(line, name, (place + 14, base), _FAINT) + 2 * GAP
+    return line
+
+
+def padded(image: Image, height: int, width: int) -> Image:
+    """The image with paper to its right and below it."""
+    below, right = height - image.shape[0], width - image.shape[1]
+    return np.asarray(cv2.copyMakeBorder(image, 0, below, 0, right, cv2.BORDER_CONSTANT, value=_PAPER), dtype=np.uint8)
+
+
+def _write(canvas: Image, text: str, at: tuple[int, int], color: Color) -> int:
+    """Write text from a point at its lower left on, and return how wide it is [px]."""
+    font, size = cv2.FONT_HERSHEY_SIMPLEX, 0.4
+    cv2.putText(canvas, text, at, font, size, color, 1, cv2.LINE_AA)
+    return int(cv2.getTextSize(text, font, size, 1)[0][0])

@@ -1,0 +1,1 @@
+"""Pictures, masks and poses on disk, and how a set is split."""

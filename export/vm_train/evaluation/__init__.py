@@ -1,0 +1,1 @@
+"""Scores of a network on pictures, as tables, plots and a report."""

@@ -1,0 +1,125 @@
+"""The objects that a picture truly shows: from the sceneX.json that vm-synth writes, else from the mask."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from vm_embedded.arrays import Floats, Mask
+from vm_embedded.errors import InputError
+from vm_embedded.manifest import Manifest
+from vm_embedded.shape import Shape
+from vm_synth.render.outlines import outline, polygon_area
+
+from ..data.pictures import Picture
+from ..scores.overlaps import TrueObject, coverage
+
+BALL = "ball"
+"""The class whose object a sceneX.json describes."""
+
+
+@dataclass(frozen=True, eq=False)
+class SceneBall:
+    """A ball around center (3,) [m], in the frame of the picture's orientation. visible: share of its outline."""
+
+    center: Floats
+    radius: float
+    visible: float
+
+
+@dataclass(frozen=True, eq=False)
+class SceneTruth:
+    """What vm-synth knows of a picture: the radius that balls have in it [m], and its ball, if there is one."""
+
+    ball_radius: float
+    ball: SceneBall | None
+
+
+def read_scene(path: Path) -> SceneTruth | None:
+    """The truth in a sceneX.json; None if there is no such file. Raises InputError naming file and fault."""
+    if not path.is_file():
+        return None
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+        ball = table["ball"]
+        found = None
+        if ball is not None:
+            found = SceneBall(np.array(ball["center"], dtype=np.float64), float(ball["radius"]), float(ball["visible"]))
+        truth = SceneTruth(float(table["ball_radius"]), found)
+    except (OSError, KeyError, TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"{path.name}: is no description of a scene by vm-synth: {error!r}") from error
+    if not _makes_sense(truth):
+        raise InputError(f"{path.name}: its ball has no center, radius or visible share that a ball can have")
+    return truth
+
+
+def _makes_sense(truth: SceneTruth) -> bool:
+    ball = truth.ball
+    if ball is None:
+        return 0.0 < truth.ball_radius < math.inf
+    numbers = (truth.ball_radius, ball.radius)
+    placed = ball.center.shape == (3,) and bool(np.isfinite(ball.center).all())
+    return placed and all(0.0 < each < math.inf for each in numbers) and 0.0 <= ball.visible <= 1.0
+
+
+def true_objects(picture: Picture, scene: SceneTruth | None, manifest: Manifest) -> dict[str, list[TrueObject]]:
+    """The true objects of each class of the kind object.
+
+    Of class ball it is what the scene says, with its whole outline, if there is a scene. Of all others each connected
+    piece of the mask is an object of the manifest's size, which stands where the mean ray through it meets the plane.
+    """
+    shape = manifest.object_shape
+    found: dict[str, list[TrueObject]] = {}
+    for number, each in enumerate(manifest.classes):
+        if each.kind != "object":
+            continue
+        if each.name == BALL and scene is not None:
+            found[each.name] = [] if scene.ball is None else [_of_scene(picture, scene.ball)]
+        else:
+            found[each.name] = _of_mask(picture, picture.labels == number, shape)
+    return found
+
+
+def _of_scene(picture: Picture, ball: SceneBall) -> TrueObject:
+    height, width = picture.labels.shape
+    orientation, size = picture.lens.orientation, (width, height)
+    assert orientation is not None
+    lens = picture.lens.lens.for_image(size)
+    whole: dict[str, Any] = {"center": ball.center, "radius": ball.radius, "size": size}
+    window, share = coverage(outline(lens, orientation, **whole), size)
+    mask = np.zeros((height, width), dtype=np.float32)
+    mask[window] = share
+    radius = math.sqrt(polygon_area(outline(lens, orientation, **whole, unseen=True)) / math.pi)
+    return TrueObject(mask, ball.center, radius, ball.visible)
+
+
+def _of_mask(picture: Picture, shown: Mask, shape: Shape) -> list[TrueObject]:
+    count, pieces, facts, _ = cv2.connectedComponentsWithStats(shown.astype(np.uint8), connectivity=8)
+    areas = facts[1:, cv2.CC_STAT_AREA].tolist()
+    masks = (pieces == number for number in range(1, count))
+    return [
+        TrueObject(mask, _place(picture, mask, shape), math.sqrt(area / math.pi))
+        for mask, area in zip(masks, areas, strict=True)
+    ]
+
+
+def _place(picture: Picture, mask: Mask, shape: Shape) -> Floats:
+    """Where the object of that shape is (3,) [m] whose pixels are set in the mask (h, w); NaN above the horizon."""
+    orientation = picture.lens.orientation
+    assert orientation is not None
+    height, width = mask.shape
+    pixels = np.argwhere(mask)[:, ::-1].astype(np.float64)
+    rays = picture.lens.lens.for_image((width, height)).unproject(pixels, (width, height)) @ orientation.rotation.T
+    rays = rays[np.isfinite(rays).all(axis=1)]
+    middle = rays.mean(axis=0) if len(rays) else np.zeros(3)
+    length = float(np.linalg.norm(middle))
+    if not length > 0.0 or middle[2] >= 0.0:
+        return np.full(3, np.nan)
+    center = shape.center_along(middle[None] / length, orientation.height)[0]
+    return np.asarray(center + np.array([0.0, 0.0, orientation.height]))

@@ -1,0 +1,88 @@
+"""Evaluation with several processes, each on one core; how many there are does not change what comes of it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+from vm_embedded.errors import VisualMeshError
+from vm_embedded.settings import Settings
+from vm_workstation.worker_process import begin, shielded
+
+from ..data.pictures import Classes, PictureFiles
+from .answers import Subject, load_subject
+from .evaluation import Evaluation, Rules, evaluated
+
+_CHUNK = 32
+"""Pictures that a worker evaluates at once: adding up costs about as much as one of them."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What every worker knows. model: a .pt or .onnx file."""
+
+    model: Path
+    settings: Settings
+    as_robot: bool
+    classes: Classes
+    rules: Rules
+
+    def subject(self) -> Subject:
+        """What is evaluated. Raises InputError or ModelError."""
+        return load_subject(self.model, self.settings, self.as_robot)
+
+
+def evaluate(
+    job: Job, subject: Subject, pictures: Sequence[PictureFiles], workers: int, report: Callable[[], None]
+) -> Evaluation:
+    """What comes of all pictures, with so many processes, 1 for none but this one; report each that is done.
+
+    Raises what `evaluated` does, and VisualMeshError if a worker was killed.
+    """
+    size = min(_CHUNK, max(-(-len(pictures) // workers), 1))
+    chunks = [pictures[start : start + size] for start in range(0, len(pictures), size)]
+    result = Evaluation.of_nothing(subject, job.rules)
+    for part, chunk in zip(_parts(job, subject, chunks, workers), chunks, strict=True):
+        result += part
+        for _ in chunk:
+            report()
+    return result
+
+
+def _parts(job: Job, subject: Subject, chunks: Sequence[Sequence[PictureFiles]], workers: int) -> Iterator[Evaluation]:
+    if workers == 1 or len(chunks) < 2:
+        for chunk in chunks:
+            yield evaluated(subject, chunk, job.classes, job.rules)
+        return
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
+    pool = ProcessPoolExecutor(min(workers, len(chunks)), get_context("spawn"), _start, (job,))
+    try:
+        with shielded():
+            results = pool.map(_evaluate_chunk, chunks)
+        yield from results
+    except BrokenProcessPool as error:
+        raise VisualMeshError("a worker was killed (out of memory?)") from error
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+_worker: tuple[Job, Subject] | None = None
+"""What a worker process keeps between pictures."""
+
+
+def _start(job: Job) -> None:
+    global _worker
+    begin()
+    _worker = (job, job.subject())
+
+
+def _evaluate_chunk(pictures: Sequence[PictureFiles]) -> Evaluation:
+    assert _worker is not None
+    job, subject = _worker
+    return evaluated(subject, pictures, job.classes, job.rules)

@@ -1,0 +1,84 @@
+"""The worst of what a network does: pictures with missed objects, and with false ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from vm_embedded.arrays import Floats, Mask, Singles
+from vm_embedded.detections import Detection
+
+from ..data.pictures import PictureFiles
+from ..scores.object_scores import Mistakes
+from ..scores.overlaps import TrueObject
+
+MOST = 12
+"""How many pictures of each kind are kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Oddity:
+    """A picture with an object that was missed, or with one that is none.
+
+    rank: radius [px] of the largest that was missed, or confidence of the most confident that is false. center (2,),
+    radius [px]: of that one. true, found: outlines (m, 2) [px] of all objects of the class.
+    """
+
+    files: PictureFiles
+    class_name: str
+    rank: float
+    center: Floats
+    radius: float
+    true: tuple[Floats, ...]
+    found: tuple[Floats, ...]
+
+
+@dataclass(frozen=True)
+class Oddities:
+    """Pictures with missed and with false objects, worst first."""
+
+    missed: tuple[Oddity, ...] = ()
+    false: tuple[Oddity, ...] = ()
+
+    def __add__(self, other: Oddities) -> Oddities:
+        """The worst of both."""
+        return Oddities(_worst(self.missed + other.missed), _worst(self.false + other.false))
+
+
+def oddities(
+    files: PictureFiles,
+    class_name: str,
+    truths: Sequence[TrueObject],
+    found: Sequence[Detection],
+    mistakes: Mistakes[Detection],
+) -> Oddities:
+    """What is odd in a picture, from its true and found objects of a class."""
+    if not mistakes.missed and not mistakes.false:
+        return Oddities()
+    true_outlines = tuple(outline for each in truths for outline in _outlines(each.mask))
+    found_outlines = tuple(each.outline for each in found)
+    missed, false = [], []
+    if mistakes.missed:
+        largest = max(mistakes.missed, key=lambda each: each.radius)
+        rows, columns = np.nonzero(largest.mask)
+        center = np.array([columns.mean(), rows.mean()]) if len(rows) else np.zeros(2)
+        shown = float(np.sqrt(largest.mask.sum(dtype=np.float64) / np.pi))  # of an endless outline little may show
+        missed.append(Oddity(files, class_name, shown, center, shown, true_outlines, found_outlines))
+    if mistakes.false:
+        worst = mistakes.false[0]
+        rank, center = worst.confidence, worst.center
+        false.append(Oddity(files, class_name, rank, center, worst.radius, true_outlines, found_outlines))
+    return Oddities(tuple(missed), tuple(false))
+
+
+def _worst(all_of_them: Sequence[Oddity]) -> tuple[Oddity, ...]:
+    return tuple(sorted(all_of_them, key=lambda each: (-each.rank, str(each.files.image)))[:MOST])
+
+
+def _outlines(mask: Mask | Singles) -> list[Floats]:
+    """Outlines (m, 2) [px] of what is set in a mask (h, w)."""
+    found, _ = cv2.findContours((mask >= 0.5).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return [each.reshape(-1, 2).astype(np.float64) for each in found]

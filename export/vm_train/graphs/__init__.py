@@ -1,0 +1,1 @@
+"""From pictures to labeled graphs, the examples that a network learns from."""

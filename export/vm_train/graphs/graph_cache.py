@@ -1,0 +1,122 @@
+"""Views of pictures kept on disk: a training of a small network takes longer to make a graph than to learn from it.
+
+A view is the graph of a picture with one draw of pose, lens and sharpness. Windows and colors are drawn anew for each
+look at it. A file holds a header, then neighbors, colors, pixels, distances and labels, all raw. Trainings whose views
+are made alike share them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import struct
+import zlib
+from dataclasses import asdict
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+
+from vm_embedded.errors import InputError
+from vm_embedded.files import written_beside
+from vm_embedded.manifest import Manifest
+from vm_export.grid import Grid
+
+from ..data.decoded_cache import KEPT_FREE, source_of
+from ..data.picture_files import PictureFiles
+from ..data.pictures import Classes
+from .augmentation import Augmentation
+from .labeled_graph import Graph
+
+_HEADER = struct.Struct("<8s32sII")  # magic, what it was made from, points, neighbors
+_MAGIC = b"vmviews1"
+_PART = ("shape", "radius", "intersections", "mesh", "max_distance", "sampling")
+"""What of a manifest decides where points are."""
+
+
+class KeptViews:
+    """`count` views of each picture, in a folder of those that are made in the same way.
+
+    Files that are stale or damaged count as absent. Raises InputError if the folder can't be made.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        count: int,
+        classes: Classes,
+        manifest: Manifest,
+        grid: Grid,
+        augmentation: Augmentation,
+        own_radius: bool,
+    ) -> None:
+        self.count = count
+        self._classes = classes
+        made = [{name: getattr(manifest, name) for name in _PART}, asdict(grid), asdict(augmentation), own_radius]
+        digest = hashlib.sha256(json.dumps(made, sort_keys=True).encode()).hexdigest()
+        self._folder = folder / f"views-{digest[:12]}"
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"can't use folder {self._folder}: {error.strerror or error}") from error
+
+    def random(self, files: PictureFiles, number: int) -> np.random.Generator:
+        """What decides a view."""
+        return np.random.default_rng([number, zlib.crc32(files.number.encode())])
+
+    def get(self, files: PictureFiles, number: int) -> Graph | None:
+        """A view, if it is there as its picture's files are now."""
+        try:
+            content = self._path(files, number).read_bytes()
+            magic, source, points, neighbors = _HEADER.unpack_from(content)
+            if magic != _MAGIC or source != source_of(files, self._classes):
+                return None
+            read = _Reader(content, _HEADER.size)
+            graph = Graph(
+                neighbors=read.array(np.int32, (points + 1, neighbors)),
+                points=read.array(np.float16, (points + 1, 3)).astype(np.float32),
+                pixels=read.array(np.float32, (points, 2)),
+                distances=read.array(np.float32, (points,)),
+                labels=read.array(np.int8, (points,)),
+            )
+        except (OSError, ValueError, struct.error):
+            return None
+        return graph if read.place == len(content) else None
+
+    def put(self, files: PictureFiles, number: int, graph: Graph) -> None:
+        """Keep a view; without effect if it can't be written."""
+        try:
+            if shutil.disk_usage(self._folder).free < KEPT_FREE:
+                return
+            header = _HEADER.pack(_MAGIC, source_of(files, self._classes), len(graph), graph.neighbors.shape[1])
+            parts = (
+                graph.neighbors.astype(np.int32),
+                graph.points.astype(np.float16),
+                graph.pixels.astype(np.float32),
+                graph.distances.astype(np.float32),
+                graph.labels,
+            )
+            # Opened with x: where two processes put the same view, neither writes into the other's file.
+            with written_beside(self._path(files, number)) as part, part.open("xb") as file:
+                for each in (header, *(array.tobytes() for array in parts)):
+                    file.write(each)
+        except (OSError, InputError):
+            return  # it is made anew next time
+
+    def _path(self, files: PictureFiles, number: int) -> Path:
+        return self._folder / f"{quote(files.number, safe='')}-{number}.raw"
+
+
+class _Reader:
+    """Arrays one after the other in a file's content."""
+
+    def __init__(self, content: bytes, place: int) -> None:
+        self._content, self.place = content, place
+
+    def array(self, kind: type[np.generic], shape: tuple[int, ...]) -> np.ndarray:
+        """The next array. Raises ValueError if the content ends before it does."""
+        count = int(np.prod(shape))
+        found = np.frombuffer(self._content, kind, count, self.place).reshape(shape)
+        self.place += found.nbytes
+        return found

@@ -1,0 +1,1 @@
+"""How a network learns: recipe, point selection, optimizer, rounds and the folder of a run."""

@@ -1,0 +1,219 @@
+"""train.toml: data, mesh, network and training, a section each."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from vm_embedded.entries import check_entries, number, one_of, share
+from vm_embedded.errors import InputError
+from vm_embedded.manifest import KINDS, POINT_SAMPLINGS, Manifest, ObjectClass
+from vm_embedded.mesh_models import MESH_MODELS
+from vm_embedded.relative import COLORINGS
+from vm_embedded.shapes import SHAPES
+from vm_export.grid import GRIDS, Grid
+from vm_export.network_shape import ACTIVATIONS, NetworkShape
+from vm_synth.dataset.files import COLORS
+
+from ..data.pictures import Classes, Color
+from ..graphs.augmentation import Augmentation
+from .recipe import Recipe
+
+KIND_OF = {"ball": "object", "goal": "upright", "robot": "upright", "environment": "background"}
+"""What the classes of vm-synth are; all others are areas."""
+
+
+@dataclass(frozen=True)
+class ClassTable:
+    """Section [classes]: an entry for each class, in the order of the network's outputs. Raises InputError.
+
+    colors: what masks have for it. kinds: what it is, of KINDS.
+    """
+
+    colors: Mapping[str, tuple[Color, ...]]
+    kinds: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        self.seen_as()
+
+    @classmethod
+    def usual(cls) -> ClassTable:
+        """The classes and colors of vm-synth and the reference."""
+        colors = {name: (color,) for name, color in COLORS.items()}
+        return cls(colors, {name: KIND_OF.get(name, "area") for name in colors})
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> ClassTable:
+        """From `name = { kind = "object", colors = [[255, 0, 0]] }`. Raises InputError."""
+        colors, kinds = {}, {}
+        if not isinstance(table, Mapping):
+            raise InputError(f"classes must be a section, [classes], not {table!r}")
+        for name, entry in table.items():
+            if not isinstance(entry, Mapping) or set(entry) != {"kind", "colors"}:
+                raise InputError(f'{name} must be like {{ kind = "object", colors = [[255, 0, 0]] }}, not {entry!r}')
+            if entry["kind"] not in KINDS:
+                raise InputError(f"{name}: kind must be one of {', '.join(KINDS)}, not {entry['kind']!r}")
+            colors[name], kinds[name] = tuple(_color(name, each) for each in _listed(name, entry)), entry["kind"]
+        return cls(colors, kinds)
+
+    def documented(self) -> Iterator[str]:
+        """The section's lines."""
+        yield "[classes]"
+        yield f"# each class: its kind, of {', '.join(KINDS)}, and its RGB colors in masks"
+        for name, colors in self.colors.items():
+            shown = ", ".join(str(list(each)) for each in colors)
+            yield f'{name} = {{ kind = "{self.kinds[name]}", colors = [{shown}] }}'
+
+    def seen_as(self) -> Classes:
+        """The classes as masks show them. Raises InputError for shared colors, or fewer than two classes."""
+        return Classes(self.colors)
+
+    @property
+    def outputs(self) -> tuple[ObjectClass, ...]:
+        """The classes as a network has them."""
+        return tuple(ObjectClass(name, kind) for name, kind in self.kinds.items())
+
+
+def _listed(name: str, entry: Mapping[str, Any]) -> list[Any]:
+    if not isinstance(entry["colors"], list) or not entry["colors"]:
+        raise InputError(f"{name}: colors must be a list of colors as [[255, 0, 0]], not {entry['colors']!r}")
+    return entry["colors"]
+
+
+def _color(name: str, value: Any) -> Color:
+    whole = isinstance(value, list) and len(value) == 3 and all(type(each) is int for each in value)
+    if not whole or not all(0 <= each <= 255 for each in value):
+        raise InputError(f"{name}: a color is [red, green, blue] from 0 to 255, not {value!r}")
+    red, green, blue = value
+    return red, green, blue
+
+
+@dataclass(frozen=True)
+class DataSettings:
+    """Section [data]: what is kept out of the training, if no lists say so."""
+
+    validation: float = share(0.1, "pictures that choose the best network")
+    test: float = share(0.1, "pictures that are kept for vm-evaluate")
+    split_seed: int = number(0, "decides which pictures these are", "", (0, 2**31))
+
+    def __post_init__(self) -> None:
+        check_entries(self)
+
+
+@dataclass(frozen=True)
+class MeshSettings:
+    """Section [mesh]: where the network looks."""
+
+    shape: str = one_of(tuple(SHAPES), "sphere", "shape of the object")
+    radius: float = number(0.095, "radius of the object, for which the mesh is made", "m", (1e-3, 100.0))
+    object_height: float = number(0.0, "height of a cylinder; of all other shapes 0", "m", (0.0, 100.0))
+    radius_of: str = one_of(
+        ("all", "scene"),
+        "all",
+        "all: the mesh is made for that radius in every picture; scene: for the radius of each picture's own ball, "
+        "from the sceneX.json that vm-synth wrote: one network then suits balls of any size",
+    )
+    intersections: float = number(4.0, "rings that cross an object, the paper's k", "", (0.1, 100.0))
+    model: str = one_of(tuple(MESH_MODELS), "ring6", "how points are placed and linked (docs/meshes.md)")
+    sampling: str = one_of(
+        POINT_SAMPLINGS,
+        "bilinear",
+        "color of a point: bilinear, between the four pixels around it; footprint, the mean of as much of the picture "
+        "as it stands for",
+    )
+    colors: str = one_of(
+        COLORINGS,
+        "absolute",
+        "colors that the network takes: absolute, or relative to the mean and the deviation of all points of a picture",
+    )
+    max_distance: float = number(10.0, "how far out the mesh reaches", "m", (0.1, 1e4))
+    grid: str = one_of(GRIDS, "visual", "the Visual Mesh, or the paper's baseline, which can't be exported")
+    equal_at: float = number(
+        0.0,
+        "distance at which a hexagonal grid has as many points on an object as the Visual Mesh; 0: as many in all",
+        "m",
+        (0.0, 1e3),
+    )
+
+    def __post_init__(self) -> None:
+        check_entries(self)
+        if self.grid == "hexagonal" and MESH_MODELS[self.model].neighbors != 6:
+            raise InputError(f"a hexagonal grid has six neighbors, as model ring6, not {self.model}")
+
+
+@dataclass(frozen=True)
+class NetworkSettings:
+    """Section [network]."""
+
+    depth: int = number(9, "graph convolutions", "", (1, 100))
+    width: int = number(8, "channels of each", "", (1, 1024))
+    activation: str = one_of(tuple(ACTIVATIONS), "selu", "between them; the paper found selu best")
+    kind: str = one_of(("convolution", "separable"), "convolution", "separable has fewer weights for its width")
+
+    def __post_init__(self) -> None:
+        check_entries(self)
+
+
+@dataclass(frozen=True)
+class SecondLookSettings:
+    """Section [second_look], for vm-train --first: which points the network gets of the one that looks first."""
+
+    above: float = number(0.05, "probability of an object above which a point is worth it", "", (0.0, 0.999))
+    rings: int = number(4, "steps around such points that are worth it too", "", (0, 100))
+
+    def __post_init__(self) -> None:
+        check_entries(self)
+
+
+@dataclass(frozen=True)
+class TrainConfiguration:
+    """All sections."""
+
+    data: DataSettings = dataclasses.field(default_factory=DataSettings)
+    classes: ClassTable = dataclasses.field(
+        default_factory=ClassTable.usual, metadata={"read": ClassTable.from_table, "documented": ClassTable.documented}
+    )
+    mesh: MeshSettings = dataclasses.field(default_factory=MeshSettings)
+    network: NetworkSettings = dataclasses.field(default_factory=NetworkSettings)
+    second_look: SecondLookSettings = dataclasses.field(default_factory=SecondLookSettings)
+    training: Recipe = dataclasses.field(default_factory=Recipe)
+    augmentation: Augmentation = dataclasses.field(default_factory=Augmentation)
+
+    @property
+    def manifest(self) -> Manifest:
+        """What model files of this training will say, without provenance."""
+        mesh = self.mesh
+        return Manifest(
+            shape=mesh.shape,
+            radius=mesh.radius,
+            object_radius=mesh.radius,
+            object_height=mesh.object_height,
+            intersections=mesh.intersections,
+            mesh=mesh.model,
+            max_distance=mesh.max_distance,
+            edge="hard",
+            classes=self.classes.outputs,
+            any_radius=mesh.radius_of == "scene",
+            sampling=mesh.sampling,
+            colors=mesh.colors,
+        )
+
+    @property
+    def grid(self) -> Grid:
+        """The points that the network is trained on."""
+        return Grid(self.mesh.grid, self.mesh.equal_at if self.mesh.grid == "hexagonal" else 0.0)
+
+    @property
+    def network_shape(self) -> NetworkShape:
+        """Layers of the network."""
+        network = self.network
+        return NetworkShape.uniform(
+            network.depth,
+            network.width,
+            len(self.classes.colors),
+            network.activation,
+            kind=network.kind,
+            neighbors=MESH_MODELS[self.mesh.model].neighbors,
+        )

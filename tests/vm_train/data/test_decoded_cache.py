@@ -1,0 +1,133 @@
+"""Decoded pictures on disk: the same as the files', and absent when stale, damaged or without room."""
+
+import multiprocessing
+import os
+import resource
+import signal
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from vm_embedded.errors import InputError
+from vm_train.data import decoded_cache as module
+from vm_train.data.decoded_cache import Unpacked, read, size_of
+from vm_train.data.pictures import Classes, find_pictures, read_picture
+from vm_train.formats.shards import write_shards
+
+from .test_pictures import CLASSES, write_pictures
+
+
+@pytest.fixture
+def files(tmp_path):
+    (tmp_path / "set").mkdir()
+    write_pictures(tmp_path / "set", ["1"])
+    return find_pictures(tmp_path / "set")[0]
+
+
+@pytest.fixture
+def kept(tmp_path):
+    return Unpacked(tmp_path / "kept")
+
+
+def same(one, other):
+    assert (one.image == other.image).all()
+    assert (one.labels == other.labels).all()
+    assert one.lens.lens == other.lens.lens
+    assert np.array_equal(one.lens.orientation.level, other.lens.orientation.level)
+
+
+def test_a_picture_comes_back_as_it_was(files, kept):
+    assert kept.get(files, CLASSES) is None
+    same(read(files, CLASSES, kept), read_picture(files, CLASSES))
+    found = kept.get(files, CLASSES)
+    same(found, read_picture(files, CLASSES))
+    assert not found.image.flags.writeable
+    assert not kept.full
+    same(read(files, CLASSES, None), found)
+
+
+def test_kept_pictures_take_the_room_that_is_told(files, kept):
+    read(files, CLASSES, kept)
+    (path,) = kept.folder.iterdir()
+    assert path.stat().st_size <= size_of(1, 160, 120)
+
+
+@pytest.mark.parametrize("part", ["image", "mask", "lens"])
+def test_a_changed_file_makes_it_stale(part, files, kept):
+    read(files, CLASSES, kept)
+    os.utime(files.path(part), ns=(0, 0))
+    assert kept.get(files, CLASSES) is None
+    read(files, CLASSES, kept)
+    assert kept.get(files, CLASSES) is not None
+    files.path(part).unlink()
+    assert kept.get(files, CLASSES) is None
+
+
+def test_other_classes_make_it_stale(files, kept):
+    read(files, CLASSES, kept)
+    others = Classes(dict(reversed(CLASSES.colors.items())))
+    assert kept.get(files, others) is None
+    same(read(files, others, kept), read_picture(files, others))
+
+
+@pytest.mark.parametrize("left", [0, 10, 70, -1])
+def test_a_damaged_file_is_made_again(left, files, kept):
+    read(files, CLASSES, kept)
+    (path,) = kept.folder.iterdir()
+    path.write_bytes(path.read_bytes()[:left])
+    assert kept.get(files, CLASSES) is None
+    read(files, CLASSES, kept)
+    assert kept.get(files, CLASSES) is not None
+
+
+def test_what_a_killed_process_left_is_put_away(files, kept):
+    (kept.folder / "1.raw.part").write_bytes(b"half")
+    read(files, CLASSES, kept)
+    read(files, CLASSES, kept)
+    assert kept.get(files, CLASSES) is not None
+    assert not kept.full
+
+
+def test_pictures_of_a_shard_are_kept_too(files, kept, tmp_path):
+    write_shards([files], tmp_path / "shards", 1, lambda: None)
+    (packed,) = find_pictures(tmp_path / "shards")
+    read(packed, CLASSES, kept)
+    same(kept.get(packed, CLASSES), read_picture(files, CLASSES))
+    assert kept.get(files, CLASSES) is None  # it is of other files
+
+
+def test_without_room_it_goes_on_and_says_so(files, kept, monkeypatch):
+    monkeypatch.setattr(module.shutil, "disk_usage", lambda path: SimpleNamespace(free=1 << 30))
+    same(read(files, CLASSES, kept), read_picture(files, CLASSES))
+    assert kept.get(files, CLASSES) is None
+    assert kept.full
+    monkeypatch.undo()
+    read(files, CLASSES, kept)
+    assert kept.get(files, CLASSES) is None  # no more are put there
+    again = Unpacked(kept.folder)
+    assert not again.full
+    read(files, CLASSES, again)
+    assert again.get(files, CLASSES) is not None
+
+
+def put_with_small_files(folder, files):
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
+    same(read(files, CLASSES, folder), read_picture(files, CLASSES))
+
+
+@pytest.mark.slow
+def test_a_write_that_fails_in_another_process_is_seen_here(files, kept):
+    other = multiprocessing.get_context("spawn").Process(target=put_with_small_files, args=(kept, files))
+    other.start()
+    other.join()
+    assert other.exitcode == 0
+    assert kept.full
+    assert [path.name for path in kept.folder.iterdir()] == ["full"]
+
+
+def test_a_folder_that_can_not_be_made_is_named(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="can't use folder"):
+        Unpacked(tmp_path / "file" / "kept")

@@ -1,0 +1,248 @@
+"""Evaluations: of both kinds of models, of parts and of all, and of networks that know the truth."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from vm_embedded.errors import InputError, ModelError
+from vm_embedded.lens_file import read_lens_file
+from vm_embedded.onnx_file import read_model
+from vm_embedded.settings import Settings
+from vm_export.checkpoint import Checkpoint
+from vm_export.grid import Grid
+from vm_export.onnx_graph import export
+from vm_train.data.pictures import Picture, find_pictures, read_picture
+from vm_train.evaluation.answers import Exact, load_subject
+from vm_train.evaluation.evaluation import Evaluation, Rules, evaluated
+from vm_train.evaluation.object_truth import SceneBall, SceneTruth
+from vm_train.evaluation.picture_selection import classes_of, pictures_of, usual_colors
+from vm_train.evaluation.tables import as_csv, as_json
+from vm_train.evaluation.workers import Job, evaluate
+
+from ...drawn_scenes import CHECKPOINT, FOLDER, IMAGES, MODEL, TRUTH
+from ..drawn import RADIUS, draw_set
+
+MANIFEST = read_model(MODEL).manifest
+USUAL = usual_colors(Path("model.onnx"), None)
+CLASSES = classes_of(MANIFEST, USUAL, [])
+SETTINGS = Settings()
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    return draw_set(tmp_path_factory.mktemp("drawn"), 10, seed=1)
+
+
+@pytest.fixture(scope="module")
+def files(drawn):
+    return find_pictures(drawn)
+
+
+@pytest.fixture(scope="module")
+def models(tmp_path_factory):
+    """The drawn frames' network as a checkpoint and as a model file of each layout."""
+    folder = tmp_path_factory.mktemp("models")
+    paths = {"pt": CHECKPOINT}
+    for layout in ("plain", "runs"):
+        paths[layout] = folder / f"{layout}.onnx"
+        export(Checkpoint.load(CHECKPOINT), paths[layout], layout)
+    return {name: load_subject(path, SETTINGS) for name, path in paths.items()}
+
+
+def drawn_pictures():
+    """The drawn frames' frames, which have no masks, with labels of nothing but field and with their balls."""
+    truth = json.loads(TRUTH.read_text())
+    for path in IMAGES:
+        image = cv2.imread(str(path))
+        lens = read_lens_file(FOLDER / path.name.replace("image", "lens").replace(".jpg", ".yaml"))
+        ball = truth[path.name]
+        scene = SceneTruth(ball["radius"], SceneBall(np.array(ball["position"]), ball["radius"], 1.0))
+        yield Picture(image, np.full(image.shape[:2], 2, dtype=np.int8), lens), scene
+
+
+def test_checkpoints_and_model_files_answer_alike_in_every_layout(models, files):
+    pictures = [read_picture(each, CLASSES) for each in files[:3]] + [picture for picture, _ in drawn_pictures()][:2]
+    for picture in pictures:
+        answers = {name: subject.answer(picture) for name, subject in models.items()}
+        for each in answers.values():
+            assert each.probabilities == pytest.approx(answers["pt"].probabilities, abs=1e-4)
+            assert (each.pixels == answers["pt"].pixels).all()
+            assert (each.distances == answers["pt"].distances).all()
+            assert len(each.found) == len(answers["pt"].found)
+            for one, other in zip(each.found, answers["pt"].found, strict=True):
+                assert one.position == pytest.approx(other.position, abs=1e-3)
+
+
+def test_scores_of_checkpoints_and_model_files_agree(models, files):
+    rules = Rules(radius_of="scene")
+    scores = [as_json(evaluated(subject, files, CLASSES, rules), 0.5) for subject in models.values()]
+    for each in scores[1:]:
+        assert each["pictures"] == 10
+        assert each["objects"] == scores[0]["objects"]
+        for name, bins in each["points"].items():
+            expected = scores[0]["points"][name]["all"]
+            assert bins["all"]["average_precision"] == pytest.approx(expected["average_precision"], abs=1e-3)
+
+
+def test_the_drawn_balls_are_found_where_they_are(models):
+    result = Evaluation.of_nothing(models["runs"], Rules())
+    files = find_pictures(FOLDER)
+    for each, (picture, scene) in zip(files, drawn_pictures(), strict=True):
+        result.count(each, picture, scene, models["runs"].answer(picture), MANIFEST)
+    ranking = result.objects["ball"].ranking(0.5)
+    assert ranking.at().hits == 6
+    assert ranking.errors().distance_median < 0.06
+    assert ranking.errors().relative_p90 < 0.04
+
+
+def test_a_robot_finds_the_same_balls_with_its_shared_meshes(models):
+    robot = load_subject(MODEL, SETTINGS, as_robot=True)
+    for picture, scene in drawn_pictures():
+        answer = robot.answer(picture)
+        nearest = min(np.linalg.norm(each.position - scene.ball.center) for each in answer.found)
+        assert nearest < 0.05 * np.linalg.norm(scene.ball.center)
+        exact = models["pt"].answer(picture)
+        assert len(answer.distances) == pytest.approx(len(exact.distances), rel=0.35)
+        assert np.isfinite(answer.distances).all()
+
+
+def by_color(mesh, colors):
+    """Probabilities (n, 4) of a network that knows how pictures are drawn: orange balls, green fields, white lines."""
+    red, green, blue = colors.T
+    answers = np.select([red > 1.4 * blue, green > 1.4 * red, red + green + blue > 1.6], [0, 2, 1], 3)
+    return np.eye(4, dtype=np.float32)[answers]
+
+
+KNOWING = Exact(MANIFEST, Grid(), "", SETTINGS, by_color)
+
+
+def test_a_network_that_sees_colors_is_nearly_perfect_on_drawn_balls(files):
+    result = evaluated(KNOWING, files, CLASSES, Rules(radius_of="scene"))
+    assert result.points.ranking("ball").at(0.5).recall > 0.8
+    ranking = result.objects["ball"].ranking(0.5)
+    assert ranking.truths >= 6
+    assert ranking.at().recall >= 0.7
+    assert ranking.errors().distance_median < 0.05
+
+
+def test_a_hexagonal_network_has_scores_of_points_only(files):
+    checkpoint = Checkpoint.load(CHECKPOINT)
+    network = load_subject(CHECKPOINT, SETTINGS).network
+    subject = Exact(checkpoint.manifest, Grid("hexagonal"), "", SETTINGS, network)
+    result = evaluated(subject, files[:2], CLASSES, Rules())
+    assert result.objects == {}
+    assert result.points.confusion().sum() > 100
+    assert "objects" not in as_csv(result, 0.5)
+
+
+def test_parts_add_up_in_any_number_of_processes(files):
+    job = Job(MODEL, SETTINGS, False, CLASSES, Rules())
+    subject, ticks = job.subject(), []
+    alone = evaluate(job, subject, files, 1, lambda: ticks.append(1))
+    shared = evaluate(job, subject, files, 2, lambda: ticks.append(1))
+    assert len(ticks) == 20
+    assert as_json(alone, 0.5) == as_json(shared, 0.5)
+    assert as_csv(alone, 0.5) == as_csv(shared, 0.5)
+    assert [each.files.number for each in alone.views] == [f"{number:04d}" for number in range(10)]
+    for one, other in zip(alone.oddities.missed, shared.oddities.missed, strict=True):
+        assert (one.files, one.rank) == (other.files, other.rank)
+
+
+def test_the_largest_missed_and_the_most_confident_false_come_first(files):
+    blind = replace(KNOWING, network=lambda mesh, colors: np.tile(np.float32([0, 0, 1, 0]), (len(mesh), 1)))
+    result = evaluated(blind, files, CLASSES, Rules())
+    ranks = [each.rank for each in result.oddities.missed]
+    assert len(ranks) == result.objects["ball"].ranking(0.5).truths
+    assert ranks == sorted(ranks, reverse=True)
+    assert result.oddities.false == ()
+    assert all(len(each.true) == 1 for each in result.oddities.missed)
+
+
+def test_pictures_that_can_t_be_used_are_named(tmp_path):
+    folder = draw_set(tmp_path / "set", 6)
+    (folder / "mask0001.png").unlink()
+    (folder / "image0002.jpg").write_bytes((folder / "image0002.jpg").read_bytes()[:500])
+    (folder / "lens0003.yaml").write_text("projection: RECTILINEAR\n")
+    (folder / "scene0004.json").write_text("{}")
+    result = evaluated(KNOWING, find_pictures(folder), CLASSES, Rules())
+    assert [path[-8:-4] for path in result.faults] == ["0001", "0002", "0003", "0004"]
+    assert len(result.views) == 2
+    with pytest.raises(InputError, match="mask0001"):
+        evaluated(KNOWING, find_pictures(folder), CLASSES, Rules(strict=True))
+
+
+def test_a_camera_below_the_ball_is_named(tmp_path):
+    folder = draw_set(tmp_path / "set", 1)
+    lens = (folder / "lens0000.yaml").read_text().splitlines()
+    row = lens[-2].rsplit(",", 1)[0] + ", 0.05]"
+    (folder / "lens0000.yaml").write_text("\n".join([*lens[:-2], row, lens[-1]]) + "\n")
+    result = evaluated(KNOWING, find_pictures(folder), CLASSES, Rules())
+    assert "diameter" in next(iter(result.faults.values()))
+
+
+def test_colors_of_no_class_end_it(tmp_path):
+    folder = draw_set(tmp_path / "set", 2)
+    mask = cv2.imread(str(folder / "mask0001.png"), cv2.IMREAD_UNCHANGED)
+    mask[:5, :5] = (255, 0, 0, 255)
+    cv2.imwrite(str(folder / "mask0001.png"), mask)
+    with pytest.raises(InputError, match=r"mask0001.*\[0, 0, 255\]"):
+        evaluated(KNOWING, find_pictures(folder), CLASSES, Rules())
+    known = classes_of(MANIFEST, USUAL, [("environment", (0, 0, 255))])
+    assert len(evaluated(KNOWING, find_pictures(folder), known, Rules()).views) == 2
+
+
+def test_answers_that_are_no_probabilities_end_it(files):
+    broken = replace(KNOWING, network=lambda mesh, colors: np.full((len(mesh), 4), np.nan, dtype=np.float32))
+    with pytest.raises(ModelError, match="0 to 1"):
+        evaluated(broken, files, CLASSES, Rules())
+
+
+def test_the_radius_of_a_scene_makes_mesh_and_fit(files, tmp_path):
+    subject = load_subject(MODEL, SETTINGS)
+    picture = read_picture(files[0], CLASSES)
+    few, many = len(subject.answer(picture).distances), len(subject.answer(picture, RADIUS).distances)
+    assert many > 1.4 * few  # a smaller ball needs a finer mesh: (0.095 / 0.07)^2
+    folder = draw_set(tmp_path / "set", 2)
+    (folder / "scene0000.json").unlink()
+    result = evaluated(subject, find_pictures(folder), CLASSES, Rules(radius_of="scene"))
+    assert "scene0000.json" in next(iter(result.faults.values()))
+    assert result.radii == [RADIUS]
+
+
+def test_lists_choose_pictures(drawn, tmp_path):
+    chosen = tmp_path / "list.txt"
+    chosen.write_text("# some\n0003\nimage0001.jpg  # by its name\n\n")
+    assert [each.number for each in pictures_of([drawn], chosen, None)] == ["0001", "0003"]
+    run = tmp_path / "pictures.json"
+    run.write_text(json.dumps({"training": ["0000"], "validation": ["0002"], "test": ["0005", "0006"]}))
+    assert [each.number for each in pictures_of([drawn], run, None)] == ["0005", "0006"]
+    assert [each.number for each in pictures_of([drawn], run, "validation")] == ["0002"]
+    assert len(pictures_of([drawn, drawn], None, None)) == 20
+    for without in (chosen, None):
+        with pytest.raises(InputError, match="give it with --list"):
+            pictures_of([drawn], without, "test")
+
+
+@pytest.mark.parametrize(("text", "part"), [("0099\n", "did you mean '0009'"), ("# none\n", "names no picture")])
+def test_lists_of_what_is_not_there_are_refused(drawn, tmp_path, text, part):
+    chosen = tmp_path / "list.txt"
+    chosen.write_text(text)
+    with pytest.raises(InputError, match=part):
+        pictures_of([drawn], chosen, None)
+    with pytest.raises(InputError, match=r"missing\.txt"):
+        pictures_of([drawn], tmp_path / "missing.txt", None)
+
+
+def test_classes_without_colors_are_asked_for():
+    manifest = replace(MANIFEST, classes=(*MANIFEST.classes[:3], replace(MANIFEST.classes[3], name="grass")))
+    with pytest.raises(InputError, match=r"--color grass=R,G,B"):
+        classes_of(manifest, USUAL, [])
+    assert classes_of(manifest, USUAL, [("grass", (1, 2, 3))]).colors["grass"] == ((1, 2, 3),)
+    with pytest.raises(InputError, match="did you mean 'ball'"):
+        classes_of(MANIFEST, USUAL, [("bal", (1, 2, 3))])
+    with pytest.raises(InputError, match="share the color"):
+        classes_of(MANIFEST, USUAL, [("environment", (255, 0, 0))])

@@ -1,0 +1,135 @@
+"""True objects of pictures: those of scenes against geometry, those of masks against those of scenes."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from vm_embedded.errors import InputError
+from vm_embedded.onnx_file import read_model
+from vm_train.data.pictures import find_pictures, read_picture
+from vm_train.evaluation.object_truth import SceneBall, SceneTruth, read_scene, true_objects
+from vm_train.evaluation.picture_selection import classes_of, usual_colors
+
+from ...drawn_scenes import MODEL
+from ..drawn import RADIUS, draw_set
+
+MANIFEST = read_model(MODEL).manifest
+USUAL = usual_colors(Path("model.onnx"), None)
+CLASSES = classes_of(MANIFEST, USUAL, [])
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory):
+    """Drawn pictures with their scenes."""
+    files = find_pictures(draw_set(tmp_path_factory.mktemp("drawn"), 12, seed=3))
+    return [
+        (read_picture(each, CLASSES), read_scene(each.image.with_name(f"scene{each.number}.json"))) for each in files
+    ]
+
+
+def whole_balls(pictures):
+    """Pictures whose mask shows a ball that no border cuts: picture, scene, and mask (h, w)."""
+    for picture, scene in pictures:
+        mask = picture.labels == 0
+        border = mask[[0, -1]].any() or mask[:, [0, -1]].any()
+        if mask.any() and not border:
+            yield picture, scene, mask
+
+
+def test_a_scene_s_ball_covers_what_its_mask_shows(pictures):
+    seen = list(whole_balls(pictures))
+    assert len(seen) >= 4
+    for picture, scene, mask in seen:
+        (ball,) = true_objects(picture, scene, MANIFEST)["ball"]
+        assert np.count_nonzero((ball.mask >= 0.5) != mask) <= 0.05 * mask.sum() + 3
+        assert ball.radius == pytest.approx(math.sqrt(mask.sum() / math.pi), rel=0.05)
+        assert ball.position.tolist() == scene.ball.center.tolist()
+        assert ball.visible == 1.0
+
+
+def test_a_mask_alone_gives_nearly_the_same_ball(pictures):
+    manifest = replace(MANIFEST, radius=RADIUS, object_radius=RADIUS)
+    for picture, scene, mask in whole_balls(pictures):
+        (ball,) = true_objects(picture, None, manifest)["ball"]
+        assert (ball.mask == mask).all()
+        assert ball.position == pytest.approx(scene.ball.center, rel=0.06, abs=0.02)
+
+
+def test_every_piece_of_a_mask_is_an_object(pictures):
+    picture, _ = pictures[0]
+    labels = np.full_like(picture.labels, 2)
+    labels[100:110, 20:30] = 0
+    labels[60, 90] = 0
+    found = true_objects(replace(picture, labels=labels), None, MANIFEST)["ball"]
+    assert sorted(int(each.mask.sum()) for each in found) == [1, 100]
+
+
+def test_what_is_above_the_horizon_has_no_place(pictures):
+    picture, _ = pictures[0]
+    labels = np.full_like(picture.labels, 2)
+    labels[0:3, 70:80] = 0
+    (found,) = true_objects(replace(picture, labels=labels), None, MANIFEST)["ball"]
+    assert np.isnan(found.position).all()
+
+
+def test_a_scene_without_a_ball_and_a_hidden_one(pictures):
+    picture, _ = pictures[0]
+    assert true_objects(picture, SceneTruth(RADIUS, None), MANIFEST)["ball"] == []
+    hidden = SceneBall(np.array([1.0, 0.1, RADIUS]), RADIUS, 0.0)
+    (found,) = true_objects(picture, SceneTruth(RADIUS, hidden), MANIFEST)["ball"]
+    assert found.visible == 0.0
+    assert found.mask.sum() > 10.0
+
+
+def test_a_file_that_is_not_there_is_no_scene(tmp_path):
+    assert read_scene(tmp_path / "scene1.json") is None
+
+
+GOOD = {"ball_radius": 0.07, "ball": {"center": [1.0, 0.0, 0.07], "radius": 0.07, "visible": 1.0}}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"ball_radius": -1.0},
+        {"ball_radius": None},
+        {"ball": 3},
+        {"ball": {"center": [1.0, 0.0], "radius": 0.07, "visible": 1.0}},
+        {"ball": {"center": [1.0, math.nan, 0.0], "radius": 0.07, "visible": 1.0}},
+        {"ball": {"center": [1.0, 0.0, 0.1], "radius": 0.0, "visible": 1.0}},
+        {"ball": {"center": [1.0, 0.0, 0.1], "radius": 0.1, "visible": 2.0}},
+        {"ball": {"center": [1.0, 0.0, 0.1], "radius": 0.1}},
+    ],
+)
+def test_scenes_that_make_no_sense_are_named(tmp_path, change):
+    path = tmp_path / "scene7.json"
+    path.write_text(json.dumps(GOOD))
+    assert read_scene(path).ball.radius == 0.07
+    path.write_text(json.dumps(GOOD | change))
+    with pytest.raises(InputError, match=r"^scene7\.json"):
+        read_scene(path)
+
+
+@pytest.mark.parametrize("text", ["", "[1]", "{", "[" * 100000])
+def test_damaged_scenes_are_named(tmp_path, text):
+    path = tmp_path / "scene7.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"^scene7\.json"):
+        read_scene(path)
+
+
+def test_a_ball_that_the_border_cuts_covers_what_is_in_the_picture(pictures):
+    picture, _ = pictures[0]
+    height, width = picture.labels.shape
+    orientation = picture.lens.orientation
+    ray = picture.lens.lens.unproject(np.array([[0.0, height - 20.0]]), (width, height))[0] @ orientation.rotation.T
+    center = ray * (orientation.height - RADIUS) / -ray[2] + (0.0, 0.0, orientation.height)
+    (cut,) = true_objects(picture, SceneTruth(RADIUS, SceneBall(center, RADIUS, 0.5)), MANIFEST)["ball"]
+    assert cut.mask.shape == (height, width)
+    assert 0.3 < cut.mask.sum() / (math.pi * cut.radius**2) < 0.7
+    assert cv2.countNonZero(cut.mask[:, width // 2 :]) == 0

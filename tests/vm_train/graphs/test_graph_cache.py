@@ -1,0 +1,91 @@
+"""Views that are kept are those that were made."""
+
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vm_train.data.pictures import find_pictures
+from vm_train.graphs.augmentation import Augmentation
+from vm_train.graphs.graph_cache import KeptViews
+from vm_train.graphs.loading import Graphs, View
+from vm_train.graphs.schedule import Item
+from vm_train.learning.configuration import TrainConfiguration
+
+from ..drawn import draw_set
+
+CONFIGURATION = TrainConfiguration()
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    return draw_set(tmp_path_factory.mktemp("drawn"), 3)
+
+
+@pytest.fixture
+def folder(drawn, tmp_path):
+    return shutil.copytree(drawn, tmp_path / "pictures")
+
+
+def graphs_of(folder, kept, count=2, **changes):
+    view = View(
+        CONFIGURATION.classes.seen_as(),
+        replace(CONFIGURATION.manifest, max_distance=4.0, **changes),
+        augmentation=Augmentation(brightness=0.0, contrast=0.0, saturation=0.0, hue=0.0, gamma=0.0, noise=0.0),
+    )
+    views = KeptViews(kept, count, view.classes, view.manifest, view.grid, view.augmentation, view.own_radius)
+    return Graphs(find_pictures(folder), view, None, views)
+
+
+def same(first, second):
+    return all(
+        np.allclose(getattr(first, name), getattr(second, name), atol=1e-3)
+        for name in ("points", "neighbors", "labels", "distances", "pixels")
+    )
+
+
+def files_in(kept):
+    return sorted(path for path in kept.rglob("*.raw"))
+
+
+def test_views_are_made_once_and_are_the_same_when_read(folder, tmp_path):
+    graphs = graphs_of(folder, tmp_path / "kept")
+    made = [graphs[Item(0, (1, seed))] for seed in range(12)]
+    assert len(files_in(tmp_path / "kept")) == 2
+    times = [path.stat().st_mtime_ns for path in files_in(tmp_path / "kept")]
+    read = [graphs_of(folder, tmp_path / "kept")[Item(0, (1, seed))] for seed in range(12)]
+    assert all(same(*each) for each in zip(made, read, strict=True))
+    assert [path.stat().st_mtime_ns for path in files_in(tmp_path / "kept")] == times
+    lengths = {len(each) for each in made}
+    assert len(lengths) == 2  # two poses, so two numbers of points
+
+
+def test_validation_sees_the_picture_as_it_is(folder, tmp_path):
+    graphs = graphs_of(folder, tmp_path / "kept")
+    graphs[Item(0)]
+    assert files_in(tmp_path / "kept") == []
+
+
+@pytest.mark.parametrize("damage", [b"", b"vmviews1", b"x" * 100, None])
+def test_damaged_and_stale_views_are_made_again(folder, tmp_path, damage):
+    graphs = graphs_of(folder, tmp_path / "kept", count=1)
+    made = graphs[Item(0, (1,))]
+    path = files_in(tmp_path / "kept")[0]
+    if damage is None:
+        image = graphs.pictures[0].image
+        content = image.read_bytes()
+        image.write_bytes(content + b"\0")
+        before = path.stat().st_mtime_ns
+    else:
+        path.write_bytes(damage)
+        before = 0
+    assert same(graphs[Item(0, (1,))], made)
+    assert path.stat().st_mtime_ns != before
+    assert path.stat().st_size > 1000
+
+
+def test_other_meshes_have_other_views(folder, tmp_path):
+    graphs_of(folder, tmp_path / "kept", count=1)[Item(0, (1,))]
+    graphs_of(folder, tmp_path / "kept", count=1, radius=0.05)[Item(0, (1,))]
+    assert len(list((tmp_path / "kept").iterdir())) == 2

@@ -1,0 +1,81 @@
+"""Weights follow their gradients in the ways that recipes name."""
+
+import pytest
+import torch
+from torch import nn
+
+from vm_train.learning.optimizer import Descent
+from vm_train.learning.recipe import OPTIMIZERS, Recipe
+
+RATE = 0.02
+
+
+def layer(seed=1):
+    torch.manual_seed(seed)
+    made = nn.Linear(28, 4)
+    made.weight.grad, made.bias.grad = torch.randn(4, 28) * torch.tensor([[1.0], [1e-3], [30.0], [0.2]]), torch.randn(4)
+    return made
+
+
+def descent(made, optimizer, schedule="constant"):
+    return Descent(made, Recipe(optimizer=optimizer, rate=RATE, schedule=schedule, decay=0.0), total=10)
+
+
+@pytest.mark.parametrize("optimizer", OPTIMIZERS)
+def test_every_weight_goes_against_its_gradient(optimizer):
+    made = layer()
+    before, gradient = made.bias.detach().clone(), made.bias.grad.clone()
+    matrix, slope = made.weight.detach().clone(), made.weight.grad.clone()
+    descent(made, optimizer).step()
+    assert (((made.bias.detach() - before) * gradient) < 0.0).all()
+    assert ((made.weight.detach() - matrix) * slope).sum() < 0.0
+
+
+def test_with_muon_weak_and_strong_channels_learn_alike():
+    made = layer()
+    before = made.weight.detach().clone()
+    descent(made, "muon").step()
+    singular = torch.linalg.svdvals((made.weight.detach() - before) / RATE)
+    assert singular.max() < 1.3  # what five steps of Newton and Schulz leave of the gradient's, 30 to 0.001
+    assert (singular > 0.5).sum() >= 3
+
+
+@pytest.mark.parametrize("optimizer", OPTIMIZERS)
+def test_a_rate_of_zero_moves_nothing(optimizer):
+    made = layer()
+    before = {name: value.clone() for name, value in made.state_dict().items()}
+    following = descent(made, optimizer)
+    following.rate = 0.0
+    following.step()
+    assert following.rate == 0.0
+    assert all(torch.equal(before[name], value) for name, value in made.state_dict().items())
+
+
+@pytest.mark.parametrize("optimizer", OPTIMIZERS)
+def test_one_cycle_goes_up_to_the_rate_and_down(optimizer):
+    made = layer()
+    following = descent(made, optimizer, "one_cycle")
+    rates = []
+    for _ in range(10):
+        rates.append(following.rate)
+        following.step()
+    top = rates.index(max(rates))
+    assert 0 < top < 9
+    assert max(rates) == pytest.approx(RATE, rel=0.05)
+    assert rates[:top] == sorted(rates[:top])
+    assert rates[top:] == sorted(rates[top:], reverse=True)
+    assert rates[-1] < 0.001 * RATE
+
+
+def test_forgotten_gradients_are_none():
+    made = layer()
+    following = descent(made, "muon")
+    following.forget()
+    assert made.weight.grad is None
+    assert made.bias.grad is None
+
+
+def test_a_state_of_another_optimizer_is_refused():
+    muon, adam = descent(layer(), "muon"), descent(layer(), "adamw")
+    with pytest.raises((ValueError, KeyError, TypeError)):
+        muon.load_state_dict(adam.state_dict())
