@@ -24,8 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from vm_embedded.lens_file import read_lens_file
-from vm_embedded.sections import read_sections
+from vm_embedded.config.sections import read_sections
+from vm_embedded.geometry.lens_files import read_lens_file
 from vm_train.data.split import Split
 from vm_train.learning.configuration import TrainConfiguration
 

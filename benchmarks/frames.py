@@ -8,7 +8,7 @@ from pathlib import Path
 
 from vm_embedded import Lens, Orientation, read_lens_file
 from vm_embedded.arrays import Image
-from vm_embedded.sources import read_image
+from vm_embedded.cameras.image_files import read_image
 
 _TOP = Path(__file__).parents[1]
 

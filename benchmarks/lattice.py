@@ -14,11 +14,11 @@ import numpy as np
 import torch
 
 from vm_embedded import Equisolid, Orientation, Settings
-from vm_embedded.layouts import laid_out
-from vm_embedded.manifest import Manifest, ObjectClass
-from vm_embedded.onnx_file import read_model
-from vm_embedded.projection import project
-from vm_embedded.session import Session
+from vm_embedded.detection.projection import project
+from vm_embedded.network.choose_layout import laid_out
+from vm_embedded.network.manifest import Manifest, ObjectClass
+from vm_embedded.network.model_file import read_model
+from vm_embedded.network.session import Session
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape

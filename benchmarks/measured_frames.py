@@ -20,11 +20,11 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Image
-from vm_embedded.detections import Detection
-from vm_embedded.detector import Detector
-from vm_embedded.lens_file import read_lens_file
-from vm_embedded.settings import Settings
-from vm_embedded.shipped import DEFAULT, model_path
+from vm_embedded.detection.detections import Detection
+from vm_embedded.detection.detector import Detector
+from vm_embedded.detection.settings import Settings
+from vm_embedded.geometry.lens_files import read_lens_file
+from vm_embedded.network.bundled import DEFAULT, model_path
 
 CELL = 240  # [px]
 

@@ -6,8 +6,8 @@ import numpy as np
 import torch
 
 from vm_embedded.arrays import Indices, Singles
-from vm_embedded.manifest import Manifest, ObjectClass
-from vm_embedded.onnx_file import ModelFile, read_model
+from vm_embedded.network.manifest import Manifest, ObjectClass
+from vm_embedded.network.model_file import ModelFile, read_model
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
 from vm_export.network_shape import Layer, NetworkShape

@@ -21,13 +21,13 @@ import cv2
 import numpy as np
 
 from vm_embedded import Detector, Orientation, Settings
-from vm_embedded.bench import cold, machine, measure, rss_mib, sgemm_rate, walk
-from vm_embedded.cache import MeshCache
-from vm_embedded.layouts import laid_out
-from vm_embedded.mesh import Mesh
-from vm_embedded.onnx_file import ModelFile
-from vm_embedded.projection import project
-from vm_embedded.shipped import DEFAULT, SHIPPED, model_path
+from vm_embedded.cli.measuring import cold, machine, measure, rss_mib, sgemm_rate, walk
+from vm_embedded.detection.cache import MeshCache
+from vm_embedded.detection.projection import project
+from vm_embedded.mesh.mesh import Mesh
+from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
+from vm_embedded.network.choose_layout import laid_out
+from vm_embedded.network.model_file import ModelFile
 from vm_export.network import Network
 
 from .frames import Frame, demo_frames, frames

@@ -16,8 +16,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from vm_embedded.settings import Settings
-from vm_embedded.shipped import DEFAULT, SHIPPED, model_path
+from vm_embedded.detection.settings import Settings
+from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
 from vm_train.data.pictures import find_pictures
 from vm_train.evaluation.evaluation import Evaluation, Rules
 from vm_train.evaluation.workers import Job, evaluate

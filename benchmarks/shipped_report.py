@@ -11,8 +11,8 @@ import numpy as np
 
 from benchmarks.report import fill, table
 from benchmarks.shipped import METERS, NETWORKS, RANGES, RESULTS, SETS
-from vm_embedded.onnx_file import read_model
-from vm_embedded.shipped import DEFAULT, model_path
+from vm_embedded.network.bundled import DEFAULT, model_path
+from vm_embedded.network.model_file import read_model
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "results.md"

@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from vm_embedded.bench import machine
+from vm_embedded.cli.measuring import machine
 
 RESULTS = Path(__file__).with_name("synth.json")
 PAGE = Path(__file__).parents[1] / "docs" / "synth.md"

@@ -19,10 +19,10 @@ import numpy as np
 
 from benchmarks.shipped import FRAMES_AN_HOUR, NETWORKS
 from vm_embedded.arrays import Singles
+from vm_embedded.detection.objects import Scene, find_objects
+from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import GeometryError
-from vm_embedded.manifest import Manifest
-from vm_embedded.objects import Scene, find_objects
-from vm_embedded.settings import Settings
+from vm_embedded.network.manifest import Manifest
 from vm_export.grid import VISUAL
 from vm_train.data.pictures import read_picture
 from vm_train.evaluation.answers import Exact, load_subject, scene_of

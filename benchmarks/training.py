@@ -19,8 +19,8 @@ import cv2
 import numpy as np
 import torch
 
-from vm_embedded.bench import machine
-from vm_embedded.sections import read_sections
+from vm_embedded.cli.measuring import machine
+from vm_embedded.config.sections import read_sections
 from vm_export.network import Network
 from vm_train.data.pictures import find_pictures
 from vm_train.data.split import Split

@@ -29,16 +29,16 @@ TOP = Path(__file__).parents[1]
 sys.path.insert(0, str(TOP))
 
 from vm_embedded import __version__  # noqa: E402
-from vm_embedded.camera import CameraSettings  # noqa: E402
-from vm_embedded.configuration import Configuration, read_configuration  # noqa: E402
+from vm_embedded.cameras.camera import CameraSettings  # noqa: E402
+from vm_embedded.config.sections import documented  # noqa: E402
+from vm_embedded.detection.settings import Settings  # noqa: E402
 from vm_embedded.errors import InputError, VisualMeshError  # noqa: E402
 from vm_embedded.files import written_beside  # noqa: E402
-from vm_embedded.onnx_file import read_model  # noqa: E402
-from vm_embedded.outputs import OutputSettings  # noqa: E402
-from vm_embedded.sections import documented  # noqa: E402
-from vm_embedded.session import Session  # noqa: E402
-from vm_embedded.settings import Settings  # noqa: E402
-from vm_embedded.shipped import DEFAULT, model_path  # noqa: E402
+from vm_embedded.live.configuration import Configuration, read_configuration  # noqa: E402
+from vm_embedded.network.bundled import DEFAULT, model_path  # noqa: E402
+from vm_embedded.network.model_file import read_model  # noqa: E402
+from vm_embedded.network.session import Session  # noqa: E402
+from vm_embedded.output.channels import OutputSettings  # noqa: E402
 
 NAME = "vm-embedded-robot"
 LOCK = TOP / "deploy" / "robot.txt"

@@ -9,11 +9,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from vm_embedded import bench_cli as bench
-from vm_embedded import cli as detect
-from vm_embedded import doctor_cli as doctor
-from vm_embedded.configuration import Configuration
-from vm_embedded.sections import documented
+from vm_embedded.cli import bench, detect, doctor
+from vm_embedded.config.sections import documented
+from vm_embedded.live.configuration import Configuration
 from vm_export import cli as export
 from vm_mesh import cli as mesh
 from vm_synth import cli as synth

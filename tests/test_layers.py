@@ -121,7 +121,7 @@ def test_runtime_imports_three_packages_and_the_standard_library():
 
 def test_a_fresh_interpreter_does_not_load_the_training_side():
     program = (
-        "import sys, json, vm_embedded, vm_embedded.cli;"
+        "import sys, json, vm_embedded, vm_embedded.cli.detect;"
         "print(json.dumps(sorted({name.split('.')[0] for name in sys.modules})))"
     )
     loaded = json.loads(subprocess.run([sys.executable, "-c", program], capture_output=True, check=True).stdout)

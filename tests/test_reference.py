@@ -79,10 +79,10 @@ def test_points_pixels_and_probabilities_are_the_reference_s(shared, points, ind
 
 def steps_from(sources, shared, index, rays):
     """Graph steps (n,) of each point on screen from the nearest of `sources`."""
-    from vm_embedded.lens_file import read_lens_file
-    from vm_embedded.mesh_models import build_mesh
-    from vm_embedded.projection import project
-    from vm_embedded.shapes import Sphere
+    from vm_embedded.detection.projection import project
+    from vm_embedded.geometry.lens_files import read_lens_file
+    from vm_embedded.geometry.shapes import Sphere
+    from vm_embedded.mesh.models import build_mesh
 
     file = read_lens_file(shared / f"reference/images/lens{index:07d}.yaml")
     mesh = build_mesh(Sphere(0.0949996), file.orientation.height, 6, 20.0)

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vm_embedded.configuration import read_configuration
-from vm_embedded.detector import Detector
-from vm_embedded.onnx_file import read_model
-from vm_embedded.settings import Settings
-from vm_embedded.shipped import DEFAULT, SHIPPED, model_path
+from vm_embedded.detection.detector import Detector
+from vm_embedded.detection.settings import Settings
+from vm_embedded.live.configuration import read_configuration
+from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
+from vm_embedded.network.model_file import read_model
 
 TOP = Path(__file__).parents[1]
 DEMO = TOP / "tests" / "fixtures" / "demo"

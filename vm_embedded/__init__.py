@@ -1,15 +1,15 @@
 """The Visual Mesh detector for robots: numpy, ONNX Runtime and OpenCV, nothing else."""
 
-from .detections import ClassPoints, Detection, Detections
-from .detector import Detector
+from .detection.detections import ClassPoints, Detection, Detections
+from .detection.detector import Detector
+from .detection.multi_view import Sighting, View, detect_views
+from .detection.settings import Settings
 from .errors import GeometryError, InputError, ModelError, VisualMeshError
-from .lens import Equidistant, Equisolid, Lens, Rectilinear
-from .lens_file import read_lens_file
-from .lens_opencv import BrownLens, FisheyeLens
-from .orientation import Orientation
-from .planes import GROUND, Plane, Pose
-from .settings import Settings
-from .views import Sighting, View, detect_views
+from .geometry.calibrated_lenses import BrownLens, FisheyeLens
+from .geometry.lens import Equidistant, Equisolid, Lens, Rectilinear
+from .geometry.lens_files import read_lens_file
+from .geometry.orientation import Orientation
+from .geometry.planes import GROUND, Plane, Pose
 
 __all__ = [
     "GROUND",

@@ -12,7 +12,7 @@ import torch
 
 from vm_embedded.errors import InputError, ModelError, one_line
 from vm_embedded.files import written_beside
-from vm_embedded.manifest import Manifest
+from vm_embedded.network.manifest import Manifest
 
 from .grid import VISUAL, Grid
 from .network import Network

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vm_embedded.errors import InputError, VisualMeshError
-from vm_embedded.manifest import EDGES, LAYOUTS
+from vm_embedded.network.manifest import EDGES, LAYOUTS
 
 if TYPE_CHECKING:
     from .checkpoint import Checkpoint

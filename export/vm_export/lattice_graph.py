@@ -1,4 +1,4 @@
-"""The graph for lattices: ordinary convolutions of 3 x 3, and no look-ups; see vm_embedded/lattice_layout.py.
+"""The graph for lattices: ordinary convolutions of 3 x 3, and no look-ups; see vm_embedded/network/lattice_layout.py.
 
 The off-screen point is a place in the picture that has only gaps around it. It goes through every layer, and before
 each convolution all that is off screen gets its value.
@@ -10,7 +10,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats
 from vm_embedded.errors import ModelError
-from vm_embedded.manifest import METADATA_KEY, Manifest
+from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
 from .column_layers import column_layers
 from .graph import BOOL, FLOAT, Graph

@@ -11,13 +11,13 @@ import torch
 
 import vm_embedded
 from vm_embedded.arrays import Indices, Singles
+from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import ModelError
 from vm_embedded.files import written_beside
-from vm_embedded.grids import lattice_neighbors
-from vm_embedded.manifest import Manifest, SelfTest
-from vm_embedded.onnx_file import ModelFile
-from vm_embedded.session import Session
-from vm_embedded.settings import Settings
+from vm_embedded.mesh.grids import lattice_neighbors
+from vm_embedded.network.manifest import Manifest, SelfTest
+from vm_embedded.network.model_file import ModelFile
+from vm_embedded.network.session import Session
 
 from .checkpoint import Checkpoint
 from .lattice_graph import lattice_graph

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from vm_embedded.manifest import METADATA_KEY, Manifest
+from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
 from .graph import FLOAT, INT32, Graph
 from .network import GraphConvolution, Network, SeparableConvolution

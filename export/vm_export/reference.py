@@ -20,8 +20,8 @@ from torch import nn
 
 from vm_embedded.errors import InputError, VisualMeshError, one_line, unknown
 from vm_embedded.files import written_beside
-from vm_embedded.manifest import Manifest, ObjectClass
-from vm_embedded.mesh_models import MESH_MODELS
+from vm_embedded.mesh.models import MESH_MODELS
+from vm_embedded.network.manifest import Manifest, ObjectClass
 
 from .checkpoint import Checkpoint
 from .network import Dense, GraphConvolution, Network, SeparableConvolution

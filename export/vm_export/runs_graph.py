@@ -1,4 +1,4 @@
-"""The fast graph: points as columns, in runs along their rings; see vm_embedded/layout.py for what it takes.
+"""The fast graph: points as columns, in runs along their rings; see vm_embedded/network/layout.py for what it takes.
 
 A convolution over the graph is one convolution of width 3 along memory that gives a table of G sums for each point, one
 for each group of neighbors, and one look-up of G values for each point. ArrayFeatureExtractor is the fastest operator
@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.manifest import METADATA_KEY, Manifest
-from vm_embedded.mesh import SELF, Runs
+from vm_embedded.mesh.mesh import SELF, Runs
+from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
 from .column_layers import column_layers
 from .graph import FLOAT, INT64, Graph

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.mesh import SELF, Runs
-from vm_embedded.runs_layout import GAP
+from vm_embedded.mesh.mesh import SELF, Runs
+from vm_embedded.network.runs_layout import GAP
 
 from .column_layers import Convolve, column_layers
 from .graph import FLOAT, INT64, Graph

@@ -13,19 +13,19 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.configuration import angle, length
-from vm_embedded.cylinder import Cylinder
+from vm_embedded.cameras.image_files import read_image
+from vm_embedded.detection.projection import project
 from vm_embedded.errors import InputError
 from vm_embedded.files import check_writable, written_beside
-from vm_embedded.lens import Size
-from vm_embedded.lens_file import LensFile, read_lens_file
-from vm_embedded.mesh_models import MESH_MODELS
-from vm_embedded.onnx_file import read_model
-from vm_embedded.orientation import Orientation
-from vm_embedded.projection import project
-from vm_embedded.shapes import shape_named
-from vm_embedded.shipped import model_path
-from vm_embedded.sources import read_image
+from vm_embedded.geometry.cylinder import Cylinder
+from vm_embedded.geometry.lens import Size
+from vm_embedded.geometry.lens_files import LensFile, read_lens_file
+from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.shapes import shape_named
+from vm_embedded.live.configuration import angle, length
+from vm_embedded.mesh.models import MESH_MODELS
+from vm_embedded.network.bundled import model_path
+from vm_embedded.network.model_file import read_model
 from vm_workstation.plots import check_figure_path, save_figure
 
 from .made_mesh import MadeMesh, Plan

@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 
 from vm_embedded.arrays import Floats, Indices
-from vm_embedded.cylinder import Cylinder
-from vm_embedded.mesh import Mesh
-from vm_embedded.mesh_models import mesh_model
-from vm_embedded.shape import Shape
-from vm_embedded.walls import wall_counts, wall_distances
+from vm_embedded.geometry.cylinder import Cylinder
+from vm_embedded.geometry.shape import Shape
+from vm_embedded.mesh.mesh import Mesh
+from vm_embedded.mesh.models import mesh_model
+from vm_embedded.mesh.walls import wall_counts, wall_distances
 
 
 @dataclass(frozen=True)

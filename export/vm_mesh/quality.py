@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.cylinder import Cylinder
 from vm_embedded.errors import InputError
-from vm_embedded.walls import NEAREST
+from vm_embedded.geometry.cylinder import Cylinder
+from vm_embedded.mesh.walls import NEAREST
 
 from .made_mesh import MadeMesh
 

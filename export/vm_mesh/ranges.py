@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.cylinder import Cylinder
+from vm_embedded.geometry.cylinder import Cylinder
 
 from .made_mesh import Plan
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import cv2
 
+from vm_embedded.config.sections import documented, overrides_of, read_sections
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable, written_beside
-from vm_embedded.sections import documented, overrides_of, read_sections
 from vm_workstation.progress import Ticker
 from vm_workstation.stopping import stoppable
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vm_embedded.entries import checked_number, entry
+from vm_embedded.config.entries import checked_number, entry
 from vm_embedded.errors import InputError, unknown
 
 Range = tuple[float, float]

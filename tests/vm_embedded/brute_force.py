@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from vm_embedded.shapes import Circle, Cylinder, Sphere
+from vm_embedded.geometry.shapes import Circle, Cylinder, Sphere
 
 STEPS = {
     4: ((-1, 0), (0, 1), (1, 0), (0, -1)),

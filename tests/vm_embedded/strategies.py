@@ -5,10 +5,10 @@ import math
 import numpy as np
 from hypothesis import strategies as st
 
-from vm_embedded.lens import Equidistant, Equisolid, Rectilinear
-from vm_embedded.lens_opencv import BrownLens, FisheyeLens
-from vm_embedded.mesh import Mesh
-from vm_embedded.orientation import Orientation
+from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
+from vm_embedded.geometry.lens import Equidistant, Equisolid, Rectilinear
+from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.mesh.mesh import Mesh
 
 SIZE = (640, 480)
 RADIUS = 400.0

@@ -12,10 +12,10 @@ import yaml
 
 from tests.vm_export.test_export import checkpoint, manifest
 from tests.vm_export.test_reference_format import reference_file
-from vm_embedded.manifest import EDGES, ObjectClass
-from vm_embedded.onnx_file import read_model
-from vm_embedded.session import Session
-from vm_embedded.settings import Settings as RuntimeSettings
+from vm_embedded.detection.settings import Settings as RuntimeSettings
+from vm_embedded.network.manifest import EDGES, ObjectClass
+from vm_embedded.network.model_file import read_model
+from vm_embedded.network.session import Session
 from vm_export import onnx_graph
 
 COMMAND = Path(sys.executable).parent / "vm-export"

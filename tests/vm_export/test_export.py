@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError, ModelError
-from vm_embedded.layouts import laid_out
-from vm_embedded.manifest import LAYOUTS, Manifest, ObjectClass
-from vm_embedded.mesh_models import MESH_MODELS, build_mesh
-from vm_embedded.onnx_file import read_model
-from vm_embedded.shapes import Sphere
+from vm_embedded.geometry.shapes import Sphere
+from vm_embedded.mesh.models import MESH_MODELS, build_mesh
+from vm_embedded.network.choose_layout import laid_out
+from vm_embedded.network.manifest import LAYOUTS, Manifest, ObjectClass
+from vm_embedded.network.model_file import read_model
 from vm_export import onnx_graph
 from vm_export.checkpoint import Checkpoint
 from vm_export.neighborhood import Neighborhood

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.vm_export.test_export import manifest
+from vm_embedded.detection.settings import Settings as RuntimeSettings
 from vm_embedded.errors import InputError, ModelError
-from vm_embedded.layouts import laid_out
-from vm_embedded.mesh_models import MESH_MODELS, build_mesh
-from vm_embedded.onnx_file import ModelFile, read_model
-from vm_embedded.session import Session
-from vm_embedded.settings import Settings as RuntimeSettings
+from vm_embedded.mesh.models import MESH_MODELS, build_mesh
+from vm_embedded.network.choose_layout import laid_out
+from vm_embedded.network.model_file import ModelFile, read_model
+from vm_embedded.network.session import Session
 from vm_export import onnx_graph
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network

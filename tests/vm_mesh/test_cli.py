@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 import pytest
 
-from vm_embedded.cylinder import Cylinder
-from vm_embedded.mesh_models import MESH_MODELS
-from vm_embedded.shapes import Circle, Sphere
+from vm_embedded.geometry.cylinder import Cylinder
+from vm_embedded.geometry.shapes import Circle, Sphere
+from vm_embedded.mesh.models import MESH_MODELS
 from vm_mesh.cli import main
 from vm_mesh.made_mesh import MadeMesh, Plan
 from vm_mesh.quality import links_of, on_object

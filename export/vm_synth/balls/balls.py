@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vm_embedded.arrays import Floats, Singles
-from vm_embedded.entries import check_entries, share
+from vm_embedded.config.entries import check_entries, share
 
 from ..ranges import drawn, some_of, uniform
 from .design import BallDesign, Color

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vm_embedded.entries import check_entries, share
+from vm_embedded.config.entries import check_entries, share
 
 from ..ranges import drawn, log_uniform, some_of, uniform
 from .carrier import CARRIERS, carriers, own_body

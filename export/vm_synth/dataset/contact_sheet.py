@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Image
+from vm_embedded.cameras.image_files import read_image
 from vm_embedded.errors import InputError, VisualMeshError, one_line
-from vm_embedded.lens_file import read_lens_file
-from vm_embedded.sources import read_image
+from vm_embedded.geometry.lens_files import read_lens_file
 
 from ..render.outlines import outline
 from .files import COLORS, file_of, read_truth

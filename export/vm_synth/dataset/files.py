@@ -22,7 +22,7 @@ import numpy as np
 from vm_embedded.arrays import Image
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
-from vm_embedded.lens_file import lens_text
+from vm_embedded.geometry.lens_files import lens_text
 
 from ..render.image_processing import developed, encoded
 from ..render.outlines import outline, polygon_area

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.arrays import Image
+from vm_embedded.cameras.image_files import read_image
 from vm_embedded.errors import InputError, VisualMeshError, one_line
-from vm_embedded.lens import Size
-from vm_embedded.lens_file import read_lens_file
-from vm_embedded.sources import read_image
+from vm_embedded.geometry.lens import Size
+from vm_embedded.geometry.lens_files import read_lens_file
 
 from ..scene.configuration import CLASSES
 from .files import COLORS, FORMAT, PARTS, file_of, indices_in, read_plan, read_truth

@@ -11,7 +11,7 @@ import numpy as np
 
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
-from vm_embedded.lens import Size
+from vm_embedded.geometry.lens import Size
 
 from ..scene.configuration import CLASSES
 from .inspection import Facts

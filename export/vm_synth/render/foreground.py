@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Mask, Singles
-from vm_embedded.lens import Lens, Size
+from vm_embedded.geometry.lens import Lens, Size
 
 from ..bodies.solids import LABELS
 from ..scene.configuration import CLASSES

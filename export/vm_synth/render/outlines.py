@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.lens import Lens, Size
-from vm_embedded.orientation import Orientation
+from vm_embedded.geometry.lens import Lens, Size
+from vm_embedded.geometry.orientation import Orientation
 
 
 def outline(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from vm_embedded.entries import check_entries, one_of, share
+from vm_embedded.config.entries import check_entries, one_of, share
 
 from ..balls.balls import BallRanges
 from ..bodies.catalog import BodyRanges

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Singles
-from vm_embedded.entries import check_entries, share
+from vm_embedded.config.entries import check_entries, share
 
 from ..ranges import drawn, log_uniform, some_of, uniform
 

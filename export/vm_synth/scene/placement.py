@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from vm_embedded.arrays import Floats, Mask
-from vm_embedded.lens import RadialLens, Size
-from vm_embedded.orientation import Orientation
+from vm_embedded.geometry.lens import RadialLens, Size
+from vm_embedded.geometry.orientation import Orientation
 
 from ..balls.balls import draw_design
 from ..bodies.catalog import draw_carrier, draw_clutter, draw_distractor, draw_furniture, draw_person, draw_robot

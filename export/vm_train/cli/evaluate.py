@@ -11,9 +11,9 @@ from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import vm_embedded
-from vm_embedded.configuration import read_configuration
+from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError, VisualMeshError
-from vm_embedded.settings import Settings
+from vm_embedded.live.configuration import read_configuration
 from vm_workstation.stopping import stoppable
 
 from .evaluate_options import parser as parser
@@ -158,8 +158,8 @@ def _notes(options: argparse.Namespace, settings: Settings, subject: Subject, re
 
 def _points(options: argparse.Namespace) -> int:
     from vm_embedded.files import check_writable
-    from vm_embedded.orientation import Orientation
-    from vm_embedded.shapes import Sphere
+    from vm_embedded.geometry.orientation import Orientation
+    from vm_embedded.geometry.shapes import Sphere
     from vm_workstation.plots import check_figure_path, save_figure
 
     from ..evaluation.points_on_ball import DISTANCES, PAPER_CAMERA, Camera, points_over_distance

@@ -6,7 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
-from vm_embedded.options import add_settings
+from vm_embedded.cli.options import add_settings
 
 _EPILOG = """\
 another command, with a --help of its own:

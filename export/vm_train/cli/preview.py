@@ -15,7 +15,7 @@ import numpy as np
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
-from vm_embedded.manifest import Manifest
+from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 
 from ..data.pictures import Picture

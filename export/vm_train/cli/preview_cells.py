@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.errors import GeometryError
-from vm_embedded.lens_file import LensFile
-from vm_embedded.manifest import Manifest
+from vm_embedded.geometry.lens_files import LensFile
+from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 from vm_synth.dataset.contact_sheet import placed
 

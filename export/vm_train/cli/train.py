@@ -13,9 +13,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vm_embedded.config.sections import documented, overrides_of, read_sections
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable
-from vm_embedded.sections import documented, overrides_of, read_sections
 from vm_workstation.progress import Ticker
 from vm_workstation.stopping import stoppable
 

@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 
 from vm_embedded.errors import VisualMeshError, unknown
-from vm_embedded.lens import Lens, RadialLens, Size
-from vm_embedded.lens_file import LensFile
-from vm_embedded.lens_opencv import CalibratedLens
+from vm_embedded.geometry.calibrated_lenses import CalibratedLens
+from vm_embedded.geometry.lens import Lens, RadialLens, Size
+from vm_embedded.geometry.lens_files import LensFile
 from vm_workstation.worker_process import begin, shielded
 
 from .picture_files import PictureFault, PictureFiles

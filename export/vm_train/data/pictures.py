@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Image
 from vm_embedded.errors import InputError
-from vm_embedded.lens_file import LensFile, read_lens_file
+from vm_embedded.geometry.lens_files import LensFile, read_lens_file
 
 from .picture_files import IMAGES as IMAGES
 from .picture_files import PARTS, PictureFault, RawPicture

@@ -15,19 +15,19 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from vm_embedded.arrays import Floats, Singles
-from vm_embedded.detections import Detection
-from vm_embedded.detector import Detector
+from vm_embedded.detection.detections import Detection
+from vm_embedded.detection.detector import Detector
+from vm_embedded.detection.objects import Scene, find_objects
+from vm_embedded.detection.projection import Projection
+from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
-from vm_embedded.layout import Layout, PlainLayout
-from vm_embedded.layouts import laid_out
-from vm_embedded.manifest import Manifest
-from vm_embedded.mesh import Mesh
-from vm_embedded.objects import Scene, find_objects
-from vm_embedded.onnx_file import read_model
-from vm_embedded.orientation import Orientation, rotation_z
-from vm_embedded.projection import Projection
-from vm_embedded.session import Session
-from vm_embedded.settings import Settings
+from vm_embedded.geometry.orientation import Orientation, rotation_z
+from vm_embedded.mesh.mesh import Mesh
+from vm_embedded.network.choose_layout import laid_out
+from vm_embedded.network.layout import Layout, PlainLayout
+from vm_embedded.network.manifest import Manifest
+from vm_embedded.network.model_file import read_model
+from vm_embedded.network.session import Session
 from vm_export.grid import VISUAL, Grid
 
 from ..data.pictures import Picture

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vm_embedded.errors import GeometryError, InputError
-from vm_embedded.manifest import Manifest
+from vm_embedded.network.manifest import Manifest
 
 from ..data.picture_files import PictureFault
 from ..data.pictures import Classes, Picture, PictureFiles, read_picture

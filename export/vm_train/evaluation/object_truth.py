@@ -13,8 +13,8 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Mask
 from vm_embedded.errors import InputError
-from vm_embedded.manifest import Manifest
-from vm_embedded.shape import Shape
+from vm_embedded.geometry.shape import Shape
+from vm_embedded.network.manifest import Manifest
 from vm_synth.render.outlines import outline, polygon_area
 
 from ..data.pictures import Picture

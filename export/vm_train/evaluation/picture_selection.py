@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
+from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError, unknown
-from vm_embedded.manifest import Manifest
-from vm_embedded.sections import read_sections
+from vm_embedded.network.manifest import Manifest
 from vm_synth.dataset.files import COLORS
 
 from ..data.pictures import IMAGES, Classes, Color, PictureFiles, find_pictures

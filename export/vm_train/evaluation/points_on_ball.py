@@ -10,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Mask, Number, frozen
+from vm_embedded.detection.projection import project
 from vm_embedded.errors import InputError
-from vm_embedded.lens import Equisolid, Lens, Size
-from vm_embedded.mesh import Mesh
-from vm_embedded.mesh_models import build_mesh
-from vm_embedded.orientation import Orientation
-from vm_embedded.projection import project
-from vm_embedded.shapes import Sphere
+from vm_embedded.geometry.lens import Equisolid, Lens, Size
+from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.shapes import Sphere
+from vm_embedded.mesh.mesh import Mesh
+from vm_embedded.mesh.models import build_mesh
 
 from ..graphs.hexagonal import HexagonalMesh, seen_hexagonal_mesh
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
+from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import VisualMeshError
-from vm_embedded.settings import Settings
 from vm_workstation.worker_process import begin, shielded
 
 from ..data.pictures import Classes, PictureFiles

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Mask, Singles
-from vm_embedded.detections import Detection
+from vm_embedded.detection.detections import Detection
 
 from ..data.pictures import PictureFiles
 from ..scores.object_scores import Mistakes

@@ -20,12 +20,12 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Image
+from vm_embedded.cli.progress import Progress
 from vm_embedded.errors import InputError, VisualMeshError, unknown
 from vm_embedded.files import written_beside
-from vm_embedded.lens import projection_named
-from vm_embedded.lens_file import lens_text
-from vm_embedded.orientation import Orientation
-from vm_embedded.progress import Progress
+from vm_embedded.geometry.lens import projection_named
+from vm_embedded.geometry.lens_files import lens_text
+from vm_embedded.geometry.orientation import Orientation
 
 from ..data.pictures import IMAGES
 from .tfexample import BytesList, Example, FloatList

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from vm_embedded.errors import InputError
-from vm_embedded.manifest import Manifest
+from vm_embedded.network.manifest import Manifest
 from vm_export.grid import VISUAL
 from vm_export.network import Network
 from vm_export.second_look import Gate, SecondLook

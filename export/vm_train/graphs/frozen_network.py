@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vm_embedded.errors import InputError
-from vm_embedded.manifest import Manifest
+from vm_embedded.network.manifest import Manifest
 from vm_export.checkpoint import Checkpoint
 from vm_export.grid import Grid
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Indices, Mask, frozen
 from vm_embedded.errors import InputError
-from vm_embedded.lens import Lens, Size
+from vm_embedded.geometry.lens import Lens, Size
 
 ROW = math.sqrt(3.0) / 2.0
 """Distance of two rows, in spacings of the points within a row."""

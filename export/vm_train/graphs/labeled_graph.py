@@ -10,14 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Indices, Singles
-from vm_embedded.footprint import alike, levels_of
-from vm_embedded.lens import Lens, Size
-from vm_embedded.lens_file import LensFile
-from vm_embedded.manifest import Manifest
-from vm_embedded.mesh import Mesh
-from vm_embedded.projection import Projection, along, project
-from vm_embedded.relative import make_relative
-from vm_embedded.sampling import sample
+from vm_embedded.detection.color_normalization import make_relative
+from vm_embedded.detection.footprint import alike, levels_of
+from vm_embedded.detection.projection import Projection, along, project
+from vm_embedded.detection.sampling import sample
+from vm_embedded.geometry.lens import Lens, Size
+from vm_embedded.geometry.lens_files import LensFile
+from vm_embedded.mesh.mesh import Mesh
+from vm_embedded.network.manifest import Manifest
 from vm_export.grid import VISUAL, Grid
 
 from ..data.pictures import Labels, Picture

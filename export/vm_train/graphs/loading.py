@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from torch.utils.data import DataLoader, Dataset
 
+from vm_embedded.detection.color_normalization import make_relative
 from vm_embedded.errors import GeometryError, InputError, VisualMeshError
-from vm_embedded.manifest import Manifest
-from vm_embedded.relative import make_relative
+from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 from vm_workstation.worker_process import begin, shielded
 

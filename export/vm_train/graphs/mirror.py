@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from vm_embedded.mesh import MeshModel
+from vm_embedded.mesh.mesh import MeshModel
 
 from .labeled_graph import Graph
 

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from vm_embedded.entries import check_entries, number, one_of, share
+from vm_embedded.config.entries import check_entries, number, one_of, share
+from vm_embedded.detection.color_normalization import COLORINGS
 from vm_embedded.errors import InputError
-from vm_embedded.manifest import KINDS, POINT_SAMPLINGS, Manifest, ObjectClass
-from vm_embedded.mesh_models import MESH_MODELS
-from vm_embedded.relative import COLORINGS
-from vm_embedded.shapes import SHAPES
+from vm_embedded.geometry.shapes import SHAPES
+from vm_embedded.mesh.models import MESH_MODELS
+from vm_embedded.network.manifest import KINDS, POINT_SAMPLINGS, Manifest, ObjectClass
 from vm_export.grid import GRIDS, Grid
 from vm_export.network_shape import ACTIVATIONS, NetworkShape
 from vm_synth.dataset.files import COLORS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vm_embedded.entries import check_entries, number, one_of
+from vm_embedded.config.entries import check_entries, number, one_of
 
 from .selection import RULES
 

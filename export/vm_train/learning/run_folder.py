@@ -21,9 +21,9 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded import __version__
+from vm_embedded.config.sections import documented, read_sections
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
-from vm_embedded.sections import documented, read_sections
 
 from ..data.decoded_cache import Unpacked
 from ..data.pictures import PictureFiles, find_pictures

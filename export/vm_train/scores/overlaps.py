@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from vm_embedded.arrays import Floats, Mask, Singles
-from vm_embedded.lens import Size
+from vm_embedded.geometry.lens import Size
 
 _LINES = 8
 """Scan lines per row of pixels, along which the share inside an outline is exact."""
@@ -19,7 +19,7 @@ Window = tuple[slice, slice]
 
 
 class Found(Protocol):
-    """What is needed of a found object; `vm_embedded.detections.Detection` is one.
+    """What is needed of a found object; `vm_embedded.detection.detections.Detection` is one.
 
     confidence. outline (m, 2) [px]: of the whole object, also beyond the picture. position (3,) [m]: on the plane.
     """

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vm_embedded.errors import InputError
-from vm_embedded.lens_file import read_lens_file
+from vm_embedded.geometry.lens_files import read_lens_file
 from vm_synth.cli import main, parsers
 from vm_synth.dataset.contact_sheet import OUTLINE, captions, cell, chosen, placed, read_shown, sheet, tinted
 from vm_synth.dataset.files import PARTS, file_of, read_truth

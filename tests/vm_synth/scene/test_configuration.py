@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import vm_synth
-from vm_embedded.entries import check_entries, number, one_of, share
+from vm_embedded.config.entries import check_entries, number, one_of, share
+from vm_embedded.config.sections import documented, read_sections
 from vm_embedded.errors import InputError
-from vm_embedded.sections import documented, read_sections
 from vm_synth.bodies.solids import LABELS
 from vm_synth.ranges import drawn, log_uniform, some_of, uniform
 from vm_synth.scene.configuration import CLASSES, SceneConfiguration

@@ -8,9 +8,9 @@ import pytest
 
 from vm_embedded import Orientation
 from vm_embedded.errors import InputError
-from vm_embedded.lens import Equisolid
-from vm_embedded.lens_file import LensFile
-from vm_embedded.manifest import Manifest, ObjectClass
+from vm_embedded.geometry.lens import Equisolid
+from vm_embedded.geometry.lens_files import LensFile
+from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_export.grid import Grid
 from vm_train.cli.preview import sheet, write_sheet
 from vm_train.cli.preview_cells import GAP, middle, point_colors

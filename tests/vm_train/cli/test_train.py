@@ -80,7 +80,7 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, data):
 
 
 def test_its_network_is_exported_with_its_provenance(whole, tmp_path):
-    from vm_embedded.onnx_file import read_model
+    from vm_embedded.network.model_file import read_model
 
     folder, _ = whole
     done = subprocess.run(

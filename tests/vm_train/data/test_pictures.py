@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from vm_embedded import Orientation
 from vm_embedded.errors import InputError
-from vm_embedded.lens import Equisolid
-from vm_embedded.manifest import Manifest, ObjectClass
+from vm_embedded.geometry.lens import Equisolid
+from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_synth.dataset.files import lens_text
 from vm_train.data.picture_files import PictureFault
 from vm_train.data.pictures import UNLABELED, Classes, find_pictures, read_picture

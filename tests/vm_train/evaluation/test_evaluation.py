@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
+from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError, ModelError
-from vm_embedded.lens_file import read_lens_file
-from vm_embedded.onnx_file import read_model
-from vm_embedded.settings import Settings
+from vm_embedded.geometry.lens_files import read_lens_file
+from vm_embedded.network.model_file import read_model
 from vm_export.checkpoint import Checkpoint
 from vm_export.grid import Grid
 from vm_export.onnx_graph import export

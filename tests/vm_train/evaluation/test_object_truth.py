@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vm_embedded.errors import InputError
-from vm_embedded.onnx_file import read_model
+from vm_embedded.network.model_file import read_model
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.object_truth import SceneBall, SceneTruth, read_scene, true_objects
 from vm_train.evaluation.picture_selection import classes_of, usual_colors

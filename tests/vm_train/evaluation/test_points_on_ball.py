@@ -6,10 +6,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError, InputError
-from vm_embedded.lens import Equisolid
-from vm_embedded.mesh_models import build_mesh
-from vm_embedded.orientation import Orientation
-from vm_embedded.shapes import Sphere
+from vm_embedded.geometry.lens import Equisolid
+from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.shapes import Sphere
+from vm_embedded.mesh.models import build_mesh
 from vm_train.evaluation.points_on_ball import (
     BEARINGS,
     PAPER_BALL,

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from vm_embedded import Orientation
-from vm_embedded.entries import check_entries
+from vm_embedded.config.entries import check_entries
 from vm_embedded.errors import InputError
-from vm_embedded.lens import Equidistant, Equisolid, Rectilinear
-from vm_embedded.lens_file import LensFile
-from vm_embedded.lens_opencv import BrownLens, FisheyeLens
+from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
+from vm_embedded.geometry.lens import Equidistant, Equisolid, Rectilinear
+from vm_embedded.geometry.lens_files import LensFile
 from vm_train.data.pictures import Picture
 from vm_train.graphs.augmentation import (
     OFF,

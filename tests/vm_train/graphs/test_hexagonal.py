@@ -6,12 +6,12 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vm_embedded.detection.projection import project
 from vm_embedded.errors import InputError
-from vm_embedded.lens import Equisolid, Rectilinear
-from vm_embedded.mesh_models import build_mesh
-from vm_embedded.orientation import Orientation
-from vm_embedded.projection import project
-from vm_embedded.shapes import Sphere
+from vm_embedded.geometry.lens import Equisolid, Rectilinear
+from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.shapes import Sphere
+from vm_embedded.mesh.models import build_mesh
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape
 from vm_train.graphs.hexagonal import hexagonal_mesh, seen_hexagonal_mesh

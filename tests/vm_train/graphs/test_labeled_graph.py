@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.lens import Equidistant, Equisolid, Rectilinear
-from vm_embedded.lens_file import LensFile
-from vm_embedded.manifest import Manifest, ObjectClass
-from vm_embedded.mesh_models import build_mesh
-from vm_embedded.orientation import Orientation
-from vm_embedded.projection import project
+from vm_embedded.detection.projection import project
+from vm_embedded.geometry.lens import Equidistant, Equisolid, Rectilinear
+from vm_embedded.geometry.lens_files import LensFile
+from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.mesh.models import build_mesh
+from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_train.graphs.labeled_graph import seen_points
 
 MANIFEST = Manifest(

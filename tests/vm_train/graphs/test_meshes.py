@@ -66,7 +66,9 @@ def test_trained_exported_and_run(model, layouts, data, tmp_path):
     for layout in layouts:
         file = tmp_path / f"{layout}.onnx"
         run("vm_export.cli", tmp_path / "run/model.pt", "-o", file, "--layout", layout)
-        shown = run("vm_embedded.cli", "--model", file, "--camera", data, "--threshold", 0.2, "--emit-points", "field")
+        shown = run(
+            "vm_embedded.cli.detect", "--model", file, "--camera", data, "--threshold", 0.2, "--emit-points", "field"
+        )
         answers.append([json.loads(line) for line in shown.splitlines()])
     assert len(answers[0]) == 12
     assert sum(each["points"] for each in answers[0]) > 1000

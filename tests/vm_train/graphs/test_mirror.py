@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from vm_embedded.lens import Rectilinear
-from vm_embedded.lens_file import LensFile
-from vm_embedded.manifest import Manifest, ObjectClass
-from vm_embedded.mesh_models import MESH_MODELS
-from vm_embedded.orientation import Orientation
+from vm_embedded.geometry.lens import Rectilinear
+from vm_embedded.geometry.lens_files import LensFile
+from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.mesh.models import MESH_MODELS
+from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_train.data.pictures import Picture
 from vm_train.graphs.labeled_graph import graph_of
 from vm_train.graphs.mirror import mirrored, mirrored_places

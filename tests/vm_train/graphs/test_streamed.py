@@ -13,8 +13,8 @@ import pytest
 import torch
 
 from tests.vm_train.drawn import CLASSES, draw_set
+from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError
-from vm_embedded.sections import read_sections
 from vm_export.checkpoint import Checkpoint
 from vm_train.cli.stream_options import shard_names
 from vm_train.cli.train import main

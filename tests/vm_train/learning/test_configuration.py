@@ -2,8 +2,8 @@
 
 import pytest
 
+from vm_embedded.config.sections import documented, overrides_of, read_sections
 from vm_embedded.errors import InputError
-from vm_embedded.sections import documented, overrides_of, read_sections
 from vm_train.learning.configuration import TrainConfiguration
 from vm_train.learning.recipe import Recipe
 

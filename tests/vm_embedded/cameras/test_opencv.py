@@ -1,0 +1,161 @@
+"""What is asked of a device, and what is believed of its frames, with a capture that stands in for one."""
+
+import time
+
+import cv2
+import numpy as np
+import pytest
+
+from vm_embedded.cameras import opencv as camera_opencv
+from vm_embedded.cameras.camera import BrokenFrameError, CameraError, CameraSettings
+from vm_embedded.cameras.opencv import OpenCvCamera, check_opencv, device_of
+from vm_embedded.cameras.synthetic import SIZE, SyntheticCamera
+from vm_embedded.errors import InputError
+
+
+class Capture:
+    """A cv2.VideoCapture of a device that gives Motion JPEG."""
+
+    made = None
+
+    def __init__(self, *arguments):
+        type(self).made = self
+        self.arguments, self.asked = arguments, {}
+        self.frames = iter(())
+        self.stamp = 0.0
+
+    def isOpened(self):
+        return True
+
+    def set(self, name, value):
+        self.asked[name] = value
+        return True
+
+    def get(self, name):
+        return cv2.VideoWriter.fourcc(*"MJPG") if name == cv2.CAP_PROP_FOURCC else 1e3 * self.stamp
+
+    def read(self):
+        frame = next(self.frames, None)
+        return frame is not None, frame
+
+    def release(self):
+        self.asked["released"] = True
+
+
+@pytest.fixture
+def device(tmp_path, monkeypatch):
+    """A node, and the capture that opens it."""
+    node = tmp_path / "video0"
+    node.write_text("")
+    monkeypatch.setattr(camera_opencv, "device_of", lambda source: node)
+    monkeypatch.setattr(camera_opencv.cv2, "VideoCapture", Capture)
+    return node
+
+
+def jpeg(at=0.0):
+    content = cv2.imencode(".jpg", SyntheticCamera(CameraSettings()).drawn(at))[1]
+    return content.reshape(1, -1)
+
+
+def test_a_device_is_asked_for_what_is_configured(device):
+    settings = CameraSettings(
+        source="0", pixel_format="MJPG", width=1280, height=1024, fps=60, exposure_ms=5.0, gain=20
+    )
+    OpenCvCamera(settings).close()
+    asked = Capture.made.asked
+    assert Capture.made.arguments == (str(device), cv2.CAP_V4L2)
+    assert asked[cv2.CAP_PROP_FOURCC] == cv2.VideoWriter.fourcc(*"MJPG")
+    assert (asked[cv2.CAP_PROP_FRAME_WIDTH], asked[cv2.CAP_PROP_FRAME_HEIGHT], asked[cv2.CAP_PROP_FPS]) == (
+        1280,
+        1024,
+        60,
+    )
+    assert (asked[cv2.CAP_PROP_AUTO_EXPOSURE], asked[cv2.CAP_PROP_EXPOSURE]) == (1, 50)
+    assert (asked[cv2.CAP_PROP_GAIN], asked[cv2.CAP_PROP_BUFFERSIZE]) == (20, 1)
+    assert asked["released"]
+
+
+def test_what_is_not_configured_is_left_to_the_device(device):
+    OpenCvCamera(CameraSettings(source="0"))
+    assert set(Capture.made.asked) == {cv2.CAP_PROP_BUFFERSIZE, cv2.CAP_PROP_CONVERT_RGB}
+
+
+def test_jpegs_of_a_device_are_kept_as_they_came_and_half_ones_are_refused(device):
+    camera = OpenCvCamera(CameraSettings(source="0"))
+    whole = jpeg()
+    Capture.made.frames = iter([whole, whole[:, : whole.size // 2], whole])
+    shot = camera.read()
+    assert shot.encoded == whole.tobytes()
+    assert shot.image.shape == (SIZE[1], SIZE[0], 3)
+    with pytest.raises(BrokenFrameError, match="cut short"):
+        camera.read()
+    assert camera.read().image.shape == (SIZE[1], SIZE[0], 3)
+    with pytest.raises(CameraError, match="no frames"):
+        camera.read()
+
+
+def test_the_device_s_own_time_is_believed_only_where_it_can_be_true(device):
+    camera = OpenCvCamera(CameraSettings(source="0", latency_ms=30))
+    whole = jpeg()
+    Capture.made.frames = iter([whole] * 10)
+
+    def captured(stamp):
+        Capture.made.stamp = stamp
+        return camera.read().captured
+
+    good = time.monotonic() - 0.02
+    assert captured(good) == pytest.approx(good, abs=1e-6)
+    for wrong in (good, good - 0.5, good + 3600.0, good - 3600.0, time.time()):
+        before = time.monotonic()
+        assert before - 0.0301 <= captured(wrong) <= time.monotonic() - 0.0299
+
+
+def test_a_node_that_is_gone_ends_it_although_frames_go_on(device):
+    camera = OpenCvCamera(CameraSettings(source="0"))
+    Capture.made.frames = iter([jpeg()] * 3)
+    camera.read()
+    device.unlink()
+    with pytest.raises(CameraError, match="is gone"):
+        camera.read()
+    with pytest.raises(CameraError, match="there is no camera"):
+        OpenCvCamera(CameraSettings(source="0"))
+
+
+def test_an_address_is_read_through_ffmpeg(tmp_path):
+    path = tmp_path / "field.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
+    for at in range(3):
+        writer.write(SyntheticCamera(CameraSettings()).drawn(at / 25.0))
+    writer.release()
+    camera = OpenCvCamera(CameraSettings(source=f"file://{path}"))
+    assert all(camera.read().image.shape == (SIZE[1], SIZE[0], 3) for _ in range(3))
+    with pytest.raises(CameraError):
+        camera.read()
+    camera.close()
+    with pytest.raises(CameraError, match="can't open"):
+        OpenCvCamera(CameraSettings(source=f"file://{tmp_path / 'none.avi'}"))
+
+
+def test_names_of_devices():
+    assert str(device_of("2")) == "/dev/video2"
+    assert str(device_of("/dev/v4l/by-id/usb-x")) == "/dev/v4l/by-id/usb-x"
+    assert device_of("http://a/0") is None
+    assert device_of("²") is None
+
+
+def test_what_no_camera_of_opencv_can_be_asked_is_refused():
+    with pytest.raises(InputError, match="four letters"):
+        check_opencv(CameraSettings(source="0", pixel_format="MJPEG"))
+    built = [cv2.videoio_registry.getBackendName(each) for each in cv2.videoio_registry.getBackends()]
+    if "GSTREAMER" not in built:
+        with pytest.raises(InputError, match="no GStreamer"):
+            check_opencv(CameraSettings(source="gstreamer:videotestsrc ! appsink"))
+
+
+def test_a_picture_of_no_bytes_is_broken(device, monkeypatch):
+    monkeypatch.setattr(Capture, "get", lambda self, name: 0)
+    camera = OpenCvCamera(CameraSettings(source="0"))
+    Capture.made.frames = iter([np.zeros((0, 0, 3), np.uint8), np.zeros((2, 2), np.uint16)])
+    for _ in range(2):
+        with pytest.raises(BrokenFrameError, match="no picture"):
+            camera.read()

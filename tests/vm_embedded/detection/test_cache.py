@@ -1,0 +1,264 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from vm_embedded.detection.cache import MeshCache
+from vm_embedded.detection.projection import project
+from vm_embedded.detection.settings import Settings
+from vm_embedded.errors import GeometryError
+from vm_embedded.geometry.lens import Equidistant, Equisolid, Rectilinear
+from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.mesh.models import build_mesh
+from vm_embedded.network.manifest import LAYOUTS, Manifest, ObjectClass
+
+from ..strategies import SIZE, lenses, orientations, random_direction, reals, rotation, seeds
+
+LENS = Equisolid(focal_length=300.0, fov=2.2)
+
+in_all_layouts = pytest.mark.parametrize("layout", LAYOUTS)
+
+
+def manifest(**changes):
+    values = {
+        "shape": "sphere",
+        "radius": 0.1,
+        "object_radius": 0.1,
+        "intersections": 2.0,
+        "mesh": "xmgrid6" if changes.get("layout") == "lattice" else "ring6",
+        "max_distance": 3.0,
+        "edge": "hard",
+        "classes": (ObjectClass("ball", "object"),),
+    }
+    return Manifest(**(values | changes))
+
+
+def built(cache, height):
+    """The whole mesh for a height, without the cache."""
+    facts = cache.manifest
+    return build_mesh(facts.mesh_shape, height, facts.intersections, facts.max_distance, facts.mesh)
+
+
+def assert_same_as_without(cache, orientation, lens, size):
+    """The prepared part gives what the whole mesh gives, to the last digit."""
+    view = cache.view(orientation, lens, size)
+    slots, places = view.layout.slots, view.layout.places
+    prepared = project(view.layout, view.rotation, lens, size)
+    shown = places[prepared.on_screen[places]]
+    whole = project(built(cache, view.mesh_height), view.rotation, lens, size).visible
+    np.testing.assert_array_equal(view.layout.rays[shown], whole.graph.rays)
+    np.testing.assert_array_equal(prepared.pixels[shown], whole.pixels)
+    rank = np.full(len(view.layout) + 1, len(shown))
+    rank[shown] = np.arange(len(shown))
+    np.testing.assert_array_equal(rank[view.layout.links(shown)], whole.graph.neighbors[:-1])
+    # Copies of a point are on screen where it is, and gaps never.
+    np.testing.assert_array_equal(prepared.on_screen, np.append(prepared.on_screen[places], False)[slots])
+    assert prepared.only(view.layout.original).on_screen.sum() == len(whole)
+    np.testing.assert_allclose(view.heading @ view.rotation, orientation.rotation, atol=1e-12)
+
+
+@st.composite
+def buckets(draw):
+    """Settings, and the middle of a bucket: height, roll and pitch."""
+    steps = draw(reals(1e-3, 0.6)), draw(reals(1e-3, 0.6))
+    roll = round(draw(reals(-math.pi, math.pi)) / steps[0]) * steps[0]
+    pitch = round(draw(reals(-1.0, 0.5 * math.pi)) / steps[1]) * steps[1]
+    return Settings(roll_step=steps[0], pitch_step=steps[1]), draw(reals(0.3, 1.5)), roll, pitch
+
+
+def within(bucket, random):
+    """A random orientation of the bucket, often in its corners."""
+    settings, height, roll, pitch = bucket
+    away = 0.499 * np.sign(random.uniform(-1.0, 1.0, 2)) * random.random(2) ** 0.3
+    pitch = min(max(pitch + away[1] * settings.pitch_step, -0.5 * math.pi), 0.5 * math.pi)
+    yaw = random.uniform(-math.pi, math.pi)
+    return Orientation.from_roll_pitch(height, roll + away[0] * settings.roll_step, pitch, yaw)
+
+
+AHEAD = (Settings(), 0.8, 0.0, 0.4)
+
+
+@in_all_layouts
+@given(buckets(), lenses(), seeds)
+@example(AHEAD, Equisolid(focal_length=100.0, fov=2.0 * math.pi), 0)
+@example(AHEAD, Equidistant(focal_length=60.0, fov=2.0 * math.pi), 0)
+def test_a_bucket_never_changes_an_answer(layout, bucket, lens, seed):
+    cache = MeshCache(manifest(layout=layout), bucket[0])
+    random = np.random.default_rng(seed)
+    for _ in range(6):
+        assert_same_as_without(cache, within(bucket, random), lens, SIZE)
+    assert cache.hits + cache.misses == 6
+
+
+BROAD = (Settings(roll_step=0.5, pitch_step=0.5), 1.0, 0.0, 0.0)
+
+
+@in_all_layouts
+@given(buckets(), lenses(), seeds)
+@example(BROAD, Equisolid(focal_length=127.0, fov=1.0, distortion=(-1e-6, 0.0)), 0)
+def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(layout, bucket, lens, seed):
+    """Matrices from files are rotations to some digits only; those that Orientation accepts are answered alike."""
+    cache = MeshCache(manifest(layout=layout), bucket[0])
+    random = np.random.default_rng(seed)
+    for _ in range(6):
+        exact = within(bucket, random)
+        rough = Orientation(exact.height, exact.rotation + 2.8e-4 * random.uniform(-1.0, 1.0, (3, 3)))
+        assert_same_as_without(cache, rough, lens, SIZE)
+
+
+@in_all_layouts
+@pytest.mark.parametrize("stretch", [1.0 - 4.9e-4, 1.0 + 4.9e-4])
+@pytest.mark.parametrize("fov", [0.2, 0.8, 1.6])
+def test_a_bucket_never_changes_an_answer_of_rotations_that_are_a_little_too_long_or_short(fov, stretch, layout):
+    fine = manifest(intersections=20.0, max_distance=1.5, layout=layout)
+    cache = MeshCache(fine, Settings(pitch_step=1e-3, roll_step=1e-3))
+    for pitch in (0.8, 1.0, 1.2):
+        stretched = Orientation(0.8, stretch * Orientation.from_roll_pitch(0.8, pitch=pitch).rotation)
+        assert_same_as_without(cache, stretched, Rectilinear(focal_length=400.0, fov=fov), SIZE)
+
+
+@given(orientations(0.3, 1.5), lenses(), seeds)
+def test_yaw_asks_for_nothing_new(orientation, lens, seed):
+    cache = MeshCache(manifest(), Settings())
+    random = np.random.default_rng(seed)
+    first = cache.view(orientation, lens, SIZE)
+    yaw = rotation([0.0, 0.0, random.uniform(-3.0, 3.0)])
+    second = cache.view(Orientation(orientation.height, yaw @ orientation.rotation), lens, SIZE)
+    np.testing.assert_allclose(second.rotation, first.rotation, atol=1e-9)
+    np.testing.assert_allclose(second.heading, yaw @ first.heading, atol=1e-9)
+
+
+@given(reals(0.2001, 50.0), reals(0.01, 2.0), reals(0.5, 12.0), st.sampled_from(["sphere", "circle"]))
+def test_mesh_height_is_never_off_by_more_than_the_tolerance(height, tolerance, k, shape):
+    """In rings across an object: k from the mesh's height is k + tolerance or less at the camera's, and back."""
+    cache = MeshCache(manifest(intersections=k, shape=shape), Settings(height_tolerance=tolerance))
+    found = cache.mesh_height(height)
+    assert abs(k * cache.shape.intersection_ratio(height, found) - k) <= tolerance * (1.0 + 1e-9) + 1e-9
+    assert abs(k * cache.shape.intersection_ratio(found, height) - k) <= tolerance * (1.0 + 1e-9) + 1e-9
+
+
+@given(reals(0.01, 1.0), seeds)
+def test_heights_share_few_meshes(tolerance, seed):
+    cache = MeshCache(manifest(), Settings(height_tolerance=tolerance))
+    heights = np.random.default_rng(seed).uniform(0.5, 1.0, 200)
+    found = {cache.mesh_height(height) for height in heights}
+    spread = math.log(float(cache.shape.spacing(0.5) / cache.shape.spacing(1.0)))
+    assert len(found) <= spread / (2.0 * math.log1p(tolerance / 2.0)) + 2
+    assert all(cache.mesh_height(height) == pytest.approx(height, rel=1e-9) for height in found)
+
+
+@in_all_layouts
+@given(orientations(0.3, 1.5))
+def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(layout, orientation):
+    cache = MeshCache(manifest(layout=layout), Settings(height_tolerance=0.0))
+    view = cache.view(orientation, LENS, SIZE)
+    assert view.mesh_height == orientation.height
+    np.testing.assert_array_equal(view.rotation, orientation.rotation)
+    np.testing.assert_array_equal(view.heading, np.eye(3))
+    assert_same_as_without(cache, orientation, LENS, SIZE)
+
+
+@in_all_layouts
+@pytest.mark.parametrize("tolerance", [0.0, 0.5])
+def test_a_camera_that_looks_at_the_sky_has_no_points(tolerance, layout):
+    cache = MeshCache(manifest(layout=layout), Settings(height_tolerance=tolerance))
+    lens = Rectilinear(focal_length=600.0, fov=1.2)
+    view = cache.view(Orientation.from_roll_pitch(0.8, pitch=-1.2), lens, SIZE)
+    assert len(view.layout.places) == 0
+    assert not project(view.layout, view.rotation, lens, SIZE).on_screen.any()
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 0.5])
+@pytest.mark.parametrize("height", [0.05, 0.1, 0.2])
+def test_a_camera_below_the_top_of_the_ball_is_refused(tolerance, height):
+    cache = MeshCache(manifest(), Settings(height_tolerance=tolerance))
+    with pytest.raises(GeometryError, match="height"):
+        cache.view(Orientation.from_roll_pitch(height, pitch=0.3), LENS, SIZE)
+    assert cache.nbytes == 0
+
+
+def test_hits_and_misses_are_counted():
+    cache = MeshCache(manifest(), Settings())
+    assert (cache.hits, cache.misses, cache.hit_rate, cache.nbytes) == (0, 0, 0.0, 0)
+    ahead = Orientation.from_roll_pitch(0.8, pitch=0.4)
+    down = Orientation.from_roll_pitch(0.8, pitch=1.2)
+    for orientation, counts in ((ahead, (0, 1)), (ahead, (1, 1)), (down, (1, 2)), (ahead, (2, 2)), (down, (3, 2))):
+        cache.view(orientation, LENS, SIZE)
+        assert (cache.hits, cache.misses) == counts
+    assert cache.hit_rate == 0.6
+    cache.view(ahead, Equisolid(focal_length=301.0, fov=2.2), SIZE)
+    assert cache.misses == 3
+    cache.view(ahead, LENS, (320, 240))
+    assert cache.misses == 4
+
+
+@in_all_layouts
+def test_a_hit_gives_the_same_layout(layout):
+    cache = MeshCache(manifest(layout=layout), Settings())
+    ahead = Orientation.from_roll_pitch(0.8, pitch=0.4)
+    assert cache.view(ahead, LENS, SIZE).layout is cache.view(ahead, LENS, SIZE).layout
+
+
+@in_all_layouts
+def test_nbytes_is_what_is_held(layout):
+    cache = MeshCache(manifest(layout=layout), Settings())
+    first = cache.view(Orientation.from_roll_pitch(0.8, pitch=0.4), LENS, SIZE)
+    whole = built(cache, first.mesh_height)
+    assert cache.nbytes == whole.nbytes + first.layout.nbytes
+    second = cache.view(Orientation.from_roll_pitch(0.8, pitch=1.2), LENS, SIZE)
+    assert cache.nbytes == whole.nbytes + first.layout.nbytes + second.layout.nbytes
+
+
+def test_the_least_recently_used_mesh_goes_first():
+    low, middle, high = (Orientation.from_roll_pitch(height, pitch=0.4) for height in (0.5, 0.7, 0.9))
+    free = MeshCache(manifest(), Settings(height_tolerance=0.0))
+    sizes = [built(free, each.height).nbytes for each in (low, middle, high)]
+    room_for_two = sum(sorted(sizes)[1:]) / 2**20
+    cache = MeshCache(manifest(), Settings(height_tolerance=0.0, cache_mib=room_for_two))
+
+    def is_hit(orientation):
+        before = cache.hits
+        cache.view(orientation, LENS, SIZE)
+        return cache.hits > before
+
+    assert [is_hit(each) for each in (low, middle, low, high, low, middle)] == [False, False, True, False, True, False]
+    assert cache.nbytes == sizes[0] + sizes[1]
+
+
+@in_all_layouts
+@given(st.lists(st.integers(0, 5), min_size=1, max_size=20), reals(0.0, 0.6))
+def test_the_memory_limit_is_obeyed_and_changes_no_answer(layout, order, cache_mib):
+    cache = MeshCache(manifest(layout=layout), Settings(cache_mib=cache_mib))
+    free = MeshCache(manifest(layout=layout), Settings())
+    for index in order:
+        orientation = Orientation.from_roll_pitch(0.5 + 0.1 * (index % 3), pitch=0.3 + 0.2 * index)
+        limited, unlimited = (each.view(orientation, LENS, SIZE) for each in (cache, free))
+        assert cache.nbytes <= cache_mib * 2**20
+        np.testing.assert_array_equal(limited.layout.rays, unlimited.layout.rays)
+        places = limited.layout.places
+        np.testing.assert_array_equal(limited.layout.links(places), unlimited.layout.links(places))
+        np.testing.assert_array_equal(limited.layout.slots, unlimited.layout.slots)
+        np.testing.assert_array_equal(limited.layout.places, unlimited.layout.places)
+    assert cache.hits + cache.misses == len(order)
+
+
+def test_without_memory_nothing_is_held():
+    cache = MeshCache(manifest(), Settings(cache_mib=0.0))
+    orientation = Orientation.from_roll_pitch(0.8, pitch=0.4)
+    for _ in range(3):
+        assert len(cache.view(orientation, LENS, SIZE).layout.places) > 0
+    assert (cache.hits, cache.misses, cache.nbytes) == (0, 3, 0)
+
+
+@given(seeds)
+def test_a_camera_that_wanders_is_answered_right(seed):
+    """Through many buckets with one cache, straight down and upside down included."""
+    random = np.random.default_rng(seed)
+    layout = LAYOUTS[seed % len(LAYOUTS)]
+    cache = MeshCache(manifest(max_distance=2.0, layout=layout), Settings(cache_mib=2.0))
+    matrix = Orientation.from_roll_pitch(1.0, pitch=1.5).rotation
+    for _ in range(5):
+        matrix = matrix @ rotation(0.4 * random_direction(random))
+        assert_same_as_without(cache, Orientation(random.uniform(0.3, 1.2), matrix), LENS, SIZE)

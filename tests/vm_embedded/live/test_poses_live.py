@@ -1,0 +1,171 @@
+"""Poses over real sockets: a camera that turns fast, poses that come late and shaken, and what is no pose."""
+
+import json
+import random
+import socket
+import subprocess
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from tests.vm_embedded.live.running import arguments, running
+from tests.vm_embedded.poses.test_buffer import quaternion
+from vm_embedded.cameras.synthetic import Motion
+from vm_embedded.live.control import ask
+
+TURN = 3.0
+MOTION = Motion(TURN)
+
+
+def pose_line(motion, at):
+    orientation = motion.orientation(at)
+    return json.dumps({"t": at, "height": orientation.height, "quaternion": quaternion(orientation)}).encode() + b"\n"
+
+
+class Sender(threading.Thread):
+    """Sends the poses of a motion, 100 a second, 20 ms late, each up to 5 ms more or less."""
+
+    def __init__(self, send, motion=MOTION):
+        super().__init__(daemon=True)
+        self._send, self._motion = send, motion
+        self.on = True
+
+    def run(self):
+        chance = random.Random(5)
+        at = time.monotonic()
+        while self.on:
+            at += 0.01
+            due = at + 0.02 + chance.uniform(-0.005, 0.005)
+            time.sleep(max(due - time.monotonic(), 0.0))
+            try:
+                self._send(pose_line(self._motion, at))
+            except OSError:
+                return
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as made:
+        made.bind(("127.0.0.1", 0))
+        return made.getsockname()[1]
+
+
+def errors_of(found):
+    """Distance of each ball from where it was, as a part of its distance."""
+    errors = []
+    for each in found.frames:
+        truth = MOTION.ball(each["t"])
+        errors += [np.linalg.norm(ball["position"] - truth) / np.linalg.norm(truth) for ball in each["detections"][:1]]
+    return np.array(errors)
+
+
+def measured(tmp_path, *options):
+    """Errors of a hundred balls while the camera turns."""
+    port = free_port()
+    source = ("--camera", f"synthetic:{TURN}", "--pose-source", f"udp:127.0.0.1:{port}")
+    with running(tmp_path, *source, *options) as found, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
+        sender = Sender(lambda line: sending.sendto(line, ("127.0.0.1", port)))
+        sender.start()
+        found.wait(lambda: len(errors_of(found)) >= 100)
+        sender.on = False
+        sender.join()
+        found.stop()
+    return errors_of(found)
+
+
+@pytest.mark.slow
+def test_a_ball_is_in_its_place_while_the_camera_turns_fast(tmp_path):
+    interpolated = np.median(measured(tmp_path))
+    newest = np.median(measured(tmp_path, "--no-pose-interpolate"))
+    assert interpolated < 0.02
+    assert newest > 3.0 * interpolated
+    print(f"interpolated {100 * interpolated:.2f} %, newest pose {100 * newest:.2f} % of the distance")
+
+
+def test_poses_that_stop_are_stale_and_nothing_is_reported(tmp_path):
+    path = tmp_path / "poses"
+    with running(tmp_path, "--camera", "synthetic", "--pose-source", f"unix:{path}") as found:
+        found.wait_for_state("pose_stale")
+        assert found.frames == []
+        with socket.socket(socket.AF_UNIX) as connection:
+            connection.connect(str(path))
+            sender = Sender(connection.sendall, Motion())
+            sender.start()
+            found.wait_for_state("ok")
+            found.wait(lambda: len(found.frames) > 10)
+            sender.on = False
+            sender.join()
+        found.wait_for_state("pose_stale")
+        before = len(found.frames)
+        time.sleep(0.5)
+        assert len(found.frames) == before
+        found.stop()
+
+
+def test_poses_come_by_standard_input_too(tmp_path):
+    options = ("--camera", "synthetic", "--pose-source", "stdin")
+    with running(tmp_path, *options, stdin=subprocess.PIPE) as found:
+
+        def send(line):
+            found.process.stdin.write(line)
+            found.process.stdin.flush()
+
+        sender = Sender(send, Motion())
+        sender.start()
+        found.wait_for_state("ok")
+        found.wait(lambda: len(found.frames) > 10)
+        sender.on = False
+        sender.join()
+        found.stop()
+
+
+@pytest.mark.slow
+def test_ten_thousand_bad_poses_change_nothing(tmp_path):
+    chance = random.Random(3)
+    port = free_port()
+    good = [pose_line(Motion(), at) for at in range(10)]
+
+    def spoilt():
+        line = bytearray(chance.choice(good))
+        for _ in range(chance.randrange(1, 8)):
+            line[chance.randrange(len(line))] = chance.randrange(256)
+        kind = chance.randrange(4)
+        if kind == 0:
+            return bytes(line)
+        if kind == 1:
+            return bytes(line[: chance.randrange(len(line))])
+        if kind == 2:
+            value = chance.choice([None, True, "x", 1e400, [1], {}, -1e300, 10**400])
+            return json.dumps({"t": time.monotonic(), "height": value, "quaternion": [1, 0, 0, 0]}).encode()
+        return chance.randbytes(chance.randrange(1, 200))
+
+    with running(tmp_path, "--camera", "synthetic", "--pose-source", f"udp:127.0.0.1:{port}") as found:
+        found.wait_for_state("pose_stale")
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
+
+            def bad():
+                return json.loads(ask(tmp_path / "control", "status"))["counts"]["poses_bad"]
+
+            sent = 0
+            while sent < 10000:
+                for _ in range(50):
+                    sending.sendto(spoilt(), ("127.0.0.1", port))
+                    sent += 1
+                time.sleep(0.01)
+            found.wait(lambda: bad() > 5000)
+            sender = Sender(lambda line: sending.sendto(line, ("127.0.0.1", port)), Motion())
+            sender.start()
+            found.wait_for_state("ok")
+            sender.on = False
+            sender.join()
+        assert found.stop()[0] == 0
+
+
+def test_what_the_line_of_a_pose_lacks_is_said_in_the_state(tmp_path):
+    port = free_port()
+    with running(tmp_path, "--camera", "synthetic", "--pose-source", f"udp:127.0.0.1:{port}") as found:
+        found.wait_for_state("pose_stale")
+        asked = subprocess.run(arguments(tmp_path, "--status"), capture_output=True, text=True, timeout=60, check=False)
+        assert json.loads(asked.stdout)["reason"] == "no pose has come yet"
+        found.stop()

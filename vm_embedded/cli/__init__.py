@@ -1,0 +1,1 @@
+"""The commands vm-detect, vm-bench and vm-doctor."""

@@ -1,0 +1,1 @@
+"""TOML sections that check themselves, and a strict YAML reader."""

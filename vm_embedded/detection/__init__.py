@@ -1,0 +1,1 @@
+"""From a frame and an orientation to objects on the plane."""

@@ -1,0 +1,80 @@
+"""Connected parts of the mesh, and how wide they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from ..mesh.mesh import Graph
+
+Members = npt.NDArray[np.intp]
+"""Positions of points in a mesh."""
+
+_Edges = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
+
+
+def clusters(graph: Graph, members: Members) -> list[Members]:
+    """The connected components of the points `members`, each in their order, largest first, then as they come.
+
+    Two points are connected if either is a neighbor of the other. Labels spread along all links at once,
+    the smaller one winning, and jump to the label of their label, so the rounds needed grow with the logarithm of a
+    component's width, and nothing loops over points.
+    """
+    a, b = _edges(graph, members)
+    label = np.arange(len(members))
+    while True:
+        spread = label.copy()
+        np.minimum.at(spread, label[a], label[b])
+        spread = spread[spread]
+        if np.array_equal(spread, label):
+            break
+        label = spread
+    order = np.argsort(label, kind="stable")
+    starts = np.flatnonzero(np.diff(label[order], prepend=-1))
+    parts = np.split(members[order], starts[1:]) if len(members) else []
+    return sorted(parts, key=len, reverse=True)
+
+
+def graph_diameter(graph: Graph, members: Members, limit: int) -> int:
+    """Steps between the two members farthest apart, going through members only.
+
+    Found by two breadth-first sweeps, the second from the end of the first: exact for chains, at most a step or two
+    short for round clusters. Counting stops at limit + 1.
+    """
+    edges = _edges(graph, members)
+    far = int(np.argmax(_steps(edges, len(members), 0, limit)))
+    return int(_steps(edges, len(members), far, limit).max())
+
+
+def wider_than(graph: Graph, members: Members, middle: int, limit: int) -> bool:
+    """Whether the graph diameter of `members` is above `limit`.
+
+    Nearly always one sweep from the member in the `middle` tells: no two are farther apart than twice its reach.
+    """
+    reach = int(_steps(_edges(graph, members), len(members), middle, limit).max())
+    return 2 * reach > limit and graph_diameter(graph, members, limit) > limit
+
+
+def _edges(graph: Graph, members: Members) -> _Edges:
+    """Links between members, as positions in `members`, in both directions."""
+    position = np.full(len(graph) + 1, -1)
+    position[members] = np.arange(len(members))
+    links = graph.links(members)
+    ends = position[links].ravel()
+    linked = np.flatnonzero(ends >= 0)
+    starts, ends = linked // links.shape[1], ends[linked]
+    return np.concatenate([starts, ends]), np.concatenate([ends, starts])
+
+
+def _steps(edges: _Edges, count: int, start: int, limit: int) -> npt.NDArray[np.intp]:
+    """Steps (count,) from `start`, at most limit + 1; -1 where there is no way within them."""
+    a, b = edges
+    steps = np.full(count, -1)
+    steps[start] = 0
+    for step in range(1, limit + 2):
+        reached = b[steps[a] == step - 1]
+        fresh = reached[steps[reached] < 0]
+        if len(fresh) == 0:
+            break
+        steps[fresh] = step
+    return steps

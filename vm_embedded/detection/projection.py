@@ -1,0 +1,146 @@
+"""From the mesh to the picture: which points are on screen, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from ..arrays import Floats, Mask
+from ..geometry.lens import Lens, Size
+from ..mesh.mesh import Graph, Mesh
+
+AnyGraph = TypeVar("AnyGraph", bound=Graph)
+G = TypeVar("G", bound=Graph, covariant=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Projection(Generic[G]):
+    """The n points of a graph, their pixels (n, 2), and which of them are on_screen (n,).
+
+    Pixels of points that are not are without meaning.
+    """
+
+    graph: G
+    pixels: Floats
+    on_screen: Mask
+
+    def __len__(self) -> int:
+        return len(self.graph)
+
+    @property
+    def visible(self: Projection[Mesh]) -> Projection[Mesh]:
+        """The points of a mesh that are on screen."""
+        kept = np.flatnonzero(self.on_screen)
+        return Projection(self.graph.part(kept), self.pixels[kept], self.on_screen[kept])
+
+    def only(self, chosen: Mask) -> Projection[G]:
+        """The same graph, of which at most the chosen points (n,) are on screen."""
+        return Projection(self.graph, self.pixels, self.on_screen & chosen)
+
+
+def along(rays: Floats, direction: Floats) -> Floats:
+    """Cosines (n,) between rays (n, 3) and a unit vector (3,).
+
+    Not a matrix product, because numpy's would start threads on every core for that.
+    """
+    x, y, z = direction.tolist()
+    cosines: Floats = rays[:, 0] * x
+    cosines += rays[:, 1] * y
+    cosines += rays[:, 2] * z
+    return cosines
+
+
+def to_camera(rays: Floats, rotation: Floats) -> Floats:
+    """Rays (n, 3) in the camera frame, R^T ray, column by column in memory.
+
+    Written out instead of as a matrix product, so that a ray's digits don't depend on how many others there are.
+    """
+    camera = np.empty((3, len(rays)))
+    term = np.empty(len(rays))
+    for sums, (a, b, c) in zip(camera, rotation.T.tolist(), strict=True):
+        np.multiply(rays[:, 0], a, out=sums)
+        np.multiply(rays[:, 1], b, out=term)
+        sums += term
+        np.multiply(rays[:, 2], c, out=term)
+        sums += term
+    return camera.T
+
+
+def project(graph: AnyGraph, rotation: Floats, lens: Lens, size: Size) -> Projection[AnyGraph]:
+    """A graph in the picture.
+
+    rotation (3, 3) maps camera to mesh coordinates. On screen means: seen by the lens, and with all four pixels
+    around the point in the picture, 0 <= x and x + 1 < width, the same for y.
+    """
+    camera = to_camera(graph.rays, rotation)
+    pixels = lens.project(camera, size)
+    return Projection(graph, pixels, lens.sees(camera) & _inside(pixels, size, 0.0))
+
+
+def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack: float) -> Mask:
+    """Which points are on screen for at least one camera turned by up to `slack` [rad] from `rotation`.
+
+    Never too few: a point that a turn brings on screen lies within slack of the part of the view that the picture
+    covers, and no pixel in it moves faster than `_pixels_per_radian`. Points outside of that part are judged by where
+    they would enter it.
+    """
+    reach = _view_angle(lens, size)
+    ahead = along(mesh.rays, rotation[:, 0])
+    # A rotation that is not quite one may shorten rays by up to 5e-4; the lens compares their x as it is.
+    near = np.flatnonzero(ahead > np.cos(min(reach + slack, np.pi)) - 1e-3)
+    camera = to_camera(mesh.rays[near], rotation)
+    cosine = np.maximum(camera[:, 0], np.cos(reach))
+    sine = np.hypot(camera[:, 1], camera[:, 2])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inward = np.where(sine > 0, np.sqrt(1.0 - cosine * cosine) / sine, 0.0)
+    camera[:, 1] *= inward
+    camera[:, 2] *= inward
+    camera[:, 0] = cosine
+    # Within a view of more than half the sphere the way around the axis can be longer than the turn.
+    detour = 1.0 if reach <= np.pi / 2 else np.pi
+    margin = detour * slack * _pixels_per_radian(lens, size)
+    possible = np.zeros(len(mesh), dtype=bool)
+    possible[near] = _inside(lens.project(camera, size), size, margin)
+    return possible
+
+
+def _inside(pixels: Floats, size: Size, margin: float) -> Mask:
+    inside = np.ones(len(pixels), dtype=bool)
+    for axis in range(2):
+        inside &= pixels[:, axis] >= -margin
+        inside &= pixels[:, axis] < size[axis] - 1 + margin
+    return inside
+
+
+@lru_cache(maxsize=32)
+def _view_angle(lens: Lens, size: Size) -> float:
+    """Largest angle from the axis [rad] at which the lens reaches a pixel of the picture."""
+    x, y = np.linspace(0.0, size[0] - 1.0, 65), np.linspace(0.0, size[1] - 1.0, 65)
+    pixels = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2)
+    angles = np.arccos(np.clip(lens.unproject(pixels, size)[:, 0], -1.0, 1.0))
+    if np.isnan(angles).any():
+        return lens.limit
+    # The farthest pixel is on the border, at most half a step of the 64 from one that was looked at.
+    return min(lens.limit, float(angles.max()) * 1.02)
+
+
+@lru_cache(maxsize=32)
+def _pixels_per_radian(lens: Lens, size: Size) -> float:
+    """Largest shift of a pixel [px] for each radian that its ray turns, anywhere in the view."""
+    reach = _view_angle(lens, size)
+    # Straight behind the camera every direction is the same one, and the speed around the axis has no limit.
+    grid = np.meshgrid(np.linspace(1e-3, min(reach, np.pi - 1e-3), 200), np.linspace(0.0, 2.0 * np.pi, 33))
+    theta, around = (axis.reshape(-1) for axis in grid)
+    step = 1e-5
+
+    def at(theta: Floats, around: Floats) -> Floats:
+        rays = np.stack([np.cos(theta), np.sin(theta) * np.cos(around), np.sin(theta) * np.sin(around)], axis=1)
+        return lens.project(rays, size)
+
+    outward = np.linalg.norm(at(theta, around) - at(theta - step, around), axis=1) / step
+    sideways = np.linalg.norm(at(theta, around + step) - at(theta, around), axis=1) / (step * np.sin(theta))
+    # The square root covers turns in both directions at once; 2 % the gaps between the 200 angles.
+    return 1.02 * float(np.hypot(outward, sideways).max())

@@ -1,0 +1,1 @@
+"""The paper's geometry: shapes, lenses, orientation and observation planes."""

@@ -1,0 +1,188 @@
+"""Lens files: the reference's lens*.yaml, OpenCV's and ROS's calibrations, and TOML."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..config.yaml_reader import read_yaml
+from ..errors import InputError, VisualMeshError, unknown
+from .calibrated_lenses import BrownLens, CalibratedLens, FisheyeLens
+from .lens import Lens, RadialLens, projection_named
+from .orientation import Orientation
+
+_LARGEST = 2**20  # bytes; a lens file has a thousand
+
+_LENS_KEYS = ("projection", "focal_length", "center", "distortion", "fov", "size")
+
+_REFERENCE_NAMES = {"centre": "center", "k": "distortion"}
+"""What the reference calls the same things."""
+
+_BROWN, _FISHEYE = ("plumb_bob", "rational_polynomial"), ("equidistant", "fisheye")
+
+
+@dataclass(frozen=True)
+class LensFile:
+    """A lens, and the orientation of the camera where the file has one."""
+
+    lens: Lens
+    orientation: Orientation | None
+
+
+def read_lens_file(path: str | Path) -> LensFile:
+    """Read a lens file by its suffix, .toml or else YAML. Raises InputError naming file and fault."""
+    path = Path(path)
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise InputError(f"{path}: too large for a lens file")
+        text = path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:  # ValueError: not text, or a path with a zero byte
+        raise InputError(f"can't read lens file {path}: {getattr(error, 'strerror', None) or error}") from error
+    try:
+        if path.suffix.lower() == ".toml":
+            table = tomllib.loads(text)
+            return LensFile(lens_from_table(table.get("lens", table)), None)
+        table = read_yaml(text)
+        if not isinstance(table, dict):
+            raise InputError("not a table of values")
+        if "projection" in table:
+            table = {_REFERENCE_NAMES.get(key, key): value for key, value in table.items()}
+            hoc = table.pop("Hoc", None)
+            return LensFile(lens_from_table(table), None if hoc is None else Orientation.from_hoc(hoc))
+        hoc = table.pop("Hoc", None)
+        return LensFile(lens_from_calibration(table), None if hoc is None else Orientation.from_hoc(hoc))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"lens file {path}: {error}") from error
+    except VisualMeshError as error:
+        raise InputError(f"lens file {path}: {error}") from error
+
+
+def lens_text(lens: Lens, orientation: Orientation) -> str:
+    """A lens and an orientation as a lens file, to the last digit: the reference's, or a calibration with Hoc."""
+    hoc = np.eye(4)
+    hoc[:3, :3] = orientation.rotation
+    hoc[2, 3] = orientation.height
+    if isinstance(lens, RadialLens):
+        lines = [
+            f"projection: {type(lens).__name__.upper()}",
+            f"focal_length: {lens.focal_length!r}",
+            f"centre: {_listed(lens.center)}",
+            f"k: {_listed(lens.distortion)}",
+            f"fov: {lens.fov!r}",
+        ]
+        if lens.size is not None:
+            lines.append(f"size: {_listed(lens.size)}")
+    elif isinstance(lens, CalibratedLens):
+        (fx, fy), (cx, cy) = lens.focal_lengths, lens.optical_center
+        fisheye = isinstance(lens, FisheyeLens)
+        lines = [
+            f"distortion_model: {'equidistant' if fisheye else 'rational_polynomial'}",
+            f"camera_matrix: {_listed((fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0))}",
+            f"distortion_coefficients: {_listed(lens.coefficients)}",
+        ]
+        if lens.size is not None:
+            lines += [f"image_width: {lens.size[0]}", f"image_height: {lens.size[1]}"]
+    else:
+        raise InputError(f"a lens of type {type(lens).__name__} has no file format")
+    lines += ["Hoc:", *(f"  - {_listed(row)}" for row in hoc.tolist())]
+    return "\n".join(lines) + "\n"
+
+
+def _listed(numbers: Sequence[float]) -> str:
+    return f"[{', '.join(repr(each) for each in numbers)}]"
+
+
+def lens_from_table(table: Mapping[str, Any]) -> RadialLens:
+    """A lens from projection, focal_length [px], fov [rad] and, where they matter, center, distortion and size [px].
+
+    Raises InputError naming an unknown or missing key.
+    """
+    if not isinstance(table, Mapping):
+        raise InputError(f"lens must be a table, not {str(table)[:60]}")
+    for key in table:
+        if key not in _LENS_KEYS:
+            raise InputError(unknown("lens key", key, _LENS_KEYS))
+    missing = [key for key in ("projection", "focal_length", "fov") if key not in table]
+    if missing:
+        raise InputError(f"lens lacks {', '.join(missing)}")
+    size = _numbers(table["size"], "size", 2) if "size" in table else None
+    return projection_named(table["projection"])(
+        focal_length=_number(table["focal_length"], "focal_length"),
+        fov=_number(table["fov"], "fov"),
+        center=_pair(table.get("center", (0.0, 0.0)), "center"),
+        distortion=_pair(table.get("distortion", (0.0, 0.0)), "distortion"),
+        size=None if size is None else (int(size[0]), int(size[1])),
+    )
+
+
+def lens_from_calibration(table: Mapping[str, Any]) -> Lens:
+    """A lens from a calibration as ROS (camera_info) and OpenCV (camera_matrix, ...) write it. Raises InputError."""
+    matrix = _first(table, "camera_matrix", "K", "k", "cameraMatrix")
+    if matrix is None:
+        raise InputError("neither a lens (no projection) nor a calibration (no camera_matrix)")
+    k = _numbers(_data(matrix), "camera_matrix", 9)
+    coefficients = _numbers(
+        _data(_first(table, "distortion_coefficients", "D", "d", "distCoeffs", "dist_coeffs") or []), "distortion"
+    )
+    width = _first(table, "image_width", "width")
+    height = _first(table, "image_height", "height")
+    model = str(table.get("distortion_model", "rational_polynomial" if len(coefficients) == 8 else "plumb_bob"))
+    common = {
+        "focal_lengths": (k[0], k[4]),
+        "optical_center": (k[2], k[5]),
+        "size": None
+        if width is None or height is None
+        else (int(_number(width, "width")), int(_number(height, "height"))),
+    }
+    if abs(k[1]) > 1e-6 * k[0]:
+        raise InputError(f"camera_matrix has a skew of {k[1]:g}; only calibrations without are supported")
+    if model.lower() in _FISHEYE:
+        return FisheyeLens(fov=2.0 * math.pi, coefficients=tuple(coefficients), **common)  # type: ignore[arg-type]
+    if model.lower() in _BROWN:
+        while len(coefficients) > 8 and coefficients[-1] == 0.0:
+            coefficients.pop()  # OpenCV writes its 12 and 14 coefficient models out even where the rest is zero
+        # As wide as a picture taken through one plane gets: 160 degrees.
+        return BrownLens(fov=math.radians(160.0), coefficients=tuple(coefficients), **common)  # type: ignore[arg-type]
+    raise InputError(unknown("distortion_model", model, (*_BROWN, *_FISHEYE)))
+
+
+def _first(table: Mapping[str, Any], *keys: str) -> Any:
+    """The value of the first key that is there, or None."""
+    return next((table[key] for key in keys if key in table), None)
+
+
+def _data(value: Any) -> Any:
+    """The numbers of a matrix written as rows, cols, data; anything else as it is."""
+    return value.get("data", value) if isinstance(value, Mapping) else value
+
+
+def _number(value: Any, name: str) -> float:
+    try:
+        number = math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(f"{name} must be a number, not {repr(value)[:60]}")
+    return number
+
+
+def _numbers(value: Any, name: str, count: int | None = None) -> list[float]:
+    """A flat list of numbers from a list, or a list of lists."""
+    try:
+        numbers = np.asarray(value, dtype=np.float64).ravel()
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name} must be a list of numbers, not {str(value)[:60]}") from error
+    if not np.isfinite(numbers).all() or (count is not None and len(numbers) != count):
+        raise InputError(f"{name} must be {count or 'finite'} numbers, not {str(value)[:60]}")
+    return [float(number) for number in numbers]
+
+
+def _pair(value: Any, name: str) -> tuple[float, float]:
+    first, second = _numbers(value, name, 2)
+    return first, second

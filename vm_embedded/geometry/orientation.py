@@ -1,0 +1,112 @@
+"""Where the camera is over the observation plane: height, roll and pitch, with the yaw taken out.
+
+Frames: camera x along the optical axis, y left, z up. Observation plane z up, the plane is z = 0. `H_oc` ("o from
+c") maps camera coordinates to plane coordinates. OpenCV's and ROS's optical frame (x right, y down, z forward) is
+converted here and nowhere else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from ..arrays import Floats, frozen
+from ..errors import GeometryError
+
+OPTICAL_TO_CAMERA: Floats = frozen(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))
+"""Rotation from an optical frame (x right, y down, z forward) to the camera frame (x forward, y left, z up)."""
+
+
+def rotation_z(angle: float) -> Floats:
+    """Rotation (3, 3) by `angle` [rad] around z."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, eq=False)
+class Orientation:
+    """Height of the camera over the plane [m] and rotation (3, 3) from camera to observation plane.
+
+    Raises GeometryError if the height is not a finite number above 0 or the matrix is not a rotation.
+    """
+
+    height: float
+    rotation: Floats
+
+    def __post_init__(self) -> None:
+        rotation = np.array(self.rotation, dtype=np.float64)
+        if not math.isfinite(self.height) or self.height <= 0:
+            raise GeometryError(f"camera height must be a number above 0 m, not {self.height}")
+        if rotation.shape != (3, 3) or not np.isfinite(rotation).all():
+            raise GeometryError("camera rotation must be 3 x 3 finite numbers (NaN or infinity in the orientation?)")
+        error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+        if error > 1e-3 or np.linalg.det(rotation) < 0:
+            mirrored = "; it mirrors" if np.linalg.det(rotation) < 0 else ""
+            raise GeometryError(f"camera rotation is no rotation: R R^T is off the identity by {error:.2g}{mirrored}")
+        object.__setattr__(self, "rotation", frozen(rotation))
+
+    @classmethod
+    def from_hoc(cls, hoc: npt.ArrayLike) -> Orientation:
+        """From the 4 x 4 transform H_oc; only its rotation and the height in row 2, column 3 [m] matter."""
+        try:
+            matrix = np.asarray(hoc, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise GeometryError(f"Hoc must be 4 x 4 numbers: {error}") from error
+        if matrix.shape != (4, 4):
+            raise GeometryError(f"Hoc must be 4 x 4 numbers, not of shape {matrix.shape}")
+        return cls(float(matrix[2, 3]), matrix[:3, :3])
+
+    @classmethod
+    def from_roll_pitch(cls, height: float, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Orientation:
+        """From angles [rad], R = Rz(yaw) Ry(pitch) Rx(roll): pitch > 0 looks down, roll > 0 leans to the right."""
+        cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+        tilt = np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])
+        return cls(height, rotation_z(yaw) @ tilt)
+
+    @classmethod
+    def from_quaternion(cls, height: float, quaternion: Sequence[float], optical: bool = False) -> Orientation:
+        """From a quaternion (w, x, y, z) of the rotation camera to plane.
+
+        `optical` says that the quaternion turns an OpenCV/ROS optical frame instead of the camera frame.
+        Raises GeometryError if its norm is further than 1e-3 from 1.
+        """
+        q = np.asarray(quaternion, dtype=np.float64)
+        if q.shape != (4,) or not np.isfinite(q).all() or abs(float(q @ q) - 1.0) > 2e-3:
+            raise GeometryError(f"quaternion must be (w, x, y, z) of length 1, not {list(quaternion)}")
+        w, x, y, z = q / np.linalg.norm(q)
+        rotation = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+        return cls(height, rotation @ OPTICAL_TO_CAMERA.T if optical else rotation)
+
+    @cached_property
+    def yaw(self) -> float:
+        """Heading of the optical axis [rad]; of the picture's upward direction when the camera looks straight down."""
+        r = self.rotation
+        if math.hypot(r[0, 0], r[1, 0]) > 1e-9:
+            return math.atan2(r[1, 0], r[0, 0])
+        return math.atan2(-r[0, 1], r[1, 1])
+
+    @cached_property
+    def level(self) -> Floats:
+        """The rotation (3, 3) without its yaw, Ry(pitch) Rx(roll)."""
+        return frozen(rotation_z(-self.yaw) @ self.rotation)
+
+    @property
+    def pitch(self) -> float:
+        """Angle of the optical axis below the horizon [rad]."""
+        return math.atan2(-self.level[2, 0], self.level[0, 0])
+
+    @property
+    def roll(self) -> float:
+        """Lean to the right [rad]."""
+        return math.atan2(-self.level[1, 2], self.level[1, 1])

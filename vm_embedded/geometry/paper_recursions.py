@@ -1,0 +1,68 @@
+"""The paper's own recursions, equation by equation.
+
+The meshes are built from the closed forms in `shapes.py`; these are what those forms are held against.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+
+from ..errors import GeometryError
+
+Step = Callable[[float, float, float], float]
+"""(phi [rad], radius [m], height [m]) -> next phi [rad]."""
+
+
+def circle_phi1(phi: float, radius: float, height: float) -> float:
+    """Inclination [rad] one circle further out; the paper's eqn:circle_phi1."""
+    return math.atan(math.tan(phi) + 2.0 * radius / height)
+
+
+def circle_dtheta(phi: float, radius: float, height: float) -> float:
+    """Angular width [rad] of a circle around the vertical; the paper's eqn:circle_dtheta.
+
+    Raises GeometryError where the circle covers the point below the camera.
+    """
+    sine = radius / (height * math.tan(phi)) if phi > 0 else math.inf
+    if sine > 1.0:
+        raise GeometryError(f"no width at phi = {phi:g} rad: an object of radius {radius:g} m covers the nadir there")
+    return 2.0 * math.asin(sine)
+
+
+def sphere_phi_1(phi: float, radius: float, height: float) -> float:
+    """Inclination [rad] one sphere further out; the paper's eqn:sphere_phi_1."""
+    return 2.0 * math.atan(radius / (math.cos(phi) * (height - radius)) + math.tan(phi)) - phi
+
+
+def repeat(step: Step, times: int, phi: float, radius: float, height: float) -> float:
+    """f^times(phi, radius): `times` objects further out."""
+    for _ in range(times):
+        phi = step(phi, radius, height)
+    return phi
+
+
+def sample_radius(intersections: Fraction, radius: float, height: float, step: Step = sphere_phi_1) -> float:
+    """Radius [m] of the small objects of which `intersections` = p/q lie across one of radius `radius` [m].
+
+    q large objects reach as far as p small ones, f^q(0, r0) = f^p(0, r1), solved for r1 by bisection. (The paper
+    prints f^pq on the right, which would be p small ones for each large one, whatever q.)
+
+    Raises GeometryError if `intersections` is not above 0.
+    """
+    if intersections <= 0:
+        raise GeometryError(f"intersections must be above 0, not {intersections}")
+    p, q = intersections.numerator, intersections.denominator
+    target = repeat(step, q, 0.0, radius, height)
+    # A small object never needs to be larger than q large ones side by side; above h / 2 a sphere has no next phi.
+    low, high = 0.0, q * radius if step is circle_phi1 else min(q * radius, height / 2.0)
+    while high - low > 1e-15 * high:
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            break
+        if repeat(step, p, 0.0, middle, height) < target:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)

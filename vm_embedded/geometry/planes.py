@@ -1,0 +1,126 @@
+"""Observation planes anywhere: a table, a shelf, a wall, a ceiling, or a spotlight on a point; not only the ground.
+
+World frame: any fixed frame of the robot or the room. A plane's own frame has z along its normal; the frame that
+detections are in stands at the foot of the camera's perpendicular on the plane.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from ..arrays import Floats, frozen
+from ..errors import GeometryError
+from .orientation import Orientation
+
+
+def _numbers(values: object) -> Floats:
+    """An array of what should be numbers. Raises GeometryError."""
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise GeometryError(f"{values!r} is not what should be numbers: {error}") from error
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Where a camera is: rotation (3, 3) from camera to world frame, and position (3,) [m] in the world frame.
+
+    Raises GeometryError if the matrix is no rotation or a number is not finite.
+    """
+
+    rotation: Floats
+    position: Floats
+
+    def __post_init__(self) -> None:
+        position = _numbers(self.position)
+        if position.shape != (3,) or not np.isfinite(position).all():
+            raise GeometryError(f"a camera's position must be three finite numbers [m], not {self.position}")
+        # An orientation's own checks of a rotation; its height does not matter here.
+        object.__setattr__(self, "rotation", Orientation(1.0, self.rotation).rotation)
+        object.__setattr__(self, "position", frozen(position))
+
+    @classmethod
+    def from_hwc(cls, hwc: npt.ArrayLike) -> Pose:
+        """From the 4 x 4 transform H_wc ("world from camera"). Raises GeometryError."""
+        matrix = _numbers(hwc)
+        if matrix.shape != (4, 4) or not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), atol=1e-6):
+            raise GeometryError("Hwc must be 4 x 4 numbers with 0, 0, 0, 1 as last row (is it transposed?)")
+        return cls(matrix[:3, :3], matrix[:3, 3])
+
+
+@dataclass(frozen=True)
+class Plane:
+    """All points p [m] of the world with normal . p = offset; objects lie on the side that the normal points to.
+
+    name: what sightings on it are called after. The normal is brought to length 1, and the offset with it. Raises
+    GeometryError for a normal without direction.
+    """
+
+    name: str
+    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        normal, offset = _numbers(self.normal), float(_numbers(self.offset).reshape(-1)[0])
+        length = float(np.linalg.norm(normal)) if normal.shape == (3,) else math.nan
+        if not (math.isfinite(length) and length > 1e-9 and math.isfinite(offset)):
+            raise GeometryError(f"plane {self.name!r} needs a direction and an offset [m], not {self.normal}, {offset}")
+        x, y, z = (normal / length).tolist()
+        object.__setattr__(self, "normal", (x, y, z))
+        object.__setattr__(self, "offset", offset / length)
+
+    @classmethod
+    def through(cls, name: str, point: Sequence[float], normal: Sequence[float]) -> Plane:
+        """The plane through a point [m] of the world. Raises GeometryError."""
+        place, direction = _numbers(point), _numbers(normal)
+        if place.shape != (3,) or direction.shape != (3,):
+            raise GeometryError(
+                f"plane {name!r} needs three numbers for its point and its normal, not {point}, {normal}"
+            )
+        x, y, z = direction.tolist()
+        return cls(name, (x, y, z), float(place @ direction))
+
+    @classmethod
+    def spotlight(cls, name: str, target: Sequence[float], camera: Sequence[float]) -> Plane:
+        """The plane through `target` that faces a camera at `camera` [m]: the mesh's middle lies on the target, and
+        objects are as dense in points there as the mesh makes them below a camera. Raises GeometryError if both are one
+        point."""
+        here, there = _numbers(camera), _numbers(target)
+        if here.shape != (3,) or there.shape != (3,):
+            raise GeometryError(f"spotlight {name!r} needs three numbers for target and camera, not {target}, {camera}")
+        toward = here - there
+        return cls.through(name, target, toward.tolist())
+
+    @cached_property
+    def axes(self) -> Floats:
+        """World to plane frame (3, 3): its rows are two directions in the plane, and the normal.
+
+        The first is the world's x as far as the plane allows, or its z where the plane is upright across x.
+        """
+        normal = np.array(self.normal)
+        along = np.eye(3)[0 if abs(self.normal[0]) < 0.99 else 2]
+        first = along - (along @ normal) * normal
+        first /= np.linalg.norm(first)
+        return frozen(np.stack([first, np.cross(normal, first), normal]))
+
+    def seen_from(self, pose: Pose) -> Orientation:
+        """The orientation of a camera over this plane. Raises GeometryError if the camera is not before the plane."""
+        height = float(np.dot(self.normal, pose.position)) - self.offset
+        if height <= 0.0:
+            raise GeometryError(f"the camera is {-height:g} m behind plane {self.name!r}; is its normal the wrong way?")
+        return Orientation(height, self.axes @ pose.rotation)
+
+    def to_world(self, points: Floats, pose: Pose) -> Floats:
+        """Points (n, 3) [m] of detections on this plane, seen from a pose, in the world frame."""
+        foot = pose.position - (np.dot(self.normal, pose.position) - self.offset) * np.array(self.normal)
+        return np.asarray(points @ self.axes + foot)
+
+
+GROUND = Plane("ground")
+"""The world's z = 0."""

@@ -1,0 +1,1 @@
+"""The daemon: its configuration, health, logs and status page."""

@@ -1,0 +1,1 @@
+"""The Visual Mesh: rings, grids and their variants."""

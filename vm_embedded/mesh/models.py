@@ -1,0 +1,31 @@
+"""All mesh models by their names."""
+
+from __future__ import annotations
+
+from ..errors import InputError, unknown
+from ..geometry.shape import Shape
+from .cap import Cap
+from .grids import KINDS, Grid
+from .mesh import Mesh, MeshModel
+from .rings import Rings
+from .walls import Walls
+
+MESH_MODELS: dict[str, MeshModel] = {
+    **{f"ring{each}": Rings(each) for each in (4, 6, 8)},
+    **{f"{kind}grid{each}": Grid(kind, each) for kind in KINDS for each in (4, 6, 8)},
+    "cap6": Cap(),
+    "wall6": Walls(),
+}
+"""The reference's twelve; cap6, rings that are as dense below the camera as elsewhere; wall6, for tall cylinders."""
+
+
+def mesh_model(name: str) -> MeshModel:
+    """The model of a name. Raises InputError for an unknown one."""
+    if name not in MESH_MODELS:
+        raise InputError(unknown("mesh model", name, MESH_MODELS))
+    return MESH_MODELS[name]
+
+
+def build_mesh(shape: Shape, height: float, intersections: float, max_distance: float, model: str = "ring6") -> Mesh:
+    """The mesh of a model by its name; see MeshModel.build. Raises InputError for an unknown model, GeometryError."""
+    return mesh_model(model).build(shape, height, intersections, max_distance)

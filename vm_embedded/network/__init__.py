@@ -1,0 +1,1 @@
+"""The model file, the layouts of its points, and ONNX Runtime."""

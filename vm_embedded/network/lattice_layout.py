@@ -1,0 +1,50 @@
+"""Points as a picture: the cells of a lattice, which a network looks at with ordinary convolutions and no look-ups."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from ..arrays import Indices, Mask, Singles, frozen
+from ..mesh.mesh import Mesh
+from .layout import OFF_SCREEN, Feeds, Layout
+
+BELOW = 3
+"""Rows of gaps before the first point: the second place of the second row has nothing but gaps around it, and so is
+what the off-screen point is in every layer (vm_export/lattice_graph.py)."""
+
+
+class LatticeLayout(Layout):
+    """The box around all cells, row by row, with gaps around it. Its neighbors need no indices, they lie beside it."""
+
+    def __init__(self, mesh: Mesh, steps: tuple[tuple[int, int], ...]) -> None:
+        assert mesh.cells is not None
+        self._steps = steps
+        column, row = (mesh.cells - mesh.cells.min(axis=0)).T if len(mesh) else np.zeros((2, 0), dtype=np.int32)
+        width = int(column.max(initial=0)) + 3
+        self._shape = int(row.max(initial=0)) + BELOW + 2, width
+        places = (row + BELOW) * width + column + 1
+        slots = np.full(self._shape[0] * width, len(mesh), dtype=np.int32)
+        slots[places] = np.arange(len(mesh), dtype=np.int32)
+        self.slots = frozen(slots)
+        self.places = frozen(places.astype(np.int32))
+        self.original = frozen(slots < len(mesh))
+        self.rays = frozen(np.take(np.append(mesh.rays.T, np.full((3, 1), np.nan), axis=1), slots, axis=1)).T
+
+    def links(self, members: npt.NDArray[np.integer]) -> Indices:
+        shifts = np.array([up * self._shape[1] + right for right, up in self._steps], dtype=np.int32)
+        beside = np.asarray(members, dtype=np.int32)[:, None] + shifts
+        return np.where(self.original[beside], beside, np.int32(len(self)))
+
+    def points(self) -> Singles:
+        return np.empty((3, len(self)), dtype=np.float32)
+
+    def colors(self, points: Singles) -> Singles:
+        return points.T
+
+    def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
+        np.copyto(points, OFF_SCREEN, where=~on_screen)
+        return {"points": points, "shown": on_screen.reshape(self._shape)}
+
+    def answers(self, output: Singles) -> Singles:
+        return output.T

@@ -1,0 +1,134 @@
+"""Reading a model file without trusting it: its manifest, and whether it points outside of itself.
+
+ONNX Runtime would follow a tensor's path to another file, so that is looked for in the bytes before it gets them. An
+.onnx file is one Protocol Buffers message; the walk below knows the wire format and the few fields that matter here.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import ModelError
+from .manifest import METADATA_KEY, Manifest
+
+# Which fields of a message lead to further messages, by the numbers of onnx.proto: where tensors can hide.
+_INNER: dict[str, dict[int, str]] = {
+    "Model": {7: "Graph", 20: "Training", 25: "Function"},
+    "Training": {1: "Graph", 2: "Graph"},
+    "Graph": {1: "Node", 5: "Tensor", 15: "SparseTensor"},
+    "Function": {7: "Node", 11: "Attribute"},
+    "Node": {5: "Attribute"},
+    "Attribute": {5: "Tensor", 6: "Graph", 10: "Tensor", 11: "Graph", 22: "SparseTensor", 23: "SparseTensor"},
+    "SparseTensor": {1: "Tensor", 2: "Tensor"},
+    "Tensor": {},
+}
+_METADATA_PROPS = 14
+_EXTERNAL_DATA, _DATA_LOCATION = 13, 14
+_DEEPEST = 64
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """A model file's bytes, its manifest, and the SHA-256 of the bytes."""
+
+    path: Path
+    content: bytes
+    manifest: Manifest
+    sha256: str
+
+
+def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
+    """Read and check a model file.
+
+    Raises ModelError if it is missing, larger than `max_mib` [MiB], no ONNX file, refers to external data, or has no
+    manifest of this format.
+    """
+    path = Path(path)
+    try:
+        size = path.stat().st_size
+        if size > max_mib * 2**20:
+            raise ModelError(f"{path}: {size / 2**20:.1f} MiB is too large for a model (allowed: {max_mib:g} MiB)")
+        content = path.read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
+        raise ModelError(f"can't read the model {path}: {getattr(error, 'strerror', None) or error}") from error
+    try:
+        metadata = _metadata(content)
+        if METADATA_KEY not in metadata:
+            raise ModelError("no Visual Mesh manifest in its metadata; was it written by vm-export?")
+        manifest = Manifest.from_json(metadata[METADATA_KEY])
+    except ModelError as error:
+        raise ModelError(f"{path}: {error}") from error
+    return ModelFile(path, content, manifest, hashlib.sha256(content).hexdigest())
+
+
+def _metadata(content: bytes) -> dict[str, str]:
+    """The metadata of an ONNX file. Raises ModelError if it is none or refers to external data."""
+    metadata: dict[str, str] = {}
+    graphs = 0
+    for number, value in _fields(memoryview(content)):
+        if number == _METADATA_PROPS and isinstance(value, memoryview):
+            entry = {key: bytes(text) for key, text in _fields(value) if isinstance(text, memoryview)}
+            metadata[_text(entry.get(1, b""))] = _text(entry.get(2, b""))
+        graphs += number == 7
+    if not graphs:
+        raise ModelError("not an ONNX file")
+    _refuse_external("Model", memoryview(content), 0)
+    return metadata
+
+
+def _refuse_external(message: str, data: memoryview, depth: int) -> None:
+    if depth > _DEEPEST:
+        raise ModelError(f"nested more than {_DEEPEST} deep")
+    for number, value in _fields(data):
+        if message == "Tensor" and (number == _EXTERNAL_DATA or (number == _DATA_LOCATION and value != 0)):
+            raise ModelError("refers to external data; a model must be one file")
+        inner = _INNER[message].get(number)
+        if inner and isinstance(value, memoryview):
+            _refuse_external(inner, value, depth + 1)
+
+
+def _fields(data: memoryview) -> Iterator[tuple[int, int | memoryview]]:
+    """Fields of a Protocol Buffers message as (number, whole number or bytes)."""
+    position = 0
+    while position < len(data):
+        tag, position = _varint(data, position)
+        if tag >> 32:  # other readers would cut it down to another field's number
+            raise ModelError("not an ONNX file")
+        number, wire = tag >> 3, tag & 7
+        if wire == 0:
+            value, position = _varint(data, position)
+            yield number, value
+            continue
+        if wire == 2:
+            length, position = _varint(data, position)
+        elif wire in (1, 5):
+            length = 8 if wire == 1 else 4
+        else:
+            raise ModelError("not an ONNX file")
+        if position + length > len(data):
+            raise ModelError("not an ONNX file, or cut short")
+        yield number, data[position : position + length]
+        position += length
+
+
+def _varint(data: memoryview, position: int) -> tuple[int, int]:
+    value = shift = 0
+    while True:
+        if position >= len(data) or shift > 63:
+            raise ModelError("not an ONNX file, or cut short")
+        byte = data[position]
+        value |= (byte & 0x7F) << shift
+        position += 1
+        shift += 7
+        if byte < 0x80:
+            return value, position
+
+
+def _text(raw: bytes) -> str:
+    try:
+        return raw.decode()
+    except UnicodeDecodeError as error:
+        raise ModelError(f"metadata is not text: {error}") from error

@@ -1,0 +1,1 @@
+"""Where detections go: messages, files, sockets, overlays and recordings."""

@@ -1,0 +1,1 @@
+"""Camera poses as a robot sends them, buffered and interpolated."""

@@ -1,0 +1,85 @@
+"""Lines in which a robot says where its camera is.
+
+{"t": 12.345, "height": 0.8, "quaternion": [w, x, y, z]}    rotation of the camera to the observation plane
+{"t": 12.345, "Hoc": [[...], [...], [...], [0, 0, 0, 1]]}   the same with the height in row 2, column 3
+
+t in seconds, lengths in meters. Lines from a robot are not trusted: numbers are numbers, rotations are rotations.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, VisualMeshError, unknown
+from ..geometry.orientation import OPTICAL_TO_CAMERA, Orientation
+
+LONGEST = 4096
+"""Bytes of a line."""
+
+_KEYS = ("t", "height", "quaternion", "Hoc")
+
+
+@dataclass(frozen=True)
+class PoseLine:
+    """time [s], None if it has none; orientation of the camera."""
+
+    time: float | None
+    orientation: Orientation
+
+
+def read_pose_line(line: bytes, optical: bool = False) -> PoseLine:
+    """Read a line. `optical` says that rotations turn an optical frame. Raises InputError."""
+    if len(line) > LONGEST:
+        raise InputError(f"pose of {len(line)} bytes, more than {LONGEST}")
+    try:
+        data = json.loads(line)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"pose is no line of JSON: {_shown(line)}") from error
+    if not isinstance(data, dict):
+        raise InputError(f'pose must be like {{"t": 1.0, "height": 0.8, "quaternion": [1, 0, 0, 0]}}: {_shown(line)}')
+    for key in data:
+        if key not in _KEYS:
+            raise InputError(unknown("key of a pose", key[:40], _KEYS))
+    try:
+        return PoseLine(None if data.get("t") is None else _number(data["t"], "t"), _orientation(data, optical))
+    except VisualMeshError as error:
+        raise InputError(f"pose: {error}") from error
+
+
+def _orientation(data: dict[str, Any], optical: bool) -> Orientation:
+    if "Hoc" in data:
+        if "quaternion" in data or "height" in data:
+            raise InputError("either Hoc, or height and quaternion, not both")
+        hoc = np.array([_numbers(row, "a row of Hoc", 4) for row in _list(data["Hoc"], "Hoc", 4)])
+        if optical:
+            hoc[:3, :3] = hoc[:3, :3] @ OPTICAL_TO_CAMERA.T
+        return Orientation.from_hoc(hoc)
+    missing = [name for name in ("height", "quaternion") if name not in data]
+    if missing:
+        raise InputError(f"lacks {' and '.join(missing)}")
+    height = _number(data["height"], "height")
+    return Orientation.from_quaternion(height, _numbers(data["quaternion"], "quaternion", 4), optical)
+
+
+def _number(value: Any, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 1e15:
+        raise InputError(f"{name} must be a finite number, not {str(value)[:40]}")
+    return float(value)
+
+
+def _list(value: Any, name: str, count: int) -> list[Any]:
+    if not isinstance(value, list) or len(value) != count:
+        raise InputError(f"{name} must be a list of {count}, not {str(value)[:40]}")
+    return value
+
+
+def _numbers(value: Any, name: str, count: int) -> list[float]:
+    return [_number(each, name) for each in _list(value, name, count)]
+
+
+def _shown(line: bytes) -> str:
+    return repr(line[:60])[1:]
