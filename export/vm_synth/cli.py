@@ -11,10 +11,10 @@ from pathlib import Path
 
 import cv2
 
+from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import documented, overrides_of, read_sections
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable, written_beside
-from vm_workstation.progress import Ticker
 from vm_workstation.stopping import stoppable
 
 from .dataset.contact_sheet import cell, chosen, read_shown, sheet
@@ -176,21 +176,21 @@ def _render(options: argparse.Namespace) -> int:
     left = [index for index in own if not is_done(options.out, index)]
     if len(left) < len(own):
         print(f"vm-synth: {len(own) - len(left)} of {len(own)} pictures are there already", file=sys.stderr)
-    ticker, memory = Ticker(len(left)), 0
+    bar, memory = ProgressBar(len(left), "vm-synth"), 0
 
     def report(done: Done) -> None:
         nonlocal memory
         memory = max(memory, done.memory)
-        ticker.count()
+        bar.advance()
 
     try:
         render_all(Job(options.out, tuple(maps), options.seed, configuration), left, workers, report)
     finally:
-        ticker.end()
-        if ticker.done:
+        bar.clear()
+        if bar.done:
             print(
-                f"vm-synth: {ticker.done} pictures in {ticker.took:.0f} s, "
-                f"{3600.0 * ticker.done / ticker.took:.0f} an hour; {memory / 2**20:.0f} MiB a worker at most",
+                f"vm-synth: {bar.done} pictures in {bar.elapsed:.0f} s, "
+                f"{3600.0 * bar.done / bar.elapsed:.0f} an hour; {memory / 2**20:.0f} MiB a worker at most",
                 file=sys.stderr,
             )
     print(f"{options.out}: {len(own)} pictures")
@@ -242,11 +242,11 @@ def _check(options: argparse.Namespace) -> int:
             check_writable(path)
     if options.plots is not None:
         load_matplotlib(options.plots)
-    ticker = Ticker(len(indices_of(options.out)[2]))
+    bar = ProgressBar(len(indices_of(options.out)[2]), "vm-synth")
     try:
-        found = inspect(options.out, options.quick, ticker.count)
+        found = inspect(options.out, options.quick, bar.advance)
     finally:
-        ticker.end()
+        bar.clear()
     print(tables(found, options.shards))
     if options.json is not None:
         with written_beside(options.json) as part:

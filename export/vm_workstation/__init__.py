@@ -1,1 +1,1 @@
-"""What the programs of the workstation share: stopping, worker processes, progress and plots."""
+"""What the programs of the workstation share: stopping, worker processes and plots."""

@@ -27,7 +27,7 @@ from ..network.bundled import model_path
 from ..network.model_file import ModelFile, read_model
 from .measuring import STAGES, Run, cold, drawn_image, machine, measure, rss_mib, sgemm_rate, walk
 from .options import ANGLES, add_model, add_pose, add_settings, read_options
-from .progress import Progress
+from .progress import ProgressBar
 from .tuning import check_editable, tuned, write_settings
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
@@ -106,14 +106,14 @@ def _run(options: argparse.Namespace) -> int:
     else:
         settings = [given.detector]
     detectors = [Detector(model, each) for each in settings]
-    progress = Progress(options.frames)
+    progress = ProgressBar(options.frames)
     runs = measure(detectors, work.image, work.lens, work.orientations, progress.show)
     progress.clear()
     found = _figures(options, model, detectors, runs, work)
     if not json_to_stdout:
         print(table(found), flush=True)
     if options.tune is not None:
-        progress = Progress(options.frames)
+        progress = ProgressBar(options.frames)
         highest = max(each.threads for each in settings)
         found["tuned"] = tuned(model, given.detector, highest, work.image, work.lens, work.orientations, progress.show)
         progress.clear()

@@ -28,7 +28,7 @@ from ..live.daemon import EXIT_CONFIGURATION, REFUSED, Daemon, ready
 from ..live.log import EventLog
 from ..output.result_files import json_line, make_folder, save_overlay, save_points
 from .options import ANGLES, add_live, add_model, add_pose, add_settings, read_options
-from .progress import Progress
+from .progress import ProgressBar
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
@@ -192,7 +192,7 @@ def _look(options: argparse.Namespace, given: Configuration) -> int:
             make_folder(folder)
 
     processed = 0
-    progress = Progress(source.count)
+    progress = ProgressBar(source.count)
     for frame in source.frames:
         try:
             line = _process(frame, detector, pose, options, emit)

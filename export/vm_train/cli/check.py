@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.files import check_writable, written_beside
 from vm_synth.dataset.report import summary
-from vm_workstation.progress import Ticker
 
 from ..data.inspection import Check as Check
 from ..data.inspection import check as check
@@ -70,11 +70,11 @@ def run_check(options: argparse.Namespace, classes: Classes, objects: Sequence[s
         check_writable(options.json)
     pictures = find_pictures(options.data)
     workers = len(os.sched_getaffinity(0)) if options.workers is None else options.workers
-    ticker = Ticker(len(pictures), "vm-train")
+    bar = ProgressBar(len(pictures), "vm-train")
     try:
-        found = check(pictures, classes, workers, ticker.count, objects)
+        found = check(pictures, classes, workers, bar.advance, objects)
     finally:
-        ticker.end()
+        bar.clear()
     print("\n".join(tables(found)))
     if options.json is not None:
         with written_beside(options.json) as part:

@@ -49,8 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _evaluate(options: argparse.Namespace) -> int:
     # Imported here, so that a machine without torch still gets help texts and one clear line.
+    from vm_embedded.cli.progress import ProgressBar
     from vm_workstation.plots import new_figure
-    from vm_workstation.progress import Ticker
 
     from ..evaluation.evaluation import Rules
     from ..evaluation.files import points_on_object, write_evaluation
@@ -67,11 +67,11 @@ def _evaluate(options: argparse.Namespace) -> int:
     subject = _subject(options, settings)
     classes = classes_of(subject.manifest, usual_colors(options.model, options.list), options.color)
     job = Job(options.model, settings, options.as_robot, classes, rules)
-    ticker = Ticker(len(pictures), "vm-evaluate")
+    bar = ProgressBar(len(pictures), "vm-evaluate")
     try:
-        result = evaluate(job, subject, pictures, options.workers or len(os.sched_getaffinity(0)), ticker.count)
+        result = evaluate(job, subject, pictures, options.workers or len(os.sched_getaffinity(0)), bar.advance)
     finally:
-        ticker.end()
+        bar.clear()
     for path, fault in result.faults.items():
         print(f"vm-evaluate: skipped {path}: {fault}", file=sys.stderr)
     if not result.views:

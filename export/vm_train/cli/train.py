@@ -13,10 +13,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import documented, overrides_of, read_sections
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable
-from vm_workstation.progress import Ticker
 from vm_workstation.stopping import stoppable
 
 from ..data.pictures import PictureFiles, find_pictures
@@ -145,11 +145,11 @@ def _begin(options: argparse.Namespace, configuration: TrainConfiguration, here:
 
 def _good_pictures(data: Path, configuration: TrainConfiguration, here: Hardware, strict: bool) -> list[PictureFiles]:
     pictures = find_pictures(data)
-    ticker = Ticker(len(pictures), "vm-train")
+    bar = ProgressBar(len(pictures), "vm-train")
     try:
-        found = checking.check(pictures, configuration.classes.seen_as(), here.workers + 1, ticker.count)
+        found = checking.check(pictures, configuration.classes.seen_as(), here.workers + 1, bar.advance)
     finally:
-        ticker.end()
+        bar.clear()
     for line in checking.complaints(found):
         print(f"vm-train: {line}", file=sys.stderr)
     if strict and checking.complaints(found):

@@ -16,9 +16,9 @@ import tarfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
-from vm_workstation.progress import Ticker
 
 from ..data.picture_files import PARTS, PictureFiles
 from ..data.pictures import find_pictures
@@ -53,12 +53,12 @@ def _positive(text: str) -> int:
 def run_shards(options: argparse.Namespace) -> int:
     """Write shards as the options say and return the exit status. Raises InputError as write_shards does."""
     pictures = find_pictures(options.data)
-    ticker = Ticker(len(pictures), "vm-train")
+    bar = ProgressBar(len(pictures), "vm-train")
     try:
-        shards = write_shards(pictures, options.out, options.size, ticker.count)
+        shards = write_shards(pictures, options.out, options.size, bar.advance)
     finally:
-        ticker.end()
-    there = len(pictures) - ticker.done
+        bar.clear()
+    there = len(pictures) - bar.done
     if there:
         print(f"vm-train: {there} pictures were there already", file=sys.stderr)
     print(f"{options.out}: {len(pictures)} pictures in {len(shards)} shards")

@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Image
-from vm_embedded.cli.progress import Progress
+from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError, VisualMeshError, unknown
 from vm_embedded.files import written_beside
 from vm_embedded.geometry.lens import projection_named
@@ -107,7 +107,7 @@ def _renamed(text: str) -> tuple[str, str]:
 
 def run(options: argparse.Namespace) -> int:
     """Import as the options say and return the exit status. Raises InputError, also if no picture came of it."""
-    bar = Progress(100)
+    bar = ProgressBar(100)
     try:
         made = import_records(
             options.files,

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.arrays import Floats
+from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
 from vm_embedded.files import check_writable, written_beside
 from vm_export.network import Network
-from vm_workstation.progress import Ticker
 
 from ..graphs.loading import loaded
 from ..graphs.schedule import schedule
@@ -48,7 +48,7 @@ def search(job: Job, hardware: Hardware, network: Network, steps: int) -> RateSe
     shares, weights = class_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
     training = Training(network, recipe, len(batches), shares, weights, device=hardware.device)
     rates = np.geomspace(LOWEST, HIGHEST, len(batches))
-    ticker = Ticker(len(batches), "vm-train")
+    bar = ProgressBar(len(batches), "vm-train")
     losses: list[float] = []
     average = 0.0
     found = loaded(job.graphs(job.split.training), batches, hardware.workers)
@@ -56,10 +56,10 @@ def search(job: Job, hardware: Hardware, network: Network, steps: int) -> RateSe
         training.set_rate(float(rates[number - 1]))
         average = _SMOOTHING * average + (1.0 - _SMOOTHING) * training.step(batch.items, graphs).loss
         losses.append(average / (1.0 - _SMOOTHING**number))
-        ticker.count()
+        bar.advance()
         if not np.isfinite(losses[-1]) or losses[-1] > _DIVERGED * min(losses):
             break
-    ticker.end()
+    bar.clear()
     kept = np.isfinite(losses)
     if not kept.any():
         raise InputError("the loss is no number from the first step on")

@@ -14,10 +14,10 @@ from time import perf_counter
 import numpy as np
 import torch
 
+from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
-from vm_workstation.progress import Ticker
 
 from ..graphs.loading import loaded
 from ..graphs.schedule import Batch, steps_an_epoch
@@ -85,7 +85,7 @@ def _train_round(job: Job, hardware: Hardware, progress: Progress, stopped: Call
     batches, ahead = tee(_left(job, progress.round, training.done, progress.validated))
     own = (each.part(hardware.rank, hardware.size) for each in ahead)
     scores = PointScores(tuple(job.configuration.classes.colors))
-    ticker = Ticker(training.total, "vm-train", training.done)
+    bar = ProgressBar(training.total, "vm-train", training.done)
     pictures, saved = 0, perf_counter()
 
     def save() -> None:
@@ -112,16 +112,16 @@ def _train_round(job: Job, hardware: Hardware, progress: Progress, stopped: Call
             else:
                 step = training.step(batch.items, found)
                 log.write(step.number, {"loss": step.loss, "points": step.points, "rate": step.rate})
-                ticker.count()
+                bar.advance()
                 if batch.last or perf_counter() - saved > _SAVED:
                     save()
                     saved = perf_counter()
             if summed(torch.tensor(float(stopped()))) > 0.0:
                 if not batch.validates:
                     save()
-                ticker.end()
+                bar.clear()
                 return pictures
-    ticker.end()
+    bar.clear()
     progress.finished = True
     save()
     hardware.shared(None)  # the next round reads what the leading process has written by now
