@@ -21,7 +21,7 @@ from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
 from vm_train.data.pictures import find_pictures
 from vm_train.evaluation.evaluation import Evaluation, Rules
 from vm_train.evaluation.workers import Job, evaluate
-from vm_train.evaluation.worst_errors import Oddity
+from vm_train.evaluation.worst_errors import WorstError
 from vm_train.evaluation.worst_pictures import drawn
 from vm_train.learning.configuration import ClassTable
 from vm_train.scores.object_scores import ObjectScores
@@ -100,7 +100,7 @@ def _curve(scores: ObjectScores) -> list[list[float]]:
 
 def sheet(result: Evaluation, count: int = 20) -> tuple[np.ndarray, list[str]]:
     """The worst errors of an evaluation, half of them missed and half of them false, and what they are."""
-    missed, false = result.oddities.missed[: count // 2], result.oddities.false[: count // 2]
+    missed, false = result.worst.missed[: count // 2], result.worst.false[: count // 2]
     cells, words = [], []
     for number, each in enumerate((*missed, *false), 1):
         cells.append(_numbered(drawn(each), number))
@@ -117,9 +117,9 @@ def _numbered(cell: np.ndarray, number: int) -> np.ndarray:
     return cell
 
 
-def _said(oddity: Oddity, missed: bool) -> str:
-    name = oddity.files.image.stem
-    return f"{name}: missed, {oddity.radius:.0f} px" if missed else f"{name}: false, confidence {oddity.rank:.2f}"
+def _said(error: WorstError, missed: bool) -> str:
+    name = error.files.image.stem
+    return f"{name}: missed, {error.radius:.0f} px" if missed else f"{name}: false, confidence {error.rank:.2f}"
 
 
 def main() -> None:

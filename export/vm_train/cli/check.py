@@ -19,9 +19,9 @@ from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.files import check_writable, written_beside
 from vm_synth.dataset.report import summary
 
-from ..data.inspection import Check as Check
-from ..data.inspection import check as check
-from ..data.pictures import Classes, find_pictures
+from ..data.classes import Classes
+from ..data.inspection import Inspection, inspect_pictures
+from ..data.pictures import find_pictures
 
 EXIT_OK, EXIT_FAULTS = 0, 1
 
@@ -72,7 +72,7 @@ def run_check(options: argparse.Namespace, classes: Classes, objects: Sequence[s
     workers = len(os.sched_getaffinity(0)) if options.workers is None else options.workers
     bar = ProgressBar(len(pictures), "vm-train")
     try:
-        found = check(pictures, classes, workers, bar.advance, objects)
+        found = inspect_pictures(pictures, classes, workers, bar.advance, objects)
     finally:
         bar.clear()
     print("\n".join(tables(found)))
@@ -84,7 +84,7 @@ def run_check(options: argparse.Namespace, classes: Classes, objects: Sequence[s
     return EXIT_FAULTS if found.faults or (options.strict and found.absent) else EXIT_OK
 
 
-def tables(found: Check) -> Iterator[str]:
+def tables(found: Inspection) -> Iterator[str]:
     """Lines of a report."""
     yield f"{found.count} pictures, {len(found.faults)} of them at fault"
     if not found.facts:
@@ -112,7 +112,7 @@ def tables(found: Check) -> Iterator[str]:
         yield from _aligned([["objects at [m]", *distances], ["", *(str(each) for each in distances.values())]])
 
 
-def _quantities(found: Check) -> dict[str, dict[str, float]]:
+def _quantities(found: Inspection) -> dict[str, dict[str, float]]:
     """Least, median, largest and so on of what differs from picture to picture."""
     values = {
         "camera height [m]": [each.height for each in found.facts],
@@ -124,7 +124,7 @@ def _quantities(found: Check) -> dict[str, dict[str, float]]:
     return {name: summary(each) for name, each in values.items()}
 
 
-def _distances(found: Check) -> dict[str, int]:
+def _distances(found: Inspection) -> dict[str, int]:
     """How many things of object classes are how far away; none if distances were not measured."""
     distances = [each for facts in found.facts for each in facts.distances]
     if not distances:
@@ -142,7 +142,7 @@ def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
         yield "  ".join(cells).rstrip()
 
 
-def as_json(found: Check) -> dict[str, Any]:
+def as_json(found: Inspection) -> dict[str, Any]:
     """All findings for other programs."""
     return {
         "count": found.count,
@@ -158,7 +158,7 @@ def as_json(found: Check) -> dict[str, Any]:
     }
 
 
-def complaints(found: Check) -> list[str]:
+def complaints(found: Inspection) -> list[str]:
     """Lines on what is at fault; none if all is well."""
     lines = []
     order = list(_KINDS)

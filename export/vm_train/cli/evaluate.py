@@ -74,11 +74,11 @@ def _evaluate(options: argparse.Namespace) -> int:
         bar.clear()
     for path, fault in result.faults.items():
         print(f"vm-evaluate: skipped {path}: {fault}", file=sys.stderr)
-    if not result.views:
+    if not result.poses:
         raise InputError("no picture could be evaluated")
     about = _about(options, settings, subject, job.classes.colors)
     about["notes"] = _notes(options, settings, subject, result)
-    figure, about["camera"] = points_on_object(result.views, job.classes, subject.manifest, subject.grid)
+    figure, about["camera"] = points_on_object(result.poses, job.classes, subject.manifest, subject.grid)
     scores = write_evaluation(options.output, result, about, settings.threshold, figure)
     print(lines(scores))
     for note in about["notes"]:

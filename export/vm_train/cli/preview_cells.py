@@ -16,7 +16,8 @@ from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 from vm_synth.dataset.contact_sheet import placed
 
-from ..data.pictures import Color, Picture
+from ..data.classes import Color
+from ..data.pictures import Picture
 from ..graphs.labeled_graph import seen_points
 
 GAP = 6

@@ -19,7 +19,9 @@ from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable
 from vm_workstation.stopping import stoppable
 
-from ..data.pictures import PictureFiles, find_pictures
+from ..data.inspection import inspect_pictures
+from ..data.picture_files import PictureFiles
+from ..data.pictures import find_pictures
 from ..data.split import Split, split_by_lists, split_by_seed
 from ..formats import shards, tfrecord_import
 from ..learning.configuration import TrainConfiguration
@@ -147,7 +149,7 @@ def _good_pictures(data: Path, configuration: TrainConfiguration, here: Hardware
     pictures = find_pictures(data)
     bar = ProgressBar(len(pictures), "vm-train")
     try:
-        found = checking.check(pictures, configuration.classes.seen_as(), here.workers + 1, bar.advance)
+        found = inspect_pictures(pictures, configuration.classes.seen_as(), here.workers + 1, bar.advance)
     finally:
         bar.clear()
     for line in checking.complaints(found):

@@ -20,8 +20,9 @@ import numpy as np
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
 
+from .classes import Classes
 from .picture_files import PARTS, PictureFiles
-from .pictures import Classes, Picture, parse_lens, read_picture
+from .pictures import Picture, parse_lens, read_picture
 
 _HEADER = struct.Struct("<8s32sIIII")  # magic, what it was made from, width, height, bytes of the lens, zero
 _MAGIC = b"vmtrain1"
@@ -29,12 +30,12 @@ KEPT_FREE = 1 << 30
 """Bytes that a training needs for its own files."""
 
 
-def size_of(count: int, width: int, height: int) -> int:
+def decoded_size(count: int, width: int, height: int) -> int:
     """Room that decoded pictures of a size [px] take on disk [bytes]."""
     return count * (4 * width * height + 4096)
 
 
-class Unpacked:
+class DecodedCache:
     """A folder of decoded pictures of one set. Entries that are stale or damaged count as absent.
 
     Raises InputError if the folder can't be made.
@@ -57,7 +58,7 @@ class Unpacked:
     def get(self, files: PictureFiles, classes: Classes) -> Picture | None:
         """A picture, read-only, if it is there as its files are now and with the labels of these classes."""
         try:
-            source = source_of(files, classes)
+            source = fingerprint(files, classes)
             with self._path(files).open("rb") as file:
                 content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
             magic, found, width, height, text, _ = _HEADER.unpack_from(content)
@@ -75,10 +76,10 @@ class Unpacked:
         """Keep a picture; without effect if it can't be written."""
         height, width = picture.labels.shape
         try:
-            if shutil.disk_usage(self.folder).free < size_of(1, width, height) + KEPT_FREE:
+            if shutil.disk_usage(self.folder).free < decoded_size(1, width, height) + KEPT_FREE:
                 raise OSError
             text = files.read("lens")
-            header = _HEADER.pack(_MAGIC, source_of(files, classes), width, height, len(text), 0)
+            header = _HEADER.pack(_MAGIC, fingerprint(files, classes), width, height, len(text), 0)
             # Opened with x: where two processes put the same picture, neither writes into the other's file.
             with written_beside(self._path(files)) as part, part.open("xb") as file:
                 for each in (header, text, picture.image.tobytes(), picture.labels.tobytes()):
@@ -99,7 +100,7 @@ class Unpacked:
         return self.folder / f"{quote(files.number, safe='')}.raw"
 
 
-def read(files: PictureFiles, classes: Classes, unpacked: Unpacked | None) -> Picture:
+def read_through_cache(files: PictureFiles, classes: Classes, unpacked: DecodedCache | None) -> Picture:
     """A picture from where it is unpacked, or from its files and then put there. Raises PictureFault."""
     if unpacked is None:
         return read_picture(files, classes)
@@ -111,7 +112,7 @@ def read(files: PictureFiles, classes: Classes, unpacked: Unpacked | None) -> Pi
     return picture
 
 
-def source_of(files: PictureFiles, classes: Classes) -> bytes:
+def fingerprint(files: PictureFiles, classes: Classes) -> bytes:
     """Digest of what a picture is made from: sizes and times of its files, and the colors of classes."""
     if files.shard is None:
         stats = [files.path(part).stat() for part in PARTS]

@@ -19,14 +19,15 @@ from vm_embedded.geometry.lens import Lens, RadialLens, Size
 from vm_embedded.geometry.lens_files import LensFile
 from vm_workstation.worker_process import begin, shielded
 
+from .classes import Classes, Labels
 from .picture_files import PictureFault, PictureFiles
-from .pictures import Classes, Labels, read_picture
+from .pictures import read_picture
 
 _CHUNK = 16  # pictures that a worker gets at once
 
 
 @dataclass(frozen=True)
-class Facts:
+class PictureFacts:
     """What a good picture shows.
 
     size: width and height [px]. lens: kind; focal_length [px] and fov [rad]. height [m], pitch and roll [rad] of the
@@ -48,7 +49,7 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class Fault:
+class FaultyPicture:
     """A picture that can't be used: its number, kind of the fault as PictureFault has it, and what it is."""
 
     number: str
@@ -57,13 +58,13 @@ class Fault:
 
 
 @dataclass(frozen=True)
-class Check:
+class Inspection:
     """What came of reading pictures: the good ones with their facts, and the others' faults, all by number."""
 
     classes: tuple[str, ...]
     good: tuple[PictureFiles, ...]
-    facts: tuple[Facts, ...]
-    faults: tuple[Fault, ...]
+    facts: tuple[PictureFacts, ...]
+    faults: tuple[FaultyPicture, ...]
 
     @property
     def count(self) -> int:
@@ -96,13 +97,13 @@ class Check:
         return Counter(each.lens for each in self.facts)
 
 
-def check(
+def inspect_pictures(
     pictures: Sequence[PictureFiles],
     classes: Classes,
     workers: int,
     report: Callable[[], None],
     objects: Sequence[str] = (),
-) -> Check:
+) -> Inspection:
     """Read all pictures with so many processes, 1 for none but this one, and report each.
 
     objects: classes whose distances are measured. Raises InputError for a class that is none, and VisualMeshError if a
@@ -111,13 +112,13 @@ def check(
     positions = [_position(name, classes) for name in objects]
     good, facts, faults = [], [], []
     for files, found in zip(pictures, _found(pictures, classes, positions, workers), strict=True):
-        if isinstance(found, Fault):
+        if isinstance(found, FaultyPicture):
             faults.append(found)
         else:
             good.append(files)
             facts.append(found)
         report()
-    return Check(classes.names, tuple(good), tuple(facts), tuple(faults))
+    return Inspection(classes.names, tuple(good), tuple(facts), tuple(faults))
 
 
 def _position(name: str, classes: Classes) -> int:
@@ -128,7 +129,7 @@ def _position(name: str, classes: Classes) -> int:
 
 def _found(
     pictures: Sequence[PictureFiles], classes: Classes, objects: Sequence[int], workers: int
-) -> Iterator[Facts | Fault]:
+) -> Iterator[PictureFacts | FaultyPicture]:
     inspected = partial(_inspected, classes=classes, objects=objects)
     if workers < 2 or len(pictures) <= _CHUNK:
         yield from map(inspected, pictures)
@@ -145,16 +146,16 @@ def _found(
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _inspected(files: PictureFiles, classes: Classes, objects: Sequence[int]) -> Facts | Fault:
+def _inspected(files: PictureFiles, classes: Classes, objects: Sequence[int]) -> PictureFacts | FaultyPicture:
     try:
         picture = read_picture(files, classes)
     except PictureFault as error:
-        return Fault(files.number, error.kind, " ".join(str(error).split()))
+        return FaultyPicture(files.number, error.kind, " ".join(str(error).split()))
     orientation, (height, width) = picture.lens.orientation, picture.labels.shape
     assert orientation is not None  # read_picture has seen to it
     pixels = [int(np.count_nonzero(picture.labels == index)) for index in range(len(classes.names))]
     distances = [_distances(picture.labels == index, picture.lens) for index in objects if pixels[index]]
-    return Facts(
+    return PictureFacts(
         files.number,
         (width, height),
         type(picture.lens.lens).__name__.lower().removesuffix("lens"),

@@ -13,13 +13,14 @@ import numpy as np
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.network.manifest import Manifest
 
-from ..data.picture_files import PictureFault
-from ..data.pictures import Classes, Picture, PictureFiles, read_picture
+from ..data.classes import Classes
+from ..data.picture_files import PictureFault, PictureFiles
+from ..data.pictures import Picture, read_picture
 from ..scores.object_scores import ObjectScores
 from ..scores.point_scores import PointScores
 from .answers import Answer, Subject
 from .object_truth import SceneTruth, read_scene, true_objects
-from .worst_errors import Oddities, oddities
+from .worst_errors import WorstErrors, worst_errors_of
 
 RADII = ("all", "scene")
 """Which radius mesh and fit have. all: the network's. scene: that of each picture's own balls, as vm-synth knows it."""
@@ -36,7 +37,7 @@ class Rules:
 
 
 @dataclass(frozen=True)
-class View:
+class CameraPose:
     """Where the camera of a picture was: height [m] and pitch [rad]."""
 
     files: PictureFiles
@@ -48,16 +49,16 @@ class View:
 class Evaluation:
     """What came of some pictures.
 
-    objects: scores by class of the kind object. views: of all pictures that were evaluated. radii: of the balls [m], of
+    objects: scores by class of the kind object. poses: of all pictures that were evaluated. radii: of the balls [m], of
     each picture that has a sceneX.json. faults: pictures that were not evaluated, by path, and why.
     """
 
     points: PointScores
     objects: dict[str, ObjectScores]
-    views: list[View] = field(default_factory=list)
+    poses: list[CameraPose] = field(default_factory=list)
     radii: list[float] = field(default_factory=list)
     faults: dict[str, str] = field(default_factory=dict)
-    oddities: Oddities = field(default_factory=Oddities)
+    worst: WorstErrors = field(default_factory=WorstErrors)
 
     @classmethod
     def of_nothing(cls, subject: Subject, rules: Rules) -> Evaluation:
@@ -72,10 +73,10 @@ class Evaluation:
         return Evaluation(
             self.points + other.points,
             {name: scores + other.objects[name] for name, scores in self.objects.items()},
-            self.views + other.views,
+            self.poses + other.poses,
             self.radii + other.radii,
             self.faults | other.faults,
-            self.oddities + other.oddities,
+            self.worst + other.worst,
         )
 
     def count(
@@ -88,12 +89,12 @@ class Evaluation:
             if name in self.objects:
                 found = [each for each in answer.found if each.class_name == name]
                 mistakes = self.objects[name].add(truths, found)
-                self.oddities += oddities(files, name, truths, found, mistakes)
+                self.worst += worst_errors_of(files, name, truths, found, mistakes)
         if scene is not None:
             self.radii.append(scene.ball_radius)
         orientation = picture.lens.orientation
         assert orientation is not None
-        self.views.append(View(files, orientation.height, orientation.pitch))
+        self.poses.append(CameraPose(files, orientation.height, orientation.pitch))
 
 
 def evaluated(subject: Subject, pictures: Sequence[PictureFiles], classes: Classes, rules: Rules) -> Evaluation:

@@ -17,14 +17,15 @@ from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 from vm_workstation.plots import save_figure
 
-from ..data.pictures import Classes, read_picture
-from .evaluation import Evaluation, View
+from ..data.classes import Classes
+from ..data.pictures import read_picture
+from .evaluation import CameraPose, Evaluation
 from .plots import plots
 from .points_on_ball import Camera, points_over_distance
 from .points_on_ball_plot import points_figure
 from .report import page
 from .tables import as_csv, as_json
-from .worst_errors import Oddity
+from .worst_errors import WorstError
 from .worst_pictures import drawn
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def write_evaluation(
 
 
 def points_on_object(
-    views: Sequence[View], classes: Classes, manifest: Manifest, grid: Grid
+    poses: Sequence[CameraPose], classes: Classes, manifest: Manifest, grid: Grid
 ) -> tuple[Figure | None, str]:
     """The paper's figure for a network's ball and the data's median camera, and which one that is.
 
@@ -82,17 +83,17 @@ def points_on_object(
     if manifest.shape != "sphere":
         return None, f"The figure is of balls, and the network's objects are of shape {manifest.shape}."
     radius = manifest.object_radius
-    values = np.array([(each.height, each.pitch) for each in views])
+    values = np.array([(each.height, each.pitch) for each in poses])
     spread = np.maximum(values.std(axis=0), 1e-9)
     nearest = np.linalg.norm((values - np.median(values, axis=0)) / spread, axis=1).argmin()
-    view = views[int(nearest)]
-    picture = read_picture(view.files, classes)
+    pose = poses[int(nearest)]
+    picture = read_picture(pose.files, classes)
     orientation = picture.lens.orientation
     assert orientation is not None
     camera = Camera(orientation, picture.lens.lens, (picture.image.shape[1], picture.image.shape[0]))
     name = (
-        f"Camera of {view.files.image.name}, nearest to the median of all: {view.height:.2f} m high, "
-        f"{np.degrees(view.pitch):.0f} degrees down; a ball of radius {radius:g} m."
+        f"Camera of {pose.files.image.name}, nearest to the median of all: {pose.height:.2f} m high, "
+        f"{np.degrees(pose.pitch):.0f} degrees down; a ball of radius {radius:g} m."
     )
     try:
         curves = points_over_distance(camera, Sphere(radius), (3, 4, 5), _DISTANCES, grid.equal_at or None)
@@ -102,7 +103,7 @@ def points_on_object(
 
 
 def _strips(evaluation: Evaluation) -> Mapping[str, list[tuple[bytes, str]]]:
-    odd = evaluation.oddities
+    odd = evaluation.worst
     return {
         "Objects that were missed, the largest": [
             (_jpeg(each), f"{_name(each)}: {each.class_name} of {each.rank:.1f} px") for each in odd.missed
@@ -113,9 +114,9 @@ def _strips(evaluation: Evaluation) -> Mapping[str, list[tuple[bytes, str]]]:
     }
 
 
-def _name(oddity: Oddity) -> str:
-    return oddity.files.image.name
+def _name(error: WorstError) -> str:
+    return error.files.image.name
 
 
-def _jpeg(oddity: Oddity) -> bytes:
-    return cv2.imencode(".jpg", drawn(oddity), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+def _jpeg(error: WorstError) -> bytes:
+    return cv2.imencode(".jpg", drawn(error), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()

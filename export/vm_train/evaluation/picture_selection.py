@@ -11,7 +11,9 @@ from vm_embedded.errors import InputError, unknown
 from vm_embedded.network.manifest import Manifest
 from vm_synth.dataset.files import COLORS
 
-from ..data.pictures import IMAGES, Classes, Color, PictureFiles, find_pictures
+from ..data.classes import Classes, Color
+from ..data.picture_files import IMAGES, PictureFiles
+from ..data.pictures import find_pictures
 from ..data.split import load
 from ..learning.configuration import TrainConfiguration
 

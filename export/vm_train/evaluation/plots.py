@@ -12,9 +12,9 @@ from vm_embedded.arrays import Floats
 from vm_workstation.plots import new_figure
 
 from ..scores.curves import Counts
+from ..scores.object_ranking import ObjectRanking
 from ..scores.object_scores import ObjectScores
 from ..scores.point_scores import PointScores
-from ..scores.ranking import ObjectRanking
 from .evaluation import Evaluation
 
 if TYPE_CHECKING:

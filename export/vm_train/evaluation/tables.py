@@ -18,7 +18,7 @@ def as_json(evaluation: Evaluation, threshold: float) -> dict[str, Any]:
     points = evaluation.points
     bins = named_bins(points.distance_edges)
     return {
-        "pictures": len(evaluation.views),
+        "pictures": len(evaluation.poses),
         "pictures_with_scenes": len(evaluation.radii),
         "skipped": evaluation.faults,
         "points": {

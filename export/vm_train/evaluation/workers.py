@@ -14,7 +14,8 @@ from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import VisualMeshError
 from vm_workstation.worker_process import begin, shielded
 
-from ..data.pictures import Classes, PictureFiles
+from ..data.classes import Classes
+from ..data.picture_files import PictureFiles
 from .answers import Subject, load_subject
 from .evaluation import Evaluation, Rules, evaluated
 

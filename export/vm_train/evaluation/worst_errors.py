@@ -11,7 +11,7 @@ import numpy as np
 from vm_embedded.arrays import Floats, Mask, Singles
 from vm_embedded.detection.detections import Detection
 
-from ..data.pictures import PictureFiles
+from ..data.picture_files import PictureFiles
 from ..scores.object_scores import Mistakes
 from ..scores.overlaps import TrueObject
 
@@ -20,7 +20,7 @@ MOST = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Oddity:
+class WorstError:
     """A picture with an object that was missed, or with one that is none.
 
     rank: radius [px] of the largest that was missed, or confidence of the most confident that is false. center (2,),
@@ -37,27 +37,27 @@ class Oddity:
 
 
 @dataclass(frozen=True)
-class Oddities:
+class WorstErrors:
     """Pictures with missed and with false objects, worst first."""
 
-    missed: tuple[Oddity, ...] = ()
-    false: tuple[Oddity, ...] = ()
+    missed: tuple[WorstError, ...] = ()
+    false: tuple[WorstError, ...] = ()
 
-    def __add__(self, other: Oddities) -> Oddities:
+    def __add__(self, other: WorstErrors) -> WorstErrors:
         """The worst of both."""
-        return Oddities(_worst(self.missed + other.missed), _worst(self.false + other.false))
+        return WorstErrors(_worst(self.missed + other.missed), _worst(self.false + other.false))
 
 
-def oddities(
+def worst_errors_of(
     files: PictureFiles,
     class_name: str,
     truths: Sequence[TrueObject],
     found: Sequence[Detection],
     mistakes: Mistakes[Detection],
-) -> Oddities:
+) -> WorstErrors:
     """What is odd in a picture, from its true and found objects of a class."""
     if not mistakes.missed and not mistakes.false:
-        return Oddities()
+        return WorstErrors()
     true_outlines = tuple(outline for each in truths for outline in _outlines(each.mask))
     found_outlines = tuple(each.outline for each in found)
     missed, false = [], []
@@ -66,15 +66,15 @@ def oddities(
         rows, columns = np.nonzero(largest.mask)
         center = np.array([columns.mean(), rows.mean()]) if len(rows) else np.zeros(2)
         shown = float(np.sqrt(largest.mask.sum(dtype=np.float64) / np.pi))  # of an endless outline little may show
-        missed.append(Oddity(files, class_name, shown, center, shown, true_outlines, found_outlines))
+        missed.append(WorstError(files, class_name, shown, center, shown, true_outlines, found_outlines))
     if mistakes.false:
         worst = mistakes.false[0]
         rank, center = worst.confidence, worst.center
-        false.append(Oddity(files, class_name, rank, center, worst.radius, true_outlines, found_outlines))
-    return Oddities(tuple(missed), tuple(false))
+        false.append(WorstError(files, class_name, rank, center, worst.radius, true_outlines, found_outlines))
+    return WorstErrors(tuple(missed), tuple(false))
 
 
-def _worst(all_of_them: Sequence[Oddity]) -> tuple[Oddity, ...]:
+def _worst(all_of_them: Sequence[WorstError]) -> tuple[WorstError, ...]:
     return tuple(sorted(all_of_them, key=lambda each: (-each.rank, str(each.files.image)))[:MOST])
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Image
 
-from .worst_errors import Oddity
+from .worst_errors import WorstError
 
 TRUE, FOUND = (120, 255, 60), (255, 60, 255)
 """BGR colors of true and found outlines."""
@@ -22,27 +22,27 @@ _LEAST = 24.0  # px around the place, so that it stays to be recognized
 _ROUND = 4  # bits behind the point, as OpenCV takes corners
 
 
-def drawn(oddity: Oddity) -> Image:
+def drawn(error: WorstError) -> Image:
     """The picture (200, w, 3) with all outlines. Raises PictureFault if it can't be read any more."""
-    data = np.frombuffer(oddity.files.read("image"), dtype=np.uint8)
+    data = np.frombuffer(error.files.read("image"), dtype=np.uint8)
     image = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION))
     height, width = image.shape[:2]
     scale = _HEIGHT / height
     whole = np.array([[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5]])
-    reach = min(max(_AROUND * oddity.radius, _LEAST), min(height, width) / 2.0)
+    reach = min(max(_AROUND * error.radius, _LEAST), min(height, width) / 2.0)
     zoom = _HEIGHT / (2.0 * reach)
     # What is shown enlarged is part of the picture, also where the place is at its border or beyond.
-    x, y = np.clip(oddity.center, reach - 0.5, (width - reach - 0.5, height - reach - 0.5)).tolist()
+    x, y = np.clip(error.center, reach - 0.5, (width - reach - 0.5, height - reach - 0.5)).tolist()
     near = np.array([[zoom, 0.0, _HEIGHT / 2.0 - 0.5 - zoom * x], [0.0, zoom, _HEIGHT / 2.0 - 0.5 - zoom * y]])
     small = cv2.resize(image, (round(width * scale), _HEIGHT), interpolation=cv2.INTER_AREA)
     close = cv2.warpAffine(image, near, (_HEIGHT, _HEIGHT), flags=cv2.INTER_LINEAR)
     gap = np.full((_HEIGHT, 3, 3), 255, dtype=np.uint8)
-    return np.hstack([_with_outlines(small, whole, oddity), gap, _with_outlines(close, near, oddity)])
+    return np.hstack([_with_outlines(small, whole, error), gap, _with_outlines(close, near, error)])
 
 
-def _with_outlines(picture: npt.NDArray[Any], view: Floats, oddity: Oddity) -> Image:
+def _with_outlines(picture: npt.NDArray[Any], view: Floats, error: WorstError) -> Image:
     canvas = np.array(picture, dtype=np.uint8)
-    for outlines, color in ((oddity.true, TRUE), (oddity.found, FOUND)):
+    for outlines, color in ((error.true, TRUE), (error.found, FOUND)):
         cv2.polylines(canvas, _corners(outlines, view), True, color, 1, cv2.LINE_AA, shift=_ROUND)
     return canvas
 

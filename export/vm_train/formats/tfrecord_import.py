@@ -27,7 +27,7 @@ from vm_embedded.geometry.lens import projection_named
 from vm_embedded.geometry.lens_files import lens_text
 from vm_embedded.geometry.orientation import Orientation
 
-from ..data.pictures import IMAGES
+from ..data.picture_files import IMAGES
 from .tfexample import BytesList, Example, FloatList
 from .tfrecord import read_records
 

@@ -23,9 +23,9 @@ from vm_embedded.files import written_beside
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 
-from ..data.decoded_cache import KEPT_FREE, source_of
+from ..data.classes import Classes
+from ..data.decoded_cache import KEPT_FREE, fingerprint
 from ..data.picture_files import PictureFiles
-from ..data.pictures import Classes
 from .augmentation import Augmentation
 from .labeled_graph import Graph
 
@@ -70,7 +70,7 @@ class KeptViews:
         try:
             content = self._path(files, number).read_bytes()
             magic, source, points, neighbors = _HEADER.unpack_from(content)
-            if magic != _MAGIC or source != source_of(files, self._classes):
+            if magic != _MAGIC or source != fingerprint(files, self._classes):
                 return None
             read = _Reader(content, _HEADER.size)
             graph = Graph(
@@ -89,7 +89,7 @@ class KeptViews:
         try:
             if shutil.disk_usage(self._folder).free < KEPT_FREE:
                 return
-            header = _HEADER.pack(_MAGIC, source_of(files, self._classes), len(graph), graph.neighbors.shape[1])
+            header = _HEADER.pack(_MAGIC, fingerprint(files, self._classes), len(graph), graph.neighbors.shape[1])
             parts = (
                 graph.neighbors.astype(np.int32),
                 graph.points.astype(np.float16),

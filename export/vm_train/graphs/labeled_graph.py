@@ -20,7 +20,8 @@ from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import VISUAL, Grid
 
-from ..data.pictures import Labels, Picture
+from ..data.classes import Labels
+from ..data.pictures import Picture
 from .hexagonal import ROW, HexagonalMesh, hexagonal_mesh, seen_hexagonal_mesh
 
 OFF_SCREEN = -1.0

@@ -15,8 +15,10 @@ from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 from vm_workstation.worker_process import begin, shielded
 
-from ..data.decoded_cache import Unpacked, read
-from ..data.pictures import Classes, Picture, PictureFiles
+from ..data.classes import Classes
+from ..data.decoded_cache import DecodedCache, read_through_cache
+from ..data.picture_files import PictureFiles
+from ..data.pictures import Picture
 from .augmentation import Augmentation, blurred, moved, recolored
 from .first_look import FirstLook
 from .graph_cache import KeptViews
@@ -103,7 +105,7 @@ class Graphs(Dataset[Graph]):
         self,
         pictures: Sequence[PictureFiles],
         view: View,
-        unpacked: Unpacked | None = None,
+        unpacked: DecodedCache | None = None,
         views: KeptViews | None = None,
     ) -> None:
         self.pictures, self.view, self.unpacked, self.views = tuple(pictures), view, unpacked, views
@@ -125,7 +127,7 @@ class Graphs(Dataset[Graph]):
         return self.view.look(graph, random)
 
     def _picture(self, files: PictureFiles) -> Picture:
-        return read(files, self.view.classes, self.unpacked)
+        return read_through_cache(files, self.view.classes, self.unpacked)
 
 
 def empty(neighbors: int) -> Graph:

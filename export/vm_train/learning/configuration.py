@@ -17,7 +17,7 @@ from vm_export.grid import GRIDS, Grid
 from vm_export.network_shape import ACTIVATIONS, NetworkShape
 from vm_synth.dataset.files import COLORS
 
-from ..data.pictures import Classes, Color
+from ..data.classes import Classes, Color
 from ..graphs.augmentation import Augmentation
 from .recipe import Recipe
 

@@ -25,8 +25,9 @@ from vm_embedded.config.sections import documented, read_sections
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
 
-from ..data.decoded_cache import Unpacked
-from ..data.pictures import PictureFiles, find_pictures
+from ..data.decoded_cache import DecodedCache
+from ..data.picture_files import PictureFiles
+from ..data.pictures import find_pictures
 from ..data.split import Split, load, save
 from ..graphs.first_look import FirstLook
 from ..graphs.frozen_network import Trained
@@ -219,7 +220,7 @@ class Job:
         views = KeptViews(
             self.unpacked, count, view.classes, view.manifest, view.grid, view.augmentation, view.own_radius
         )
-        return Graphs(pictures, view, Unpacked(self.unpacked), views if count else None)
+        return Graphs(pictures, view, DecodedCache(self.unpacked), views if count else None)
 
     def round_path(self, training_round: int) -> Path:
         """The best network of a round, counted from 1."""

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Mask, Singles
 
-from ..data.pictures import Labels
+from ..data.classes import Labels
 
 RULES = ("all", "weighed", "balanced", "hard")
 """all: every labeled point. weighed: every labeled point, those of frequent classes counting less. balanced: as many of

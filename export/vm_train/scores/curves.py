@@ -17,7 +17,7 @@ Counts = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Rates:
+class Outcome:
     """Numbers of what was reported rightly (hits) and wrongly (false), and of what was not but should be (missed)."""
 
     hits: int

@@ -28,8 +28,8 @@ from vm_embedded.arrays import Floats, Mask
 from vm_embedded.errors import InputError
 
 from .distance_bins import DISTANCE_EDGES, bins_of, checked_edges
+from .object_ranking import ObjectRanking
 from .overlaps import Found, TrueObject, common_areas
-from .ranking import ObjectRanking
 
 OVERLAPS = (0.5, 0.75)
 """IoU from which a found object is right; the paper has 0.75, because at 0.5 the center may lie on the edge."""

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from vm_embedded.errors import VisualMeshError
-from vm_train.cli.check import as_json, check, check_parser, complaints, run_check, tables
-from vm_train.data.pictures import Classes, find_pictures
+from vm_train.cli.check import as_json, check_parser, complaints, run_check, tables
+from vm_train.data.classes import Classes
+from vm_train.data.inspection import inspect_pictures
+from vm_train.data.pictures import find_pictures
 
 from ..data.test_pictures import CLASSES, FAULTS, LOOKING_DOWN, write_pictures
 
@@ -21,7 +23,7 @@ def folder(tmp_path):
 
 
 def checked(folder, classes=CLASSES, workers=1, objects=()):
-    return check(find_pictures(folder), classes, workers, lambda: None, objects)
+    return inspect_pictures(find_pictures(folder), classes, workers, lambda: None, objects)
 
 
 def run(folder, *options, classes=CLASSES):
@@ -92,7 +94,7 @@ def test_worker_processes_find_the_same(tmp_path):
     write_pictures(tmp_path, [f"{index:02d}" for index in range(20)])
     (tmp_path / "mask07.png").unlink()
     done = []
-    found = check(find_pictures(tmp_path), CLASSES, 2, lambda: done.append(1))
+    found = inspect_pictures(find_pictures(tmp_path), CLASSES, 2, lambda: done.append(1))
     assert len(done) == 20
     assert found == checked(tmp_path)
 

@@ -17,7 +17,7 @@ from vm_export.checkpoint import Checkpoint
 from vm_export.grid import Grid
 from vm_train.cli.evaluate import main
 from vm_train.data.pictures import find_pictures
-from vm_train.evaluation.worst_errors import Oddity
+from vm_train.evaluation.worst_errors import WorstError
 from vm_train.evaluation.worst_pictures import FOUND, TRUE, drawn
 
 from ...drawn_scenes import CHECKPOINT, IMAGES, MODEL
@@ -230,7 +230,7 @@ def test_an_interrupt_ends_it_with_130_and_writes_nothing(data, tmp_path):
 def test_small_pictures_show_outlines_and_the_place(data, center):
     files = find_pictures(data)[0]
     at = circle(*center, 9.0)
-    made = drawn(Oddity(files, "ball", 1.0, at.mean(axis=0), 9.0, (at,), (at + 3.0, at * 1e30)))
+    made = drawn(WorstError(files, "ball", 1.0, at.mean(axis=0), 9.0, (at,), (at + 3.0, at * 1e30)))
     assert made.shape == (200, 250 + 3 + 200, 3)
     nearest = min(np.abs(made.astype(int) - color).sum(axis=2).min() for color in (FOUND, TRUE))
     assert bool(nearest < 60) == (0.0 < center[0] < 160.0)

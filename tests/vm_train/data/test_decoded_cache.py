@@ -11,8 +11,9 @@ import pytest
 
 from vm_embedded.errors import InputError
 from vm_train.data import decoded_cache as module
-from vm_train.data.decoded_cache import Unpacked, read, size_of
-from vm_train.data.pictures import Classes, find_pictures, read_picture
+from vm_train.data.classes import Classes
+from vm_train.data.decoded_cache import DecodedCache, decoded_size, read_through_cache
+from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.formats.shards import write_shards
 
 from .test_pictures import CLASSES, write_pictures
@@ -27,7 +28,7 @@ def files(tmp_path):
 
 @pytest.fixture
 def kept(tmp_path):
-    return Unpacked(tmp_path / "kept")
+    return DecodedCache(tmp_path / "kept")
 
 
 def same(one, other):
@@ -39,52 +40,52 @@ def same(one, other):
 
 def test_a_picture_comes_back_as_it_was(files, kept):
     assert kept.get(files, CLASSES) is None
-    same(read(files, CLASSES, kept), read_picture(files, CLASSES))
+    same(read_through_cache(files, CLASSES, kept), read_picture(files, CLASSES))
     found = kept.get(files, CLASSES)
     same(found, read_picture(files, CLASSES))
     assert not found.image.flags.writeable
     assert not kept.full
-    same(read(files, CLASSES, None), found)
+    same(read_through_cache(files, CLASSES, None), found)
 
 
 def test_kept_pictures_take_the_room_that_is_told(files, kept):
-    read(files, CLASSES, kept)
+    read_through_cache(files, CLASSES, kept)
     (path,) = kept.folder.iterdir()
-    assert path.stat().st_size <= size_of(1, 160, 120)
+    assert path.stat().st_size <= decoded_size(1, 160, 120)
 
 
 @pytest.mark.parametrize("part", ["image", "mask", "lens"])
 def test_a_changed_file_makes_it_stale(part, files, kept):
-    read(files, CLASSES, kept)
+    read_through_cache(files, CLASSES, kept)
     os.utime(files.path(part), ns=(0, 0))
     assert kept.get(files, CLASSES) is None
-    read(files, CLASSES, kept)
+    read_through_cache(files, CLASSES, kept)
     assert kept.get(files, CLASSES) is not None
     files.path(part).unlink()
     assert kept.get(files, CLASSES) is None
 
 
 def test_other_classes_make_it_stale(files, kept):
-    read(files, CLASSES, kept)
+    read_through_cache(files, CLASSES, kept)
     others = Classes(dict(reversed(CLASSES.colors.items())))
     assert kept.get(files, others) is None
-    same(read(files, others, kept), read_picture(files, others))
+    same(read_through_cache(files, others, kept), read_picture(files, others))
 
 
 @pytest.mark.parametrize("left", [0, 10, 70, -1])
 def test_a_damaged_file_is_made_again(left, files, kept):
-    read(files, CLASSES, kept)
+    read_through_cache(files, CLASSES, kept)
     (path,) = kept.folder.iterdir()
     path.write_bytes(path.read_bytes()[:left])
     assert kept.get(files, CLASSES) is None
-    read(files, CLASSES, kept)
+    read_through_cache(files, CLASSES, kept)
     assert kept.get(files, CLASSES) is not None
 
 
 def test_what_a_killed_process_left_is_put_away(files, kept):
     (kept.folder / "1.raw.part").write_bytes(b"half")
-    read(files, CLASSES, kept)
-    read(files, CLASSES, kept)
+    read_through_cache(files, CLASSES, kept)
+    read_through_cache(files, CLASSES, kept)
     assert kept.get(files, CLASSES) is not None
     assert not kept.full
 
@@ -92,29 +93,29 @@ def test_what_a_killed_process_left_is_put_away(files, kept):
 def test_pictures_of_a_shard_are_kept_too(files, kept, tmp_path):
     write_shards([files], tmp_path / "shards", 1, lambda: None)
     (packed,) = find_pictures(tmp_path / "shards")
-    read(packed, CLASSES, kept)
+    read_through_cache(packed, CLASSES, kept)
     same(kept.get(packed, CLASSES), read_picture(files, CLASSES))
     assert kept.get(files, CLASSES) is None  # it is of other files
 
 
 def test_without_room_it_goes_on_and_says_so(files, kept, monkeypatch):
     monkeypatch.setattr(module.shutil, "disk_usage", lambda path: SimpleNamespace(free=1 << 30))
-    same(read(files, CLASSES, kept), read_picture(files, CLASSES))
+    same(read_through_cache(files, CLASSES, kept), read_picture(files, CLASSES))
     assert kept.get(files, CLASSES) is None
     assert kept.full
     monkeypatch.undo()
-    read(files, CLASSES, kept)
+    read_through_cache(files, CLASSES, kept)
     assert kept.get(files, CLASSES) is None  # no more are put there
-    again = Unpacked(kept.folder)
+    again = DecodedCache(kept.folder)
     assert not again.full
-    read(files, CLASSES, again)
+    read_through_cache(files, CLASSES, again)
     assert again.get(files, CLASSES) is not None
 
 
 def put_with_small_files(folder, files):
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
-    same(read(files, CLASSES, folder), read_picture(files, CLASSES))
+    same(read_through_cache(files, CLASSES, folder), read_picture(files, CLASSES))
 
 
 @pytest.mark.slow
@@ -130,4 +131,4 @@ def test_a_write_that_fails_in_another_process_is_seen_here(files, kept):
 def test_a_folder_that_can_not_be_made_is_named(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="can't use folder"):
-        Unpacked(tmp_path / "file" / "kept")
+        DecodedCache(tmp_path / "file" / "kept")

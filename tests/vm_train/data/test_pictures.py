@@ -15,8 +15,9 @@ from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Equisolid
 from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_synth.dataset.files import lens_text
+from vm_train.data.classes import UNLABELED, Classes
 from vm_train.data.picture_files import PictureFault
-from vm_train.data.pictures import UNLABELED, Classes, find_pictures, read_picture
+from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.graphs.labeled_graph import graph_of
 
 CLASSES = Classes({"ball": ((255, 0, 0),), "field": ((0, 255, 0), (255, 255, 255)), "environment": ((0, 0, 0),)})

@@ -147,19 +147,19 @@ def test_parts_add_up_in_any_number_of_processes(files):
     assert len(ticks) == 20
     assert as_json(alone, 0.5) == as_json(shared, 0.5)
     assert as_csv(alone, 0.5) == as_csv(shared, 0.5)
-    assert [each.files.number for each in alone.views] == [f"{number:04d}" for number in range(10)]
-    for one, other in zip(alone.oddities.missed, shared.oddities.missed, strict=True):
+    assert [each.files.number for each in alone.poses] == [f"{number:04d}" for number in range(10)]
+    for one, other in zip(alone.worst.missed, shared.worst.missed, strict=True):
         assert (one.files, one.rank) == (other.files, other.rank)
 
 
 def test_the_largest_missed_and_the_most_confident_false_come_first(files):
     blind = replace(KNOWING, network=lambda mesh, colors: np.tile(np.float32([0, 0, 1, 0]), (len(mesh), 1)))
     result = evaluated(blind, files, CLASSES, Rules())
-    ranks = [each.rank for each in result.oddities.missed]
+    ranks = [each.rank for each in result.worst.missed]
     assert len(ranks) == result.objects["ball"].ranking(0.5).truths
     assert ranks == sorted(ranks, reverse=True)
-    assert result.oddities.false == ()
-    assert all(len(each.true) == 1 for each in result.oddities.missed)
+    assert result.worst.false == ()
+    assert all(len(each.true) == 1 for each in result.worst.missed)
 
 
 def test_pictures_that_can_t_be_used_are_named(tmp_path):
@@ -170,7 +170,7 @@ def test_pictures_that_can_t_be_used_are_named(tmp_path):
     (folder / "scene0004.json").write_text("{}")
     result = evaluated(KNOWING, find_pictures(folder), CLASSES, Rules())
     assert [path[-8:-4] for path in result.faults] == ["0001", "0002", "0003", "0004"]
-    assert len(result.views) == 2
+    assert len(result.poses) == 2
     with pytest.raises(InputError, match="mask0001"):
         evaluated(KNOWING, find_pictures(folder), CLASSES, Rules(strict=True))
 
@@ -192,7 +192,7 @@ def test_colors_of_no_class_end_it(tmp_path):
     with pytest.raises(InputError, match=r"mask0001.*\[0, 0, 255\]"):
         evaluated(KNOWING, find_pictures(folder), CLASSES, Rules())
     known = classes_of(MANIFEST, USUAL, [("environment", (0, 0, 255))])
-    assert len(evaluated(KNOWING, find_pictures(folder), known, Rules()).views) == 2
+    assert len(evaluated(KNOWING, find_pictures(folder), known, Rules()).poses) == 2
 
 
 def test_answers_that_are_no_probabilities_end_it(files):

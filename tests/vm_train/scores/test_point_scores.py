@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError, ModelError
 from vm_train.scores.distance_bins import bins_of
-from vm_train.scores.point_scores import BINS, PROBABILITY_EDGES, Outcome, PointScores
+from vm_train.scores.point_ranking import BINS, PROBABILITY_EDGES, PointOutcome
+from vm_train.scores.point_scores import PointScores
 
 CLASSES = ("ball", "line", "field")
 EDGES = np.array([0.0, 1.0, 2.0, 5.0])
@@ -69,7 +70,7 @@ def roc_area(p, own):
 
 def outcome(p, own, threshold):
     taken = p >= threshold
-    return Outcome(*(int(each.sum()) for each in (taken & own, taken & ~own, ~taken & own, ~taken & ~own)))
+    return PointOutcome(*(int(each.sum()) for each in (taken & own, taken & ~own, ~taken & own, ~taken & ~own)))
 
 
 def test_edges_of_bins_reach_from_0_to_1_over_one_half_and_no_bin_is_wide():
@@ -138,7 +139,7 @@ def test_curves_pass_through_the_outcomes_at_their_thresholds(given_points):
 
 
 counts = st.integers(0, 20)
-outcomes = st.builds(Outcome, counts, counts, counts, counts)
+outcomes = st.builds(PointOutcome, counts, counts, counts, counts)
 
 
 @given(outcomes)
@@ -164,7 +165,7 @@ def test_informedness_times_markedness_is_the_square_of_mcc(each):
 
 @given(outcomes)
 def test_informedness_is_markedness_with_truth_and_answer_exchanged(each):
-    exchanged = Outcome(each.hits, each.missed, each.false, each.rejected)
+    exchanged = PointOutcome(each.hits, each.missed, each.false, each.rejected)
     if not math.isnan(each.mcc):
         assert each.informedness == pytest.approx(exchanged.markedness)
 

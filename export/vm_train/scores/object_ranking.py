@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Mask
 
-from .curves import PrecisionRecall, Rates, ratio, shares, without_nan
+from .curves import Outcome, PrecisionRecall, ratio, shares, without_nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Errors:
 
 
 @dataclass(frozen=True)
-class ObjectOutcome(Rates):
+class ObjectOutcome(Outcome):
     """Numbers of objects that were found (hits) or not (missed), of false ones, and of pictures."""
 
     pictures: int
