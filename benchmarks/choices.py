@@ -132,19 +132,19 @@ def trained(task: tuple[str, int, Path, Path]) -> Path:
 
     from vm_train.learning.hardware import Hardware
     from vm_train.learning.rounds import train
-    from vm_train.learning.run_folder import Job
+    from vm_train.learning.run_folder import TrainingRun
 
     torch.set_num_threads(1)
     folder = folder_of(out, name, seed)
     if (folder / "run.json").exists():
-        job = Job.read(folder)
+        job = TrainingRun.read(folder)
     else:
         table = tomllib.loads(BASE.read_text())
         for changes in (COMMON, VARIANTS[name].changes, {"training": {"seed": seed}}):
             for section, entries in changes.items():
                 table[section] = entries if section == "classes" else {**table.get(section, {}), **entries}
         configuration = read_sections(TrainConfiguration, None, table)
-        job = Job.begin(folder, data, configuration, split_of(data, VARIANTS[name].only), out / "unpacked")
+        job = TrainingRun.begin(folder, data, configuration, split_of(data, VARIANTS[name].only), out / "unpacked")
     train(job, Hardware("cpu", 0, 1, 0), lambda: False)
     return folder
 

@@ -48,7 +48,7 @@ class Answered:
 def answered(subject: Exact, data: Path, numbers: Path, part: str) -> Iterator[Answered]:
     """The pictures of a part of a training."""
     table = tomllib.loads((NETWORKS / "ball-5x4.toml").read_text())["classes"]
-    classes = ClassTable.from_table(table).seen_as()
+    classes = ClassTable.from_table(table).mask_classes()
     for files in pictures_of([data], numbers, part):
         picture = read_picture(files, classes)
         scene = read_scene(files.image.with_name(f"scene{files.number}.json"))

@@ -24,14 +24,14 @@ from vm_embedded.config.sections import read_sections
 from vm_export.network import Network
 from vm_train.data.pictures import find_pictures
 from vm_train.data.split import Split
-from vm_train.graphs.augmentation import OFF
-from vm_train.graphs.loading import Graphs
+from vm_train.graphs.augmentation import NO_AUGMENTATION
+from vm_train.graphs.loading import PictureGraphs
 from vm_train.graphs.schedule import Item
 from vm_train.learning.configuration import TrainConfiguration
 from vm_train.learning.hardware import Hardware
 from vm_train.learning.rounds import train
-from vm_train.learning.run_folder import Job
-from vm_train.learning.trainer import Training
+from vm_train.learning.run_folder import TrainingRun
+from vm_train.learning.trainer import Trainer
 
 RESULTS = Path(__file__).with_name("training.json")
 PAGE = Path(__file__).parents[1] / "docs" / "training.md"
@@ -61,10 +61,10 @@ def per_second(call: Callable[[int], object], count: int) -> float:
 def parts(data: Path, numbers: tuple[str, ...], folder: Path) -> dict[str, float]:
     """Pictures a second on one core."""
     made = configuration(5, 4)
-    job = Job.begin(folder / "parts", data, made, Split(numbers, (), ()), folder / "unpacked")
+    job = TrainingRun.begin(folder / "parts", data, made, Split(numbers, (), ()), folder / "unpacked")
     kept = job.graphs(numbers)
-    plain = Graphs(list(kept.pictures), kept.view, None)
-    still = Graphs(list(kept.pictures), replace(kept.view, augmentation=OFF), kept.unpacked)
+    plain = PictureGraphs(list(kept.pictures), kept.view, None)
+    still = PictureGraphs(list(kept.pictures), replace(kept.view, augmentation=NO_AUGMENTATION), kept.unpacked)
     for each in range(len(numbers)):
         kept[Item(each)]
     found = {
@@ -77,10 +77,10 @@ def parts(data: Path, numbers: tuple[str, ...], folder: Path) -> dict[str, float
         recipe = configuration(depth, width).training
         torch.manual_seed(0)
         network = Network(configuration(depth, width).network_shape)
-        training = Training(network, recipe, 10**6, np.full(network.shape.classes, 0.1), np.ones(network.shape.classes))
+        training = Trainer(network, recipe, 10**6, np.full(network.shape.classes, 0.1), np.ones(network.shape.classes))
         batches = [graphs[start : start + BATCH] for start in range(0, len(graphs) - BATCH + 1, BATCH)]
 
-        def step(number: int, training: Training = training, batches: list = batches) -> None:
+        def step(number: int, training: Trainer = training, batches: list = batches) -> None:
             batch = batches[number % len(batches)]
             training.step([Item(each, (number, each)) for each in range(len(batch))], batch)
 
@@ -95,7 +95,7 @@ def whole(data: Path, numbers: tuple[str, ...], folder: Path, workers: int) -> d
     for name, (depth, width) in NETWORKS.items():
         split = Split(numbers[8:], numbers[:8], ())
         made = configuration(depth, width)
-        job = Job.begin(folder / f"{depth}x{width}", data, made, split, folder / "unpacked")
+        job = TrainingRun.begin(folder / f"{depth}x{width}", data, made, split, folder / "unpacked")
         graphs = job.graphs(numbers)
         for each in range(len(numbers)):
             graphs[Item(each)]  # unpacks it

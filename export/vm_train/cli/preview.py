@@ -19,7 +19,16 @@ from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 
 from ..data.pictures import Picture
-from ..graphs.augmentation import Augmentation, Tone, blurred, moved, recolored, softened, told_otherwise, toned
+from ..graphs.augmentation import (
+    Augmentation,
+    Tone,
+    apply_tone,
+    perturb_camera,
+    perturb_colors,
+    perturb_sharpness,
+    soften,
+    with_camera_error,
+)
 from .preview_cells import CIRCLES, GAP, add_circles, cell, legend, middle, padded, point_colors, scaled, with_points
 
 _DEVIATIONS = 2.0  # of errors of the camera, shown as their ends
@@ -51,9 +60,9 @@ def sheet(
         cells = [cell(with_points(picture, manifest, grid, width), "as it is")]
         for version in range(versions):
             random = np.random.default_rng([seed, 3, version, number])
-            told = moved(picture, augmentation, random)
-            soft = blurred(told, augmentation, random)
-            made = _with_colors(soft, recolored(_colors(soft.image), augmentation, random))
+            told = perturb_camera(picture, augmentation, random)
+            soft = perturb_sharpness(told, augmentation, random)
+            made = _with_colors(soft, perturb_colors(_colors(soft.image), augmentation, random))
             cells.append(cell(with_points(made, manifest, grid, width), _camera_error(picture, told)))
         rows.append(np.hstack(cells))
     alone = [_both_ends(pictures[0], entry, augmentation, seed, width) for entry in _switched_on(augmentation)]
@@ -119,19 +128,19 @@ def _changed(picture: Picture, name: str, value: float, random: np.random.Genera
     """A picture with one change, named as its entry."""
     match name:
         case "height":
-            return told_otherwise(picture, height=value)
+            return with_camera_error(picture, height=value)
         case "focal_length":
-            return told_otherwise(picture, focal_length=value)
+            return with_camera_error(picture, focal_length=value)
         case "tilt":
-            return told_otherwise(picture, tilt=(0.0, math.radians(value)))
+            return with_camera_error(picture, tilt=(0.0, math.radians(value)))
         case "center":
-            return told_otherwise(picture, center=(value, 0.0))
+            return with_camera_error(picture, center=(value, 0.0))
         case "blur":
-            return replace(picture, image=softened(picture.image, blur=value))
+            return replace(picture, image=soften(picture.image, blur=value))
         case "jpeg":
-            return replace(picture, image=softened(picture.image, jpeg=round(value)))
+            return replace(picture, image=soften(picture.image, jpeg=round(value)))
     tone = replace(Tone(), **{name: value})
-    return _with_colors(picture, toned(_colors(picture.image), tone, random))
+    return _with_colors(picture, apply_tone(_colors(picture.image), tone, random))
 
 
 def _colors(image: Image) -> Singles:

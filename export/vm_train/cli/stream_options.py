@@ -14,7 +14,7 @@ from vm_embedded.errors import InputError
 from ..learning.configuration import TrainConfiguration
 
 if TYPE_CHECKING:
-    from ..graphs.streamed import Source
+    from ..graphs.streamed import StreamSource
     from ..learning.hardware import Hardware
 
 _RANGE = re.compile(r"\{(\d+)\.\.(\d+)\}")
@@ -41,9 +41,11 @@ def add_stream(made: argparse.ArgumentParser) -> None:
     )
 
 
-def source_of(options: argparse.Namespace, configuration: TrainConfiguration, here: Hardware) -> Source | None:
+def stream_source(
+    options: argparse.Namespace, configuration: TrainConfiguration, here: Hardware
+) -> StreamSource | None:
     """Where training pictures are streamed from, if they are. Raises InputError for options that don't fit."""
-    from ..graphs.streamed import Source
+    from ..graphs.streamed import StreamSource
 
     if not options.stream:
         if options.epoch_pictures is not None:
@@ -59,7 +61,7 @@ def source_of(options: argparse.Namespace, configuration: TrainConfiguration, he
         raise InputError("mesh.radius_of = 'scene' needs sceneX.json, which shards don't have")
     shards = shard_names(options.stream)
     workers = min(here.workers, len(shards) // here.size)
-    return Source(shards, options.epoch_pictures, here.size, workers, options.strict)
+    return StreamSource(shards, options.epoch_pictures, here.size, workers, options.strict)
 
 
 def shard_names(patterns: Sequence[str]) -> tuple[str, ...]:

@@ -27,11 +27,11 @@ from ..formats import shards, tfrecord_import
 from ..learning.configuration import TrainConfiguration
 from . import check as checking
 from .options import parsers
-from .stream_options import source_of
+from .stream_options import stream_source
 
 if TYPE_CHECKING:
     from ..learning.hardware import Hardware
-    from ..learning.run_folder import Job
+    from ..learning.run_folder import TrainingRun
 
 _FEW = 10.0
 """Points of a picture that give gradients; with fewer a training is told to be slow."""
@@ -98,12 +98,12 @@ def _configuration(options: argparse.Namespace) -> TrainConfiguration:
 
 
 def _train(options: argparse.Namespace) -> int:
-    from ..learning.hardware import hardware
+    from ..learning.hardware import set_up_hardware
 
     configuration = _configuration(options)
-    with hardware(options.device, options.workers, options.threads) as here:
+    with set_up_hardware(options.device, options.workers, options.threads) as here:
         # One process prepares; the others wait for what came of it.
-        fault = here.shared(_fault_of(lambda: _begin(options, configuration, here)) if here.leads else None)
+        fault = here.broadcast(_fault_of(lambda: _begin(options, configuration, here)) if here.is_leader else None)
         if fault is not None:
             raise InputError(fault)
         return _go_on(options.output, here)
@@ -117,12 +117,12 @@ def _fault_of(work: Callable[[], object]) -> str | None:
     return None
 
 
-def _begin(options: argparse.Namespace, configuration: TrainConfiguration, here: Hardware) -> Job:
+def _begin(options: argparse.Namespace, configuration: TrainConfiguration, here: Hardware) -> TrainingRun:
     """Check all pictures, and write down a new training."""
-    from ..learning.run_folder import Job, check_new
+    from ..learning.run_folder import TrainingRun, check_unused
 
-    check_new(options.output)
-    source = source_of(options, configuration, here)
+    check_unused(options.output)
+    source = stream_source(options, configuration, here)
     good = _good_pictures(options.data, configuration, here, options.strict)
     if source is None:
         split = _split(options, configuration, good)
@@ -133,7 +133,7 @@ def _begin(options: argparse.Namespace, configuration: TrainConfiguration, here:
     parts = f"{training} for training, {len(split.validation)} for validation, {len(split.test)} for test"
     print(f"{options.data}: {len(good)} pictures: {parts}")
     unpacked = None if options.no_unpacked else options.unpacked or options.output / "unpacked"
-    job = Job.begin(
+    job = TrainingRun.begin(
         options.output, options.data, configuration, split, unpacked, source, options.first, options.teacher
     )
     if job.points_a_picture < _FEW:
@@ -149,7 +149,7 @@ def _good_pictures(data: Path, configuration: TrainConfiguration, here: Hardware
     pictures = find_pictures(data)
     bar = ProgressBar(len(pictures), "vm-train")
     try:
-        found = inspect_pictures(pictures, configuration.classes.seen_as(), here.workers + 1, bar.advance)
+        found = inspect_pictures(pictures, configuration.classes.mask_classes(), here.workers + 1, bar.advance)
     finally:
         bar.clear()
     for line in checking.complaints(found):
@@ -170,26 +170,26 @@ def _split(options: argparse.Namespace, configuration: TrainConfiguration, good:
 
 
 def _resume(options: argparse.Namespace) -> int:
-    from ..learning.hardware import hardware
+    from ..learning.hardware import set_up_hardware
 
-    with hardware(options.device, options.workers, options.threads) as here:
+    with set_up_hardware(options.device, options.workers, options.threads) as here:
         return _go_on(options.run, here, options.data)
 
 
 def _go_on(folder: Path, here: Hardware, moved_to: Path | None = None) -> int:
     from ..learning.rounds import train
-    from ..learning.run_folder import Job, in_work
+    from ..learning.run_folder import TrainingRun, locked
 
-    job = Job.read(folder)
+    job = TrainingRun.read(folder)
     if moved_to is not None:
         job = replace(job, data=moved_to.resolve())
     if job.source is not None and job.source.workers != here.workers:
         here = replace(here, workers=job.source.workers)
-        if here.leads:
+        if here.is_leader:
             print(f"vm-train: {here.workers} workers read the stream, as run.json says", file=sys.stderr)
-    with in_work(folder) if here.leads else nullcontext(), _on_request() as stopped:
+    with locked(folder) if here.is_leader else nullcontext(), _on_request() as stopped:
         done = train(job, here, stopped)
-    if not here.leads:
+    if not here.is_leader:
         return EXIT_OK if done.finished else EXIT_INTERRUPTED
     speed = f"{done.pictures / max(done.seconds, 1e-9):.0f} pictures/s"
     if not done.finished:
@@ -209,7 +209,7 @@ def _go_on(folder: Path, here: Hardware, moved_to: Path | None = None) -> int:
 def _check(options: argparse.Namespace) -> int:
     classes = read_sections(TrainConfiguration, options.config).classes
     objects = [name for name, kind in classes.kinds.items() if kind == "object"]
-    return checking.run_check(options, classes.seen_as(), objects)
+    return checking.run_check(options, classes.mask_classes(), objects)
 
 
 def _preview(options: argparse.Namespace) -> int:
@@ -221,7 +221,7 @@ def _preview(options: argparse.Namespace) -> int:
     configuration = _configuration(options)
     check_writable(options.output)
     pictures = find_pictures(options.data)
-    classes = configuration.classes.seen_as()
+    classes = configuration.classes.mask_classes()
     picked = [pictures[each] for each in chosen(range(len(pictures)), options.count, None, options.seed)]
     shown = [read_picture(each, classes) for each in picked]
     made = sheet(
@@ -245,19 +245,19 @@ def _rate(options: argparse.Namespace) -> int:
 
     from vm_export.network import Network
 
-    from ..learning.hardware import hardware
-    from ..learning.rate_finder import check_plot, plot_rates, search
-    from ..learning.run_folder import Job
+    from ..learning.hardware import set_up_hardware
+    from ..learning.rate_finder import check_plot, find_rate, plot_rates
+    from ..learning.run_folder import TrainingRun
 
     configuration = _configuration(options)
     if options.plot is not None:
         check_plot(options.plot)
-    with hardware(options.device, options.workers, options.threads) as here, TemporaryDirectory() as folder:
+    with set_up_hardware(options.device, options.workers, options.threads) as here, TemporaryDirectory() as folder:
         good = _good_pictures(options.data, configuration, here, strict=False)
         split = Split(tuple(each.number for each in good), (), ())
-        job = Job.begin(Path(folder) / "run", options.data, configuration, split, None)
+        job = TrainingRun.begin(Path(folder) / "run", options.data, configuration, split, None)
         torch.manual_seed(configuration.training.seed)
-        found = search(job, here, Network(configuration.network_shape), options.steps)
+        found = find_rate(job, here, Network(configuration.network_shape), options.steps)
     for position in range(0, len(found.rates), max(len(found.rates) // 12, 1)):
         print(f"rate {found.rates[position]:.1e}  loss {found.losses[position]:.4f}")
     print(f"proposed: training.rate = {found.proposed:.2g}")

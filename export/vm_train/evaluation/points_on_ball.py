@@ -18,7 +18,7 @@ from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import build_mesh
 
-from ..graphs.hexagonal import HexagonalMesh, seen_hexagonal_mesh
+from ..graphs.hexagonal import HexagonalMesh, visible_hexagonal_mesh
 
 MESHES = ("visual", "hexagonal", "early")
 """What a curve is of. visual: our rings. hexagonal: the baseline. early: rings as wide as EarlySphere has them."""
@@ -164,7 +164,7 @@ def points_over_distance(
         mesh = _rings_on_screen(camera, ball, k)
         curves.append(_ring_curve("visual", mesh, camera, ball, k, seen))
         count = len(mesh) if equal_at is None else _equal_count(mesh, camera, ball, equal_at)
-        hexagonal = seen_hexagonal_mesh(camera.lens, camera.size, count)
+        hexagonal = visible_hexagonal_mesh(camera.lens, camera.size, count)
         curves.append(_hexagonal_curve(hexagonal, camera, ball, k, seen))
         if early:
             mesh = _rings_on_screen(camera, EarlySphere(ball.radius), k)
@@ -234,7 +234,7 @@ def _curve(
 
 def _equal_count(mesh: Mesh, camera: Camera, ball: Sphere, distance: float) -> int:
     """How many points a hexagonal mesh needs, to have as many as this mesh on a ball at about this distance [m]."""
-    hexagonal = seen_hexagonal_mesh(camera.lens, camera.size, len(mesh))
+    hexagonal = visible_hexagonal_mesh(camera.lens, camera.size, len(mesh))
     totals = np.zeros(2)
     for near in (distance * np.linspace(0.9, 1.1, 9)).tolist():
         bearings = BEARINGS[shown_as_a_whole(camera, ball, near, BEARINGS)]

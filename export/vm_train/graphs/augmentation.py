@@ -51,7 +51,7 @@ class Augmentation:
         check_entries(self)
 
 
-OFF = Augmentation(
+NO_AUGMENTATION = Augmentation(
     height=0.0,
     tilt=0.0,
     focal_length=0.0,
@@ -87,14 +87,14 @@ class Tone:
 # draws as they were.
 
 
-def moved(picture: Picture, augmentation: Augmentation, random: np.random.Generator) -> Picture:
+def perturb_camera(picture: Picture, augmentation: Augmentation, random: np.random.Generator) -> Picture:
     """The same image and labels, told to be from another pose and lens; the same object if all that is off."""
     height, roll, pitch, focal_length, right, down = random.standard_normal(6).tolist()
     told = augmentation
     if not any((told.height, told.tilt, told.focal_length, told.center)):
         return picture
     tilt = math.radians(told.tilt)
-    return told_otherwise(
+    return with_camera_error(
         picture,
         height=math.exp(told.height * height),
         tilt=(tilt * roll, tilt * pitch),
@@ -103,17 +103,17 @@ def moved(picture: Picture, augmentation: Augmentation, random: np.random.Genera
     )
 
 
-def blurred(picture: Picture, augmentation: Augmentation, random: np.random.Generator) -> Picture:
+def perturb_sharpness(picture: Picture, augmentation: Augmentation, random: np.random.Generator) -> Picture:
     """The picture with its image blurred, compressed, both, or, the same object, neither."""
     blur, sigma, jpeg, quality = random.random(4).tolist()
     low, high = augmentation.blur
     worst, best = augmentation.jpeg
     soft = low + (high - low) * sigma if blur < augmentation.blur_share else 0.0
     packed = round(worst + (best - worst) * quality) if jpeg < augmentation.jpeg_share else 0
-    return replace(picture, image=softened(picture.image, soft, packed)) if soft or packed else picture
+    return replace(picture, image=soften(picture.image, soft, packed)) if soft or packed else picture
 
 
-def recolored(colors: Singles, augmentation: Augmentation, random: np.random.Generator) -> Singles:
+def perturb_colors(colors: Singles, augmentation: Augmentation, random: np.random.Generator) -> Singles:
     """Colors (n, 3), RGB from 0 to 1, as another camera or light would have them; the same shape and limits."""
     brightness, contrast, saturation, hue, gamma, noise = random.uniform(-1.0, 1.0, 6).tolist()
     tone = Tone(
@@ -124,10 +124,10 @@ def recolored(colors: Singles, augmentation: Augmentation, random: np.random.Gen
         gamma=(1.0 + augmentation.gamma) ** gamma,
         noise=augmentation.noise * abs(noise),
     )
-    return toned(colors, tone, random)
+    return apply_tone(colors, tone, random)
 
 
-def told_otherwise(
+def with_camera_error(
     picture: Picture,
     height: float = 1.0,
     tilt: tuple[float, float] = (0.0, 0.0),
@@ -163,7 +163,7 @@ def _other_lens(lens: Lens, size: Size, factor: float, shift: tuple[float, float
     return replace(scaled, optical_center=(x + shift[0], y + shift[1]))
 
 
-def softened(image: Image, blur: float = 0.0, jpeg: int = 0) -> Image:
+def soften(image: Image, blur: float = 0.0, jpeg: int = 0) -> Image:
     """An image (h, w, 3) BGR after a Gaussian blur [px], then a JPEG file of that quality; 0 leaves each out."""
     if blur:
         image = np.asarray(cv2.GaussianBlur(image, (0, 0), blur), dtype=np.uint8)
@@ -173,7 +173,7 @@ def softened(image: Image, blur: float = 0.0, jpeg: int = 0) -> Image:
     return image
 
 
-def toned(colors: Singles, tone: Tone, random: np.random.Generator) -> Singles:
+def apply_tone(colors: Singles, tone: Tone, random: np.random.Generator) -> Singles:
     """Colors (n, 3), RGB from 0 to 1, with another tone, within the same limits. `random` is for the noise."""
     saturated = tone.saturation * np.eye(3) + (1.0 - tone.saturation) * LUMINANCE
     matrix = tone.brightness * tone.contrast * saturated @ _hue_turn(math.radians(tone.hue))

@@ -14,8 +14,8 @@ from vm_export.grid import VISUAL
 from vm_export.network import Network
 from vm_export.second_look import Gate, SecondLook
 
-from .frozen_network import Trained
-from .labeled_graph import Graph
+from .frozen_network import FrozenNetwork
+from .labeled_graph import LabeledGraph
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class FirstLook:
 
         above, rings: of the gate, which is for the classes that are objects.
         """
-        found = Trained.load(path, manifest, VISUAL)
+        found = FrozenNetwork.load(path, manifest, VISUAL)
         if found.checkpoint.network is not found.checkpoint.last:
             raise InputError(f"{path} can't look first: it has a second look itself")
         objects = tuple(at for at, each in enumerate(manifest.classes) if each.kind == "object")
@@ -41,7 +41,7 @@ class FirstLook:
         return cls(found.checkpoint.last, Gate(above, rings, objects), found.sha256)
 
     @torch.no_grad()
-    def part(self, graph: Graph) -> Graph:
+    def part(self, graph: LabeledGraph) -> LabeledGraph:
         """The points of a picture that get a second look."""
         neighbors = torch.tensor(graph.neighbors)
         passed = self.gate.passed(self.network(torch.from_numpy(graph.points), neighbors), neighbors)

@@ -16,14 +16,14 @@ _ALIKE = ("shape", "radius", "intersections", "mesh", "classes", "any_radius", "
 
 
 @dataclass(frozen=True, eq=False)
-class Trained:
+class FrozenNetwork:
     """A trained network. sha256: of its file."""
 
     checkpoint: Checkpoint
     sha256: str
 
     @classmethod
-    def load(cls, path: Path, manifest: Manifest, grid: Grid) -> Trained:
+    def load(cls, path: Path, manifest: Manifest, grid: Grid) -> FrozenNetwork:
         """Read a checkpoint of a manifest's mesh and classes, and of a grid. Raises InputError."""
         checkpoint = Checkpoint.load(path)
         for name in _ALIKE:

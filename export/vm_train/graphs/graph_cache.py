@@ -27,7 +27,7 @@ from ..data.classes import Classes
 from ..data.decoded_cache import KEPT_FREE, fingerprint
 from ..data.picture_files import PictureFiles
 from .augmentation import Augmentation
-from .labeled_graph import Graph
+from .labeled_graph import LabeledGraph
 
 _HEADER = struct.Struct("<8s32sII")  # magic, what it was made from, points, neighbors
 _MAGIC = b"vmviews1"
@@ -35,7 +35,7 @@ _PART = ("shape", "radius", "intersections", "mesh", "max_distance", "sampling")
 """What of a manifest decides where points are."""
 
 
-class KeptViews:
+class GraphCache:
     """`count` views of each picture, in a folder of those that are made in the same way.
 
     Files that are stale or damaged count as absent. Raises InputError if the folder can't be made.
@@ -65,7 +65,7 @@ class KeptViews:
         """What decides a view."""
         return np.random.default_rng([number, zlib.crc32(files.number.encode())])
 
-    def get(self, files: PictureFiles, number: int) -> Graph | None:
+    def get(self, files: PictureFiles, number: int) -> LabeledGraph | None:
         """A view, if it is there as its picture's files are now."""
         try:
             content = self._path(files, number).read_bytes()
@@ -73,7 +73,7 @@ class KeptViews:
             if magic != _MAGIC or source != fingerprint(files, self._classes):
                 return None
             read = _Reader(content, _HEADER.size)
-            graph = Graph(
+            graph = LabeledGraph(
                 neighbors=read.array(np.int32, (points + 1, neighbors)),
                 points=read.array(np.float16, (points + 1, 3)).astype(np.float32),
                 pixels=read.array(np.float32, (points, 2)),
@@ -84,7 +84,7 @@ class KeptViews:
             return None
         return graph if read.place == len(content) else None
 
-    def put(self, files: PictureFiles, number: int, graph: Graph) -> None:
+    def put(self, files: PictureFiles, number: int, graph: LabeledGraph) -> None:
         """Keep a view; without effect if it can't be written."""
         try:
             if shutil.disk_usage(self._folder).free < KEPT_FREE:

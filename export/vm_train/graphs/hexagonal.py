@@ -80,7 +80,7 @@ def hexagonal_mesh(size: Size, count: int) -> HexagonalMesh:
     return HexagonalMesh(frozen(pixels), frozen(neighbors), spacing)
 
 
-def seen_hexagonal_mesh(lens: Lens, size: Size, count: int) -> HexagonalMesh:
+def visible_hexagonal_mesh(lens: Lens, size: Size, count: int) -> HexagonalMesh:
     """The part that the lens sees of a mesh over the whole picture, with about `count` points in that part.
 
     Raises InputError as hexagonal_mesh does, and if the lens sees nothing of the picture.

@@ -22,14 +22,14 @@ from vm_export.grid import VISUAL, Grid
 
 from ..data.classes import Labels
 from ..data.pictures import Picture
-from .hexagonal import ROW, HexagonalMesh, hexagonal_mesh, seen_hexagonal_mesh
+from .hexagonal import ROW, HexagonalMesh, hexagonal_mesh, visible_hexagonal_mesh
 
 OFF_SCREEN = -1.0
 """Color of the off-screen point."""
 
 
 @dataclass(frozen=True)
-class Graph:
+class LabeledGraph:
     """n points of one picture, or of many put together.
 
     points (n + 1, 3): colors, RGB from 0 to 1; row n is the off-screen point. neighbors (n + 1, N): rows of points.
@@ -46,13 +46,13 @@ class Graph:
     def __len__(self) -> int:
         return len(self.labels)
 
-    def part(self, kept: npt.NDArray[np.intp]) -> Graph:
+    def part(self, kept: npt.NDArray[np.intp]) -> LabeledGraph:
         """The graph of the points `kept`, in that order; links to all others lead to the off-screen point."""
         position = np.full(len(self) + 1, len(kept), dtype=np.int32)
         position[kept] = np.arange(len(kept), dtype=np.int32)
         rows = np.append(kept, len(self))
         neighbors = position[self.neighbors[rows]]
-        return Graph(self.points[rows], neighbors, self.labels[kept], self.distances[kept], self.pixels[kept])
+        return LabeledGraph(self.points[rows], neighbors, self.labels[kept], self.distances[kept], self.pixels[kept])
 
 
 def seen_points(lens: LensFile, size: Size, manifest: Manifest, grid: Grid = VISUAL) -> Projection[Mesh]:
@@ -72,7 +72,7 @@ def seen_points(lens: LensFile, size: Size, manifest: Manifest, grid: Grid = VIS
         flat = _equal_hexagonal_mesh(fitted, size, manifest, orientation.height, grid.equal_at)
     else:
         count = np.count_nonzero(project(mesh, orientation.level, fitted, size).on_screen)
-        flat = seen_hexagonal_mesh(fitted, size, max(int(count), 1))
+        flat = visible_hexagonal_mesh(fitted, size, max(int(count), 1))
     rays = np.asarray(fitted.unproject(flat.pixels, size) @ orientation.level.T)
     return Projection(Mesh(rays, flat.neighbors), flat.pixels, np.ones(len(flat), dtype=bool))
 
@@ -114,7 +114,7 @@ def _equal_hexagonal_mesh(lens: Lens, size: Size, manifest: Manifest, height: fl
     return mesh.part(np.flatnonzero(mesh.on_screen(lens, size)))
 
 
-def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> Graph:
+def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> LabeledGraph:
     """What a network with this manifest sees of a picture. Raises GeometryError or InputError as seen_points does."""
     height, width = picture.labels.shape
     shown = seen_points(picture.lens, (width, height), manifest, grid)
@@ -123,7 +123,7 @@ def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> Graph
     x, y = np.rint(shown.pixels).astype(np.intp).T
     assert picture.lens.orientation is not None
     distances = plane_distances(shown.graph.rays, picture.lens.orientation.height)
-    return Graph(points, shown.graph.neighbors, picture.labels[y, x], distances, shown.pixels)
+    return LabeledGraph(points, shown.graph.neighbors, picture.labels[y, x], distances, shown.pixels)
 
 
 def color(
@@ -151,7 +151,7 @@ def plane_distances(rays: Floats, height: float) -> Floats:
         return np.asarray(np.where(down > 0.0, height * across / down, np.inf))
 
 
-def together(graphs: Sequence[Graph]) -> tuple[Graph, npt.NDArray[np.intp]]:
+def join_graphs(graphs: Sequence[LabeledGraph]) -> tuple[LabeledGraph, npt.NDArray[np.intp]]:
     """Graphs as one with one off-screen point, and where each begins (len(graphs) + 1,)."""
     starts = np.cumsum([0, *map(len, graphs)])
     last = int(starts[-1])
@@ -160,7 +160,7 @@ def together(graphs: Sequence[Graph]) -> tuple[Graph, npt.NDArray[np.intp]]:
         for each, start in zip(graphs, starts, strict=False)
     ]
     off_screen = np.full((1, graphs[0].neighbors.shape[1]), last)
-    joined = Graph(
+    joined = LabeledGraph(
         np.concatenate([*(each.points[:-1] for each in graphs), graphs[0].points[-1:]]),
         np.concatenate([*neighbors, off_screen]).astype(np.int32),
         np.concatenate([each.labels for each in graphs]),

@@ -19,17 +19,17 @@ from ..data.classes import Classes
 from ..data.decoded_cache import DecodedCache, read_through_cache
 from ..data.picture_files import PictureFiles
 from ..data.pictures import Picture
-from .augmentation import Augmentation, blurred, moved, recolored
+from .augmentation import Augmentation, perturb_camera, perturb_colors, perturb_sharpness
 from .first_look import FirstLook
-from .graph_cache import KeptViews
-from .labeled_graph import OFF_SCREEN, Graph, graph_of
+from .graph_cache import GraphCache
+from .labeled_graph import OFF_SCREEN, LabeledGraph, graph_of
 from .mirror import mirrored
 from .schedule import Batch, Item
-from .windows import window_of
+from .windows import random_window
 
 
 @dataclass(frozen=True)
-class View:
+class GraphRecipe:
     """What makes a picture a graph: classes of the masks, the network's mesh and grid, and augmentation.
 
     own_radius: the mesh is made for the radius of each picture's own ball, as its sceneX.json has it. window: share of
@@ -50,41 +50,41 @@ class View:
         """The manifest with the radius of a picture's own ball, if asked for. Raises InputError."""
         return replace(self.manifest, radius=ball_radius(files)) if self.own_radius else self.manifest
 
-    def graph(self, picture: Picture, manifest: Manifest, seed: tuple[int, ...] | None) -> Graph:
+    def graph(self, picture: Picture, manifest: Manifest, seed: tuple[int, ...] | None) -> LabeledGraph:
         """What a network with a manifest sees of a picture, augmented with a seed. Raises InputError."""
         if seed is None:
             return self._passed(self._plain(picture, manifest))
         random = np.random.default_rng(seed)
         return self.look(self.view(picture, manifest, random), random)
 
-    def view(self, picture: Picture, manifest: Manifest, random: np.random.Generator) -> Graph:
+    def view(self, picture: Picture, manifest: Manifest, random: np.random.Generator) -> LabeledGraph:
         """The whole graph of a picture told to be from another pose and lens, and softened, in absolute colors.
 
         Raises InputError.
         """
-        changed = blurred(moved(picture, self.augmentation, random), self.augmentation, random)
+        changed = perturb_sharpness(perturb_camera(picture, self.augmentation, random), self.augmentation, random)
         return self._plain(changed, replace(manifest, colors="absolute"))
 
-    def look(self, graph: Graph, random: np.random.Generator) -> Graph:
+    def look(self, graph: LabeledGraph, random: np.random.Generator) -> LabeledGraph:
         """A window of a view with other colors, or what the first network passes on of it."""
         objects = [at for at, each in enumerate(self.manifest.classes) if each.kind == "object"]
-        colors = recolored(graph.points[:-1], self.augmentation, random)
+        colors = perturb_colors(graph.points[:-1], self.augmentation, random)
         if self.manifest.colors == "relative":
             make_relative(colors)
         told = replace(graph, points=np.concatenate([colors, graph.points[-1:]]))
-        seen = window_of(told, self.window, objects, random)
+        seen = random_window(told, self.window, objects, random)
         if self.mirrored and random.random() < self.mirrored:  # where it is off, nothing more is drawn
             seen = mirrored(seen, self.manifest.model)
         return self._passed(seen)
 
-    def _passed(self, graph: Graph) -> Graph:
+    def _passed(self, graph: LabeledGraph) -> LabeledGraph:
         return graph if self.first is None else self.first.part(graph)
 
-    def _plain(self, picture: Picture, manifest: Manifest) -> Graph:
+    def _plain(self, picture: Picture, manifest: Manifest) -> LabeledGraph:
         try:
             return graph_of(picture, manifest, self.grid)
         except GeometryError:  # so low a camera sees no points
-            return empty(manifest.neighbors)
+            return empty_graph(manifest.neighbors)
 
 
 def ball_radius(files: PictureFiles) -> float:
@@ -98,22 +98,22 @@ def ball_radius(files: PictureFiles) -> float:
         raise InputError(f"{path.name}: does not say the ball's radius, ball_radius") from error
 
 
-class Graphs(Dataset[Graph]):
+class PictureGraphs(Dataset[LabeledGraph]):
     """The graphs of pictures, by Item. Raises InputError for a picture that can't be read."""
 
     def __init__(
         self,
         pictures: Sequence[PictureFiles],
-        view: View,
+        view: GraphRecipe,
         unpacked: DecodedCache | None = None,
-        views: KeptViews | None = None,
+        views: GraphCache | None = None,
     ) -> None:
         self.pictures, self.view, self.unpacked, self.views = tuple(pictures), view, unpacked, views
 
     def __len__(self) -> int:
         return len(self.pictures)
 
-    def __getitem__(self, item: Item) -> Graph:
+    def __getitem__(self, item: Item) -> LabeledGraph:
         files = self.pictures[item.position]
         if self.views is None or item.seed is None:
             return self.view.graph(self._picture(files), self.view.manifest_for(files), item.seed)
@@ -130,9 +130,9 @@ class Graphs(Dataset[Graph]):
         return read_through_cache(files, self.view.classes, self.unpacked)
 
 
-def empty(neighbors: int) -> Graph:
+def empty_graph(neighbors: int) -> LabeledGraph:
     """A graph without points."""
-    return Graph(
+    return LabeledGraph(
         np.full((1, 3), OFF_SCREEN, dtype=np.float32),
         np.zeros((1, neighbors), dtype=np.int32),
         np.empty(0, dtype=np.int8),
@@ -141,12 +141,14 @@ def empty(neighbors: int) -> Graph:
     )
 
 
-def loaded(graphs: Dataset[Graph], batches: Iterable[Batch], workers: int) -> Generator[list[Graph]]:
+def load_batches(
+    graphs: Dataset[LabeledGraph], batches: Iterable[Batch], workers: int
+) -> Generator[list[LabeledGraph]]:
     """The graphs of batches, in their order, whatever the number of worker processes (0: none).
 
     Raises what reading raised, and InputError if a worker was killed.
     """
-    loader: DataLoader[list[Graph] | VisualMeshError] = DataLoader(
+    loader: DataLoader[list[LabeledGraph] | VisualMeshError] = DataLoader(
         _Faults(graphs),
         batch_sampler=(list(each.items) for each in batches),
         num_workers=workers,
@@ -168,20 +170,20 @@ def loaded(graphs: Dataset[Graph], batches: Iterable[Batch], workers: int) -> Ge
         raise InputError("a worker that read pictures was killed (out of memory?)") from error
 
 
-class _Faults(Dataset["list[Graph] | VisualMeshError"]):
+class _Faults(Dataset["list[LabeledGraph] | VisualMeshError"]):
     """Graphs, or why there is none: an error that a worker raises would come with its traceback for a message."""
 
-    def __init__(self, graphs: Dataset[Graph]) -> None:
+    def __init__(self, graphs: Dataset[LabeledGraph]) -> None:
         self._graphs = graphs
 
-    def __getitems__(self, items: Sequence[Item]) -> list[Graph] | VisualMeshError:
+    def __getitems__(self, items: Sequence[Item]) -> list[LabeledGraph] | VisualMeshError:
         try:
             return [self._graphs[item] for item in items]
         except VisualMeshError as error:
             return error
 
 
-def _as_they_are(found: list[Graph] | VisualMeshError) -> list[Graph] | VisualMeshError:
+def _as_they_are(found: list[LabeledGraph] | VisualMeshError) -> list[LabeledGraph] | VisualMeshError:
     return found
 
 

@@ -9,18 +9,18 @@ import numpy.typing as npt
 
 from vm_embedded.mesh.mesh import MeshModel
 
-from .labeled_graph import Graph
+from .labeled_graph import LabeledGraph
 
 
-def mirrored(graph: Graph, model: MeshModel) -> Graph:
+def mirrored(graph: LabeledGraph, model: MeshModel) -> LabeledGraph:
     """What a network would see of the mirror image of a picture with a mesh of a model.
 
     Left and right neighbors change places; pixels stay where they are.
     """
-    return replace(graph, neighbors=np.ascontiguousarray(graph.neighbors[:, mirrored_places(model)]))
+    return replace(graph, neighbors=np.ascontiguousarray(graph.neighbors[:, mirrored_columns(model)]))
 
 
-def mirrored_places(model: MeshModel) -> npt.NDArray[np.intp]:
+def mirrored_columns(model: MeshModel) -> npt.NDArray[np.intp]:
     """Which neighbor (N,) stands in the mirror image where each stood: rings run from left to right, and columns of a
     lattice ahead, so that its rows are what changes sides."""
     if model.steps is None:

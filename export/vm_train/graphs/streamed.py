@@ -21,13 +21,13 @@ from vm_embedded.errors import InputError
 from ..data.picture_files import PictureFault, RawPicture
 from ..data.pictures import decode_picture
 from ..data.shard_stream import stream
-from .labeled_graph import Graph
-from .loading import Graphs, empty
+from .labeled_graph import LabeledGraph
+from .loading import PictureGraphs, empty_graph
 from .schedule import Batch, Item
 
 
 @dataclass(frozen=True)
-class Source:
+class StreamSource:
     """Where training pictures come from.
 
     shards: as shard_stream.stream takes them, but such as can begin again. epoch: pictures in an epoch. processes, and
@@ -60,7 +60,7 @@ class StreamedItem(Item):
     place: int = 0
 
 
-def in_lanes(batches: Iterable[Batch], seed: tuple[int, ...], source: Source) -> Iterator[Batch]:
+def assign_lanes(batches: Iterable[Batch], seed: tuple[int, ...], source: StreamSource) -> Iterator[Batch]:
     """All batches of `schedule` with StreamedItems for training. Each worker finds its own lane in its batches."""
     places = Counter[tuple[int, int]]()
     for index, batch in enumerate(batches):
@@ -76,19 +76,19 @@ def in_lanes(batches: Iterable[Batch], seed: tuple[int, ...], source: Source) ->
         yield replace(batch, items=tuple(items))
 
 
-class StreamedGraphs(Dataset[Graph]):
+class StreamedGraphs(Dataset[LabeledGraph]):
     """The graphs of a stream's pictures by StreamedItem, and those of the validation by Item, from source.epoch on.
 
     A picture at fault is named on standard error and has a graph without points, so that the others keep their places.
     Raises InputError if it must not be skipped, or a shard can't be read on.
     """
 
-    def __init__(self, source: Source, validation: Graphs) -> None:
+    def __init__(self, source: StreamSource, validation: PictureGraphs) -> None:
         self._source, self._validation = source, validation
         self._lanes: dict[int, _Lane] = {}
         self._named: set[str] = set()
 
-    def __getitem__(self, item: Item) -> Graph:
+    def __getitem__(self, item: Item) -> LabeledGraph:
         if not isinstance(item, StreamedItem):
             return self._validation[replace(item, position=item.position - self._source.epoch)]
         view, raw = self._validation.view, self._raw(item)
@@ -97,7 +97,7 @@ class StreamedGraphs(Dataset[Graph]):
             return view.graph(picture, view.manifest, item.seed)
         except InputError as error:
             self._skip(InputError(f"picture {raw.number} of the stream: {error}"))
-            return empty(view.manifest.neighbors)
+            return empty_graph(view.manifest.neighbors)
 
     def _raw(self, item: StreamedItem) -> RawPicture:
         lane = self._lanes.get(item.lane)
@@ -128,7 +128,7 @@ class _Lane:
 
 
 def _pictures(
-    source: Source, order: tuple[int, ...], lane: int, report: Callable[[PictureFault], None]
+    source: StreamSource, order: tuple[int, ...], lane: int, report: Callable[[PictureFault], None]
 ) -> Iterator[RawPicture]:
     """The pictures of a lane without end. Raises InputError if its shards have none."""
     for turn in count():

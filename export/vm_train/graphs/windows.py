@@ -11,13 +11,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .labeled_graph import Graph
+from .labeled_graph import LabeledGraph
 
 AIMED = 0.75
 """Share of the windows that show a point of an object, where the picture has one."""
 
 
-def window_of(graph: Graph, share: float, objects: Sequence[int], random: np.random.Generator) -> Graph:
+def random_window(
+    graph: LabeledGraph, share: float, objects: Sequence[int], random: np.random.Generator
+) -> LabeledGraph:
     """The part of a picture's graph in a window of a share of its width and height.
 
     The same object if that is 1, or if the graph has no points. objects: positions of the classes that most windows are

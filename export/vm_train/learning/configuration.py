@@ -36,10 +36,10 @@ class ClassTable:
     kinds: Mapping[str, str]
 
     def __post_init__(self) -> None:
-        self.seen_as()
+        self.mask_classes()
 
     @classmethod
-    def usual(cls) -> ClassTable:
+    def default(cls) -> ClassTable:
         """The classes and colors of vm-synth and the reference."""
         colors = {name: (color,) for name, color in COLORS.items()}
         return cls(colors, {name: KIND_OF.get(name, "area") for name in colors})
@@ -66,7 +66,7 @@ class ClassTable:
             shown = ", ".join(str(list(each)) for each in colors)
             yield f'{name} = {{ kind = "{self.kinds[name]}", colors = [{shown}] }}'
 
-    def seen_as(self) -> Classes:
+    def mask_classes(self) -> Classes:
         """The classes as masks show them. Raises InputError for shared colors, or fewer than two classes."""
         return Classes(self.colors)
 
@@ -173,7 +173,8 @@ class TrainConfiguration:
 
     data: DataSettings = dataclasses.field(default_factory=DataSettings)
     classes: ClassTable = dataclasses.field(
-        default_factory=ClassTable.usual, metadata={"read": ClassTable.from_table, "documented": ClassTable.documented}
+        default_factory=ClassTable.default,
+        metadata={"read": ClassTable.from_table, "documented": ClassTable.documented},
     )
     mesh: MeshSettings = dataclasses.field(default_factory=MeshSettings)
     network: NetworkSettings = dataclasses.field(default_factory=NetworkSettings)

@@ -30,11 +30,11 @@ class Hardware:
     workers: int
 
     @property
-    def leads(self) -> bool:
+    def is_leader(self) -> bool:
         """Whether this process writes the files."""
         return self.rank == 0
 
-    def shared(self, value: Value) -> Value:
+    def broadcast(self, value: Value) -> Value:
         """The leading process's value, in all of them."""
         if self.size == 1:
             return value
@@ -42,7 +42,7 @@ class Hardware:
         distributed.broadcast_object_list(box, src=0)
         return box[0]
 
-    def gathered(self, value: Value) -> list[Value]:
+    def gather(self, value: Value) -> list[Value]:
         """Every process's value, in all of them."""
         if self.size == 1:
             return [value]
@@ -52,7 +52,7 @@ class Hardware:
 
 
 @contextmanager
-def hardware(device: str, workers: int | None, threads: int | None) -> Iterator[Hardware]:
+def set_up_hardware(device: str, workers: int | None, threads: int | None) -> Iterator[Hardware]:
     """The hardware that is there: the processes of torchrun, if it started this one, meet here.
 
     device: auto, cpu or cuda. workers: None for as many as the processor has cores for. threads: None for one. Raises

@@ -11,7 +11,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
 
 
-class Log:
+class TrainingLog:
     """log.jsonl and tensorboard/ in a folder. Records have a round and a step; scalars are shown in TensorBoard.
 
     A training that goes on from a state of `step` steps and `validated` epochs forgets what came after it. Of several
@@ -46,7 +46,7 @@ class Log:
         for name, value in _scalars(record):
             self._board.add_scalar(name, value, step)
 
-    def __enter__(self) -> Log:
+    def __enter__(self) -> TrainingLog:
         return self
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:

@@ -17,7 +17,7 @@ from .recipe import Recipe
 _MOMENTUM = 0.9  # of sgd
 
 
-class Descent:
+class ScheduledOptimizer:
     """The optimizers of a network's weights, and their schedule of `total` steps."""
 
     def __init__(self, network: nn.Module, recipe: Recipe, total: int) -> None:
@@ -39,7 +39,7 @@ class Descent:
             for group in optimizer.param_groups:
                 group["lr"] = rate
 
-    def forget(self) -> None:
+    def zero_grad(self) -> None:
         """Set all gradients to none."""
         for optimizer in self._optimizers:
             optimizer.zero_grad()

@@ -14,12 +14,12 @@ from vm_embedded.errors import InputError
 from vm_embedded.files import check_writable, written_beside
 from vm_export.network import Network
 
-from ..graphs.loading import loaded
+from ..graphs.loading import load_batches
 from ..graphs.schedule import schedule
 from .hardware import Hardware
-from .run_folder import Job
-from .selection import class_shares, class_weights
-from .trainer import Training
+from .run_folder import TrainingRun
+from .selection import class_weights, selection_shares
+from .trainer import Trainer
 
 LOWEST, HIGHEST = 1e-5, 3.0
 _SMOOTHING = 0.9  # of the loss's moving average
@@ -39,19 +39,19 @@ class RateSearch:
         return float(self.rates[self.losses.argmin()]) / 3.0
 
 
-def search(job: Job, hardware: Hardware, network: Network, steps: int) -> RateSearch:
+def find_rate(job: TrainingRun, hardware: Hardware, network: Network, steps: int) -> RateSearch:
     """Train for up to `steps` steps, each with a higher rate. The first round's selection counts."""
     recipe = replace(job.configuration.training, schedule="constant")
     epochs = -(-steps * recipe.batch // len(job.split.training))
     batches = list(schedule((recipe.seed, 0), epochs, recipe.batch, len(job.split.training), 0))[:steps]
     rule = recipe.selection_of(1)
-    shares, weights = class_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
-    training = Training(network, recipe, len(batches), shares, weights, device=hardware.device)
+    shares, weights = selection_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
+    training = Trainer(network, recipe, len(batches), shares, weights, device=hardware.device)
     rates = np.geomspace(LOWEST, HIGHEST, len(batches))
     bar = ProgressBar(len(batches), "vm-train")
     losses: list[float] = []
     average = 0.0
-    found = loaded(job.graphs(job.split.training), batches, hardware.workers)
+    found = load_batches(job.graphs(job.split.training), batches, hardware.workers)
     for number, (batch, graphs) in enumerate(zip(batches, found, strict=False), 1):
         training.set_rate(float(rates[number - 1]))
         average = _SMOOTHING * average + (1.0 - _SMOOTHING) * training.step(batch.items, graphs).loss

@@ -19,20 +19,20 @@ from vm_embedded.errors import InputError
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
 
-from ..graphs.loading import loaded
+from ..graphs.loading import load_batches
 from ..graphs.schedule import Batch, steps_an_epoch
 from ..scores.point_scores import PointScores
 from .hardware import Hardware
-from .log import Log
-from .run_folder import Job
-from .selection import class_shares, class_weights
-from .trainer import Training, read_state, summed
+from .log import TrainingLog
+from .run_folder import TrainingRun
+from .selection import class_weights, selection_shares
+from .trainer import Trainer, read_state, sum_over_processes
 
 _SAVED = 30.0  # seconds between states
 
 
 @dataclass
-class Progress:
+class TrainingProgress:
     """How far a training is beside its weights.
 
     round: counted from 1. finished: whether the round is. validated: epochs of it that are. best: score of its best
@@ -48,36 +48,36 @@ class Progress:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TrainingOutcome:
     """What a call of `train` came to. finished: or stopped on request."""
 
     finished: bool
-    progress: Progress
+    progress: TrainingProgress
     pictures: int
     seconds: float
 
 
-def train(job: Job, hardware: Hardware, stopped: Callable[[], bool]) -> Outcome:
+def train(job: TrainingRun, hardware: Hardware, stopped: Callable[[], bool]) -> TrainingOutcome:
     """Do all that is left of a training, or as much as there is until `stopped` says so. Raises InputError.
 
     The final weights are the same however often it was stopped or killed.
     """
     began = perf_counter()
-    progress = Progress()
+    progress = TrainingProgress()
     if job.state_path.exists():
-        progress = Progress(**read_state(job.state_path)["more"])
+        progress = TrainingProgress(**read_state(job.state_path)["more"])
     pictures = 0
     while True:
         if progress.finished:
             if progress.round == job.configuration.training.trainings:
-                return Outcome(True, progress, pictures, perf_counter() - began)
-            progress = Progress(round=progress.round + 1, best_ever=progress.best_ever)
+                return TrainingOutcome(True, progress, pictures, perf_counter() - began)
+            progress = TrainingProgress(round=progress.round + 1, best_ever=progress.best_ever)
         pictures += _train_round(job, hardware, progress, stopped)
         if not progress.finished:
-            return Outcome(False, progress, pictures, perf_counter() - began)
+            return TrainingOutcome(False, progress, pictures, perf_counter() - began)
 
 
-def _train_round(job: Job, hardware: Hardware, progress: Progress, stopped: Callable[[], bool]) -> int:
+def _train_round(job: TrainingRun, hardware: Hardware, progress: TrainingProgress, stopped: Callable[[], bool]) -> int:
     """Do what is left of a round, and return the number of pictures that were looked at."""
     training = _prepared(job, hardware, progress)
     recipe = job.configuration.training
@@ -89,13 +89,13 @@ def _train_round(job: Job, hardware: Hardware, progress: Progress, stopped: Call
     pictures, saved = 0, perf_counter()
 
     def save() -> None:
-        if hardware.leads:
+        if hardware.is_leader:
             training.save(job.state_path, asdict(progress))
 
     with (
-        Log(job.folder, progress.round, training.done, progress.validated, hardware.leads) as log,
+        TrainingLog(job.folder, progress.round, training.done, progress.validated, hardware.is_leader) as log,
         _resumable(job.folder, save),
-        closing(loaded(job.scheduled(), own, hardware.workers)) as loader,
+        closing(load_batches(job.scheduled(), own, hardware.workers)) as loader,
     ):
         for whole, found in zip(batches, loader, strict=True):
             batch = whole.part(hardware.rank, hardware.size)
@@ -116,7 +116,7 @@ def _train_round(job: Job, hardware: Hardware, progress: Progress, stopped: Call
                 if batch.last or perf_counter() - saved > _SAVED:
                     save()
                     saved = perf_counter()
-            if summed(torch.tensor(float(stopped()))) > 0.0:
+            if sum_over_processes(torch.tensor(float(stopped()))) > 0.0:
                 if not batch.validates:
                     save()
                 bar.clear()
@@ -124,11 +124,11 @@ def _train_round(job: Job, hardware: Hardware, progress: Progress, stopped: Call
     bar.clear()
     progress.finished = True
     save()
-    hardware.shared(None)  # the next round reads what the leading process has written by now
+    hardware.broadcast(None)  # the next round reads what the leading process has written by now
     return pictures
 
 
-def _prepared(job: Job, hardware: Hardware, progress: Progress) -> Training:
+def _prepared(job: TrainingRun, hardware: Hardware, progress: TrainingProgress) -> Trainer:
     """A round's training as far as it is."""
     recipe = job.configuration.training
     torch.manual_seed(int(np.random.default_rng([recipe.seed, progress.round]).integers(2**31)))
@@ -136,9 +136,9 @@ def _prepared(job: Job, hardware: Hardware, progress: Progress) -> Training:
     rule = recipe.selection_of(progress.round)
     graders = [Checkpoint.load(job.round_path(each)).last for each in range(1, progress.round)]
     total = recipe.epochs * steps_an_epoch(recipe.looks * job.epoch, recipe.batch)
-    shares, weights = class_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
+    shares, weights = selection_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
     teacher = None if job.teacher is None else job.teacher.checkpoint.network
-    training = Training(network, recipe, total, shares, weights, graders, teacher, hardware.device)
+    training = Trainer(network, recipe, total, shares, weights, graders, teacher, hardware.device)
     if job.state_path.exists():
         state = read_state(job.state_path)
         if state["more"]["round"] == progress.round:
@@ -146,7 +146,7 @@ def _prepared(job: Job, hardware: Hardware, progress: Progress) -> Training:
     return training
 
 
-def _left(job: Job, training_round: int, done: int, validated: int) -> Iterator[Batch]:
+def _left(job: TrainingRun, training_round: int, done: int, validated: int) -> Iterator[Batch]:
     """Batches of a round that are left after so many steps and validated epochs."""
     for batch in job.batches(training_round):
         if batch.epoch >= validated if batch.validates else batch.step > done:
@@ -164,15 +164,20 @@ def _resumable(folder: Path, save: Callable[[], None]) -> Iterator[None]:
 
 
 def _validated(
-    job: Job, hardware: Hardware, progress: Progress, training: Training, log: Log, own: PointScores
+    job: TrainingRun,
+    hardware: Hardware,
+    progress: TrainingProgress,
+    training: Trainer,
+    log: TrainingLog,
+    own: PointScores,
 ) -> None:
     """Score a network, and keep it if it is the best so far."""
-    first, *others = hardware.gathered(own)
+    first, *others = hardware.gather(own)
     scores = sum(others, start=first)
     precisions = {name: scores.ranking(name).precision_recall.average_precision for name in scores.classes}
     score, unseen = _score(job, precisions)
     progress.validated += 1
-    if unseen and progress.validated == 1 and hardware.leads:
+    if unseen and progress.validated == 1 and hardware.is_leader:
         print(
             f"vm-train: the validation shows no {' or '.join(unseen)}: networks are chosen by all classes",
             file=sys.stderr,
@@ -183,7 +188,7 @@ def _validated(
         return
     progress.best, progress.best_epoch = score, progress.validated
     best_ever, progress.best_ever = progress.best_ever, max(progress.best_ever, score)
-    if not hardware.leads:
+    if not hardware.is_leader:
         return
     provenance = job.provenance() | {
         "round": str(progress.round),
@@ -199,7 +204,7 @@ def _validated(
         checkpoint.save(job.model_path)
 
 
-def _score(job: Job, precisions: dict[str, float]) -> tuple[float, list[str]]:
+def _score(job: TrainingRun, precisions: dict[str, float]) -> tuple[float, list[str]]:
     """Mean average precision of the objects that occur, else of all classes that do; and the objects if none does."""
     objects = [name for name, kind in job.configuration.classes.kinds.items() if kind == "object"]
     known = {name: value for name, value in precisions.items() if not math.isnan(value)}

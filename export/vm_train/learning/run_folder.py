@@ -30,13 +30,13 @@ from ..data.picture_files import PictureFiles
 from ..data.pictures import find_pictures
 from ..data.split import Split, load, save
 from ..graphs.first_look import FirstLook
-from ..graphs.frozen_network import Trained
-from ..graphs.graph_cache import KeptViews
-from ..graphs.loading import Graphs, View
+from ..graphs.frozen_network import FrozenNetwork
+from ..graphs.graph_cache import GraphCache
+from ..graphs.loading import GraphRecipe, PictureGraphs
 from ..graphs.schedule import Batch, Item, schedule
-from ..graphs.streamed import Source, StreamedGraphs, StreamedItem, in_lanes
+from ..graphs.streamed import StreamedGraphs, StreamedItem, StreamSource, assign_lanes
 from .configuration import TrainConfiguration
-from .selection import class_shares
+from .selection import selection_shares
 
 _COUNTED = 300  # pictures of which classes are counted
 
@@ -44,7 +44,7 @@ _FORMAT = 3
 
 
 @dataclass(frozen=True)
-class Job:
+class TrainingRun:
     """What is to be done. data: the pictures' folder. counts (C,): points of each class in some training pictures.
 
     unpacked: where decoded pictures are kept, or None. source: where training pictures are streamed from, or None if
@@ -58,9 +58,9 @@ class Job:
     split: Split
     counts: npt.NDArray[np.int64]
     unpacked: Path | None
-    source: Source | None = None
+    source: StreamSource | None = None
     first: FirstLook | None = None
-    teacher: Trained | None = None
+    teacher: FrozenNetwork | None = None
 
     @classmethod
     def begin(
@@ -70,15 +70,15 @@ class Job:
         configuration: TrainConfiguration,
         split: Split,
         unpacked: Path | None,
-        source: Source | None = None,
+        source: StreamSource | None = None,
         first: Path | None = None,
         teacher: Path | None = None,
-    ) -> Job:
+    ) -> TrainingRun:
         """Write down a new training. first, teacher: checkpoints of the networks that have a part in it.
 
         Raises InputError, also if its folder holds a training already.
         """
-        check_new(folder)
+        check_unused(folder)
         looks_first = None if first is None else _first(first, configuration)
         teaches = None if teacher is None else _teacher(teacher, configuration)
         try:
@@ -115,7 +115,7 @@ class Job:
         return job
 
     @classmethod
-    def read(cls, folder: Path) -> Job:
+    def read(cls, folder: Path) -> TrainingRun:
         """A training that was begun. Raises InputError."""
         path = folder / "run.json"
         try:
@@ -126,7 +126,7 @@ class Job:
             data, kept, origin = Path(content["data"]), content["unpacked"], content["source"]
             sha256, first_sha256 = content["configuration_sha256"], content["first_sha256"]
             teacher_sha256 = content["teacher_sha256"]
-            source = None if origin is None else Source(**origin | {"shards": tuple(origin["shards"])})
+            source = None if origin is None else StreamSource(**origin | {"shards": tuple(origin["shards"])})
         except OSError as error:
             raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
         except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -160,7 +160,7 @@ class Job:
     @property
     def points_a_picture(self) -> float:
         """How many points of a training picture are about to give gradients."""
-        shares = class_shares(self.configuration.training.selection, self.counts, self.objects)
+        shares = selection_shares(self.configuration.training.selection, self.counts, self.objects)
         return float(shares @ self.counts) / min(_COUNTED, self.epoch)
 
     @property
@@ -174,9 +174,9 @@ class Job:
         seed = (recipe.seed, training_round)
         validation = len(self.split.validation)
         batches = schedule(seed, recipe.epochs, recipe.batch, self.epoch, validation, recipe.looks)
-        return batches if self.source is None else in_lanes(batches, seed, self.source)
+        return batches if self.source is None else assign_lanes(batches, seed, self.source)
 
-    def scheduled(self) -> Graphs | StreamedGraphs:
+    def scheduled(self) -> PictureGraphs | StreamedGraphs:
         """The graphs of what is in batches. Raises InputError if a picture of the folder is not there any more."""
         graphs = self.graphs((*self.split.training, *self.split.validation))
         return graphs if self.source is None else StreamedGraphs(self.source, graphs)
@@ -196,7 +196,7 @@ class Job:
             counts += np.bincount(labels[labels >= 0], minlength=len(counts))
         return counts
 
-    def graphs(self, numbers: Sequence[str]) -> Graphs:
+    def graphs(self, numbers: Sequence[str]) -> PictureGraphs:
         """The graphs of some pictures. Raises InputError if one is not there any more."""
         found = {each.number: each for each in find_pictures(self.data)}
         missing = [number for number in numbers if number not in found]
@@ -204,8 +204,8 @@ class Job:
             raise InputError(f"{len(missing)} pictures of the training are not in {self.data}, as {missing[0]}")
         pictures: list[PictureFiles] = [found[number] for number in numbers]
         mesh = self.configuration.mesh
-        view = View(
-            self.configuration.classes.seen_as(),
+        view = GraphRecipe(
+            self.configuration.classes.mask_classes(),
             self.configuration.manifest,
             self.configuration.grid,
             self.configuration.augmentation,
@@ -215,12 +215,12 @@ class Job:
             self.configuration.training.mirrored,
         )
         if self.unpacked is None:
-            return Graphs(pictures, view)
+            return PictureGraphs(pictures, view)
         count = self.configuration.training.views
-        views = KeptViews(
+        views = GraphCache(
             self.unpacked, count, view.classes, view.manifest, view.grid, view.augmentation, view.own_radius
         )
-        return Graphs(pictures, view, DecodedCache(self.unpacked), views if count else None)
+        return PictureGraphs(pictures, view, DecodedCache(self.unpacked), views if count else None)
 
     def round_path(self, training_round: int) -> Path:
         """The best network of a round, counted from 1."""
@@ -259,7 +259,7 @@ class Job:
 _FILES = ("train.toml", "pictures.json", "first.pt", "teacher.pt", "state.pt", "model.pt", "round1.pt", "log.jsonl")
 
 
-def check_new(folder: Path) -> None:
+def check_unused(folder: Path) -> None:
     """Raise InputError if a folder holds a training, or files that one would write over."""
     if (folder / "run.json").exists():
         raise InputError(f"{folder} holds a training already: vm-train resume {folder}, or another folder")
@@ -271,7 +271,7 @@ def check_new(folder: Path) -> None:
 
 
 @contextmanager
-def in_work(folder: Path) -> Iterator[None]:
+def locked(folder: Path) -> Iterator[None]:
     """Keep other processes from going on with the same training. Raises InputError if one does."""
     with (folder / "run.json").open() as file:
         try:
@@ -286,8 +286,8 @@ def _first(path: Path, configuration: TrainConfiguration) -> FirstLook:
     return FirstLook.load(path, configuration.manifest, gate.above, gate.rings)
 
 
-def _teacher(path: Path, configuration: TrainConfiguration) -> Trained:
-    return Trained.load(path, configuration.manifest, configuration.grid)
+def _teacher(path: Path, configuration: TrainConfiguration) -> FrozenNetwork:
+    return FrozenNetwork.load(path, configuration.manifest, configuration.grid)
 
 
 def _named(unpacked: Path, folder: Path) -> str:

@@ -25,7 +25,7 @@ FLOOR = 0.05
 """Weight of a point that no network was wrong about (the paper's 5 % baseline)."""
 
 
-def class_shares(rule: str, counts: npt.NDArray[np.int64], objects: Mask) -> Floats:
+def selection_shares(rule: str, counts: npt.NDArray[np.int64], objects: Mask) -> Floats:
     """Share (C,) of each class's points that is selected, from its number of points in the set (C,).
 
     objects (C,): which classes are objects. The rarest of them says how many points of a class are selected, or the
@@ -51,7 +51,7 @@ def class_weights(rule: str, counts: npt.NDArray[np.int64], balance: float) -> F
     return np.asarray(weights * counts.sum() / (weights @ counts))
 
 
-def hardness(errors: Singles) -> Floats:
+def hardness_weights(errors: Singles) -> Floats:
     """Weights (n,) of points in the choice within their class, from the summed errors (n,) of the rounds before."""
     return np.minimum(errors.astype(np.float64), 1.0) + FLOOR
 
@@ -63,7 +63,7 @@ def class_totals(labels: Labels, weights: Floats, classes: int) -> Floats:
     return np.stack([sums, np.bincount(own, minlength=classes).astype(np.float64)])
 
 
-def selected(labels: Labels, shares: Floats, draws: Floats, weights: Floats | None = None) -> Mask:
+def select_points(labels: Labels, shares: Floats, draws: Floats, weights: Floats | None = None) -> Mask:
     """Points (n,) that are selected from labels (n,), -1 for unlabeled, by draws (n,) from 0 to 1.
 
     shares (C,): chance of a point of each class. weights (n,): factors of these chances, of mean 1 in each class. A
@@ -75,7 +75,7 @@ def selected(labels: Labels, shares: Floats, draws: Floats, weights: Floats | No
     return (labels >= 0) & (draws < chance)
 
 
-def errors_of(probabilities: Singles, labels: Labels) -> Singles:
+def point_errors(probabilities: Singles, labels: Labels) -> Singles:
     """How wrong (n,) a network's probabilities (n, C) are: 1 minus that of the true class; 0 where unlabeled."""
     labeled = labels >= 0
     true = probabilities[np.arange(len(labels)), np.where(labeled, labels, 0)]

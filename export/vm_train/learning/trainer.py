@@ -25,11 +25,11 @@ from vm_embedded.errors import InputError, one_line
 from vm_embedded.files import written_beside
 from vm_export.network import Network
 
-from ..graphs.labeled_graph import Graph, together
+from ..graphs.labeled_graph import LabeledGraph, join_graphs
 from ..graphs.schedule import Item
-from .optimizer import Descent
+from .optimizer import ScheduledOptimizer
 from .recipe import Recipe
-from .selection import class_totals, errors_of, hardness, selected
+from .selection import class_totals, hardness_weights, point_errors, select_points
 from .targets import targets
 
 
@@ -43,7 +43,7 @@ class Step:
     rate: float
 
 
-class Training:
+class Trainer:
     """A network while it is trained for `total` steps.
 
     shares (C,): chance of each class's points to give gradients. weights (C,): how much each then counts. graders:
@@ -68,7 +68,7 @@ class Training:
         self._weights = torch.from_numpy(weights.astype(np.float32)).to(device)
         self._graders = [each.to(device).eval() for each in graders]
         self._teacher = None if teacher is None else teacher.to(device).eval()
-        self._descent = Descent(self.network, recipe, total)
+        self._optimizer = ScheduledOptimizer(self.network, recipe, total)
         self._average = _average_of(self.network, recipe.averaging) if recipe.averaging else None
 
     @property
@@ -78,36 +78,36 @@ class Training:
 
     def set_rate(self, rate: float) -> None:
         """The learning rate of the next step, where the schedule is constant."""
-        self._descent.rate = rate
+        self._optimizer.rate = rate
 
-    def step(self, items: Sequence[Item], graphs: Sequence[Graph]) -> Step:
+    def step(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> Step:
         """Learn from the graphs of this process's part of a batch. Raises InputError if the loss is no number."""
-        rate = self._descent.rate
+        rate = self._optimizer.rate
         loss, weight, points = self._loss(items, graphs)
-        weights = float(summed(torch.tensor(weight))) or 1.0
-        mean = float(summed(loss.detach().cpu())) / weights
+        weights = float(sum_over_processes(torch.tensor(weight))) or 1.0
+        mean = float(sum_over_processes(loss.detach().cpu())) / weights
         if not math.isfinite(mean):
             raise InputError(f"the loss of step {self.done + 1} is no number: begin again with a lower training.rate")
-        self._descent.forget()
+        self._optimizer.zero_grad()
         if points:
             (loss / weights).backward()  # type: ignore[no-untyped-call]
         _sum_gradients(self.network)
         if self.recipe.clip:
             nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.clip)
-        self._descent.step()
+        self._optimizer.step()
         if self._average is not None:
             self._average.update_parameters(self.network)
         self.done += 1
-        return Step(self.done, mean, int(summed(torch.tensor(points))), rate)
+        return Step(self.done, mean, int(sum_over_processes(torch.tensor(points))), rate)
 
-    def _loss(self, items: Sequence[Item], graphs: Sequence[Graph]) -> tuple[torch.Tensor, float, int]:
+    def _loss(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> tuple[torch.Tensor, float, int]:
         """The weighed sum of losses of the selected points of some pictures, their summed weight and their number."""
         classes = self.network.shape.classes
         if not graphs:  # of a small batch other processes have all; they wait for the totals
             if self._graders:
-                summed(torch.zeros((2, classes), dtype=torch.float64))
+                sum_over_processes(torch.zeros((2, classes), dtype=torch.float64))
             return torch.zeros(()), 0.0, 0
-        graph, _ = together(graphs)
+        graph, _ = join_graphs(graphs)
         points = torch.from_numpy(graph.points).to(self._device)
         neighbors = torch.from_numpy(graph.neighbors).to(self._device)
         draws = [
@@ -115,7 +115,7 @@ class Training:
             for item, each in zip(items, graphs, strict=True)
         ]
         chances = self._chances(points, neighbors, graph) if self._graders else None
-        chosen = selected(graph.labels, self._shares, np.concatenate(draws), chances)
+        chosen = select_points(graph.labels, self._shares, np.concatenate(draws), chances)
         with torch.autocast(torch.device(self._device).type, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
             logits = self.network.logits(points, neighbors)
         labels = torch.from_numpy(np.where(chosen, graph.labels, -1).astype(np.int64)).to(self._device)
@@ -130,7 +130,7 @@ class Training:
 
     @torch.no_grad()
     def _targets(
-        self, graph: Graph, points: torch.Tensor, neighbors: torch.Tensor, chosen: torch.Tensor
+        self, graph: LabeledGraph, points: torch.Tensor, neighbors: torch.Tensor, chosen: torch.Tensor
     ) -> torch.Tensor:
         """What the selected points are to answer: their labels (n,), or probabilities (n, C)."""
         recipe = self.recipe
@@ -141,18 +141,20 @@ class Training:
         return targets(labels, self.network.shape.classes, neighbors, recipe.smoothing, taught, recipe.distillation)
 
     @torch.no_grad()
-    def _chances(self, points: torch.Tensor, neighbors: torch.Tensor, graph: Graph) -> Floats:
+    def _chances(self, points: torch.Tensor, neighbors: torch.Tensor, graph: LabeledGraph) -> Floats:
         """How much rather than others of their class the points (n,) are selected: 1 in the mean of each class."""
         errors = np.zeros(len(graph), dtype=np.float32)
         for grader in self._graders:
-            errors += errors_of(grader(points, neighbors)[:-1].cpu().numpy(), graph.labels)
-        weights = hardness(errors)
-        sums, counts = summed(torch.from_numpy(class_totals(graph.labels, weights, len(self._shares)))).numpy()
+            errors += point_errors(grader(points, neighbors)[:-1].cpu().numpy(), graph.labels)
+        weights = hardness_weights(errors)
+        sums, counts = sum_over_processes(
+            torch.from_numpy(class_totals(graph.labels, weights, len(self._shares)))
+        ).numpy()
         means = np.divide(sums, counts, out=np.ones_like(sums), where=counts > 0)
         return np.asarray(weights / means[graph.labels])
 
     @torch.no_grad()
-    def probabilities(self, graph: Graph) -> Singles:
+    def probabilities(self, graph: LabeledGraph) -> Singles:
         """The network's answers (n, C)."""
         points, neighbors = torch.from_numpy(graph.points), torch.tensor(graph.neighbors)
         answers: Singles = self.result(points.to(self._device), neighbors.to(self._device))[:-1].cpu().numpy()
@@ -164,7 +166,7 @@ class Training:
             "done": self.done,
             "network": self.network.state_dict(),
             "average": None if self._average is None else self._average.state_dict(),
-            "descent": self._descent.state_dict(),
+            "descent": self._optimizer.state_dict(),
             "more": dict(more),
         }
         content = io.BytesIO()  # on a full disk torch would fail in its own way
@@ -176,7 +178,7 @@ class Training:
         """Go on from a state that `read_state` read. Raises InputError if it is of another training."""
         try:
             self.network.load_state_dict(state["network"])
-            self._descent.load_state_dict(state["descent"])
+            self._optimizer.load_state_dict(state["descent"])
             if self._average is not None:
                 self._average.load_state_dict(state["average"])
             self.done = int(state["done"])
@@ -185,7 +187,7 @@ class Training:
 
 
 def read_state(path: Path) -> dict[str, Any]:
-    """What `Training.save` wrote; nothing in it is executed. Raises InputError."""
+    """What `Trainer.save` wrote; nothing in it is executed. Raises InputError."""
     try:
         state = torch.load(path, map_location="cpu", weights_only=True)
     except (OSError, RuntimeError, KeyError, ValueError, EOFError, pickle.UnpicklingError) as error:
@@ -197,7 +199,7 @@ def read_state(path: Path) -> dict[str, Any]:
     return state
 
 
-def summed(value: torch.Tensor) -> torch.Tensor:
+def sum_over_processes(value: torch.Tensor) -> torch.Tensor:
     """The sum over all processes, as every one of them gets it."""
     if not distributed.is_initialized():
         return value

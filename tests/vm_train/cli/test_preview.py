@@ -15,7 +15,7 @@ from vm_export.grid import Grid
 from vm_train.cli.preview import sheet, write_sheet
 from vm_train.cli.preview_cells import GAP, middle, point_colors
 from vm_train.data.pictures import Picture
-from vm_train.graphs.augmentation import OFF, Augmentation
+from vm_train.graphs.augmentation import NO_AUGMENTATION, Augmentation
 
 MANIFEST = Manifest(
     shape="sphere",
@@ -48,21 +48,23 @@ def test_a_sheet_has_a_row_for_each_picture_and_cells_for_each_entry():
 
 
 def test_entries_that_are_off_are_left_out():
-    only = replace(OFF, hue=10.0, blur_share=0.1)
+    only = replace(NO_AUGMENTATION, hue=10.0, blur_share=0.1)
     made = sheet([picture()], MANIFEST, GRID, only, seed=0, versions=1, width=80)
     assert made.shape[0] == 2 * HEAD + 3 * (60 + TEXT)
-    assert sheet([picture()], MANIFEST, GRID, OFF, seed=0, versions=1, width=80).shape[0] == HEAD + 60 + TEXT
+    assert (
+        sheet([picture()], MANIFEST, GRID, NO_AUGMENTATION, seed=0, versions=1, width=80).shape[0] == HEAD + 60 + TEXT
+    )
 
 
 def test_without_augmentation_all_versions_are_the_picture():
-    made = sheet([picture()], MANIFEST, GRID, OFF, seed=0, versions=2, width=160)
+    made = sheet([picture()], MANIFEST, GRID, NO_AUGMENTATION, seed=0, versions=2, width=160)
     first, second, third = (made[HEAD : HEAD + 120, start : start + 160] for start in (0, 166, 332))
     assert np.array_equal(first, second)
     assert np.array_equal(first, third)
 
 
 def test_points_have_the_colors_of_their_classes():
-    made = sheet([picture()], MANIFEST, GRID, OFF, seed=0, versions=1, width=160)
+    made = sheet([picture()], MANIFEST, GRID, NO_AUGMENTATION, seed=0, versions=1, width=160)
     image = made[HEAD : HEAD + 120, :160].astype(int)
     ball, _, field = point_colors(MANIFEST)
     for half, color in ((image[:, :79], ball), (image[:, 82:], field)):
@@ -82,7 +84,7 @@ def test_seeds_differ_and_repeat():
 
 @pytest.mark.parametrize("shown", [picture(pitch=-1.4), picture(height=0.05)], ids=["sky", "too low"])
 def test_pictures_without_points_are_shown(shown):
-    made = sheet([shown], MANIFEST, GRID, OFF, seed=0, versions=1, width=160)
+    made = sheet([shown], MANIFEST, GRID, NO_AUGMENTATION, seed=0, versions=1, width=160)
     assert (made[HEAD : HEAD + 120, :160] == 100).all()
 
 
@@ -98,11 +100,11 @@ def test_the_middle_is_never_empty(width):
 
 def test_no_pictures_are_an_error():
     with pytest.raises(InputError, match="no pictures"):
-        sheet([], MANIFEST, GRID, OFF, seed=0)
+        sheet([], MANIFEST, GRID, NO_AUGMENTATION, seed=0)
 
 
 def test_a_sheet_is_written_as_picture(tmp_path):
-    made = sheet([picture()], MANIFEST, GRID, OFF, seed=0, versions=1, width=80)
+    made = sheet([picture()], MANIFEST, GRID, NO_AUGMENTATION, seed=0, versions=1, width=80)
     write_sheet(tmp_path / "preview.png", made)
     assert np.array_equal(cv2.imread(str(tmp_path / "preview.png")), made)
     with pytest.raises(InputError, match=r"a sheet is a \.jpg or a \.png"):

@@ -17,15 +17,15 @@ from vm_embedded.geometry.lens import Equidistant, Equisolid, Rectilinear
 from vm_embedded.geometry.lens_files import LensFile
 from vm_train.data.pictures import Picture
 from vm_train.graphs.augmentation import (
-    OFF,
+    NO_AUGMENTATION,
     Augmentation,
     Tone,
-    blurred,
-    moved,
-    recolored,
-    softened,
-    told_otherwise,
-    toned,
+    apply_tone,
+    perturb_camera,
+    perturb_colors,
+    perturb_sharpness,
+    soften,
+    with_camera_error,
 )
 
 SIZE = (96, 64)
@@ -79,15 +79,15 @@ def tilt_of(made, of):
 @given(colors_of_points, lenses, seeds)
 def test_off_changes_nothing(colors, lens, seed):
     before = picture(lens)
-    assert moved(before, OFF, generator(seed)) is before
-    assert blurred(before, OFF, generator(seed)) is before
-    assert np.array_equal(recolored(colors, OFF, generator(seed)), colors)
+    assert perturb_camera(before, NO_AUGMENTATION, generator(seed)) is before
+    assert perturb_sharpness(before, NO_AUGMENTATION, generator(seed)) is before
+    assert np.array_equal(perturb_colors(colors, NO_AUGMENTATION, generator(seed)), colors)
 
 
 def test_off_is_every_entry_at_0_and_all_can_be_0():
-    on = {name for name, value in vars(OFF).items() if value != 0}
+    on = {name for name, value in vars(NO_AUGMENTATION).items() if value != 0}
     assert on == {"blur", "jpeg"}
-    check_entries(OFF)
+    check_entries(NO_AUGMENTATION)
 
 
 @pytest.mark.parametrize(
@@ -108,8 +108,8 @@ def test_entries_that_cant_be_are_named(name, value, said):
 def test_same_seed_same_result(colors, lens, seed):
     def all_three():
         random = generator(seed)
-        made = blurred(moved(picture(lens), FULL, random), FULL, random)
-        return made, recolored(colors, FULL, random)
+        made = perturb_sharpness(perturb_camera(picture(lens), FULL, random), FULL, random)
+        return made, perturb_colors(colors, FULL, random)
 
     (first, first_colors), (second, second_colors) = all_three(), all_three()
     assert first.lens.lens == second.lens.lens
@@ -121,13 +121,13 @@ def test_same_seed_same_result(colors, lens, seed):
 
 @given(colors_of_points, seeds)
 def test_an_entry_leaves_the_draws_of_others_as_they_were(colors, seed):
-    only_colors = replace(OFF, hue=30.0, brightness=0.5)
+    only_colors = replace(NO_AUGMENTATION, hue=30.0, brightness=0.5)
     both = replace(only_colors, height=0.1, blur_share=1.0)
 
     def last_of(augmentation):
         random = generator(seed)
-        blurred(moved(picture(), augmentation, random), augmentation, random)
-        return recolored(colors, augmentation, random)
+        perturb_sharpness(perturb_camera(picture(), augmentation, random), augmentation, random)
+        return perturb_colors(colors, augmentation, random)
 
     assert np.array_equal(last_of(only_colors), last_of(both))
 
@@ -135,7 +135,7 @@ def test_an_entry_leaves_the_draws_of_others_as_they_were(colors, seed):
 @given(lenses, seeds)
 def test_moved_keeps_image_and_labels_and_stays_a_camera(lens, seed):
     before = picture(lens)
-    made = moved(before, FULL, generator(seed))
+    made = perturb_camera(before, FULL, generator(seed))
     assert made.image is before.image
     assert made.labels is before.labels
     assert made.lens.orientation.height > 0.01
@@ -152,7 +152,7 @@ def test_moved_keeps_image_and_labels_and_stays_a_camera(lens, seed):
 @given(seeds)
 def test_a_tilt_turns_nothing_about_the_planes_normal(seed):
     before = picture()
-    made = moved(before, replace(OFF, tilt=5.0), generator(seed))
+    made = perturb_camera(before, replace(NO_AUGMENTATION, tilt=5.0), generator(seed))
     turn = made.lens.orientation.rotation @ before.lens.orientation.rotation.T
     assert turn[1, 0] - turn[0, 1] == pytest.approx(0.0, abs=1e-9)
     assert made.lens.orientation.height == before.lens.orientation.height
@@ -160,8 +160,8 @@ def test_a_tilt_turns_nothing_about_the_planes_normal(seed):
 
 def test_errors_of_the_camera_are_as_large_as_the_entries_say():
     before, random = picture(), generator()
-    augmentation = replace(OFF, height=0.02, tilt=1.0, focal_length=0.01, center=0.005)
-    made = [moved(before, augmentation, random) for _ in range(2000)]
+    augmentation = replace(NO_AUGMENTATION, height=0.02, tilt=1.0, focal_length=0.01, center=0.005)
+    made = [perturb_camera(before, augmentation, random) for _ in range(2000)]
     heights = [math.log(each.lens.orientation.height / 0.8) for each in made]
     assert np.mean(heights) == pytest.approx(0.0, abs=0.002)
     assert np.std(heights) == pytest.approx(0.02, rel=0.1)
@@ -178,7 +178,7 @@ def test_errors_of_the_camera_are_as_large_as_the_entries_say():
 @pytest.mark.parametrize("lens", LENSES, ids=lambda lens: type(lens).__name__)
 def test_a_shifted_center_shifts_the_picture(lens):
     before = picture(lens)
-    made = told_otherwise(before, center=(0.1, -0.05))
+    made = with_camera_error(before, center=(0.1, -0.05))
     rays = np.array([[1.0, 0.0, 0.0], [0.9, 0.3, 0.1]]) / [[1.0], [math.sqrt(0.91)]]
     shift = made.lens.lens.for_image(SIZE).project(rays, SIZE) - lens.for_image(SIZE).project(rays, SIZE)
     assert shift == pytest.approx(np.array([[9.6, -4.8]] * 2), abs=1e-6)
@@ -186,7 +186,7 @@ def test_a_shifted_center_shifts_the_picture(lens):
 
 @pytest.mark.parametrize("lens", LENSES, ids=lambda lens: type(lens).__name__)
 def test_a_longer_focal_length_enlarges_the_picture_about_the_center(lens):
-    made = told_otherwise(picture(lens), focal_length=1.1).lens.lens.for_image(SIZE)
+    made = with_camera_error(picture(lens), focal_length=1.1).lens.lens.for_image(SIZE)
     fitted = lens.for_image(SIZE)
     rays = np.array([[1.0, 0.0, 0.0], [0.8, 0.0, 0.6], [0.8, -0.6, 0.0]])
     spans = [each.project(rays, SIZE)[1:] - each.project(rays, SIZE)[0] for each in (fitted, made)]
@@ -195,7 +195,7 @@ def test_a_longer_focal_length_enlarges_the_picture_about_the_center(lens):
 
 def test_blurred_changes_only_the_image_of_as_many_pictures_as_asked_for():
     before, random = picture(), generator()
-    made = [blurred(before, replace(OFF, blur_share=0.3), random) for _ in range(600)]
+    made = [perturb_sharpness(before, replace(NO_AUGMENTATION, blur_share=0.3), random) for _ in range(600)]
     changed = [each for each in made if each is not before]
     assert len(changed) / len(made) == pytest.approx(0.3, abs=0.06)
     for each in changed:
@@ -209,7 +209,7 @@ def test_more_blur_and_less_quality_take_more_away():
     image = picture().image
 
     def lost(**change):
-        return float(np.abs(softened(image, **change).astype(float) - image).mean())
+        return float(np.abs(soften(image, **change).astype(float) - image).mean())
 
     assert 0.0 == lost() < lost(blur=0.5) < lost(blur=1.5)
     assert lost(jpeg=95) < lost(jpeg=30)
@@ -218,7 +218,7 @@ def test_more_blur_and_less_quality_take_more_away():
 @given(colors_of_points, seeds)
 def test_colors_stay_colors(colors, seed):
     before = colors.copy()
-    made = recolored(colors, FULL, generator(seed))
+    made = perturb_colors(colors, FULL, generator(seed))
     assert made.shape == colors.shape
     assert made.dtype == np.float32
     assert made.min() >= 0.0
@@ -227,51 +227,51 @@ def test_colors_stay_colors(colors, seed):
 
 
 def test_no_points_have_no_colors():
-    assert recolored(np.empty((0, 3), np.float32), FULL, generator()).shape == (0, 3)
+    assert perturb_colors(np.empty((0, 3), np.float32), FULL, generator()).shape == (0, 3)
 
 
 @given(colors_of_points, st.integers(1, 22), seeds)
 def test_a_point_changes_whatever_the_others_are(colors, count, seed):
     augmentation = replace(FULL, noise=0.0)
-    whole, part = (recolored(each, augmentation, generator(seed)) for each in (colors, colors[:count]))
+    whole, part = (perturb_colors(each, augmentation, generator(seed)) for each in (colors, colors[:count]))
     assert part == pytest.approx(whole[:count], abs=1e-4)
 
 
 @given(colors_of_points, factors, factors)
 def test_brighter_is_brighter_and_a_larger_gamma_darker(colors, one, other):
     low, high = sorted((one, other))
-    darker, brighter = (toned(colors, Tone(brightness=each), generator()) for each in (low, high))
+    darker, brighter = (apply_tone(colors, Tone(brightness=each), generator()) for each in (low, high))
     assert (darker <= brighter).all()
-    light, dark = (toned(colors, Tone(gamma=each), generator()) for each in (low, high))
+    light, dark = (apply_tone(colors, Tone(gamma=each), generator()) for each in (low, high))
     assert (dark <= light + 1e-6).all()
     ends = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]], np.float32)
-    assert np.array_equal(toned(ends, Tone(gamma=one), generator()), ends)
+    assert np.array_equal(apply_tone(ends, Tone(gamma=one), generator()), ends)
 
 
 @given(colors_of_points, st.floats(0.1, 1.0))
 def test_contrast_leaves_mid_gray_alone_and_draws_all_others_from_it(colors, factor):
     gray = np.full((1, 3), 0.5, np.float32)
-    assert toned(gray, Tone(contrast=1.0 / factor), generator()) == pytest.approx(gray, abs=1e-6)
-    near = toned(colors, Tone(contrast=factor), generator())
+    assert apply_tone(gray, Tone(contrast=1.0 / factor), generator()) == pytest.approx(gray, abs=1e-6)
+    near = apply_tone(colors, Tone(contrast=factor), generator())
     assert near - 0.5 == pytest.approx(factor * (colors - 0.5), abs=1e-5)
 
 
 @given(st.floats(0.0, 1.0, width=32), st.floats(0.0, 3.0), st.floats(-180.0, 180.0))
 def test_saturation_and_hue_leave_gray_alone(level, saturation, hue):
     gray = np.full((1, 3), level, np.float32)
-    assert toned(gray, Tone(saturation=saturation, hue=hue), generator()) == pytest.approx(gray, abs=1e-5)
+    assert apply_tone(gray, Tone(saturation=saturation, hue=hue), generator()) == pytest.approx(gray, abs=1e-5)
 
 
 @given(colors_of_points)
 def test_no_saturation_is_gray_and_a_third_of_a_turn_swaps_channels(colors):
-    assert np.ptp(toned(colors, Tone(saturation=0.0), generator()), axis=1) == pytest.approx(0.0, abs=1e-5)
-    turned = toned(colors, Tone(hue=120.0), generator())
+    assert np.ptp(apply_tone(colors, Tone(saturation=0.0), generator()), axis=1) == pytest.approx(0.0, abs=1e-5)
+    turned = apply_tone(colors, Tone(hue=120.0), generator())
     assert turned == pytest.approx(np.roll(colors, 1, axis=1), abs=1e-5)
 
 
 def test_noise_is_as_strong_as_it_says_and_each_points_own():
     gray = np.full((20000, 3), 0.5, np.float32)
-    made = toned(gray, Tone(noise=0.05), generator())
+    made = apply_tone(gray, Tone(noise=0.05), generator())
     assert made.mean() == pytest.approx(0.5, abs=0.001)
     assert made.std(axis=0) == pytest.approx(0.05, rel=0.05)
     assert abs(np.corrcoef(made.T)[0, 1]) < 0.05

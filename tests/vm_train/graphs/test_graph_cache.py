@@ -8,8 +8,8 @@ import pytest
 
 from vm_train.data.pictures import find_pictures
 from vm_train.graphs.augmentation import Augmentation
-from vm_train.graphs.graph_cache import KeptViews
-from vm_train.graphs.loading import Graphs, View
+from vm_train.graphs.graph_cache import GraphCache
+from vm_train.graphs.loading import GraphRecipe, PictureGraphs
 from vm_train.graphs.schedule import Item
 from vm_train.learning.configuration import TrainConfiguration
 
@@ -29,13 +29,13 @@ def folder(drawn, tmp_path):
 
 
 def graphs_of(folder, kept, count=2, **changes):
-    view = View(
-        CONFIGURATION.classes.seen_as(),
+    view = GraphRecipe(
+        CONFIGURATION.classes.mask_classes(),
         replace(CONFIGURATION.manifest, max_distance=4.0, **changes),
         augmentation=Augmentation(brightness=0.0, contrast=0.0, saturation=0.0, hue=0.0, gamma=0.0, noise=0.0),
     )
-    views = KeptViews(kept, count, view.classes, view.manifest, view.grid, view.augmentation, view.own_radius)
-    return Graphs(find_pictures(folder), view, None, views)
+    views = GraphCache(kept, count, view.classes, view.manifest, view.grid, view.augmentation, view.own_radius)
+    return PictureGraphs(find_pictures(folder), view, None, views)
 
 
 def same(first, second):

@@ -14,7 +14,7 @@ from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import build_mesh
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape
-from vm_train.graphs.hexagonal import hexagonal_mesh, seen_hexagonal_mesh
+from vm_train.graphs.hexagonal import hexagonal_mesh, visible_hexagonal_mesh
 
 SIZE = (640, 480)
 WIDE = Equisolid(focal_length=210.0, fov=2.0, size=SIZE)
@@ -101,7 +101,7 @@ def test_links_of_a_part_to_all_others_lead_to_its_off_screen_point(mesh, seed):
 
 @given(st.integers(1000, 20000))
 def test_of_a_fisheye_s_circle_all_points_are_seen_and_as_many_as_wanted(count):
-    mesh = seen_hexagonal_mesh(WIDE, SIZE, count)
+    mesh = visible_hexagonal_mesh(WIDE, SIZE, count)
     assert mesh.on_screen(WIDE, SIZE).all()
     assert len(mesh) == pytest.approx(count, rel=0.01)
     assert len(mesh) < 0.9 * len(hexagonal_mesh(SIZE, round(640 * 480 / (mesh.spacing**2 * math.sqrt(0.75)))))
@@ -109,7 +109,7 @@ def test_of_a_fisheye_s_circle_all_points_are_seen_and_as_many_as_wanted(count):
 
 def test_a_lens_that_sees_the_whole_picture_sees_the_whole_mesh():
     lens = Rectilinear(focal_length=400.0, fov=2.5, size=SIZE)
-    whole, seen = hexagonal_mesh(SIZE, 5000), seen_hexagonal_mesh(lens, SIZE, 5000)
+    whole, seen = hexagonal_mesh(SIZE, 5000), visible_hexagonal_mesh(lens, SIZE, 5000)
     np.testing.assert_array_equal(seen.pixels, whole.pixels)
     np.testing.assert_array_equal(seen.neighbors, whole.neighbors)
 
@@ -130,4 +130,4 @@ def test_no_points_no_picture_and_a_blind_lens_are_refused():
     with pytest.raises(InputError, match="1 x 480"):
         hexagonal_mesh((1, 480), 100)
     with pytest.raises(InputError, match="sees nothing"):
-        seen_hexagonal_mesh(Rectilinear(focal_length=400.0, fov=0.1, center=(2000.0, 0.0)), SIZE, 100)
+        visible_hexagonal_mesh(Rectilinear(focal_length=400.0, fov=0.1, center=(2000.0, 0.0)), SIZE, 100)

@@ -10,7 +10,7 @@ from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_train.data.pictures import Picture
 from vm_train.graphs.labeled_graph import graph_of
-from vm_train.graphs.mirror import mirrored, mirrored_places
+from vm_train.graphs.mirror import mirrored, mirrored_columns
 
 SIZE = (161, 121)
 
@@ -42,7 +42,7 @@ def pictures():
 
 @pytest.mark.parametrize("model", MESH_MODELS)
 def test_places_of_a_mirror_image_in_a_mirror_are_where_they_were(model):
-    places = mirrored_places(MESH_MODELS[model])
+    places = mirrored_columns(MESH_MODELS[model])
     assert sorted(places.tolist()) == list(range(MESH_MODELS[model].neighbors))
     assert places[places].tolist() == list(range(len(places)))
 
@@ -63,5 +63,5 @@ def test_a_mirror_image_is_what_a_network_sees_of_a_picture_that_is_mirrored(mod
     expected = true.neighbors[twin]
     shown = expected < len(true)
     assert (twin[seen.neighbors] == expected)[shown].mean() > 0.9
-    stay = np.mean(mirrored_places(MESH_MODELS[model]) == np.arange(expected.shape[1]))
+    stay = np.mean(mirrored_columns(MESH_MODELS[model]) == np.arange(expected.shape[1]))
     assert (twin[told.neighbors] == expected)[shown].mean() < stay + 0.1

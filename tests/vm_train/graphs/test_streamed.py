@@ -22,11 +22,11 @@ from vm_train.data.pictures import find_pictures
 from vm_train.data.split import Split
 from vm_train.formats.shards import write_shards
 from vm_train.graphs.schedule import schedule
-from vm_train.graphs.streamed import Source, StreamedItem, in_lanes
+from vm_train.graphs.streamed import StreamedItem, StreamSource, assign_lanes
 from vm_train.learning.configuration import TrainConfiguration
-from vm_train.learning.hardware import Hardware, hardware
+from vm_train.learning.hardware import Hardware, set_up_hardware
 from vm_train.learning.rounds import train
-from vm_train.learning.run_folder import Job
+from vm_train.learning.run_folder import TrainingRun
 
 SMALL = """
 [mesh]
@@ -46,7 +46,7 @@ EPOCH, SHARDS = 14, 5
 @pytest.fixture(autouse=True)
 def repeatable():
     """As vm-train computes."""
-    with hardware("cpu", 0, 1):
+    with set_up_hardware("cpu", 0, 1):
         yield
 
 
@@ -70,8 +70,8 @@ def shards(place, tmp_path):
 def begun(place, folder, shards, workers=0, strict=False):
     configuration = read_sections(TrainConfiguration, place / "train.toml")
     split = Split((), tuple(each.number for each in find_pictures(place / "data")))
-    source = Source(tuple(map(str, shards)), EPOCH, 1, workers, strict)
-    return Job.begin(folder, place / "data", configuration, split, None, source)
+    source = StreamSource(tuple(map(str, shards)), EPOCH, 1, workers, strict)
+    return TrainingRun.begin(folder, place / "data", configuration, split, None, source)
 
 
 def trained(job, stops=None):
@@ -80,7 +80,7 @@ def trained(job, stops=None):
     if stops is not None:
         asked = iter(range(stops))
         assert not train(job, here, lambda: next(asked, None) is None).finished
-        job = Job.read(job.folder)
+        job = TrainingRun.read(job.folder)
     assert train(job, here, lambda: False).finished
     return Checkpoint.load(job.model_path).network.state_dict()
 
@@ -104,8 +104,8 @@ def rewritten(path, change):
 
 @pytest.mark.parametrize(("processes", "workers"), [(1, 0), (1, 3), (2, 2)])
 def test_each_worker_has_a_lane_of_its_own_and_misses_none_of_it(processes, workers):
-    source = Source(tuple("abcdef"), 22, processes, workers)
-    batches = list(in_lanes(schedule((0, 1), 2, 4, source.epoch, 9), (0, 1), source))
+    source = StreamSource(tuple("abcdef"), 22, processes, workers)
+    batches = list(assign_lanes(schedule((0, 1), 2, 4, source.epoch, 9), (0, 1), source))
     places = {}
     for index, batch in enumerate(batches):
         for rank in range(processes):
@@ -203,7 +203,7 @@ def test_strict_ends_at_a_fault_and_goes_on_when_it_is_mended(place, shards, who
         trained(job)
     for shard, content in zip(shards, before, strict=True):
         shard.write_bytes(content)
-    assert same(trained(Job.read(job.folder)), whole)
+    assert same(trained(TrainingRun.read(job.folder)), whole)
 
 
 def test_a_cut_shard_is_named_with_its_byte_and_the_training_goes_on_when_it_is_whole(place, shards, whole, tmp_path):
@@ -217,10 +217,10 @@ def test_a_cut_shard_is_named_with_its_byte_and_the_training_goes_on_when_it_is_
     with pytest.raises(
         InputError, match=r"pictures-00000\d\.tar: can't be read on .*, at byte 5000: .*resume .* goes on"
     ):
-        train(Job.read(job.folder), here, lambda: False)
+        train(TrainingRun.read(job.folder), here, lambda: False)
     for shard, content in zip(shards, before, strict=True):
         shard.write_bytes(content)
-    assert same(trained(Job.read(job.folder)), whole)
+    assert same(trained(TrainingRun.read(job.folder)), whole)
 
 
 def test_shards_without_a_picture_are_named(place, tmp_path):
@@ -266,4 +266,4 @@ def test_wrong_options_end_in_one_line(arguments, said, place, tmp_path, capsys)
 
 def test_there_are_no_more_readers_than_shards():
     with pytest.raises(InputError, match="4 processes that read need at least as many shards, not 3"):
-        Source(("a", "b", "c"), 9, 2, 2)
+        StreamSource(("a", "b", "c"), 9, 2, 2)

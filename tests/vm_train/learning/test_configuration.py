@@ -32,7 +32,7 @@ def test_classes_come_in_their_order_with_their_colors(write):
     )
     found = read_sections(TrainConfiguration, path)
     assert [(each.name, each.kind) for each in found.manifest.classes] == [("field", "area"), ("ball", "object")]
-    assert found.classes.seen_as().colors["field"] == ((0, 255, 0), (9, 9, 9))
+    assert found.classes.mask_classes().colors["field"] == ((0, 255, 0), (9, 9, 9))
     assert found.network_shape.classes == 2
     assert read_sections(TrainConfiguration, write("\n".join(documented(found)))) == found
 

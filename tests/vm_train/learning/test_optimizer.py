@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import nn
 
-from vm_train.learning.optimizer import Descent
+from vm_train.learning.optimizer import ScheduledOptimizer
 from vm_train.learning.recipe import OPTIMIZERS, Recipe
 
 RATE = 0.02
@@ -18,7 +18,7 @@ def layer(seed=1):
 
 
 def descent(made, optimizer, schedule="constant"):
-    return Descent(made, Recipe(optimizer=optimizer, rate=RATE, schedule=schedule, decay=0.0), total=10)
+    return ScheduledOptimizer(made, Recipe(optimizer=optimizer, rate=RATE, schedule=schedule, decay=0.0), total=10)
 
 
 @pytest.mark.parametrize("optimizer", OPTIMIZERS)
@@ -70,7 +70,7 @@ def test_one_cycle_goes_up_to_the_rate_and_down(optimizer):
 def test_forgotten_gradients_are_none():
     made = layer()
     following = descent(made, "muon")
-    following.forget()
+    following.zero_grad()
     assert made.weight.grad is None
     assert made.bias.grad is None
 

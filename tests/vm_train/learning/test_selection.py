@@ -5,7 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_train.learning.selection import FLOOR, class_shares, class_totals, class_weights, errors_of, hardness, selected
+from vm_train.learning.selection import (
+    FLOOR,
+    class_totals,
+    class_weights,
+    hardness_weights,
+    point_errors,
+    select_points,
+    selection_shares,
+)
 
 counts = st.lists(st.integers(0, 10**9), min_size=2, max_size=8).map(np.array)
 labelings = st.lists(st.integers(-1, 3), min_size=1, max_size=200).map(lambda each: np.array(each, dtype=np.int8))
@@ -14,18 +22,18 @@ labelings = st.lists(st.integers(-1, 3), min_size=1, max_size=200).map(lambda ea
 @given(counts)
 def test_balanced_shares_give_every_class_as_many_points_as_the_rarest_has(counts):
     none = np.zeros(len(counts), dtype=bool)
-    shares = class_shares("balanced", counts, none)
+    shares = selection_shares("balanced", counts, none)
     assert ((shares >= 0.0) & (shares <= 1.0)).all()
     if counts.any():
         assert (shares * counts)[counts > 0] == pytest.approx(counts[counts > 0].min())
-    assert (class_shares("all", counts, none) == 1.0).all()
-    assert (class_shares("hard", counts, none) == shares).all()
+    assert (selection_shares("all", counts, none) == 1.0).all()
+    assert (selection_shares("hard", counts, none) == shares).all()
 
 
 @given(counts, st.integers(0, 7))
 def test_classes_that_are_rarer_than_every_object_are_taken_whole(counts, position):
     objects = np.arange(len(counts)) == position % len(counts)
-    shares = class_shares("balanced", counts, objects)
+    shares = selection_shares("balanced", counts, objects)
     if counts[objects].any():
         assert shares * counts == pytest.approx(np.minimum(counts, counts[objects][0]))
 
@@ -33,13 +41,13 @@ def test_classes_that_are_rarer_than_every_object_are_taken_whole(counts, positi
 @given(labelings, st.integers(0, 99))
 def test_all_that_is_labeled_can_be_selected_and_nothing_else(labels, seed):
     draws = np.random.default_rng(seed).random(len(labels))
-    assert (selected(labels, np.ones(4), draws) == (labels >= 0)).all()
-    assert not selected(labels, np.zeros(4), draws).any()
+    assert (select_points(labels, np.ones(4), draws) == (labels >= 0)).all()
+    assert not select_points(labels, np.zeros(4), draws).any()
 
 
 def test_a_class_is_selected_by_its_share():
     labels = np.repeat(np.array([0, 1, -1], dtype=np.int8), 20000)
-    chosen = selected(labels, np.array([0.3, 0.02]), np.random.default_rng(2).random(len(labels)))
+    chosen = select_points(labels, np.array([0.3, 0.02]), np.random.default_rng(2).random(len(labels)))
     assert np.bincount(labels[chosen], minlength=2) / 20000 == pytest.approx([0.3, 0.02], abs=0.01)
 
 
@@ -47,17 +55,19 @@ def test_hard_points_are_selected_by_their_error_and_the_floor_and_as_many_as_wi
     labels = np.zeros(10000, dtype=np.int8)
     errors = np.zeros(len(labels), dtype=np.float32)
     errors[:1000] = 1.0
-    weights = hardness(errors)
+    weights = hardness_weights(errors)
     sums, numbers = class_totals(labels, weights, 1)
     draws = np.random.default_rng(1).random((50, len(labels)))
-    chosen = np.array([selected(labels, np.array([0.05]), each, weights / (sums / numbers)) for each in draws])
+    chosen = np.array([select_points(labels, np.array([0.05]), each, weights / (sums / numbers)) for each in draws])
     expected = 1000 * (1.0 + FLOOR) / (1000 * (1.0 + FLOOR) + 9000 * FLOOR)
     assert chosen[:, :1000].sum() / chosen.sum() == pytest.approx(expected, abs=0.02)
     assert chosen.mean() == pytest.approx(0.05, rel=0.02)
 
 
 def test_errors_of_several_networks_add_up_to_at_most_a_whole():
-    assert hardness(np.array([0.0, 0.4, 1.7], dtype=np.float32)) == pytest.approx([FLOOR, 0.4 + FLOOR, 1.0 + FLOOR])
+    assert hardness_weights(np.array([0.0, 0.4, 1.7], dtype=np.float32)) == pytest.approx(
+        [FLOOR, 0.4 + FLOOR, 1.0 + FLOOR]
+    )
 
 
 @given(labelings)
@@ -70,7 +80,7 @@ def test_totals_of_parts_add_up(labels):
 
 def test_errors_are_one_minus_the_probability_of_the_truth():
     probabilities = np.array([[0.9, 0.1], [0.3, 0.7], [0.5, 0.5]], dtype=np.float32)
-    assert errors_of(probabilities, np.array([0, 0, -1], dtype=np.int8)) == pytest.approx([0.1, 0.7, 0.0])
+    assert point_errors(probabilities, np.array([0, 0, -1], dtype=np.int8)) == pytest.approx([0.1, 0.7, 0.0])
 
 
 @given(counts.filter(np.any), st.floats(0.0, 1.0))

@@ -9,11 +9,11 @@ import torch
 from vm_embedded.errors import InputError
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape
-from vm_train.graphs.labeled_graph import Graph, together
-from vm_train.graphs.loading import empty
+from vm_train.graphs.labeled_graph import LabeledGraph, join_graphs
+from vm_train.graphs.loading import empty_graph
 from vm_train.graphs.schedule import schedule
 from vm_train.learning.recipe import Recipe
-from vm_train.learning.trainer import Training, read_state
+from vm_train.learning.trainer import Trainer, read_state
 
 COUNT = 6
 SHARES = np.array([0.7, 1.0])
@@ -39,7 +39,7 @@ def graph(position):
     neighbors = np.concatenate([neighbors, np.full((1, 6), n)]).astype(np.int32)
     labels = (points[:-1].mean(axis=1) > 0.5).astype(np.int8)
     labels[::7] = -1
-    return Graph(points, neighbors, labels, np.linspace(0.0, 10.0, n), np.zeros((n, 2)))
+    return LabeledGraph(points, neighbors, labels, np.linspace(0.0, 10.0, n), np.zeros((n, 2)))
 
 
 def network(seed=3):
@@ -53,7 +53,7 @@ def batches_of(recipe):
 
 def training(recipe=None, graders=(), teacher=None):
     recipe = recipe or Recipe(epochs=3, batch=2, seed=5)
-    return Training(network(), recipe, len(batches_of(recipe)), SHARES, WEIGHTS, graders, teacher)
+    return Trainer(network(), recipe, len(batches_of(recipe)), SHARES, WEIGHTS, graders, teacher)
 
 
 def run(made, until=None, rank=0, size=1):
@@ -77,7 +77,7 @@ def same(first, second):
 def test_graphs_together_answer_as_they_do_alone():
     made = network()
     graphs = [graph(each) for each in range(3)]
-    joined, starts = together(graphs)
+    joined, starts = join_graphs(graphs)
     assert starts.tolist() == [0, 40, 80, 120]
     whole = made(torch.from_numpy(joined.points), torch.from_numpy(joined.neighbors))
     for each, start in zip(graphs, starts, strict=False):
@@ -159,7 +159,7 @@ def test_a_pupil_comes_to_answer_as_its_teacher_whatever_the_labels_say():
 def test_a_batch_without_points_changes_no_weights():
     made = training()
     before = weights(made)
-    step = made.step(batches_of(made.recipe)[0].items[:1], [empty(6)])
+    step = made.step(batches_of(made.recipe)[0].items[:1], [empty_graph(6)])
     assert (step.loss, made.done) == (0.0, 1)
     assert same(weights(made), before)
 
@@ -173,7 +173,7 @@ def test_a_damaged_state_is_refused(content, tmp_path):
 
 def test_a_state_of_another_network_is_refused(tmp_path):
     training().save(tmp_path / "state.pt", {})
-    other = Training(Network(NetworkShape.uniform(depth=2, width=4, classes=2)), Recipe(), 5, SHARES, WEIGHTS)
+    other = Trainer(Network(NetworkShape.uniform(depth=2, width=4, classes=2)), Recipe(), 5, SHARES, WEIGHTS)
     with pytest.raises(InputError, match="another training"):
         other.load(read_state(tmp_path / "state.pt"))
 
