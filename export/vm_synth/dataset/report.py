@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from textwrap import wrap
 from typing import Any
 
-import numpy as np
+from vm_workstation.text_tables import aligned, summary
 
 from ..scene.configuration import CLASSES
 from .inspection import Facts, Inspection, shard_that_lacks, spans
@@ -71,12 +71,6 @@ def as_json(found: Inspection) -> dict[str, Any]:
     }
 
 
-def summary(values: Sequence[float]) -> dict[str, float]:
-    """Least, 5 %, median, mean, 95 % and largest of some numbers."""
-    low, few, median, many, high = (float(each) for each in np.percentile(values, [0, 5, 50, 95, 100]))
-    return {"least": low, "5 %": few, "median": median, "mean": float(np.mean(values)), "95 %": many, "largest": high}
-
-
 def tables(found: Inspection, shards: int = 1) -> str:
     """A set's tables as text: how much is done, by shards if it has several, and what its pictures show."""
     parts = [_progress(found, shards)]
@@ -94,7 +88,7 @@ def _progress(found: Inspection, shards: int) -> str:
             there = sum(index % shards == number for index in found.done)
             bad = sum(each.index % shards == number for each in found.faults)
             rows.append([f"{number + 1}/{shards}", str(there), str(len(own)), str(bad)])
-        lines += ["", *_aligned([["shard", "there", "of", "at fault"], *rows])]
+        lines += ["", *aligned([["shard", "there", "of", "at fault"], *rows])]
     return "\n".join(lines)
 
 
@@ -103,7 +97,7 @@ def _quantity_table(facts: Sequence[Facts]) -> str:
     for name, values in quantities(facts).items():
         numbers = summary(values)
         rows.append([name, *(_short(each) for each in numbers.values())])
-    return "\n".join(_aligned([["", *numbers], *rows]))
+    return "\n".join(aligned([["", *numbers], *rows]))
 
 
 def _short(value: float) -> str:
@@ -125,14 +119,6 @@ def _category_table(found: Inspection) -> str:
             wrapped = wrap(text, _WIDTH, initial_indent=f"{name:<13}", subsequent_indent=13 * " ")
             lines += [line.replace(_JOINED, " ") for line in wrapped]
     return "\n".join(lines)
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> Iterable[str]:
-    """Lines of a table, its first column flush left and the others flush right."""
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    for row in rows:
-        cells = [row[0].ljust(widths[0]), *(each.rjust(width) for each, width in zip(row[1:], widths[1:], strict=True))]
-        yield "  ".join(cells).rstrip()
 
 
 def complaints(found: Inspection) -> list[str]:

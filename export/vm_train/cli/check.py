@@ -17,7 +17,8 @@ import numpy as np
 
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.files import check_writable, written_beside
-from vm_synth.dataset.report import summary
+from vm_workstation.option_types import at_least
+from vm_workstation.text_tables import aligned, summary
 
 from ..data.classes import Classes
 from ..data.inspection import Inspection, inspect_pictures
@@ -49,16 +50,10 @@ def check_parser() -> argparse.ArgumentParser:
     )
     made.add_argument("data", type=Path, metavar="DATA", help="folder of imageX.jpg or .png, maskX.png, lensX.yaml")
     made.add_argument("--config", type=Path, metavar="FILE", help="train.toml with the classes; default vm-synth's")
-    made.add_argument("--workers", type=_positive, metavar="N", help="processes that read; default all cores")
+    made.add_argument("--workers", type=at_least(1), metavar="N", help="processes that read; default all cores")
     made.add_argument("--json", type=Path, metavar="FILE", help="all findings, and all faults by number")
     made.add_argument("--strict", action="store_true", help="also exit with 1 if no picture shows one of the classes")
     return made
-
-
-def _positive(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
-    return int(text)
 
 
 def run_check(options: argparse.Namespace, classes: Classes, objects: Sequence[str] = ()) -> int:
@@ -96,7 +91,7 @@ def tables(found: Inspection) -> Iterator[str]:
     yield ""
     quantities = _quantities(found)
     rows = [[name, *(f"{each:.2f}" for each in numbers.values())] for name, numbers in quantities.items()]
-    yield from _aligned([["", *next(iter(quantities.values()))], *rows])
+    yield from aligned([["", *next(iter(quantities.values()))], *rows])
     yield ""
     total = sum(width * height * n for (width, height), n in found.sizes.items())
     shown = found.shown
@@ -105,11 +100,11 @@ def tables(found: Inspection) -> Iterator[str]:
         for name, pixels in found.pixels.items()
     ]
     unlabeled = 100.0 * sum(each.unlabeled for each in found.facts) / total
-    yield from _aligned([["class", "pictures", "[%]", "pixels [%]"], *rows, ["unlabeled", "", "", f"{unlabeled:.3f}"]])
+    yield from aligned([["class", "pictures", "[%]", "pixels [%]"], *rows, ["unlabeled", "", "", f"{unlabeled:.3f}"]])
     distances = _distances(found)
     if distances:
         yield ""
-        yield from _aligned([["objects at [m]", *distances], ["", *(str(each) for each in distances.values())]])
+        yield from aligned([["objects at [m]", *distances], ["", *(str(each) for each in distances.values())]])
 
 
 def _quantities(found: Inspection) -> dict[str, dict[str, float]]:
@@ -132,14 +127,6 @@ def _distances(found: Inspection) -> dict[str, int]:
     counts, _ = np.histogram(distances, [*_EDGES, 1e300, np.inf])
     names = [*(f"{low:g}-{high:g}" for low, high in pairwise(_EDGES)), f"over {_EDGES[-1]:g}", "no plane"]
     return dict(zip(names, counts.tolist(), strict=True))
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Lines of a table, its first column flush left and the others flush right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for first, *others in rows:
-        cells = [first.ljust(widths[0]), *(each.rjust(n) for each, n in zip(others, widths[1:], strict=True))]
-        yield "  ".join(cells).rstrip()
 
 
 def as_json(found: Inspection) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 
 from vm_embedded.cli.options import add_settings
+from vm_workstation.option_types import at_least
 
 _EPILOG = """\
 another command, with a --help of its own:
@@ -55,7 +56,7 @@ def parser() -> argparse.ArgumentParser:
     how.add_argument(
         "--as-robot", action="store_true", help="with meshes shared between poses, as a robot does; .onnx only"
     )
-    how.add_argument("--workers", type=_workers, metavar="N", help="processes, of one core each; default all cores")
+    how.add_argument("--workers", type=at_least(1), metavar="N", help="processes, of one core each; default all cores")
     how.add_argument("--config", type=Path, metavar="FILE", help="vm.toml, whose settings options below override")
     add_settings(made)
     return made
@@ -112,9 +113,3 @@ def _numbers(text: str) -> tuple[float, ...]:
     if not all(values):
         raise argparse.ArgumentTypeError(f"{text!r} must be numbers above 0, as 3,4,5")
     return values
-
-
-def _workers(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
-    return int(text)

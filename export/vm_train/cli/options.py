@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from vm_workstation.option_types import at_least
+
 from ..formats import shards, tfrecord_import
 from . import check
 from .stream_options import add_stream
@@ -93,10 +95,10 @@ def preview_parser() -> argparse.ArgumentParser:
     )
     _add_data(made)
     _add_configuration(made)
-    made.add_argument("--count", type=_positive, default=4, metavar="N", help="pictures; default 4")
-    made.add_argument("--versions", type=_positive, default=5, metavar="N", help="versions of each; default 5")
+    made.add_argument("--count", type=at_least(1), default=4, metavar="N", help="pictures; default 4")
+    made.add_argument("--versions", type=at_least(1), default=5, metavar="N", help="versions of each; default 5")
     made.add_argument("--seed", type=int, default=0, metavar="S", help="same seed, same sheet; default 0")
-    made.add_argument("--width", type=_positive, default=320, metavar="PX", help="width of each; default 320")
+    made.add_argument("--width", type=at_least(1), default=320, metavar="PX", help="width of each; default 320")
     made.add_argument("-o", "--output", type=Path, default=Path("preview.jpg"), metavar="FILE", help="a .jpg or .png")
     return made
 
@@ -109,7 +111,7 @@ def rate_parser() -> argparse.ArgumentParser:
     )
     _add_data(made)
     _add_configuration(made)
-    made.add_argument("--steps", type=_steps, default=200, metavar="N", help="steps of the search; default 200")
+    made.add_argument("--steps", type=at_least(20), default=200, metavar="N", help="steps of the search; default 200")
     made.add_argument("--plot", type=Path, metavar="FILE", help="loss over rate; a .png or .svg")
     _add_hardware(made)
     return made
@@ -156,28 +158,10 @@ def _add_configuration(made: argparse.ArgumentParser) -> None:
 def _add_hardware(made: argparse.ArgumentParser) -> None:
     group = made.add_argument_group("hardware")
     group.add_argument("--device", choices=DEVICES, default="auto", help="default a GPU, if there is one")
-    group.add_argument("--workers", type=_whole, metavar="N", help="processes that read; default half the cores")
+    group.add_argument("--workers", type=at_least(0), metavar="N", help="processes that read; default half the cores")
     group.add_argument(
         "--threads",
-        type=_positive,
+        type=at_least(1),
         metavar="N",
         help="threads that compute; default 1; with more a resumed training is not the same to the last digit",
     )
-
-
-def _steps(text: str) -> int:
-    if not text.isdecimal() or int(text) < 20:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 20")
-    return int(text)
-
-
-def _positive(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
-    return int(text)
-
-
-def _whole(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
-    return int(text)

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
+from vm_workstation.text_tables import aligned
+
 Scores = Mapping[str, Any]
 """What goes to scores.json: that of evaluation_tables.as_json, and about: model, data, settings and notes."""
 
@@ -72,9 +74,9 @@ def lines(scores: Scores) -> str:
     rows = [_subject(scores)]
     for name, by_overlap in scores["objects"].items():
         heading, body = _object_table(by_overlap)
-        rows += ["", f"objects of class {name}", *_aligned([heading, *body])]
+        rows += ["", f"objects of class {name}", *aligned([heading, *body])]
     heading, body = _point_table(scores["points"])
-    return "\n".join([*rows, "", "points", *_aligned([heading, *body])])
+    return "\n".join([*rows, "", "points", *aligned([heading, *body])])
 
 
 _KEY = '<p>Outlines: <b class="true">true</b>, <b class="found">found</b>.</p>'
@@ -183,15 +185,6 @@ def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     head = "".join(f"<th>{escape(each)}</th>" for each in heading)
     body = "".join("<tr>" + "".join(f"<td>{escape(each)}</td>" for each in row) + "</tr>" for row in rows)
     return f"<table><tr>{head}</tr>{body}</table>"
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of a table as lines, the first column at the left, all others at the right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join([row[0].ljust(widths[0]), *(each.rjust(n) for each, n in zip(row[1:], widths[1:], strict=True))])
-        for row in rows
-    ]
 
 
 def _number(value: float | None, digits: int = 3) -> str:

@@ -19,6 +19,7 @@ from pathlib import Path
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
 from vm_embedded.files import written_beside
+from vm_workstation.option_types import at_least
 
 from ..data.picture_files import PARTS, PictureFiles
 from ..data.pictures import find_pictures
@@ -40,14 +41,8 @@ def shards_parser() -> argparse.ArgumentParser:
     )
     made.add_argument("data", type=Path, metavar="DATA", help="folder of imageX.jpg or .png, maskX.png, lensX.yaml")
     made.add_argument("out", type=Path, metavar="OUT", help="folder to write to; made if it is not there")
-    made.add_argument("--size", type=_positive, default=1000, metavar="N", help="pictures in each; default 1000")
+    made.add_argument("--size", type=at_least(1), default=1000, metavar="N", help="pictures in each; default 1000")
     return made
-
-
-def _positive(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
-    return int(text)
 
 
 def run_shards(options: argparse.Namespace) -> int:

@@ -13,8 +13,9 @@ import pytest
 from vm_synth.cli import main
 from vm_synth.dataset.files import PARTS, file_of, read_truth
 from vm_synth.dataset.inspection import inspect, shard_that_lacks, spans
-from vm_synth.dataset.report import as_json, categories, complaints, quantities, summary, tables
+from vm_synth.dataset.report import as_json, categories, complaints, quantities, tables
 from vm_synth.scene.configuration import CLASSES
+from vm_workstation.text_tables import summary
 
 from ..sets import SIZE, picture_of, scene_of, write_set
 
