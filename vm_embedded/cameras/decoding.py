@@ -1,4 +1,4 @@
-"""Pictures from the bytes of a file or of a camera."""
+"""Decode images from the bytes of a file or a camera."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ import numpy as np
 
 from ..arrays import Image
 from ..errors import InputError
+from .camera import BrokenFrameError
 
 _TAIL = 1024
-"""Bytes at the end among which a file says that it ends; cameras and programs append what they like."""
+"""Bytes at the end of a file in which to look for its end marker; cameras and programs append other data to it."""
 
 
 def decode(content: bytes, raw: bool = False) -> Image:
-    """An image file as BGR, or with `raw` in the channels that it has.
+    """Decode an image file to BGR, or with `raw` to its own channels.
 
-    Raises InputError for one that can't be decoded, and for a JPEG or PNG that is cut short: OpenCV would decode what
-    there is, fill up with grey, and call it success.
+    Raises InputError for content that is not an image, and for a JPEG or PNG without its end marker: OpenCV would
+    decode the part that is there, fill the rest with gray, and report success.
     """
     tail = content.rstrip(b"\x00")[-_TAIL:]  # some cameras pad their buffers
     jpeg_cut = content.startswith(b"\xff\xd8") and b"\xff\xd9" not in tail
@@ -31,5 +32,13 @@ def decode(content: bytes, raw: bool = False) -> Image:
         except cv2.error:
             image = None
     if image is None:
-        raise InputError("is no image that can be decoded")
+        raise InputError("can't be decoded as an image")
     return np.asarray(image, dtype=np.uint8)
+
+
+def decode_frame(content: bytes, raw: bool = False) -> Image:
+    """Decode an image that a camera sent. Raises BrokenFrameError if it is cut short or not an image."""
+    try:
+        return decode(content, raw)
+    except InputError as error:
+        raise BrokenFrameError(f"frame of {len(content)} bytes {error}") from error

@@ -1,9 +1,9 @@
-"""A camera that fails on purpose, by a script: to see what a robot's software makes of it.
+"""A camera that fails on purpose, to test how a robot's software reacts. A script lists its faults:
 
-source = "synthetic"                                # the camera that has the faults
-faults = [{ kind = "hang", at = 5.0, seconds = 2.0 }]   # at: from when the camera was first opened [s]
+source = "synthetic"                                    # the camera to which faults are added
+faults = [{ kind = "hang", at = 5.0, seconds = 2.0 }]   # at: time since the camera was first opened [s]
 
-[random]                                            # and more of them, one after another
+[random]                                                # adds random faults, one after another
 count = 200
 """
 
@@ -22,29 +22,31 @@ import numpy as np
 from ..config.entries import check_entries, number
 from ..config.sections import read_sections
 from ..errors import InputError, unknown
-from .camera import Camera, CameraError, Shot, decode_frame
+from .camera import Camera, CameraError, Shot
+from .decoding import decode_frame
 
 KINDS = {
-    "unplug": "reads fail, and so does opening",
-    "hang": "a read does not come back",
-    "frozen": "the same picture comes again and again",
-    "truncated": "pictures end in the middle",
+    "unplug": "reading and opening fail",
+    "hang": "a read does not return",
+    "frozen": "the same image repeats",
+    "truncated": "images end in the middle",
     "slow": "frames arrive long after they were taken",
-    "resize": "pictures have other proportions",
-    "ahead": "frames come from the future, as after a jump of the clock",
-    "behind": "frames come from an hour ago",
+    "resize": "images have another size",
+    "ahead": "timestamps are an hour in the future, as after a clock jump",
+    "behind": "timestamps are an hour in the past",
 }
-"""What can go wrong."""
+"""All kinds of faults."""
 
-_LATE = 0.6
-"""Seconds by which slow frames are late."""
+_SLOW = 0.6
+"""Delay of slow frames [s]."""
 
-_HOUR = 3600.0
+_JUMP = 3600.0
+"""Error of the timestamps of frames ahead and behind [s]."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """kind: of KINDS. at: when it begins, seconds: how long it takes [s]."""
+    """One fault. kind: one of KINDS. at: when it starts [s]. seconds: how long it lasts [s]."""
 
     kind: str
     at: float
@@ -53,20 +55,20 @@ class Fault:
 
 @dataclass(frozen=True)
 class RandomFaults:
-    """Section [random]: faults one after another, as chance has it."""
+    """Section [random]: random faults, one after another."""
 
-    count: int = number(0, "faults", "", (0, 100000))
-    seed: int = number(0, "decides which", "", (0, 2**31))
-    first: float = number(2.0, "when the first one begins", "s", (0, 1e6))
+    count: int = number(0, "number of random faults", "", (0, 100000))
+    seed: int = number(0, "seed of the random numbers", "", (0, 2**31))
+    first: float = number(2.0, "start of the first fault", "s", (0, 1e6))
     shortest: float = number(0.3, "shortest fault", "s", (0, 1e4))
     longest: float = number(1.0, "longest fault", "s", (0, 1e4))
-    pause: float = number(1.0, "from the end of one to the next", "s", (0, 1e4))
+    pause: float = number(1.0, "pause between two faults", "s", (0, 1e4))
 
     def __post_init__(self) -> None:
         check_entries(self)
 
-    def drawn(self) -> Iterator[Fault]:
-        """The faults, each kind as often as the others."""
+    def draw(self) -> Iterator[Fault]:
+        """Draw the faults; all kinds are equally frequent."""
         random = np.random.default_rng(self.seed)
         kinds = np.resize(list(KINDS), self.count)
         random.shuffle(kinds)
@@ -91,18 +93,18 @@ def _read_faults(value: object) -> tuple[Fault, ...]:
 
 def _read_fault(value: object) -> Fault:
     if not isinstance(value, Mapping) or set(value) != {"kind", "at", "seconds"}:
-        raise InputError(f'a fault is like {{ kind = "hang", at = 5.0, seconds = 2.0 }}, not {value!r}')
+        raise InputError(f'write a fault like {{ kind = "hang", at = 5.0, seconds = 2.0 }}, not {value!r}')
     if value["kind"] not in KINDS:
         raise InputError(unknown("kind of fault", value["kind"], KINDS))
     times = [value["at"], value["seconds"]]
     if not all(isinstance(each, int | float) and not isinstance(each, bool) and 0 <= each < 1e6 for each in times):
-        raise InputError(f"at and seconds of a fault must be numbers of at least 0 s, not {times}")
+        raise InputError(f"at and seconds of a fault must be numbers from 0 s to 1e6 s, not {times}")
     return Fault(value["kind"], float(value["at"]), float(value["seconds"]))
 
 
 @dataclass(frozen=True)
 class FaultScript:
-    """source: of the camera that has them."""
+    """The source of the camera to which faults are added, and its faults in the order of their start."""
 
     source: str = field(default="synthetic", metadata={"read": _read_source})
     faults: tuple[Fault, ...] = field(default=(), metadata={"read": _read_faults})
@@ -112,22 +114,22 @@ class FaultScript:
     def read(cls, path: Path) -> FaultScript:
         """Read a script. Raises InputError."""
         script: FaultScript = read_sections(cls, path)
-        return replace(script, faults=tuple(sorted((*script.faults, *script.random.drawn()), key=lambda each: each.at)))
+        return replace(script, faults=tuple(sorted((*script.faults, *script.random.draw()), key=lambda each: each.at)))
 
 
 class Faults:
-    """The faults of a script as time goes by, from when the camera is first opened. One at a time: that which began
-    last."""
+    """Tells which fault of a script is active. Time starts when the camera is first opened; if faults overlap, only the
+    last one is active."""
 
     def __init__(self, script: FaultScript) -> None:
         self._faults = script.faults
         self._starts = [each.at for each in script.faults]
         self._began: float | None = None
         self.last: Shot | None = None
-        """The last good shot; a frozen camera gives it again even when it is opened again."""
+        """The last good shot, which a frozen camera repeats even after it was opened again."""
 
     def now(self) -> Fault | None:
-        """The fault of this moment."""
+        """The active fault, or None."""
         if self._began is None:
             self._began = time.monotonic()
         passed = time.monotonic() - self._began
@@ -135,8 +137,8 @@ class Faults:
         fault = self._faults[last] if last >= 0 else None
         return fault if fault is not None and passed < fault.at + fault.seconds else None
 
-    def left(self, fault: Fault) -> float:
-        """How long a fault goes on [s]."""
+    def remaining(self, fault: Fault) -> float:
+        """How much longer a fault lasts [s]."""
         return max(fault.at + fault.seconds - (time.monotonic() - (self._began or 0.0)), 0.0)
 
 
@@ -149,18 +151,18 @@ class FaultCamera:
         self._camera = open_camera()
 
     def read(self) -> Shot | None:
-        """The next shot of the other camera, or what the fault makes of it."""
+        """Return the next shot of the other camera, with the active fault applied."""
         fault = self._faults.now()
         _check_plugged(fault)
         if fault is not None and fault.kind == "hang":
-            time.sleep(self._faults.left(fault))
+            time.sleep(self._faults.remaining(fault))
         shot = self._camera.read()
         if shot is None or fault is None:
             self._faults.last = shot
             return shot
-        return self._spoilt(shot, fault.kind)
+        return self._apply(fault.kind, shot)
 
-    def _spoilt(self, shot: Shot, kind: str) -> Shot:
+    def _apply(self, kind: str, shot: Shot) -> Shot:
         truth: dict[str, Any] = {**shot.truth, "fault": kind}
         if kind == "frozen" and self._faults.last is not None:
             return replace(shot, image=self._faults.last.image, truth=truth)
@@ -168,10 +170,10 @@ class FaultCamera:
             content = cv2.imencode(".jpg", shot.image)[1].tobytes()
             return replace(shot, image=decode_frame(content[: len(content) // 2]), truth=truth)
         if kind == "slow":
-            time.sleep(_LATE)
+            time.sleep(_SLOW)
         if kind == "resize":
             return replace(shot, image=np.ascontiguousarray(shot.image[: shot.image.shape[0] // 2]), truth=truth)
-        jump = {"ahead": _HOUR, "behind": -_HOUR}.get(kind, 0.0)
+        jump = {"ahead": _JUMP, "behind": -_JUMP}.get(kind, 0.0)
         return replace(shot, captured=shot.captured + jump, truth=truth)
 
     def close(self) -> None:
@@ -181,4 +183,4 @@ class FaultCamera:
 
 def _check_plugged(fault: Fault | None) -> None:
     if fault is not None and fault.kind == "unplug":
-        raise CameraError("camera is unplugged, as the script says")
+        raise CameraError("camera is unplugged by the fault script")

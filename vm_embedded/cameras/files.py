@@ -1,4 +1,4 @@
-"""Video files and folders of images, played at their rate as if a camera gave them."""
+"""Play video files and folders of images at their frame rate, as a camera would deliver them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from .camera import BrokenFrameError, CameraError, CameraSettings, Shot
 from .image_files import Frame, lens_beside, open_source
 
 RATE = 30.0
-"""Frames a second of what has no rate of its own."""
+"""Frame rate of files without their own [1/s]."""
 
 
 class FileCamera:
-    """Plays what sources.py reads. Raises CameraError if it can't be opened."""
+    """Plays the frames that image_files.py reads. Raises CameraError if the source can't be opened."""
 
     def __init__(self, settings: CameraSettings, raw: bool = False) -> None:
         self.settings = settings
@@ -32,7 +32,7 @@ class FileCamera:
         return source.frames
 
     def read(self) -> Shot | None:
-        """The next shot, once it is due. Raises BrokenFrameError for an image that can't be read."""
+        """Return the next shot when it is due. Raises BrokenFrameError for an image that can't be read."""
         self._due = max(self._due + self._period, time.monotonic() - self._period)
         time.sleep(max(self._due - time.monotonic(), 0.0))
         frame = next(self._frames, None)
@@ -51,5 +51,5 @@ class FileCamera:
             raise BrokenFrameError(str(error)) from error
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Release the file."""
         self._frames = iter(())

@@ -1,7 +1,8 @@
-"""Takes frames from a camera in a thread of its own, and keeps the newest one only.
+"""Read a camera in a thread and keep only its newest frame.
 
-A camera that gives no new frame in time is lost: its thread is left to itself, however long its read hangs, and another
-one opens the camera again, after pauses that double. What a thread gives that was left to itself counts for nothing.
+A camera that delivers no new frame in time is lost. The grabber then abandons the reading thread, however long its read
+hangs, and starts another thread that opens the camera again, after pauses that double. It ignores everything that an
+abandoned thread delivers.
 """
 
 from __future__ import annotations
@@ -13,23 +14,27 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import cv2
+import numpy as np
 
 from ..arrays import Image
 from ..errors import VisualMeshError, one_line
-from .camera import BrokenFrameError, Camera, CameraSettings, Shot, same_image
+from .camera import BrokenFrameError, Camera, CameraSettings, Shot
 from .open_camera import Opener
 
-MOST_LEFT = 8
-"""Threads that may hang at a time; with more of them only a new process helps."""
+MOST_HANGING = 8
+"""Largest number of hanging threads; beyond it, only a new process helps."""
 
 _EARLY = 0.005
-"""Seconds that a frame's time may lie ahead: clocks are read one after the other."""
+"""How far in the future a frame's time may be [s]: the two clocks are read one after the other."""
 
 
 @dataclass
-class Counts:
-    """What became of frames: grabbed are new ones; skipped gave way to newer ones; broken, frozen and ahead (from the
-    future) were not used. reconnects: times that a camera was opened again."""
+class CameraCounts:
+    """Counts of frames by their outcome, and of reconnects.
+
+    grabbed: new frames. skipped: replaced by a newer frame before they were taken. broken, frozen (identical to the one
+    before) and ahead (from the future) were rejected. reconnects: how often the camera was opened again.
+    """
 
     grabbed: int = 0
     skipped: int = 0
@@ -39,35 +44,35 @@ class Counts:
     reconnects: int = 0
 
     @property
-    def spoilt(self) -> int:
+    def rejected(self) -> int:
         """Frames that were not used because something was wrong with them."""
         return self.broken + self.frozen + self.ahead
 
 
 class Grabber:
-    """The newest shot of a camera.
+    """Holds the newest shot of a camera.
 
     wake: called in another thread whenever there is a shot or the camera has failed.
     """
 
     def __init__(self, opener: Opener, settings: CameraSettings, wake: Callable[[], None]) -> None:
         self.settings = settings
-        self.counts = Counts()
+        self.counts = CameraCounts()
         self.trouble = ""
-        """What is wrong with the camera, or was last."""
+        """The last problem of the camera."""
         self.ended = False
-        """Whether the camera has come to its end, as files do."""
+        """Whether the camera has reached its end, as files do."""
         self._opener = opener
         self._wake = wake
         self._lock = threading.Lock()
         self._newest: Shot | None = None
-        self._image: Image | None = None  # of the last new frame, also across readers
-        self._fresh = -math.inf  # when the last new frame came
-        self._opened = 0.0  # when the last try to open the camera began
+        self._image: Image | None = None  # of the last new frame, kept when the camera is opened again
+        self._fresh = -math.inf  # when the last new frame arrived
+        self._opened = 0.0  # when the last attempt to open the camera started
         self._retry = 0.0  # when to try again, if there is no reader
         self._pause = 1e-3 * settings.retry_ms
         self._reader: _Reader | None = None
-        self._left: list[_Reader] = []
+        self._abandoned: list[_Reader] = []
 
     def start(self) -> None:
         """Open the camera."""
@@ -76,24 +81,25 @@ class Grabber:
         self._reader.start()
 
     def take(self) -> Shot | None:
-        """The newest shot, if it was not taken yet."""
+        """Return the newest shot, or None if it was taken before."""
         with self._lock:
             shot, self._newest = self._newest, None
         return shot
 
     @property
-    def waiting(self) -> bool:
+    def has_shot(self) -> bool:
         """Whether there is a shot to take."""
         return self._newest is not None
 
     @property
     def hanging(self) -> int:
-        """Threads that were left to themselves and still hang."""
-        self._left = [each for each in self._left if each.is_alive()]
-        return len(self._left)
+        """Number of abandoned threads that still hang."""
+        self._abandoned = [each for each in self._abandoned if each.is_alive()]
+        return len(self._abandoned)
 
     def supervise(self, now: float) -> bool:
-        """Leave a reader that is late, begin a new one when it is time to; whether the camera is lost."""
+        """Abandon a reader that is late or has failed, start a new one when it is due, and return whether the camera is
+        lost. now: monotonic time [s]."""
         with self._lock:
             if self.ended:
                 return False
@@ -105,43 +111,43 @@ class Grabber:
                 if late:
                     self.trouble = f"no new frame for {now - since:.1f} s"
                 if late or reader.failed:
-                    self._leave(reader, now)
+                    self._abandon(reader, now)
             lost = self._reader is None or self._fresh <= self._opened
             due = self._reader is None and now >= self._retry
-        if due and self.hanging < MOST_LEFT:
+        if due and self.hanging < MOST_HANGING:
             self.counts.reconnects += 1
             self.start()
         return lost
 
-    def _leave(self, reader: _Reader, now: float) -> None:
-        reader.left = True
-        self._left.append(reader)
+    def _abandon(self, reader: _Reader, now: float) -> None:
+        reader.abandoned = True
+        self._abandoned.append(reader)
         self._reader = None
         self._newest = None
         self._retry = now + self._pause
         self._pause = min(2.0 * self._pause, 1e-3 * self.settings.longest_retry_ms)
 
     def stop(self, seconds: float) -> None:
-        """End, and wait so long for threads to close the camera."""
+        """Stop, and wait up to `seconds` [s] for the threads to close the camera."""
         with self._lock:
             if self._reader is not None:
-                self._leave(self._reader, time.monotonic())
+                self._abandon(self._reader, time.monotonic())
             self.ended = True
         deadline = time.monotonic() + seconds
-        for each in self._left:
+        for each in self._abandoned:
             each.join(max(deadline - time.monotonic(), 0.0))
 
-    def _give(self, reader: _Reader, shot: Shot) -> None:
+    def _deliver(self, reader: _Reader, shot: Shot) -> None:
         arrived = time.monotonic()
         with self._lock:
             if reader is not self._reader:
                 return
             if shot.captured > arrived + _EARLY:
-                self.trouble = f"a frame came from {shot.captured - arrived:.3f} s ahead"
+                self.trouble = f"frame time is {shot.captured - arrived:.3f} s in the future"
                 self.counts.ahead += 1
                 return
             if self.settings.frozen and self._image is not None and same_image(shot.image, self._image):
-                self.trouble = "the same picture came again"
+                self.trouble = "the camera repeats the same image"
                 self.counts.frozen += 1
                 return
             self._image = shot.image
@@ -152,7 +158,7 @@ class Grabber:
             self._pause = 1e-3 * self.settings.retry_ms
         self._wake()
 
-    def _complain(self, reader: _Reader, trouble: str, broken: int = 0) -> None:
+    def _report(self, reader: _Reader, trouble: str, broken: int = 0) -> None:
         with self._lock:
             if reader is self._reader:
                 self.trouble = trouble
@@ -166,17 +172,17 @@ class Grabber:
 
 
 class _Reader(threading.Thread):
-    """Reads a camera until it fails, ends or is left."""
+    """Reads a camera until the camera fails or ends, or the grabber abandons the thread."""
 
     def __init__(self, grabber: Grabber, opener: Opener) -> None:
         super().__init__(name="camera", daemon=True)
-        self.left = False
+        self.abandoned = False
         self.failed = False
         self._grabber = grabber
         self._opener = opener
 
     def run(self) -> None:
-        """Open, read, close."""
+        """Open, read and close the camera."""
         try:
             camera = self._opener()
             try:
@@ -184,19 +190,24 @@ class _Reader(threading.Thread):
             finally:
                 camera.close()
         except (VisualMeshError, cv2.error, OSError, ValueError, MemoryError) as error:
-            self._grabber._complain(self, one_line(error))
+            self._grabber._report(self, one_line(error))
         finally:
             self.failed = True
             self._grabber._wake()
 
     def _read(self, camera: Camera) -> None:
-        while not self.left:
+        while not self.abandoned:
             try:
                 shot = camera.read()
             except BrokenFrameError as error:
-                self._grabber._complain(self, str(error), broken=1)
+                self._grabber._report(self, str(error), broken=1)
                 continue
             if shot is None:
                 self._grabber._end(self)
                 return
-            self._grabber._give(self, shot)
+            self._grabber._deliver(self, shot)
+
+
+def same_image(one: Image, other: Image) -> bool:
+    """Whether two images are identical. It compares every sixteenth row only, which noise always changes."""
+    return one.shape == other.shape and bool(np.array_equal(one[::16], other[::16]))

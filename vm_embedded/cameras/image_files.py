@@ -1,4 +1,4 @@
-"""Where frames come from: an image, a directory or glob of images, a video file, or a camera through OpenCV."""
+"""Read frames one by one from an image, a directory or glob of images, or a video file."""
 
 from __future__ import annotations
 
@@ -21,22 +21,24 @@ IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".pgm", ".ppm", ".tif", ".tif
 
 
 def check_file_format(format: str) -> None:
-    """Raise InputError for a pixel format that frames read here can't have.
+    """Raise InputError for a pixel format that frames read from files never have.
 
-    OpenCV gives colors as BGR, or the one channel of a grey or Bayer file as it is.
+    OpenCV reads colors as BGR and keeps the single channel of a gray or Bayer file.
     """
     if format in ("rgb", "bgra", "rgba"):
         allowed = ", ".join(name for name in FORMATS if name not in ("rgb", "bgra", "rgba"))
-        raise InputError(f"--format {format} is for frames handed over in Python; those read here are {allowed}")
+        raise InputError(
+            f"--format {format} is only for frames passed in from Python; frames read from files are {allowed}"
+        )
 
 
 @dataclass(frozen=True)
 class Frame:
     """One frame of a source.
 
-    index: its number, from 0. source: what to call it. read: gives the image, BGR, or as the file has it if the pixel
-    format is another; raises InputError. path: of its file, where it has one of its own. stamp: time in its video
-    [s].
+    index: its number, from 0. source: its name in messages. read: returns the image, BGR, or in the file's own channels
+    if the pixel format is another; raises InputError. path: its image file; None for a frame of a video. stamp: time
+    within its video [s].
     """
 
     index: int
@@ -48,7 +50,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Source:
-    """Frames to iterate over, and where that is known how many there are, and how many a second."""
+    """Frames to iterate over. count: number of frames, if known. rate: frames per second [1/s], if known."""
 
     frames: Iterator[Frame]
     count: int | None
@@ -56,9 +58,9 @@ class Source:
 
 
 def open_source(name: str, raw: bool = False) -> Source:
-    """Open a source by name. `raw` leaves images in the channels that their files have.
+    """Open a source by name. With `raw`, images keep the channels of their files.
 
-    Raises InputError if it does not exist, holds no images or can't be opened.
+    Raises InputError if the source does not exist, contains no images or can't be opened.
     """
     try:
         return _open(name, Path(name), raw)
@@ -92,12 +94,12 @@ def _images(paths: list[Path], raw: bool) -> Source:
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
-    """Order in which frame9 comes before frame10."""
+    """A sort key that puts frame9 before frame10."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
 def read_image(path: str | Path, raw: bool = False) -> Image:
-    """An image file as BGR, or with `raw` in the channels it has. Raises InputError if it is missing or broken."""
+    """Read an image file as BGR, or with `raw` in its own channels. Raises InputError if it is missing or broken."""
     path = Path(path)
     try:
         content = path.read_bytes()
@@ -110,7 +112,7 @@ def read_image(path: str | Path, raw: bool = False) -> Image:
 
 
 def lens_beside(path: Path | None) -> Path | None:
-    """lensNAME.yaml beside imageNAME.jpg, if it is there."""
+    """The file lensNAME.yaml beside imageNAME.jpg, or None if it does not exist."""
     if path is None or not path.stem.startswith("image"):
         return None
     beside = path.with_name("lens" + path.stem.removeprefix("image") + ".yaml")
@@ -118,35 +120,36 @@ def lens_beside(path: Path | None) -> Path | None:
 
 
 def _video(name: str) -> Source:
-    """A video file, or a camera by number or device path."""
+    """The frames of a video file; or of a camera, by number or device path."""
     capture = cv2.VideoCapture(int(name) if name.isdigit() else name)
     live = name.isdigit() or Path(name).is_char_device()
     if not capture.isOpened():
         raise InputError(f"can't open {'camera' if live else 'video'} {name}")
     count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-    first = _grabbed(capture)
+    first = _next_image(capture)
     if first is None:
-        raise InputError(f"{'camera' if live else 'video'} {name} gives no frames")
+        raise InputError(f"{'camera' if live else 'video'} {name} contains no frames that can be read")
     rate = capture.get(cv2.CAP_PROP_FPS)
     return Source(
-        _captured(capture, first, Path(name).name),
+        _frames(capture, first, Path(name).name),
         None if live or count <= 0 else count,
         rate if 0.0 < rate < 1e4 else None,
     )
 
 
-def _captured(capture: cv2.VideoCapture, first: Image, name: str) -> Iterator[Frame]:
+def _frames(capture: cv2.VideoCapture, first: Image, name: str) -> Iterator[Frame]:
     image: Image | None = first
     index = 0
     while image is not None:
         stamp = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
         yield Frame(index, name, partial(np.asarray, image), None, stamp)
-        image = _grabbed(capture)
+        image = _next_image(capture)
         index += 1
     capture.release()
 
 
-def _grabbed(capture: cv2.VideoCapture) -> Image | None:
-    """The next frame, or None at the end."""
+def _next_image(capture: cv2.VideoCapture) -> Image | None:
+    """The next image, or None at the end."""
+
     good, image = capture.read()
     return np.asarray(image, dtype=np.uint8) if good else None

@@ -1,4 +1,4 @@
-"""Which camera a name means."""
+"""Choose the kind of camera from the name of its source."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from ..errors import InputError
 from .camera import Camera, CameraSettings
 from .fault import FaultCamera, Faults, FaultScript
 from .files import FileCamera
-from .mjpeg import MjpegCamera, NoMotionJpegError, address_of
-from .opencv import OpenCvCamera, check_opencv, device_of
-from .synthetic import SyntheticCamera, motion_of
+from .mjpeg import MjpegCamera, NotMotionJpegError, parse_url
+from .opencv import OpenCvCamera, check_opencv_settings, device_path
+from .synthetic import SyntheticCamera, parse_motion
 
 Opener = Callable[[], Camera]
-"""Opens a camera; raises CameraError if that fails now and may work later."""
+"""Opens a camera. Raises CameraError if that fails now but may succeed later."""
 
 
 def is_live(source: str) -> bool:
-    """Whether a source is a camera by nature, not a file that might be played as one."""
+    """Whether a source is always a live camera: not a file, which vm-detect may also process frame by frame."""
     prefix = source.partition(":")[0]
-    node = device_of(source)
+    node = device_path(source)
     return prefix in ("synthetic", "fault", "gstreamer") or "://" in source or (node is not None and not node.is_file())
 
 
 def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
-    """What opens the configured camera, again and again.
+    """Return a function that opens the configured camera; it may be called again and again.
 
-    raw: images keep the channels that they have. Raises InputError for a name or setting that can never work.
+    raw: images keep their own channels. Raises InputError for a source or setting that can never work.
     """
     source = settings.source
     if source.startswith("fault:"):
@@ -36,27 +36,27 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
         faults, inner = Faults(script), camera_opener(replace(settings, source=script.source), raw)
         return lambda: FaultCamera(faults, inner)
     if source.partition(":")[0] == "synthetic":
-        motion_of(source)
+        parse_motion(source)
         if raw:
-            raise InputError("a drawn camera gives bgr, and nothing else")
+            raise InputError("the synthetic camera supports only --format bgr")
         return lambda: SyntheticCamera(settings)
     if source.startswith(("http://", "https://")):
-        address_of(source)
+        parse_url(source)
         return lambda: _network_camera(settings, raw)
-    if device_of(source) is not None or source.startswith("gstreamer:") or "://" in source:
-        check_opencv(settings)
+    if device_path(source) is not None or source.startswith("gstreamer:") or "://" in source:
+        check_opencv_settings(settings)
         return lambda: OpenCvCamera(settings, raw)
     if not Path(source).exists():
         raise InputError(
-            f"no such camera: {source!r} is no device, address, file or folder, nor synthetic, fault:SCRIPT or "
-            "gstreamer:PIPELINE"
+            f"no such camera: {source!r}; give a device, an address, an existing file or folder, synthetic, "
+            "fault:SCRIPT or gstreamer:PIPELINE"
         )
     return lambda: FileCamera(settings, raw)
 
 
 def _network_camera(settings: CameraSettings, raw: bool) -> Camera:
-    """A stream of JPEGs, or whatever else OpenCV can make of an address."""
+    """A Motion JPEG stream, or any other stream that OpenCV reads from the address."""
     try:
         return MjpegCamera(settings, raw)
-    except NoMotionJpegError:
+    except NotMotionJpegError:
         return OpenCvCamera(settings, raw)

@@ -1,4 +1,4 @@
-"""Cameras through OpenCV: V4L2 devices, RTSP and other streams, GStreamer pipelines."""
+"""Read cameras through OpenCV: V4L2 devices, RTSP and other streams, GStreamer pipelines."""
 
 from __future__ import annotations
 
@@ -6,34 +6,35 @@ import os
 import time
 from pathlib import Path
 
-# Waiting for a frame longer than this is done by whoever reads; OpenCV's own limit is ten seconds.
+# OpenCV's default waits ten seconds for a frame; a lost camera should show earlier. Set before cv2 is imported.
 os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")
 
 import cv2
 import numpy as np
 
 from ..errors import InputError
-from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, decode_frame, named
+from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, without_password
+from .decoding import decode_frame
 
 _OLDEST = 1.0
-"""Seconds that a frame's own time may lie back to be believed."""
+"""Largest age of a device's own timestamp that is trusted [s]."""
 
 _EARLY = 0.005
-"""Seconds that it may lie ahead: clocks are read one after the other."""
+"""How far in the future a timestamp may be [s]: the two clocks are read one after the other."""
 
 
 class OpenCvCamera:
-    """A camera that OpenCV reads. Raises CameraError if it can't be opened."""
+    """A camera that OpenCV reads. Raises CameraError if OpenCV can't open it."""
 
     def __init__(self, settings: CameraSettings, raw: bool = False) -> None:
         self.settings = settings
         self._raw = raw
-        self._device = device_of(settings.source)
-        self._last = -np.inf
+        self._device = device_path(settings.source)
+        self._last = -np.inf  # the last timestamp that was trusted
         source = settings.source
         if self._device is not None:
             if not self._device.exists():
-                raise CameraError(f"there is no camera {self._device}")
+                raise CameraError(f"there is no camera at {self._device}")
             self._capture = cv2.VideoCapture(str(self._device.resolve()), cv2.CAP_V4L2)
         elif source.startswith("gstreamer:"):
             self._capture = cv2.VideoCapture(source.removeprefix("gstreamer:"), cv2.CAP_GSTREAMER)
@@ -43,11 +44,11 @@ class OpenCvCamera:
             self._capture = cv2.VideoCapture(source, cv2.CAP_FFMPEG, limits)
         if not self._capture.isOpened():
             self._capture.release()
-            raise CameraError(f"can't open camera {named(source)}")
+            raise CameraError(f"can't open camera {without_password(source)}")
         self._motion_jpeg = self._device is not None and self._configure()
 
     def _configure(self) -> bool:
-        """Ask the device for what is configured; whether it gives JPEGs as they come."""
+        """Request the configured settings from the device; return whether it delivers undecoded JPEGs."""
         settings, capture = self.settings, self._capture
         if settings.pixel_format:
             capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*settings.pixel_format))
@@ -59,54 +60,55 @@ class OpenCvCamera:
         capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
         if settings.exposure_ms:
             capture.set(cv2.CAP_PROP_AUTO_EXPOSURE, 1)  # V4L2_EXPOSURE_MANUAL
-            capture.set(cv2.CAP_PROP_EXPOSURE, round(10.0 * settings.exposure_ms))  # V4L2 counts in 100 us
+            capture.set(cv2.CAP_PROP_EXPOSURE, round(10.0 * settings.exposure_ms))  # in units of 100 us
         if settings.gain >= 0.0:
             capture.set(cv2.CAP_PROP_GAIN, settings.gain)
         fourcc = int(capture.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little")
-        # JPEGs are decoded here, because OpenCV takes half of one for a whole picture.
+        # decode_frame decodes JPEGs instead of OpenCV, which accepts half a JPEG as a whole image.
         return fourcc in (b"MJPG", b"JPEG") and bool(capture.set(cv2.CAP_PROP_CONVERT_RGB, 0))
 
     def read(self) -> Shot:
-        """The next shot. Raises CameraError if there is none, BrokenFrameError if it is cut short."""
+        """Return the next shot. Raises CameraError if there is none, BrokenFrameError if it is cut short."""
         good, image = self._capture.read()
         arrived = time.monotonic()
         if not good or image is None:
-            raise CameraError(f"camera {named(self.settings.source)} gives no frames")
+            raise CameraError(f"camera {without_password(self.settings.source)} delivers no frames")
         if self._device is not None and not self._device.exists():
-            # After an unplug the last frame may come again and again.
-            raise CameraError(f"camera {self._device} is gone")
+            # Some drivers repeat the last frame after the camera was unplugged.
+            raise CameraError(f"camera {self._device} was unplugged")
         captured = self._captured(arrived)
         if self._motion_jpeg:
             content = image.tobytes()
             return Shot(decode_frame(content, self._raw), captured, content)
         if image.dtype != np.uint8 or image.size == 0:
-            raise BrokenFrameError(f"frame of {image.dtype} {image.shape} is no picture")
+            raise BrokenFrameError(f"frame has {image.dtype} values of shape {image.shape}, not an 8-bit image")
         return Shot(np.asarray(image), captured)
 
     def _captured(self, arrived: float) -> float:
-        """When the frame was taken: V4L2 says so in monotonic time. What can't be is not believed."""
+        """When the frame was taken, in monotonic time [s]: V4L2's timestamp if it is plausible, else the arrival less
+        the configured latency."""
         stamp = 1e-3 * self._capture.get(cv2.CAP_PROP_POS_MSEC) if self._device is not None else -np.inf
-        believed = arrived - _OLDEST < stamp < arrived + _EARLY and stamp > self._last
-        self._last = max(self._last, stamp) if believed else self._last
-        return float(min(stamp, arrived)) if believed else arrived - 1e-3 * self.settings.latency_ms
+        trusted = arrived - _OLDEST < stamp < arrived + _EARLY and stamp > self._last
+        self._last = max(self._last, stamp) if trusted else self._last
+        return float(min(stamp, arrived)) if trusted else arrived - 1e-3 * self.settings.latency_ms
 
     def close(self) -> None:
-        """Give the device back."""
+        """Release the device or stream."""
         self._capture.release()
 
 
-def device_of(source: str) -> Path | None:
-    """The node of a device, by number or path; None for any other source."""
+def device_path(source: str) -> Path | None:
+    """The path of a V4L2 device given by number or path; None for any other source."""
     if source.isascii() and source.isdigit():
         return Path(f"/dev/video{int(source)}")
     return Path(source) if source.startswith("/dev/") else None
 
 
-def check_opencv(settings: CameraSettings) -> None:
-    """Raise InputError for what no camera of OpenCV can be asked."""
+def check_opencv_settings(settings: CameraSettings) -> None:
+    """Raise InputError for settings that OpenCV can never use."""
     if settings.pixel_format and (len(settings.pixel_format) != 4 or not settings.pixel_format.isascii()):
-        raise InputError(f"pixel_format must be four letters, as MJPG, not {settings.pixel_format!r}")
+        raise InputError(f"pixel_format must be four letters such as MJPG, not {settings.pixel_format!r}")
     if settings.source.startswith("gstreamer:"):
         backends = [cv2.videoio_registry.getBackendName(each) for each in cv2.videoio_registry.getBackends()]
         if "GSTREAMER" not in backends:
-            raise InputError(f"this OpenCV has no GStreamer (it has {', '.join(backends)})")
+            raise InputError(f"this OpenCV was built without GStreamer (it has {', '.join(backends)})")

@@ -13,7 +13,7 @@ from importlib import metadata
 from pathlib import Path
 
 from ..cameras.open_camera import camera_opener
-from ..cameras.opencv import device_of
+from ..cameras.opencv import device_path
 from ..errors import VisualMeshError, one_line
 from ..live.configuration import Configuration
 from ..live.control import usual_path
@@ -131,7 +131,7 @@ def camera(configuration: Configuration, root: Path) -> Iterator[Finding]:
             "camera", WARNING, "none is configured", "vm-detect --camera SOURCE, or [camera] source in vm.toml"
         )
         return
-    device = device_of(source)
+    device = device_path(source)
     try:
         camera_opener(configuration.camera, configuration.detector.format != "bgr")
         if device is not None and not (root / device.relative_to("/")).exists():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import asdict, dataclass
 
-from ..cameras.grabber import Counts
+from ..cameras.grabber import CameraCounts
 from ..detection.cache import MeshCache
 from ..detection.detections import Detections
 from ..output.messages import STATES
@@ -63,11 +63,11 @@ class Figures:
         for name, seconds in {**stages, "answer": took, "age": age}.items():
             self._stages.setdefault(name, Histogram()).add(seconds)
 
-    def counts(self, camera: Counts) -> dict[str, int]:
+    def counts(self, camera: CameraCounts) -> dict[str, int]:
         """All counts by name."""
         return {**asdict(self.tally), **asdict(camera)}
 
-    def metrics(self, state: str, camera: Counts, cache: MeshCache, since: float) -> str:
+    def metrics(self, state: str, camera: CameraCounts, cache: MeshCache, since: float) -> str:
         """For Prometheus. since: when the last frame was answered, in monotonic time [s]."""
         now = time.monotonic()
         counts = {**self.counts(camera), "cache_hits": cache.hits, "cache_misses": cache.misses}

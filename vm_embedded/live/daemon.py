@@ -21,8 +21,8 @@ from typing import Protocol
 
 import cv2
 
-from ..cameras.camera import Shot, named
-from ..cameras.grabber import MOST_LEFT, Grabber
+from ..cameras.camera import Shot, without_password
+from ..cameras.grabber import MOST_HANGING, Grabber
 from ..cameras.open_camera import camera_opener, is_live
 from ..config.sections import documented
 from ..detection.detector import Detector
@@ -77,9 +77,9 @@ def ready(configuration: Configuration) -> Detector:
         detector.manifest.column(configuration.recorder.trigger_class)
     if is_live(camera) and camera.partition(":")[0] not in ("synthetic", "fault"):
         if configuration.lens is None:
-            raise InputError(f"camera {named(camera)} needs a lens: give --lens")
+            raise InputError(f"camera {without_password(camera)} needs a lens: give --lens")
         if configuration.pose.source == "fixed" and fixed is None:
-            raise InputError(f"camera {named(camera)} needs poses: give --height, or --pose-source")
+            raise InputError(f"camera {without_password(camera)} needs poses: give --height, or --pose-source")
     return detector
 
 
@@ -152,7 +152,7 @@ class Daemon:
         self.grabber.start()
         self._show_state()
         self._notifier.send(READY=1)
-        self._log("ready", model=self.configuration.model, camera=named(self.configuration.camera.source))
+        self._log("ready", model=self.configuration.model, camera=without_password(self.configuration.camera.source))
         wall = time.time() - time.monotonic()
         while not self._stops and not self._finished():
             await self._step()
@@ -179,9 +179,9 @@ class Daemon:
 
     def _finished(self) -> bool:
         """Whether the camera has come to its end, or nothing but a new process helps."""
-        if self.grabber.hanging >= MOST_LEFT:
-            self._fatal = f"{MOST_LEFT} reads of the camera hang"
-        return self._fatal is not None or (self.grabber.ended and not self.grabber.waiting)
+        if self.grabber.hanging >= MOST_HANGING:
+            self._fatal = f"{MOST_HANGING} reads of the camera hang"
+        return self._fatal is not None or (self.grabber.ended and not self.grabber.has_shot)
 
     async def _step(self) -> None:
         """Wait for a shot, or a moment, and do what is due."""
@@ -275,7 +275,7 @@ class Daemon:
         lost = self.grabber.supervise(now)
         if self.outputs.failure:
             self.health.trouble(now, f"lines are lost: {self.outputs.failure}")
-        spoilt = self.grabber.counts.spoilt
+        spoilt = self.grabber.counts.rejected
         if spoilt != self._spoilt:
             self._spoilt = spoilt
             self.health.trouble(now, self.grabber.trouble)

@@ -11,6 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 COMMAND = Path(sys.executable).parent / "vm-detect"
+LENS = '[lens]\nprojection = "rectilinear"\nfocal_length = 448\nfov = 1.75\n[orientation]\nheight = 0.8\npitch = 0.4\n'
+"""A vm.toml for the images of a synthetic camera of 640 pixels."""
+
 PATIENCE = 60.0
 """Seconds after which a test gives up waiting; never what is measured."""
 

@@ -378,4 +378,4 @@ def test_passwords_of_cameras_are_not_shown(tmp_path):
         found.wait_for_state("camera_lost")
         found.stop()
     assert "secret" not in json.dumps([found.messages, found.events])
-    assert "no answer from http://127.0.0.1:9/x" in json.dumps(found.messages)
+    assert "no response from http://127.0.0.1:9/x" in json.dumps(found.messages)

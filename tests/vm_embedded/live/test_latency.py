@@ -21,7 +21,7 @@ def video(tmp_path):
     path = tmp_path / "field.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 200.0, (320, 256))
     for at in range(20):
-        writer.write(camera.drawn(at / 30.0))
+        writer.write(camera.draw(at / 30.0))
     writer.release()
     return path
 

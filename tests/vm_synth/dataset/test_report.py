@@ -55,7 +55,7 @@ def truth_with(**entries):
 
 DAMAGES = {
     "image cut": ("image", cut, "image0000002.jpg is cut short"),
-    "image empty": ("image", lambda path: path.write_bytes(b""), "image0000002.jpg is no image"),
+    "image empty": ("image", lambda path: path.write_bytes(b""), "image0000002.jpg can't be decoded as an image"),
     "image of another size": (
         "image",
         lambda path: cv2.imwrite(str(path), np.zeros((64, 90, 3), np.uint8)),

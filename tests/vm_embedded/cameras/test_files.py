@@ -1,0 +1,35 @@
+"""Video files that are played as a camera would deliver them."""
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.vm_embedded.live.running import LENS, running
+from vm_embedded.cameras.camera import CameraSettings
+from vm_embedded.cameras.grabber import same_image
+from vm_embedded.cameras.open_camera import camera_opener
+from vm_embedded.cameras.synthetic import SIZE, SyntheticCamera
+
+
+def test_a_video_is_played_at_its_rate_again_and_again(tmp_path):
+    camera = SyntheticCamera(CameraSettings())
+    path = tmp_path / "field.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
+    assert writer.isOpened()
+    for at in range(10):
+        writer.write(camera.draw(at / 25.0))
+    writer.release()
+    opened = camera_opener(CameraSettings(source=str(path), loop=True))()
+    shots = [opened.read() for _ in range(25)]
+    opened.close()
+    times = np.diff([each.captured for each in shots])
+    assert np.median(times) == pytest.approx(1 / 25.0, rel=0.02)
+    assert same_image(shots[0].image, shots[10].image)
+    assert not same_image(shots[0].image, shots[1].image)
+    (tmp_path / "vm.toml").write_text(LENS)
+    with running(tmp_path, "--config", tmp_path / "vm.toml", "--camera", path, "--live", "--camera-loop") as found:
+        found.wait(lambda: len(found.frames) > 15)
+        found.stop()
+    with running(tmp_path, "--config", tmp_path / "vm.toml", "--camera", path, "--live") as found:
+        assert found.process.wait(60) == 0
+    assert 0 < len(found.frames) <= 10

@@ -1,0 +1,88 @@
+"""Motion JPEG from a real HTTP server that dies and comes back."""
+
+import threading
+import time
+
+import pytest
+
+from tests.vm_embedded.cameras.mjpeg_server import Server
+from tests.vm_embedded.live.running import LENS, running
+from vm_embedded.cameras.camera import BrokenFrameError, CameraError, CameraSettings
+from vm_embedded.cameras.mjpeg import MjpegCamera, NotMotionJpegError, parse_url
+from vm_embedded.cameras.synthetic import SIZE
+
+
+@pytest.mark.parametrize("length", [True, False], ids=["with lengths", "without"])
+def test_motion_jpeg_is_read_picture_by_picture(pictures, length):
+    server = Server(pictures, length=length, rate=100.0)
+    try:
+        camera = MjpegCamera(CameraSettings(source=server.address))
+        for at in range(20):
+            shot = camera.read()
+            assert shot.encoded == pictures[at]
+            assert shot.image.shape == (SIZE[1], SIZE[0], 3)
+        camera.close()
+    finally:
+        server.kill()
+
+
+def test_a_picture_that_is_cut_short_is_not_taken_and_the_next_one_is(pictures):
+    count = iter(range(1000))
+    server = Server(pictures, spoil=lambda part: part[: len(part) // 2] if next(count) % 2 else part, rate=100.0)
+    try:
+        camera = MjpegCamera(CameraSettings(source=server.address))
+        for _ in range(5):
+            assert camera.read().image.shape == (SIZE[1], SIZE[0], 3)
+            with pytest.raises(BrokenFrameError, match="cut short"):
+                camera.read()
+        camera.close()
+    finally:
+        server.kill()
+
+
+def test_a_server_that_falls_silent_is_given_up_in_time(pictures):
+    stop = threading.Event()
+    server = Server(pictures, spoil=lambda part: stop.wait(20.0) or part)
+    try:
+        camera = MjpegCamera(CameraSettings(source=server.address, lost_ms=200))
+        started = time.monotonic()
+        with pytest.raises(CameraError, match="timed out"):
+            camera.read()
+        assert time.monotonic() - started < 5.0
+        camera.close()
+    finally:
+        stop.set()
+        server.kill()
+
+
+def test_what_is_no_motion_jpeg_is_said(pictures):
+    server = Server(pictures)
+    try:
+        with pytest.raises(NotMotionJpegError, match="text/html"):
+            MjpegCamera(CameraSettings(source=server.address.replace("stream", "page")))
+    finally:
+        server.kill()
+    with pytest.raises(CameraError, match="refused"):
+        MjpegCamera(CameraSettings(source=server.address))
+
+
+def test_a_server_that_is_killed_and_started_again_is_found_again(tmp_path, pictures):
+    (tmp_path / "vm.toml").write_text(LENS)
+    server = Server(pictures)
+    options = ("--config", tmp_path / "vm.toml", "--camera", server.address)
+    with running(tmp_path, *options, "--camera-lost-ms", 400, "--camera-retry-ms", 50) as found:
+        found.wait_for_state("ok")
+        for _ in range(2):
+            server.kill()
+            found.wait_for_state("camera_lost")
+            server = Server(pictures, server.port)
+            found.wait_for_state("ok")
+        before = len(found.frames)
+        found.wait(lambda: len(found.frames) > before + 20)
+        found.wait(lambda: sum(len(each["detections"]) for each in found.frames[before:]) > 10)
+        assert found.stop()[0] == 0
+    server.kill()
+
+
+def test_a_url_is_split_into_its_parts():
+    assert parse_url("http://user:pass@[::1]:81/a?b").port == 81
