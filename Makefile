@@ -12,19 +12,19 @@ BUILD ?= build/networks
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
 
-.PHONY: help setup demo test lint bundle deb deploy logs lock bench bench-synth bench-train data networks test-data score choices fixtures docs clean
+.PHONY: help setup demo test lint bundle deb deploy logs lock bench bench-synth bench-train data networks test-data score choices fixtures docs site clean
 .DELETE_ON_ERROR:
 
-help: ## what can be made
+help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
-setup: .venv/dev ## everything for developing: runtime, torch, tests
+setup: .venv/dev ## install everything for development: runtime, torch, tests
 
-demo: .venv/runtime ## find the balls in the frames of the repository
+demo: .venv/runtime ## find the balls in the twelve test pictures
 	@$(BIN)/vm-detect --camera $(DEMO) --save-overlay demo-out
 	@echo "Annotated pictures: $(CURDIR)/demo-out/"
 
-test: lint ## lint, types and tests; LONG=1 with those that take minutes: 200 faults of a camera, a booted robot
+test: lint ## lint, types and tests; LONG=1 adds tests that take minutes: 200 camera faults, a booted robot
 	$(BIN)/python deploy/bundle.py --download
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder $(if $(LONG),,-m 'not long')
 
@@ -33,20 +33,20 @@ lint: .venv/dev ## style and types
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-bundle: .venv/bundle ## all that a robot needs, in one file: make bundle [MODEL=model.onnx] [CONFIG=vm.toml] [TARGET=linux_x86_64-cp311]
+bundle: .venv/bundle ## pack all that a robot needs in one file: make bundle [MODEL=model.onnx] [CONFIG=vm.toml] [TARGET=linux_x86_64-cp311]
 	$(BIN)/python deploy/bundle.py --target $(TARGET) $(if $(MODEL),--model '$(MODEL)') $(if $(CONFIG),--config '$(CONFIG)')
 
 BUNDLE = dist/vm-embedded-robot-$(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' vm_embedded/__init__.py)-$(TARGET).tar.gz
 
-deb: bundle ## the same as a Debian package
+deb: bundle ## pack the bundle as a Debian package
 	$(BIN)/python deploy/debian.py $(BUNDLE)
 
-deploy: ## bundle, copy, install, and show what it sees: make deploy ROBOT=user@host [MODEL=] [CONFIG=] [TARGET=]
+deploy: ## bundle, copy, install, and show the detections: make deploy ROBOT=user@host [MODEL=] [CONFIG=] [TARGET=]
 	@test -n "$(ROBOT)" || { echo 'make deploy needs ROBOT=user@host'; exit 1; }
 	@$(MAKE) bundle
 	sh deploy/deploy.sh $(BUNDLE) $(ROBOT)
 
-logs: ## what happens on a robot: make logs ROBOT=user@host
+logs: ## follow the log of a robot: make logs ROBOT=user@host
 	@test -n "$(ROBOT)" || { echo 'make logs needs ROBOT=user@host'; exit 1; }
 	ssh $(ROBOT) 'if [ "$$(id -u)" = 0 ]; then s=; else s=sudo; fi; $$s journalctl --unit vm-detect --lines 50 --follow'
 
@@ -57,7 +57,7 @@ lock: ## choose the robot's packages, and write their hashes to deploy/robot.txt
 		--allow-unsafe --strip-extras --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-annotate \
 		--constraint constraints.txt --output-file robot.txt ../pyproject.toml -
 
-bench: .venv/bench ## measure against the plain graph and the peers; write results.json and docs/performance.md (10 minutes)
+bench: .venv/bench ## measure the speed, also of other detectors; write docs/performance.md (10 minutes)
 	$(BIN)/python -m benchmarks.run
 	$(BIN)/python -m benchmarks.report
 
@@ -65,7 +65,7 @@ data: .venv/synth ## render a training set: make data HDRI=folder-of-maps [OUT=d
 	@test -n "$(HDRI)" || { echo 'make data needs HDRI=folder-of-maps'; exit 1; }
 	$(BIN)/vm-synth $(OUT) --count $(COUNT) --hdri $(HDRI) --seed $(SEED) --config $(SCENES)
 
-networks: .venv/dev ## the networks of the package, from seeds: make networks HDRI=folder-of-maps (hours)
+networks: .venv/dev ## train the networks of the package from their seeds: make networks HDRI=folder-of-maps (hours)
 	$(MAKE) data OUT=data/soccer COUNT=4000 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 
@@ -79,7 +79,7 @@ vm_embedded/models/%.onnx: export/networks/%.toml
 test-data: .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
 	$(BIN)/python -m benchmarks.test_data $(HDRI) $(TEST)
 
-score: .venv/dev ## how good the networks of the package are: make score [TEST=data/test] (10 minutes)
+score: .venv/dev ## evaluate the networks of the package; write docs/results.md: make score [TEST=data/test] (10 minutes)
 	$(BIN)/python -m benchmarks.shipped $(TEST)
 	$(BIN)/python -m benchmarks.shipped_report
 
@@ -89,18 +89,22 @@ bench-synth: .venv/synth ## measure vm-synth: make bench-synth HDRI=folder-of-ma
 bench-train: .venv/dev ## measure vm-train: make bench-train DATA=folder-of-pictures (5 minutes)
 	$(BIN)/python -m benchmarks.training $(DATA)
 
-choices: .venv/dev ## what each choice of a training brings: make choices [TEST=data/test], after networks and test-data (hours)
+choices: .venv/dev ## measure what each choice of a training is worth: make choices [TEST=data/test], after networks and test-data (hours)
 	$(BIN)/python -m benchmarks.choices data/soccer $(TEST)/field build/choices
 	$(BIN)/python -m benchmarks.choices_report
 
 fixtures: .venv/dev ## draw the frames of the tests and train their network again (about 20 minutes)
 	$(BIN)/python -m tests.fixtures.make_drawn
 
-docs: .venv/dev demo ## write the help texts and the demo's picture in docs/ again
+docs: .venv/dev demo ## write the generated pages of docs/ and the demo's picture again
 	$(BIN)/python docs/help_pages.py
 	$(BIN)/python docs/demo_picture.py
 
-clean: ## remove what was made
+site: .venv/docs ## build docs/ as a web site in build/site
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --config-file docs/site/mkdocs.yml
+	@echo "Open $(CURDIR)/build/site/index.html"
+
+clean: ## remove everything that make made
 	rm -rf .venv demo-out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 .venv/made:
@@ -114,6 +118,10 @@ clean: ## remove what was made
 
 .venv/dev: .venv/made pyproject.toml deploy/constraints.txt
 	$(PIP) --editable '.[dev]'
+	@touch $@ .venv/runtime .venv/docs
+
+.venv/docs: .venv/made pyproject.toml deploy/constraints.txt
+	$(PIP) --editable '.[docs]'
 	@touch $@ .venv/runtime
 
 .venv/bundle: .venv/made pyproject.toml deploy/constraints.txt
@@ -122,7 +130,7 @@ clean: ## remove what was made
 
 .venv/bench: .venv/made pyproject.toml deploy/constraints.txt
 	$(PIP) --editable '.[dev,bench]'
-	@touch $@ .venv/dev .venv/runtime
+	@touch $@ .venv/dev .venv/runtime .venv/docs
 
 .venv/synth: .venv/made pyproject.toml deploy/constraints.txt
 	$(PIP) --editable '.[synth]'

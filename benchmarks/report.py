@@ -15,6 +15,7 @@ from matplotlib import pyplot
 RESULTS = Path(__file__).with_name("results.json")
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "performance.md"
+README = DOCS.parent / "README.md"
 
 
 def table(heads: list[str], rows: list[list[str]]) -> str:
@@ -87,6 +88,16 @@ def shipped(found: dict[str, Any]) -> str:
         )
     stages = next(iter(found["shipped"].values()))["stages_ms"]
     return table(["network", "points", "found", *stages, "whole call", "p99"], rows)
+
+
+def speed(found: dict[str, Any]) -> str:
+    """The README's table: whole calls of the networks of the package, with the mesh that they come with."""
+    rows = [
+        [name.split(",")[0], str(row["points"]), *(f"{row['total'][share]:.1f} ms" for share in ("p50", "p99"))]
+        for name, row in found["shipped"].items()
+        if name.endswith("to 14 m")
+    ]
+    return table(["network", "points", "whole call, median", "p99"], rows)
 
 
 def peers(found: dict[str, Any]) -> str:
@@ -193,6 +204,7 @@ def main() -> None:
             raise SystemExit(f"{PAGE} has no place for the table {name}")
         text = pattern.sub(lambda match, made=made: match[1] + made(found) + "\n" + match[2], text)  # type: ignore[misc]
     PAGE.write_text(text)
+    fill(README, {"speed": speed(found)})
     plot_peers(found, DOCS / "performance-peers.png")
     plot_growth(found, DOCS / "performance-growth.png")
 

@@ -16,6 +16,7 @@ from vm_embedded.network.model_file import read_model
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "results.md"
+README = DOCS.parent / "README.md"
 COLORS = {"ball-5x4": "#7570b3", "ball-9x4": "#d95f02", "ball-best": "#1b9e77"}
 
 
@@ -43,6 +44,25 @@ def networks(found: dict[str, Any], each_set: str) -> str:
     heads = ["network", "AP50, 0.5 to 6 m", "6 to 10 m", "AP75, 0.5 to 6 m", "6 to 10 m"]
     heads += ["found [%], 0.5 to 6 m", "6 to 10 m", "false a picture", "error of distance [%]"]
     return table(heads, rows)
+
+
+def accuracy(found: dict[str, Any]) -> str:
+    """The README's table: all networks on fields."""
+    rows = []
+    for name, sets in found["networks"].items():
+        scores = sets["field"]
+        near, far = "0.5 to 6 m", "6 to 10 m"
+        rows.append(
+            [
+                name,
+                *(number(scores["ranked 0.5"][each]["average_precision"], 2) for each in (near, far)),
+                *(number(scores["used 0.5"][each]["recall"], 0, 100.0) + " %" for each in (near, far)),
+                number(scores["all"]["false_per_picture"]),
+                number(scores["used 0.5"][near]["distance_error"], 1, 100.0) + " %",
+            ]
+        )
+    heads = ["network", "AP50, 0.5 to 6 m", "AP50, 6 to 10 m", "found, 0.5 to 6 m", "found, 6 to 10 m"]
+    return table([*heads, "false per picture", "median distance error"], rows)
 
 
 def grid(found: dict[str, Any]) -> str:
@@ -186,6 +206,7 @@ def main() -> None:
         ],
     )
     fill(PAGE, made)
+    fill(README, {"accuracy": accuracy(found)})
     for name in found["networks"]:
         model_path(name).with_suffix(".md").write_text(card(found, name))
     plot(found)

@@ -1,13 +1,18 @@
-"""Writes docs/command-line.md from the parsers, and docs/vm.toml, scene.toml and train.toml from the entries of
-configurations, so that they and the programs can't drift apart.
+"""Writes the pages that are made from the programs, so that both stay the same:
 
-python docs/help_pages.py writes them; a test checks that they are what this would write.
+- docs/command-line.md from the parsers,
+- docs/vm.toml, scene.toml and train.toml from the entries of configurations,
+- docs/api.md from the docstrings (api_page.py).
+
+`python docs/help_pages.py` writes them; a test checks that they are current.
 """
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+
+import api_page
 
 from vm_embedded.cli import bench, detect, doctor
 from vm_embedded.config.sections import documented
@@ -20,20 +25,31 @@ from vm_train.cli import evaluate
 from vm_train.cli import options as train
 from vm_train.learning.configuration import TrainConfiguration
 
-PAGE = Path(__file__).parent / "command-line.md"
-SCENE = Path(__file__).parent / "scene.toml"
-ROBOT = Path(__file__).parent / "vm.toml"
-TRAIN = Path(__file__).parent / "train.toml"
+DOCS = Path(__file__).parent
 
 
-def page() -> str:
-    """The page's text."""
-    parts = [
-        "# Command line\n\nMade from the programs' own help texts; every program also prints them with `--help`.\n"
-    ]
+def pages() -> dict[Path, str]:
+    """All files that this script writes, with their texts."""
+    return {
+        DOCS / "command-line.md": command_line(),
+        DOCS / "api.md": api_page.page(),
+        DOCS / "vm.toml": "\n".join(documented(Configuration())),
+        DOCS / "scene.toml": "\n".join(documented(SceneConfiguration())),
+        DOCS / "train.toml": "\n".join(documented(TrainConfiguration())),
+    }
+
+
+def parsers() -> dict[str, argparse.ArgumentParser]:
+    """All programs, and commands of programs ("vm-train check"), with their parsers, in the order of the page."""
     robot = (detect.parser(), doctor.parser(), bench.parser(), export.parser())
     workstation = (each for program in (synth, train, evaluate, mesh) for each in program.parsers().values())
-    for parser in (*robot, *workstation):
+    return {each.prog: each for each in (*robot, *workstation)}
+
+
+def command_line() -> str:
+    """The page of the command line."""
+    parts = ["# Command line\n\nMade from the help texts of the programs by `make docs`. `--help` prints the same.\n"]
+    for parser in parsers().values():
         parts.append(f"## {parser.prog}\n\n{parser.description}\n")
         for group in parser._action_groups:
             rows = [_row(action) for action in group._group_actions if not isinstance(action, argparse._HelpAction)]
@@ -46,21 +62,6 @@ def page() -> str:
     return "\n".join(parts)
 
 
-def robot_configuration() -> str:
-    """All entries of a vm.toml with their meanings and defaults."""
-    return "\n".join(documented(Configuration()))
-
-
-def scene() -> str:
-    """All entries of a scene.toml with their meanings and defaults."""
-    return "\n".join(documented(SceneConfiguration()))
-
-
-def training() -> str:
-    """All entries of a train.toml with their meanings and defaults."""
-    return "\n".join(documented(TrainConfiguration()))
-
-
 def _row(action: argparse.Action) -> str:
     names = ", ".join(f"`{name}`" for name in action.option_strings) or f"`{action.dest}`"
     if action.choices:
@@ -71,7 +72,5 @@ def _row(action: argparse.Action) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page())
-    ROBOT.write_text(robot_configuration())
-    SCENE.write_text(scene())
-    TRAIN.write_text(training())
+    for path, text in pages().items():
+        path.write_text(text)

@@ -1,28 +1,145 @@
-"""The documentation says what the programs do."""
+"""The documentation says what the programs do, is complete, and its links lead somewhere."""
 
+import json
 import re
+import shlex
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-DOCS = Path(__file__).parents[1] / "docs"
-PAGES = [DOCS.parent / "README.md", DOCS.parent / "CHANGELOG.md", *sorted(DOCS.glob("*.md"))]
+import vm_embedded
+
+TOP = Path(__file__).parents[1]
+DOCS = TOP / "docs"
+README = TOP / "README.md"
+OUTSIDE = [README, TOP / "CHANGELOG.md", TOP / "deploy" / "README.md", TOP / "benchmarks" / "README.md"]
+PAGES = [*OUTSIDE, *sorted(DOCS.glob("*.md"))]
 
 
-def test_command_line_and_configuration_pages_are_what_the_programs_say(monkeypatch):
+def name_of(page: Path) -> str:
+    return str(page.relative_to(TOP))
+
+
+every_page = pytest.mark.parametrize("page", PAGES, ids=name_of)
+
+
+@pytest.fixture
+def docs_script(monkeypatch):
+    """Imports a script of docs/ by its name."""
     monkeypatch.syspath_prepend(str(DOCS))
-    import help_pages
-
-    sys.modules.pop("help_pages")
-    assert help_pages.PAGE.read_text() == help_pages.page(), "run: make docs"
-    assert help_pages.ROBOT.read_text() == help_pages.robot_configuration(), "run: make docs"
-    assert help_pages.SCENE.read_text() == help_pages.scene(), "run: make docs"
-    assert help_pages.TRAIN.read_text() == help_pages.training(), "run: make docs"
+    yield __import__
+    for name in ("help_pages", "api_page"):
+        sys.modules.pop(name, None)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_generated_pages_are_current(docs_script):
+    for path, text in docs_script("help_pages").pages().items():
+        assert path.read_text() == text, f"{path.name} is out of date; run: python docs/help_pages.py"
+
+
+def test_the_api_page_has_every_public_name(docs_script):
+    grouped = [name for names in docs_script("api_page").GROUPS.values() for name in names]
+    assert sorted(grouped) == sorted(vm_embedded.__all__)
+    assert all(f"\n### {name}\n" in (DOCS / "api.md").read_text() for name in grouped)
+
+
+def test_tables_of_the_readme_are_the_published_figures():
+    from benchmarks import report, shipped, shipped_report
+
+    made = {
+        "accuracy": shipped_report.accuracy(json.loads(shipped.RESULTS.read_text())),
+        "speed": report.speed(json.loads(report.RESULTS.read_text())),
+    }
+    for name, table in made.items():
+        assert f"<!-- {name} -->\n{table}\n<!-- end -->" in README.read_text()
+
+
+def test_the_changelog_has_this_version():
+    assert vm_embedded.__version__ == "0.1.0"
+    assert f"## {vm_embedded.__version__} " in (TOP / "CHANGELOG.md").read_text()
+
+
+def test_the_readme_is_short():
+    assert len(README.read_text().splitlines()) <= 150
+
+
+def test_the_python_of_the_readme_works(monkeypatch, capsys):
+    program = README.read_text().split("```python\n")[1].split("```")[0]
+    monkeypatch.chdir(TOP)
+    exec(program, {})
+    assert capsys.readouterr().out.startswith("ball 0.")
+
+
+def test_every_page_is_in_the_index():
+    index = (DOCS / "index.md").read_text()
+    for page in PAGES:
+        target = page.name if page.parent == DOCS else f"../{name_of(page)}"
+        assert page.name == "index.md" or f"]({target})" in index, f"{name_of(page)} is not in docs/index.md"
+
+
+@every_page
 def test_links_lead_somewhere(page):
-    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text()):
-        if not target.startswith("http"):
-            assert (page.parent / target).exists(), f"{page.name} links to {target}"
+    for path, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([^)\s]*))?\)", page.read_text()):
+        if path.startswith("http"):
+            continue
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), f"{name_of(page)} links to {path}"
+        assert not anchor or anchor in anchors(target), f"{name_of(page)} links to {path}#{anchor}"
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of a page's headings, as code hosts and mkdocs name them."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", each.lower()).strip().replace(" ", "-") for each in headings}
+
+
+@every_page
+def test_commands_are_what_the_programs_take(page, docs_script, capsys):
+    parsers = docs_script("help_pages").parsers()
+    programs = {name.split()[0] for name in parsers}
+    for line in shell_lines(page):
+        words = shlex.split(line, comments=True)
+        while words and (words[0] in ("sudo", "&&") or "=" in words[0]):
+            del words[0]
+        program = Path(words[0]).name if words else ""
+        if program not in programs:
+            continue
+        words = words[1 : words.index(">") if ">" in words else None]
+        command = f"{program} {words[0]}" if words else ""
+        parser = parsers[command] if command in parsers else parsers[program]
+        try:
+            parser.parse_args(words[1:] if command in parsers else words)
+        except SystemExit:
+            pytest.fail(f"{name_of(page)}: {line}\n{capsys.readouterr().err}")
+
+
+def shell_lines(page: Path) -> list[str]:
+    """Lines of a page's blocks of shell commands, continued lines as one, variables as 1."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+    return re.sub(r"\$[A-Z_]+", "1", "".join(blocks).replace("\\\n", " ")).splitlines()
+
+
+@every_page
+def test_targets_of_make_exist(page):
+    makefile = (TOP / "Makefile").read_text()
+    named = re.findall(r"`(?:.*&& )?make ([a-z-]+)", page.read_text())
+    named += [words[1] for words in map(str.split, shell_lines(page)) if words[:1] == ["make"]]
+    for target in named:
+        assert re.search(rf"^{target}:", makefile, re.MULTILINE), f"{name_of(page)} names make {target}"
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_warnings_and_needs_no_network(tmp_path):
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", DOCS / "site" / "mkdocs.yml"]
+    environment = {"NO_MKDOCS_2_WARNING": "1", "PATH": ""}
+    done = subprocess.run([*command, "--site-dir", tmp_path], capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr
+    assert "INFO    -  The following pages" not in done.stderr
+    pages = list(tmp_path.rglob("*.html"))
+    assert len(pages) > len(PAGES)
+    loaded = re.compile(r"<(?:script|img|iframe)[^>]* src=\"?(?:https?:)?//|<link[^>]* href=\"?(?:https?:)?//")
+    for page in pages:
+        assert not loaded.search(page.read_text()), f"{page.name} loads something from a network"

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from onnx import helper
 
-import vm_embedded
 from tests.drawn_scenes import CHECKPOINT, FOLDER, IMAGES, MODEL
 from vm_embedded import Detector, GeometryError, InputError, ModelError, Orientation, Settings, read_lens_file
 from vm_embedded.cameras.image_files import read_image
@@ -292,14 +291,6 @@ def test_the_edge_policy_same_links_missing_neighbors_to_the_point_itself(models
     alone.neighbors[0, 0], alone.neighbors[3, 1] = 0, 3
     found, expected = (answers(*each)[[0, 2, 3]] for each in ((same, mesh, (True, False, True, True)), (hard, alone)))
     np.testing.assert_array_equal(found, expected)
-
-
-def test_the_three_lines_of_the_readme_work():
-    readme = (FOLDER.parents[2] / "README.md").read_text()
-    program = readme.split("```python\n")[1].split("```")[0]
-    names = {"image": frame()[0], "lens": frame()[2], "orientation": frame()[1]}
-    exec(program, names)
-    assert vm_embedded.__version__ == "0.1.0"
 
 
 def test_the_model_s_facts_are_readable():

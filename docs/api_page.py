@@ -1,0 +1,211 @@
+"""The text of docs/api.md, the reference of vm_embedded's public names, from their signatures and docstrings.
+
+`python docs/help_pages.py` writes it; a test checks that it is current. It is plain Markdown, so that it also reads
+well on a code host.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import re
+import textwrap
+from functools import cached_property
+from itertools import pairwise
+from types import FunctionType, ModuleType
+from typing import Any
+
+import vm_embedded
+from vm_embedded import arrays
+
+GROUPS = {
+    "Detect": ("Detector", "Settings", "Detections", "Detection", "ClassPoints"),
+    "Camera pose": ("Orientation",),
+    "Lenses": ("Lens", "Rectilinear", "Equisolid", "Equidistant", "BrownLens", "FisheyeLens", "read_lens_file"),
+    "Several cameras and planes": ("detect_views", "View", "Sighting", "Plane", "GROUND", "Pose"),
+    "Errors": ("VisualMeshError", "GeometryError", "InputError", "ModelError"),
+}
+"""The order of the page. A test checks that it holds every public name."""
+
+HEAD = """# API reference
+
+Every public name of `vm_embedded`, made from its docstring by `make docs`. Examples are on the page
+[Use](use.md#from-python). Arrays are numpy arrays: shapes are in parentheses, units in brackets.
+"""
+
+_SPECIAL = {"__len__": "len({})", "__iter__": "iter({})", "__getitem__": "{}[index]"}
+"""Special methods that the page shows, as a caller writes them."""
+
+
+def page() -> str:
+    """The page's text."""
+    parts = [HEAD]
+    for title, names in GROUPS.items():
+        parts += [f"## {title}", *(_entry(name, getattr(vm_embedded, name)) for name in names)]
+    parts.append("## Array types")
+    notes = _attribute_docs(arrays)
+    types = [
+        f"- `{name}` = `{ast.unparse(value)}`{': ' + notes[name] if name in notes else ''}"
+        for name, value in _assignments(arrays).items()
+    ]
+    parts.append("\n".join(types))
+    return re.sub(r"\n{3,}", "\n\n", "\n\n".join(parts)) + "\n"
+
+
+def _entry(name: str, value: Any) -> str:
+    """The section of a public name."""
+    if not inspect.isclass(value) and not inspect.isfunction(value):
+        note = _attribute_docs(inspect.getmodule(type(value))).get(name, "")
+        return f"### {name}\n\n{_code(f'{name}: {type(value).__name__}')}\n\n{note}"
+    if inspect.isfunction(value):
+        return f"### {name}\n\n{_code(name + _signature(value))}\n\n{_markdown(value.__doc__)}"
+    if issubclass(value, BaseException):
+        head = f"class {name}({value.__bases__[0].__name__})"
+        return f"### {name}\n\n{_code(head)}\n\n{_markdown(value.__doc__)}"
+    base = next((each.__name__ for each in value.__mro__[1:] if each.__name__ in vm_embedded.__all__), None)
+    head = f"class {name}({base or ''})".replace("()", "")
+    fields = dataclasses.is_dataclass(value)
+    if not fields:
+        head += _signature(value)
+    meanings: dict[str, str] = {}
+    text = _docstring(value)
+    if fields:
+        for each in reversed(value.__mro__[1:]):
+            if dataclasses.is_dataclass(each):
+                meanings |= _field_meanings(each)[0]
+        own, text = _field_meanings(value)
+        meanings |= own
+    parts = [f"### {name}", _code(head), _markdown(text)]
+    if base:
+        parts.append(f"It has the methods of [{base}](#{base.lower()}), too.")
+    if fields:
+        parts += [_field_table(value, meanings)]
+    parts += [_member(name, value, member) for member in _members(value)]
+    return "\n\n".join(parts)
+
+
+def _field_meanings(value: type) -> tuple[dict[str, str], str]:
+    """What a dataclass's docstring says about each field, and the docstring without that.
+
+    Docstrings describe fields as `name: text. name (n, 3), name [m]: text.`, in paragraphs that start with a name.
+    """
+    names = "|".join(each.name for each in _fields(value))
+    label = rf"(?:{names})(?: \([^)]*\))?(?: \[[^\]]*\])?"
+    labels = re.compile(rf"(?:^|(?<=\. )|(?<=; ))({label}(?:(?:, | and ){label})*): ")
+    meanings: dict[str, str] = {}
+    kept = []
+    for paragraph in _docstring(value).split("\n\n"):
+        pieces = labels.split(" ".join(paragraph.split()))
+        if pieces[0] or len(pieces) < 3:
+            kept.append(paragraph)
+            continue
+        for head, text in zip(pieces[1::2], pieces[2::2], strict=True):
+            text, _, raised = text.partition(" Raises ")
+            kept += [f"Raises {raised}"] if raised else []
+            for one in re.finditer(rf"({names})((?: \([^)]*\))?(?: \[[^\]]*\])?)(?=,|$| and )", head):
+                shape = one[2].strip()
+                meanings[one[1]] = (f"{shape} " if shape else "") + text.strip().rstrip(".")
+    return meanings, "\n\n".join(kept)
+
+
+def _field_table(value: type, meanings: dict[str, str]) -> str:
+    """A table of a dataclass's fields. Settings have help texts, units and limits in their metadata."""
+    kind = "Arguments, by name only" if all(each.kw_only for each in _fields(value)) else "Arguments"
+    rows = [f"{kind}, which are also fields:", "", "| field | type | default | meaning |", "| --- | --- | --- | --- |"]
+    explained = bool(meanings) or any("help" in each.metadata for each in _fields(value))
+    rows[2:] = [row if explained else row[: row.rindex("|", 0, -1) + 1] for row in rows[2:]]
+    for each in _fields(value):
+        data = each.metadata
+        meaning = data.get("help", meanings.get(each.name, ""))
+        meaning += f" [{data['unit']}]" if data.get("unit") else ""
+        meaning += f"; one of {', '.join(data['allowed'])}" if data.get("allowed") else ""
+        meaning += "; {:g} to {:g}".format(*data["limits"]) if data.get("limits") else ""
+        default = "" if each.default is dataclasses.MISSING else f"`{each.default!r}`"
+        default = default if each.default_factory is dataclasses.MISSING else f"`{each.default_factory()!r}`"
+        cells = (f"`{each.name}`", f"`{each.type}`", default, *([meaning] if explained else []))
+        rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(rows)
+
+
+def _fields(value: type) -> list[dataclasses.Field[Any]]:
+    return [each for each in dataclasses.fields(value) if not each.name.startswith("_")]  # type: ignore[arg-type]
+
+
+def _members(value: type) -> list[str]:
+    """Names of a class's public methods and properties, in their order, without those of public base classes."""
+    listed = {name for each in value.__mro__[1:] if each.__name__ in vm_embedded.__all__ for name in vars(each)}
+    listed |= {each.name for each in _fields(value)} if dataclasses.is_dataclass(value) else set()
+    kinds = (FunctionType, classmethod, staticmethod, property, cached_property)
+    return list(
+        dict.fromkeys(
+            name
+            for owner in reversed(value.__mro__)
+            if owner.__module__.startswith("vm_embedded")
+            for name, member in vars(owner).items()
+            if isinstance(member, kinds) and name not in listed and (name in _SPECIAL or not name.startswith("_"))
+        )
+    )
+
+
+def _member(owner: str, value: type, name: str) -> str:
+    """A method or property, with the nearest docstring of the class and its bases."""
+    found = [vars(each)[name] for each in value.__mro__ if name in vars(each)]
+    functions = [
+        getattr(each, "fget", None) or getattr(each, "func", None) or getattr(each, "__func__", each) for each in found
+    ]
+    text = _markdown(next((each.__doc__ for each in functions if each.__doc__), None))
+    kind = str(inspect.signature(functions[0]).return_annotation)
+    if isinstance(found[0], (property, cached_property)):
+        return f"**`{name}: {kind}`**\n\n{text}"
+    if name in _SPECIAL:
+        variable = re.sub(r"(?<!^)(?=[A-Z])", "_", owner).lower()
+        return f"**`{_SPECIAL[name].format(variable)} -> {kind}`**\n\n{text}"
+    called = f"{owner}.{name}" if isinstance(found[0], (classmethod, staticmethod)) else name
+    return f"**`{called}{_signature(functions[0], bound=not isinstance(found[0], staticmethod))}`**\n\n{text}"
+
+
+def _signature(value: Any, bound: bool = False) -> str:
+    """Parameters and result as the source has them, without self and cls."""
+    signature = inspect.signature(value)
+    shown = []
+    for each in list(signature.parameters.values())[1 if bound else 0 :]:
+        default = "" if each.default is each.empty else f" = {each.default!r}"
+        shown.append(f"{each.name}: {each.annotation}{default.replace(repr(vm_embedded.GROUND), 'GROUND')}")
+    result = "" if inspect.isclass(value) else f" -> {signature.return_annotation}"
+    return f"({', '.join(shown)}){result}"
+
+
+def _docstring(value: Any) -> str:
+    return inspect.cleandoc(value.__doc__ or "")
+
+
+def _markdown(docstring: str | None) -> str:
+    """A docstring as Markdown: indented blocks become code."""
+    blocks = inspect.cleandoc(docstring or "").split("\n\n")
+    return "\n\n".join(_code(textwrap.dedent(each)) if each.startswith("    ") else each for each in blocks)
+
+
+def _code(text: str) -> str:
+    return f"```python\n{text}\n```"
+
+
+def _assignments(module: ModuleType) -> dict[str, ast.expr]:
+    """Names that a module assigns at its top, with their values."""
+    return {
+        node.targets[0].id: node.value
+        for node in ast.parse(inspect.getsource(module)).body
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+    }
+
+
+def _attribute_docs(module: ModuleType | None) -> dict[str, str]:
+    """Docstrings below a module's assignments."""
+    assert module is not None
+    body = ast.parse(inspect.getsource(module)).body
+    return {
+        node.targets[0].id: " ".join(after.value.value.split())
+        for node, after in pairwise(body)
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+        if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant) and isinstance(after.value.value, str)
+    }
