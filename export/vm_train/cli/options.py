@@ -7,8 +7,9 @@ from pathlib import Path
 
 from vm_workstation.option_types import at_least
 
-from ..formats import shards, tfrecord_import
-from . import check
+from .check import check_parser
+from .import_pictures import import_parser
+from .shards import shards_parser
 from .stream_options import add_stream
 
 DEVICES = ("auto", "cpu", "cuda")
@@ -130,12 +131,12 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
     made = (
         parser(),
         resume_parser(),
-        check.check_parser(),
+        check_parser(),
         preview_parser(),
         rate_parser(),
         config_parser(),
-        tfrecord_import.parser(),
-        shards.shards_parser(),
+        import_parser(),
+        shards_parser(),
     )
     return {each.prog: each for each in made}
 

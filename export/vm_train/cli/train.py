@@ -23,10 +23,11 @@ from ..data.inspection import inspect_pictures
 from ..data.picture_files import PictureFiles
 from ..data.pictures import find_pictures
 from ..data.split import Split, split_by_lists, split_by_seed
-from ..formats import shards, tfrecord_import
 from ..learning.configuration import TrainConfiguration
-from . import check as checking
+from .check import complaints, run_check
+from .import_pictures import run_import
 from .options import parsers
+from .shards import run_shards
 from .stream_options import stream_source
 
 if TYPE_CHECKING:
@@ -48,8 +49,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "preview": _preview,
         "rate": _rate,
         "config": _config,
-        "import": tfrecord_import.run,
-        "shards": shards.run_shards,
+        "import": run_import,
+        "shards": run_shards,
     }
     command = given[0] if given[:1] and given[0] in commands else None
     prog = "vm-train" if command is None else f"vm-train {command}"
@@ -152,9 +153,9 @@ def _good_pictures(data: Path, configuration: TrainConfiguration, here: Hardware
         found = inspect_pictures(pictures, configuration.classes.mask_classes(), here.workers + 1, bar.advance)
     finally:
         bar.clear()
-    for line in checking.complaints(found):
+    for line in complaints(found):
         print(f"vm-train: {line}", file=sys.stderr)
-    if strict and checking.complaints(found):
+    if strict and complaints(found):
         raise InputError("the pictures are at fault, as said above, and --strict allows none")
     if not found.good:
         raise InputError(f"no picture of {data} can be used")
@@ -209,7 +210,7 @@ def _go_on(folder: Path, here: Hardware, moved_to: Path | None = None) -> int:
 def _check(options: argparse.Namespace) -> int:
     classes = read_sections(TrainConfiguration, options.config).classes
     objects = [name for name, kind in classes.kinds.items() if kind == "object"]
-    return checking.run_check(options, classes.mask_classes(), objects)
+    return run_check(options, classes.mask_classes(), objects)
 
 
 def _preview(options: argparse.Namespace) -> int:

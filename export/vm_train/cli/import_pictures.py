@@ -1,0 +1,81 @@
+"""vm-train import: training data of the reference implementation as a folder of pictures."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from vm_embedded.cli.progress import ProgressBar
+from vm_embedded.errors import InputError, unknown
+
+from ..formats.picture_example import KEYS
+from ..formats.tfrecord_import import import_records
+
+EXIT_OK = 0
+
+_SHOWN = 20
+"""Skipped records to print; a wrong name of a feature skips all of them."""
+
+
+def import_parser() -> argparse.ArgumentParser:
+    """The options of vm-train import FILES... OUT."""
+    made = argparse.ArgumentParser(
+        prog="vm-train import",
+        description="Convert TFRecord files (plain or gzip) of the reference implementation to a folder of pictures. "
+        "Images and masks keep their bytes; a file beside them holds lens and pose. Records without a usable picture "
+        "are named and skipped. To continue an import that was stopped, repeat the command.",
+    )
+    made.add_argument("files", type=Path, nargs="+", metavar="FILES", help="TFRecord files, in this order")
+    made.add_argument("out", type=Path, metavar="OUT", help="folder to write to; created if missing")
+    made.add_argument(
+        "--key",
+        type=_renamed,
+        action="append",
+        default=[],
+        metavar="OURS=THEIRS",
+        help=f"the files' name of a feature, for example lens/fov=camera/field_of_view; ours are {', '.join(KEYS)}; "
+        "repeat it for each feature",
+    )
+    made.add_argument(
+        "--normalized",
+        action="store_true",
+        help="the files give lens/focal_length, lens/centre and lens/k for an image of width 1; default: in pixels",
+    )
+    made.add_argument("--strict", action="store_true", help="stop at the first record without a usable picture")
+    return made
+
+
+def _renamed(text: str) -> tuple[str, str]:
+    ours, _, theirs = text.partition("=")
+    if not theirs:
+        raise argparse.ArgumentTypeError(f"{text!r}: write OURS=THEIRS, for example lens/k=lens/distortion")
+    if ours not in KEYS:
+        raise argparse.ArgumentTypeError(unknown("key", ours, KEYS))
+    return ours, theirs
+
+
+def run_import(options: argparse.Namespace) -> int:
+    """Import as the options say and return the exit status. Raises InputError, also if no picture was imported."""
+    bar = ProgressBar(100)
+    try:
+        result = import_records(
+            options.files,
+            options.out,
+            dict(options.key),
+            options.normalized,
+            options.strict,
+            lambda share: bar.show(int(100 * share)),
+        )
+    finally:
+        bar.clear()
+    for fault in result.skipped[:_SHOWN]:
+        print(f"vm-train: skipped {fault}", file=sys.stderr)
+    if len(result.skipped) > _SHOWN:
+        print(f"vm-train: skipped {len(result.skipped) - _SHOWN} more records", file=sys.stderr)
+    if not result.count and not result.there:
+        raise InputError(f"found no usable picture in {', '.join(str(each) for each in options.files)}")
+    before = f", {result.there} were there already" if result.there else ""
+    skipped = f", {len(result.skipped)} records skipped" if result.skipped else ""
+    print(f"{options.out}: {result.count} pictures imported{before}{skipped}")
+    return EXIT_OK

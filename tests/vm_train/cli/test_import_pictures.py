@@ -1,0 +1,35 @@
+"""vm-train import names the records that it skipped, and fails if it imported nothing."""
+
+import pytest
+
+from vm_embedded.errors import InputError
+from vm_train.cli.import_pictures import import_parser, run_import
+
+from ..formats.test_picture_example import reference_example, written
+
+
+def test_the_command_imports_and_names_what_it_skipped(tmp_path, capsys):
+    example = reference_example()
+    example["theirs"] = example.pop("lens/fov")
+    path = written(tmp_path / "a", example, reference_example(mask=None))
+    out = str(tmp_path / "out")
+    assert run_import(import_parser().parse_args([str(path), out, "--key", "lens/fov=theirs"])) == 0
+    said = capsys.readouterr()
+    assert said.out == f"{out}: 1 pictures imported, 1 records skipped\n"
+    assert said.err.startswith(f"vm-train: skipped {path}: record 1: lacks mask, lens/fov (as 'theirs'); it has 'Hoc'")
+
+
+def test_the_command_shows_the_first_faults_only_and_fails_if_nothing_was_imported(tmp_path, capsys):
+    path = written(tmp_path / "a", *[reference_example(mask=None)] * 23)
+    with pytest.raises(InputError, match="found no usable picture"):
+        run_import(import_parser().parse_args([str(path), str(tmp_path / "out")]))
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 21
+    assert said[-1] == "vm-train: skipped 3 more records"
+
+
+@pytest.mark.parametrize("key", ["lens/fov", "lens/fov=", "fov=x"])
+def test_a_renaming_that_is_none_is_wrong_usage(key, capsys):
+    with pytest.raises(SystemExit):
+        import_parser().parse_args(["a", "out", "--key", key])
+    assert "OURS=THEIRS" in capsys.readouterr().err
