@@ -10,11 +10,12 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.manifests import ball_manifest
 from vm_embedded.errors import InputError, ModelError
 from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import laid_out
-from vm_embedded.network.manifest import LAYOUTS, Manifest, ObjectClass
+from vm_embedded.network.manifest import LAYOUTS
 from vm_embedded.network.model_file import read_model
 from vm_export import onnx_graph
 from vm_export.checkpoint import Checkpoint
@@ -29,17 +30,7 @@ in_all_layouts = pytest.mark.parametrize("layout", LAYOUTS)
 
 
 def manifest(classes=("ball", "environment"), mesh="ring6", **changes):
-    facts = {
-        "shape": "sphere",
-        "radius": 0.095,
-        "object_radius": 0.075,
-        "intersections": 4.0,
-        "mesh": mesh,
-        "max_distance": 10.0,
-        "edge": "hard",
-        "classes": tuple(ObjectClass(name, "object" if name == "ball" else "background") for name in classes),
-    }
-    return Manifest(**(facts | changes))
+    return ball_manifest(*classes, mesh=mesh, radius=0.095, object_radius=0.075, **{"max_distance": 10.0} | changes)
 
 
 def checkpoint(seed=0, shape=None, mesh="ring6"):

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from tests.manifests import ball_manifest
 from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.projection import project
 from vm_embedded.detection.settings import Settings
@@ -12,7 +13,7 @@ from vm_embedded.errors import GeometryError
 from vm_embedded.geometry.lens import Equidistant, Equisolid, Rectilinear
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.mesh.models import build_mesh
-from vm_embedded.network.manifest import LAYOUTS, Manifest, ObjectClass
+from vm_embedded.network.manifest import LAYOUTS
 
 from ..strategies import SIZE, lenses, orientations, random_direction, reals, rotation, seeds
 
@@ -22,17 +23,8 @@ in_all_layouts = pytest.mark.parametrize("layout", LAYOUTS)
 
 
 def manifest(**changes):
-    values = {
-        "shape": "sphere",
-        "radius": 0.1,
-        "object_radius": 0.1,
-        "intersections": 2.0,
-        "mesh": "xmgrid6" if changes.get("layout") == "lattice" else "ring6",
-        "max_distance": 3.0,
-        "edge": "hard",
-        "classes": (ObjectClass("ball", "object"),),
-    }
-    return Manifest(**(values | changes))
+    mesh = "xmgrid6" if changes.get("layout") == "lattice" else "ring6"
+    return ball_manifest(**{"intersections": 2.0, "mesh": mesh, "max_distance": 3.0} | changes)
 
 
 def built(cache, height):

@@ -9,6 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.manifests import ball_manifest
 from vm_embedded.detection.projection import project
 from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.lens import Equisolid, Rectilinear
@@ -19,7 +20,7 @@ from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import laid_out
 from vm_embedded.network.lattice_layout import LatticeLayout
 from vm_embedded.network.layout import PlainLayout
-from vm_embedded.network.manifest import LAYOUTS, Manifest, ObjectClass
+from vm_embedded.network.manifest import LAYOUTS
 from vm_embedded.network.model_file import ModelFile
 from vm_embedded.network.runs_layout import RunsLayout
 from vm_embedded.network.session import Session
@@ -61,18 +62,8 @@ def network_of(shape, seed):
 
 
 def manifest_of(model, layout="plain", classes=2, **changes):
-    facts = {
-        "shape": "sphere",
-        "radius": 0.1,
-        "object_radius": 0.1,
-        "intersections": 4.0,
-        "mesh": model,
-        "max_distance": 8.0,
-        "edge": "hard",
-        "classes": tuple(ObjectClass(f"class{number}", "object") for number in range(classes)),
-        "layout": layout,
-    }
-    return Manifest(**(facts | changes))
+    names = (f"class{number}:object" for number in range(classes))
+    return ball_manifest(*names, mesh=model, layout=layout, **changes)
 
 
 @st.composite

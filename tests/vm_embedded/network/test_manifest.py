@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.manifests import ball_manifest
 from vm_embedded.errors import GeometryError, InputError, ModelError
 from vm_embedded.geometry.shapes import SHAPES, Circle, Sphere
 from vm_embedded.mesh.models import MESH_MODELS
@@ -64,16 +65,7 @@ manifests = st.builds(
     provenance=st.dictionaries(st.text(max_size=8), st.text(max_size=8), max_size=3),
 )
 
-BALL = Manifest(
-    shape="sphere",
-    radius=0.1,
-    object_radius=0.075,
-    intersections=4.0,
-    mesh="ring6",
-    max_distance=8.0,
-    edge="hard",
-    classes=(ObjectClass("ball", "object"), ObjectClass("line", "area"), ObjectClass("other", "background")),
-)
+BALL = ball_manifest("ball", "line", "other", object_radius=0.075)
 
 
 def changed(**entries):

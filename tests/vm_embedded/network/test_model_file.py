@@ -8,23 +8,14 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from onnx import TensorProto, helper, numpy_helper
 
+from tests.manifests import ball_manifest
 from vm_embedded.errors import ModelError
 from vm_embedded.network.manifest import METADATA_KEY, Manifest, ObjectClass
 from vm_embedded.network.model_file import read_model
 
 from ..strategies import attempt
 
-MANIFEST = Manifest(
-    shape="sphere",
-    radius=0.1,
-    object_radius=0.1,
-    intersections=4.0,
-    mesh="ring6",
-    max_distance=8.0,
-    edge="hard",
-    classes=(ObjectClass("ball", "object"),),
-    provenance={"made by": "a test"},
-)
+MANIFEST = ball_manifest(provenance={"made by": "a test"})
 
 FLOAT = TensorProto.FLOAT
 

@@ -6,27 +6,18 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.manifests import ball_manifest
 from vm_embedded import Orientation
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Equisolid
 from vm_embedded.geometry.lens_files import LensFile
-from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_export.grid import Grid
 from vm_train.cli.preview import sheet, write_sheet
 from vm_train.cli.preview_cells import GAP, middle, point_colors
 from vm_train.data.pictures import Picture
 from vm_train.graphs.augmentation import NO_AUGMENTATION, Augmentation
 
-MANIFEST = Manifest(
-    shape="sphere",
-    radius=0.1,
-    object_radius=0.1,
-    intersections=4.0,
-    mesh="ring6",
-    max_distance=6.0,
-    edge="hard",
-    classes=(ObjectClass("ball", "object"), ObjectClass("environment", "background"), ObjectClass("field", "area")),
-)
+MANIFEST = ball_manifest("ball", "environment", "field", max_distance=6.0)
 GRID = Grid()
 TEXT, HEAD = 20, 28  # [px] below each image, and of a legend
 ENTRIES = 12

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.manifests import ball_manifest
 from vm_embedded import Orientation
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Equisolid
-from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_synth.dataset.files import lens_text
 from vm_train.data.classes import UNLABELED, Classes
 from vm_train.data.picture_files import PictureFault
@@ -21,16 +21,7 @@ from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.graphs.labeled_graph import graph_of
 
 CLASSES = Classes({"ball": ((255, 0, 0),), "field": ((0, 255, 0), (255, 255, 255)), "environment": ((0, 0, 0),)})
-MANIFEST = Manifest(
-    shape="sphere",
-    radius=0.1,
-    object_radius=0.1,
-    intersections=4.0,
-    mesh="ring6",
-    max_distance=6.0,
-    edge="hard",
-    classes=(ObjectClass("ball", "object"), ObjectClass("field", "area"), ObjectClass("environment", "background")),
-)
+MANIFEST = ball_manifest("ball", "field", "environment", max_distance=6.0)
 LENS = Equisolid(focal_length=90.0, fov=2.8)
 LOOKING_DOWN = Orientation.from_roll_pitch(0.8, 0.1, 0.5)
 

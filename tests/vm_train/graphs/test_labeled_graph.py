@@ -8,24 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.manifests import ball_manifest
 from vm_embedded.detection.projection import project
 from vm_embedded.geometry.lens import Equidistant, Equisolid, Rectilinear
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.mesh.models import build_mesh
-from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_train.graphs.labeled_graph import seen_points
 
-MANIFEST = Manifest(
-    shape="sphere",
-    radius=0.1,
-    object_radius=0.1,
-    intersections=2.0,
-    mesh="ring6",
-    max_distance=6.0,
-    edge="hard",
-    classes=(ObjectClass("ball", "object"), ObjectClass("other", "background")),
-)
+MANIFEST = ball_manifest("ball", "other", intersections=2.0, max_distance=6.0)
 SIZE = (160, 120)
 LENSES = [
     Rectilinear(focal_length=90.0, fov=2.8, center=(60.0, -45.0)),

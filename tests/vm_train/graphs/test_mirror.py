@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from tests.manifests import ball_manifest
 from vm_embedded.geometry.lens import Rectilinear
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.mesh.models import MESH_MODELS
-from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_train.data.pictures import Picture
 from vm_train.graphs.labeled_graph import graph_of
 from vm_train.graphs.mirror import mirrored, mirrored_columns
@@ -16,17 +16,10 @@ SIZE = (161, 121)
 
 
 def manifest(model):
-    return Manifest(
-        shape="cylinder" if model == "wall6" else "sphere",
-        radius=0.1,
-        object_radius=0.1,
-        object_height=1.0 if model == "wall6" else 0.0,
-        intersections=3.0,
-        mesh=model,
-        max_distance=6.0,
-        edge="hard",
-        classes=(ObjectClass("ball", "upright" if model == "wall6" else "object"), ObjectClass("other", "background")),
-    )
+    entries = {"intersections": 3.0, "mesh": model, "max_distance": 6.0}
+    if model == "wall6":
+        return ball_manifest("ball:upright", "other", shape="cylinder", object_height=1.0, **entries)
+    return ball_manifest("ball", "other", **entries)
 
 
 def pictures():
