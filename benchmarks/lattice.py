@@ -15,7 +15,7 @@ import torch
 
 from vm_embedded import Equisolid, Orientation, Settings
 from vm_embedded.detection.projection import project
-from vm_embedded.network.choose_layout import laid_out
+from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_embedded.network.model_file import read_model
 from vm_embedded.network.session import Session
@@ -69,7 +69,7 @@ def _call(depth, width, model, layout, lens, pose):
         session = Session(read_model(path), Settings())
     whole = facts.model.build(facts.mesh_shape, HEIGHT, 4.0, 10.0)
     mesh = project(whole, pose.level, lens, SIZE).visible.graph
-    arranged = laid_out(mesh, replace(facts, layout=layout))
+    arranged = choose_layout(mesh, replace(facts, layout=layout))
     points = arranged.points()
     arranged.colors(points)[:] = np.random.default_rng(0).random((len(arranged.slots), 3))
     shown = arranged.slots < len(mesh)

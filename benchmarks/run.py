@@ -26,7 +26,7 @@ from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.projection import project
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
-from vm_embedded.network.choose_layout import laid_out
+from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.model_file import ModelFile
 from vm_export.network import Network
 
@@ -73,7 +73,7 @@ def mesh_on_screen(detector: Detector, frame: Frame) -> Mesh:
 
 def session_call(detector: Detector, mesh: Mesh) -> Callable[[], object]:
     """The session alone on a mesh, its inputs ready."""
-    layout = laid_out(mesh, detector.manifest)
+    layout = choose_layout(mesh, detector.manifest)
     points = layout.points()
     layout.colors(points)[:] = np.random.default_rng(0).random((len(layout.slots), 3), dtype=np.float32)
     feeds = layout.feeds(points, layout.slots < len(mesh))

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.cylinder import Cylinder
-from vm_embedded.geometry.shapes import Circle, Sphere
+from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.walls import wall_distances
 from vm_mesh.made_mesh import MadeMesh, Plan
 from vm_mesh.pictures import draw_mesh

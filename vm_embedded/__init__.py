@@ -6,15 +6,22 @@ from .detection.multi_view import Sighting, View, detect_views
 from .detection.settings import Settings
 from .errors import GeometryError, InputError, ModelError, VisualMeshError
 from .geometry.calibrated_lenses import BrownLens, FisheyeLens
-from .geometry.lens import Equidistant, Equisolid, Lens, Rectilinear
+from .geometry.circle import Circle
+from .geometry.cylinder import Cylinder
+from .geometry.lens import Lens
 from .geometry.lens_files import read_lens_file
 from .geometry.orientation import Orientation
 from .geometry.planes import GROUND, Plane, Pose
+from .geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
+from .geometry.sphere import Sphere
+from .mesh.models import build_mesh
 
 __all__ = [
     "GROUND",
     "BrownLens",
+    "Circle",
     "ClassPoints",
+    "Cylinder",
     "Detection",
     "Detections",
     "Detector",
@@ -31,8 +38,10 @@ __all__ = [
     "Rectilinear",
     "Settings",
     "Sighting",
+    "Sphere",
     "View",
     "VisualMeshError",
+    "build_mesh",
     "detect_views",
     "read_lens_file",
 ]

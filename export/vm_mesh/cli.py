@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.errors import VisualMeshError, unknown
-from vm_embedded.geometry.shapes import SHAPES
+from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
 
 EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130

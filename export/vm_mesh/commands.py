@@ -20,8 +20,8 @@ from vm_embedded.files import check_writable, written_beside
 from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.lens import Size
 from vm_embedded.geometry.lens_files import LensFile, read_lens_file
+from vm_embedded.geometry.make_shape import make_shape
 from vm_embedded.geometry.orientation import Orientation
-from vm_embedded.geometry.shapes import shape_named
 from vm_embedded.live.configuration import angle, length
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.bundled import model_path
@@ -165,7 +165,7 @@ def _plan(options: argparse.Namespace, file: LensFile | None) -> tuple[Plan, str
     if chosen["shape"] not in (None, "cylinder"):
         given["object_height"] = 0.0  # of the network's cylinder
     given |= {name: value for name, value in chosen.items() if value is not None}
-    shape = shape_named(given["shape"], given["radius"], given["object_height"])
+    shape = make_shape(given["shape"], given["radius"], given["object_height"])
     height = 1.0 if file is None or file.orientation is None else file.orientation.height
     if options.height is not None:
         height = length(options.height)

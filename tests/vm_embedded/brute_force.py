@@ -6,7 +6,9 @@ from collections import deque
 
 import numpy as np
 
-from vm_embedded.geometry.shapes import Circle, Cylinder, Sphere
+from vm_embedded.geometry.circle import Circle
+from vm_embedded.geometry.cylinder import Cylinder
+from vm_embedded.geometry.sphere import Sphere
 
 STEPS = {
     4: ((-1, 0), (0, 1), (1, 0), (0, -1)),

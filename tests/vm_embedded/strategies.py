@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
-from vm_embedded.geometry.lens import Equidistant, Equisolid, Rectilinear
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from vm_embedded.mesh.mesh import Mesh
 
 SIZE = (640, 480)

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from tests.manifests import ball_manifest
 from vm_embedded.errors import InputError, ModelError
-from vm_embedded.geometry.shapes import Sphere
+from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
-from vm_embedded.network.choose_layout import laid_out
+from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.manifest import LAYOUTS
 from vm_embedded.network.model_file import read_model
 from vm_export import onnx_graph
@@ -84,7 +84,7 @@ def test_far_below_zero_no_layer_makes_numbers_that_slow_a_processor_down(layout
     model = onnx.load_from_string(content)
     made = [node.output[0] for node in model.graph.node if node.op_type in ("MatMul", "Exp", "Add")]
     model.graph.output.extend(onnx.ValueInfoProto(name=name) for name in made)
-    laid = laid_out(build_mesh(Sphere(0.1), 0.5, 4.0, 10.0, mesh), facts)
+    laid = choose_layout(build_mesh(Sphere(0.1), 0.5, 4.0, 10.0, mesh), facts)
     points, shown = laid.points(), np.ones(len(laid.slots), dtype=bool)
     laid.colors(points)[:] = np.random.default_rng(1).random((len(shown), 3))
     session = onnxruntime.InferenceSession(model.SerializeToString())

@@ -13,7 +13,7 @@ from tests.vm_export.test_export import manifest
 from vm_embedded.detection.settings import Settings as RuntimeSettings
 from vm_embedded.errors import InputError, ModelError
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
-from vm_embedded.network.choose_layout import laid_out
+from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.model_file import ModelFile, read_model
 from vm_embedded.network.session import Session
 from vm_export import onnx_graph
@@ -107,7 +107,7 @@ def test_onnx_runtime_gives_the_same_answers_on_real_meshes(
 
     content = onnx_graph.build(made, facts)
     session = Session(ModelFile("model", content, facts, ""), RuntimeSettings())
-    layout = laid_out(part, facts)
+    layout = choose_layout(part, facts)
     given_points = layout.points()
     layout.colors(given_points)[:] = colors[layout.slots]
     answers = session.run(layout, given_points, layout.slots < len(part))[layout.places]

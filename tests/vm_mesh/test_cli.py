@@ -11,8 +11,9 @@ import cv2
 import numpy as np
 import pytest
 
+from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.cylinder import Cylinder
-from vm_embedded.geometry.shapes import Circle, Sphere
+from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_mesh.cli import main
 from vm_mesh.made_mesh import MadeMesh, Plan

@@ -10,8 +10,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vm_embedded.geometry.lens import Rectilinear
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import Rectilinear
 from vm_synth.dataset.files import lens_text
 
 SIZE = (160, 128)

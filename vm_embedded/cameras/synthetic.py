@@ -16,8 +16,9 @@ import numpy as np
 
 from ..arrays import Floats, Image, Singles
 from ..errors import InputError
-from ..geometry.lens import Lens, Rectilinear, Size
+from ..geometry.lens import Lens, Size
 from ..geometry.orientation import Orientation
+from ..geometry.radial_lenses import Rectilinear
 from .camera import CameraSettings, Shot
 
 SIZE = (640, 512)

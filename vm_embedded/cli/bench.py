@@ -20,8 +20,9 @@ from ..detection.detector import Detector
 from ..detection.sampling import checked_image
 from ..errors import InputError, VisualMeshError
 from ..files import check_writable, written_beside
-from ..geometry.lens import Lens, Rectilinear, Size
+from ..geometry.lens import Lens, Size
 from ..geometry.orientation import Orientation
+from ..geometry.radial_lenses import Rectilinear
 from ..live.configuration import Configuration, angle, length
 from ..network.bundled import model_path
 from ..network.model_file import ModelFile, read_model

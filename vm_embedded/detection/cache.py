@@ -18,7 +18,7 @@ from ..arrays import Floats, Mask
 from ..geometry.lens import Lens, Size
 from ..geometry.orientation import Orientation, rotation_z
 from ..mesh.mesh import Mesh
-from ..network.choose_layout import laid_out
+from ..network.choose_layout import choose_layout
 from ..network.layout import Layout
 from ..network.manifest import Manifest
 from .footprint import Levels, levels_of
@@ -123,7 +123,7 @@ class MeshCache:
         return self._prepared(mesh.part(np.flatnonzero(np.any(quarters, axis=0))), height, lens, size)
 
     def _prepared(self, mesh: Mesh, height: float, lens: Lens, size: Size) -> Prepared:
-        layout = laid_out(mesh, self.manifest)
+        layout = choose_layout(mesh, self.manifest)
         if self.manifest.sampling == "bilinear":
             return Prepared(layout, None)
         scale = lens.for_image(size).scale

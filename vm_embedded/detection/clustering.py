@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from ..mesh.mesh import Graph
+from ..mesh.mesh import PointGraph
 
 Members = npt.NDArray[np.intp]
 """Positions of points in a mesh."""
@@ -13,7 +13,7 @@ Members = npt.NDArray[np.intp]
 _Edges = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 
-def clusters(graph: Graph, members: Members) -> list[Members]:
+def clusters(graph: PointGraph, members: Members) -> list[Members]:
     """The connected components of the points `members`, each in their order, largest first, then as they come.
 
     Two points are connected if either is a neighbor of the other. Labels spread along all links at once,
@@ -35,7 +35,7 @@ def clusters(graph: Graph, members: Members) -> list[Members]:
     return sorted(parts, key=len, reverse=True)
 
 
-def graph_diameter(graph: Graph, members: Members, limit: int) -> int:
+def graph_diameter(graph: PointGraph, members: Members, limit: int) -> int:
     """Steps between the two members farthest apart, going through members only.
 
     Found by two breadth-first sweeps, the second from the end of the first: exact for chains, at most a step or two
@@ -46,7 +46,7 @@ def graph_diameter(graph: Graph, members: Members, limit: int) -> int:
     return int(_steps(edges, len(members), far, limit).max())
 
 
-def wider_than(graph: Graph, members: Members, middle: int, limit: int) -> bool:
+def wider_than(graph: PointGraph, members: Members, middle: int, limit: int) -> bool:
     """Whether the graph diameter of `members` is above `limit`.
 
     Nearly always one sweep from the member in the `middle` tells: no two are farther apart than twice its reach.
@@ -55,7 +55,7 @@ def wider_than(graph: Graph, members: Members, middle: int, limit: int) -> bool:
     return 2 * reach > limit and graph_diameter(graph, members, limit) > limit
 
 
-def _edges(graph: Graph, members: Members) -> _Edges:
+def _edges(graph: PointGraph, members: Members) -> _Edges:
     """Links between members, as positions in `members`, in both directions."""
     position = np.full(len(graph) + 1, -1)
     position[members] = np.arange(len(members))

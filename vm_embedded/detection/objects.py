@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Floats, Indices, Mask, Singles
 from ..geometry.lens import Lens, Size
 from ..geometry.shape import Shape, tangents
-from ..mesh.mesh import Graph
+from ..mesh.mesh import PointGraph
 from ..network.manifest import ObjectClass
 from .clustering import Members, clusters, wider_than
 from .detections import Detection
@@ -56,7 +56,7 @@ class Scene:
     heading: Floats
     lens: Lens
     size: Size
-    projected: Projection[Graph]
+    projected: Projection[PointGraph]
     order: Indices
     rings: float
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from ..geometry.lens import Lens, Size
-from ..mesh.mesh import Graph, Mesh
+from ..mesh.mesh import Mesh, PointGraph
 
-AnyGraph = TypeVar("AnyGraph", bound=Graph)
-G = TypeVar("G", bound=Graph, covariant=True)
+AnyGraph = TypeVar("AnyGraph", bound=PointGraph)
+G = TypeVar("G", bound=PointGraph, covariant=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,12 @@ from .lens import Lens, Size
 
 @dataclass(frozen=True, kw_only=True)
 class CalibratedLens(Lens):
-    """Base of the calibrated lenses: `focal_lengths` (fx, fy) and `optical_center` (cx, cy) [px]."""
+    """Base of the calibrated lenses.
+
+    focal_lengths: (fx, fy) [px]. optical_center: (cx, cy) [px]. coefficients: of the distortion, in OpenCV's order.
+
+    Raises InputError for focal lengths that are not above 0 and for numbers that are not finite.
+    """
 
     focal_lengths: tuple[float, float]
     optical_center: tuple[float, float]
@@ -35,7 +40,7 @@ class CalibratedLens(Lens):
         return math.sqrt(self.focal_lengths[0] * self.focal_lengths[1])
 
     def scaled(self, factor: float, size: Size) -> Self:
-        # Pixel centers are at whole numbers, so the picture's corner lies at -0.5 and that is what stays in place.
+        # Scaling keeps the corner of the picture in place. It lies at -0.5, as pixel centers are at whole numbers.
         return replace(
             self,
             focal_lengths=(self.focal_lengths[0] * factor, self.focal_lengths[1] * factor),
@@ -47,7 +52,7 @@ class CalibratedLens(Lens):
         )
 
     def _pixels(self, right: Floats, down: Floats) -> Floats:
-        """Pixels (n, 2) from distorted coordinates at focal length 1."""
+        """Pixels (n, 2) from distorted coordinates (n,) to the right and down, at focal length 1."""
         return np.stack(
             [
                 self.focal_lengths[0] * right + self.optical_center[0],
@@ -62,7 +67,10 @@ class CalibratedLens(Lens):
 
 
 class BrownLens(CalibratedLens):
-    """Rectilinear with OpenCV's coefficients (k1, k2, p1, p2[, k3[, k4, k5, k6]])."""
+    """A rectilinear lens with OpenCV's distortion (k1, k2, p1, p2[, k3[, k4, k5, k6]]): Brown-Conrady.
+
+    ROS calls it plumb_bob, or rational_polynomial with eight coefficients.
+    """
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -71,11 +79,11 @@ class BrownLens(CalibratedLens):
                 f"a plumb_bob or rational lens has 0, 4, 5 or 8 coefficients, not {len(self.coefficients)}"
             )
         if self.fov >= math.pi:
-            raise InputError(f"a rectilinear lens covers less than pi rad, not {self.fov}")
+            raise InputError(f"fov of a rectilinear lens must be below pi rad, not {self.fov}")
 
     @cached_property
     def limit(self) -> float:
-        # In the tangent of theta: beyond the turning point the polynomial folds outer rays back into the picture.
+        # Beyond its turning point the polynomial, in tan(theta), would fold outer rays back into the picture.
         tangent = np.linspace(0.0, math.tan(self.fov / 2.0), 4096)
         return math.atan(_growing_until(lambda r: r * self._radial(r * r), tangent))
 
@@ -85,7 +93,7 @@ class BrownLens(CalibratedLens):
         return numerator / (1.0 + square * (k4 + square * (k5 + square * k6)))
 
     def _tangential(self, flat: Floats) -> Floats:
-        """Shift (n, 2) of undistorted coordinates (n, 2) by a lens that is not quite parallel to its sensor."""
+        """Shift (n, 2) of undistorted coordinates (n, 2), caused by a lens that is not quite parallel to its sensor."""
         p1, p2 = self.coefficients[2:4] if self.coefficients else (0.0, 0.0)
         right, down = flat[:, 0], flat[:, 1]
         cross, square = 2.0 * right * down, right * right + down * down
@@ -103,17 +111,17 @@ class BrownLens(CalibratedLens):
     def unproject(self, pixels: Floats, size: Size) -> Floats:
         distorted = self._normalized(pixels)
         undistorted = distorted
-        for _ in range(20):  # the tangential part is small, so taking it off by what was found last converges fast
+        for _ in range(20):  # subtract the shift at the last estimate; converges because the tangential shift is small
             undistorted = self._without_radial(distorted - self._tangential(undistorted))
         rays = np.column_stack([np.ones(len(pixels)), -undistorted])
         return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
     def _without_radial(self, distorted: Floats) -> Floats:
-        """Undistorted coordinates (n, 2), the radial part taken off; NaN beyond the limit."""
+        """Coordinates (n, 2) without their radial distortion; NaN beyond the limit."""
         table = np.linspace(0.0, math.tan(self.limit), 4096)
         radius = np.hypot(distorted[:, 0], distorted[:, 1])
         found = np.interp(radius, table * self._radial(table * table), table, right=np.nan)
-        for _ in range(4):  # Newton's method from the table's neighborhood
+        for _ in range(4):  # Newton's method, starting from the table's value
             step = 1e-6
             value, ahead = ((r * self._radial(r * r)) for r in (found, found + step))
             found = found - (value - radius) * step / (ahead - value)
@@ -122,7 +130,10 @@ class BrownLens(CalibratedLens):
 
 
 class FisheyeLens(CalibratedLens):
-    """OpenCV's fisheye and ROS's equidistant: r = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)."""
+    """Kannala-Brandt: r = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8) at focal length 1.
+
+    OpenCV calls it fisheye, ROS equidistant.
+    """
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -154,7 +165,7 @@ class FisheyeLens(CalibratedLens):
     def unproject(self, pixels: Floats, size: Size) -> Floats:
         normalized = self._normalized(pixels)
         radius = np.hypot(normalized[:, 0], normalized[:, 1])
-        # A table finds the neighborhood, Newton's method the digits.
+        # Newton's method, starting from the value in a table.
         table = np.linspace(0.0, self.limit, 1024)
         theta = np.interp(radius, self._distort(table), table, right=np.nan)
         slope = np.polyder(self._polynomial())
@@ -166,7 +177,10 @@ class FisheyeLens(CalibratedLens):
 
 
 def _growing_until(radius: Callable[[Floats], Floats], steps: Floats) -> float:
-    """Last of `steps` up to which `radius` surely grows: its maximum lies on either side of the largest value seen."""
+    """The last of `steps` (n,) up to which `radius` is sure to grow.
+
+    The true maximum may lie on either side of the step with the largest value, so the result is the step before that.
+    """
     with np.errstate(all="ignore"):
         growing = np.diff(radius(steps)) > 0
     return float(steps[-1] if growing.all() else steps[max(int(np.argmin(growing)) - 1, 0)])

@@ -1,8 +1,8 @@
-"""The upright cylinder: goal posts, robots, legs.
+"""The upright cylinder: goal posts, robots, legs. The paper names it as a shape that could be added.
 
-Objects stand one behind another, each in the shadow's end of the one before: with t = tan(phi), a cylinder of radius r
-and height H whose near foot is seen at t ends with its far upper edge at (h t + 2 r) / (h - H). This recursion has the
-fixed point t = -2 r / H and the closed form t(n) = (2 r / H) (e^(n s) - 1) with s = -ln(1 - H / h).
+Each object stands where the shadow of the one before it ends, for a light at the camera. Let t = tan(phi) be the slope
+to the near foot of a cylinder of radius r and height H. Its shadow ends at the slope (h t + 2 r) / (h - H). This
+recursion has the fixed point t = -2 r / H and the closed form t(n) = (2 r / H) (e^(n s) - 1) with s = -ln(1 - H / h).
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ import numpy as np
 
 from ..arrays import Floats, Number
 from ..errors import GeometryError
-from .shape import Shape, between
+from .shape import Shape, all_between
 
 
 @dataclass(frozen=True)
 class Cylinder(Shape):
     """A cylinder of height `object_height` [m] that stands on the plane.
 
-    The formulas of phi, n and theta need a camera above its top; mesh wall6 does not (`walls.py`).
+    phi, n and theta need a camera above its top. For lower cameras use mesh model wall6 (`mesh/walls.py`).
     """
 
     object_height: float
@@ -29,17 +29,17 @@ class Cylinder(Shape):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not (math.isfinite(self.object_height) and self.object_height > 0):
-            raise GeometryError(f"height of a cylinder must be a number above 0 m, not {self.object_height}")
+            raise GeometryError(f"cylinder height must be a number above 0 m, not {self.object_height}")
 
     @property
     def center_height(self) -> float:
         return self.object_height / 2.0
 
     def spacing(self, height: Number) -> Number:
-        if not between(height, self.object_height, math.inf):
+        if not all_between(height, self.object_height, math.inf):
             raise GeometryError(
                 f"camera height must be above the cylinder's top, {self.object_height:g} m, not {height} m; "
-                "mesh wall6 is made for what is higher than the camera"
+                "for objects as high as the camera or higher, use mesh model wall6"
             )
         return -np.log1p(-self.object_height / height)
 
@@ -55,14 +55,14 @@ class Cylinder(Shape):
         return np.sign(phi) * np.log1p(np.abs(np.tan(phi)) / slope) / self.spacing(height)
 
     def theta(self, n: Number, height: Number) -> Number:
-        # The cylinder between phi(n - 1/2) and phi(n + 1/2) has its axis here; r at n = 1/2, where it meets the nadir.
+        # The near foot of the cylinder n objects out is at phi(n - 1/2), its axis one radius farther.
         slope = 2.0 * self.radius / self.object_height
-        beyond = np.expm1((np.asarray(n) - 0.5) * self.spacing(height))
-        return self._theta(n, self.radius + slope * height * beyond)
+        foot = np.expm1((np.asarray(n) - 0.5) * self.spacing(height))
+        return self._theta(n, self.radius + slope * height * foot)
 
     def offset(self, rays: Floats, centers: Floats, height: float) -> Floats:
-        # Between top and bottom of the object a ray's shadow on the plane is a line from `first` to `last`, in units
-        # of the ray's length; how near it comes to the axis says whether and how clearly the ray hits.
+        # Seen from above, the part of a ray at the heights of the object is a line. It runs from `first` to `last`, in
+        # units of the ray's length. Its distance from the object's axis decides whether the ray hits the object.
         top, bottom = self.object_height - height, -height
         down = np.where(rays[:, 2] == 0.0, -1e-12, rays[:, 2])
         first, last = np.sort(np.stack([top / down, bottom / down]), axis=0)
@@ -78,9 +78,12 @@ class Cylinder(Shape):
         above = height > self.object_height
         if away <= self.radius:
             if not above:
-                raise GeometryError(f"a camera at a height of {height:g} m is inside of the cylinder {away:g} m away")
+                raise GeometryError(
+                    f"a camera at a height of {height:g} m is inside of the cylinder whose axis is {away:g} m away"
+                )
             return self._edge(center, np.linspace(0.0, 2.0 * np.pi, count, endpoint=False), top=True)
-        # The camera sees the near part of the foot's circle, and of the upper one the far part, if it sees its top.
+        # The outline follows the near part of the lower circle. It continues along the far part of the upper circle if
+        # the camera sees the top, and along its near part otherwise.
         toward = math.atan2(-center[1], -center[0])
         half = math.acos(self.radius / away)
         low, high = count - count // 2, count // 2
@@ -89,7 +92,7 @@ class Cylinder(Shape):
         return np.concatenate([self._edge(center, near, top=False), self._edge(center, upper, top=True)])
 
     def _edge(self, center: Floats, angles: Floats, top: bool) -> Floats:
-        """Unit rays (m, 3) to the points at some angles (m,) of the upper or the lower circle."""
+        """Unit rays (m, 3) to points of the upper or lower circle at these angles (m,) [rad]."""
         points = np.tile(center, (len(angles), 1))
         points[:, 0] += self.radius * np.cos(angles)
         points[:, 1] += self.radius * np.sin(angles)

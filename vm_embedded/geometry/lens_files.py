@@ -14,8 +14,9 @@ import numpy as np
 from ..config.yaml_reader import read_yaml
 from ..errors import InputError, VisualMeshError, unknown
 from .calibrated_lenses import BrownLens, CalibratedLens, FisheyeLens
-from .lens import Lens, RadialLens, projection_named
+from .lens import Lens
 from .orientation import Orientation
+from .radial_lenses import RadialLens, projection_named
 
 _LARGEST = 2**20  # bytes; a lens file has a thousand
 

@@ -1,7 +1,8 @@
-"""What a shape of the target object has to say: how densely it must be sampled, seen from a height.
+"""The base class of the target object's shapes: how densely to sample an object, seen from a height.
 
 `n` counts objects from straight below the camera outwards: n = 0 is the nadir, and an object that lies between
-phi(n) and phi(n + 1) fills that gap exactly.
+phi(n) and phi(n + 1) fills that gap exactly. `phi` is the paper's inclination from straight below, `theta` its angle
+around the vertical (section "Visual Mesh Geometry", fig:geometry).
 """
 
 from __future__ import annotations
@@ -20,14 +21,15 @@ from ..errors import GeometryError
 class Shape(ABC):
     """An object of radius `radius` [m] that lies on the observation plane.
 
-    Every method takes the camera's height over the plane [m] and raises GeometryError where the shape has no mesh.
+    All methods take the camera's height over the plane [m]. `spacing` and the methods that use it raise GeometryError
+    for a camera that is too low for the shape.
     """
 
     radius: float
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.radius) and self.radius > 0):
-            raise GeometryError(f"object radius must be a positive number of metres, not {self.radius}")
+            raise GeometryError(f"object radius must be a positive number of meters, not {self.radius}")
 
     @property
     @abstractmethod
@@ -36,7 +38,7 @@ class Shape(ABC):
 
     @abstractmethod
     def spacing(self, height: Number) -> Number:
-        """The one number through which the height enters: phi depends on n * spacing alone."""
+        """The number s through which the height enters: phi depends only on n * s."""
 
     @abstractmethod
     def height_of(self, spacing: float) -> float:
@@ -48,22 +50,22 @@ class Shape(ABC):
 
     @abstractmethod
     def n(self, phi: Number, height: Number) -> Number:
-        """Objects between straight below and the inclination phi [rad]; inverse of `phi`."""
+        """Number of objects between straight below and the inclination phi [rad]; inverse of `phi`."""
 
     @abstractmethod
     def theta(self, n: Number, height: Number) -> Number:
-        """Angular width [rad] of an object around the vertical, n objects out.
+        """Angular width [rad] of an object around the vertical, n objects out; the paper's Delta theta.
 
-        Below n = 0.5 the object covers the nadir; there the width grows linearly to the whole circle, as in the
-        reference.
+        Up to n = 0.5 the object covers the nadir. There the width is 2 pi / (1 + 2 n), as in the reference: the whole
+        circle at the nadir and pi at n = 0.5.
         """
 
     @abstractmethod
     def offset(self, rays: Floats, centers: Floats, height: float) -> Floats:
-        """How far rays (n, 3) pass from objects at `centers` (m, 3), in units of the object's outline: (m, n).
+        """Distance (m, n) of rays from objects, relative to their outline: 0 at the center, 1 on the outline.
 
-        0 is the object's center, 1 its outline. Rays are unit vectors below the horizon or not, centers [m] are
-        relative to the camera, both in the observation-plane frame.
+        rays: (n, 3) unit vectors from the camera. centers: (m, 3) of the objects, relative to the camera [m]. Both are
+        in the observation-plane frame.
         """
 
     @abstractmethod
@@ -71,19 +73,19 @@ class Shape(ABC):
         """Unit rays (count, 3) around the outline of the object at `center` (3,) [m], relative to the camera."""
 
     def center_along(self, rays: Floats, height: float) -> Floats:
-        """Centers (n, 3) [m], relative to the camera, of objects on the plane that rays (n, 3) point at.
+        """Centers (n, 3) [m], relative to the camera, of the objects on the plane that rays (n, 3) point at.
 
-        Rays on or above the horizon give centers as far out as numbers go (1e6 heights).
+        For a ray on or above the horizon the center is a million heights away.
         """
         depth = np.maximum(-rays[:, 2:], 1e-6)
         return np.asarray(rays * ((height - self.center_height) / depth))
 
     def intersection_ratio(self, height: float, mesh_height: float) -> float:
-        """Rings that cross an object at `height`, over those at `mesh_height`, for a mesh made for `mesh_height`."""
+        """How many rings cross an object seen from `height`, relative to the height that the mesh was made for."""
         return float(self.spacing(height) / self.spacing(mesh_height))
 
     def _theta(self, n: Number, distance: Number) -> Number:
-        """theta of an object whose axis is so far [m] from the vertical, n objects out."""
+        """theta of an object n objects out whose axis is at this distance [m] from the vertical (eqn:circle_dtheta)."""
         n = np.asarray(n, dtype=np.float64)
         with np.errstate(divide="ignore", over="ignore"):
             sine = self.radius / np.abs(distance)
@@ -91,14 +93,14 @@ class Shape(ABC):
         return np.where(n <= 0.5, 2.0 * np.pi / (1.0 + 2.0 * n), beyond)
 
 
-def between(value: Number, low: float, high: float) -> bool:
-    """Whether a number, or every one of an array, lies between two others."""
+def all_between(value: Number, low: float, high: float) -> bool:
+    """Whether a number, or every number of an array, lies between two others, limits excluded."""
     inside = (value > low) & (value < high)
     return inside if isinstance(inside, bool) else bool(np.all(inside))
 
 
 def tangents(axis: Floats) -> Floats:
-    """Two unit vectors (2, 3) that are orthogonal to the unit vector `axis` (3,) and to each other."""
+    """Two unit vectors (2, 3), orthogonal to the unit vector `axis` (3,) and to each other."""
     x, y, z = (float(value) for value in axis)
     level = math.hypot(x, y)
     across_x, across_y = (-y / level, x / level) if level > 1e-9 else (1.0, 0.0)

@@ -18,9 +18,9 @@ from ..config.entries import check_entries, entry
 from ..config.sections import read_sections
 from ..detection.settings import Settings
 from ..errors import InputError, VisualMeshError
-from ..geometry.lens import RadialLens
 from ..geometry.lens_files import LensFile, lens_from_table, read_lens_file
 from ..geometry.orientation import Orientation
+from ..geometry.radial_lenses import RadialLens
 from ..network.bundled import DEFAULT, SHIPPED, model_path
 from ..output.channels import OutputSettings
 from ..output.recorder import RecorderSettings

@@ -25,7 +25,7 @@ MOST_POINTS = 8_000_000
 """Of a mesh: more than OpenCV samples at once, and more than a camera has pixels."""
 
 
-class Graph(Protocol):
+class PointGraph(Protocol):
     """n points that are linked."""
 
     @property

@@ -1,19 +1,20 @@
-"""The layout that a model file asks for."""
+"""The choice between the three layouts."""
 
 from __future__ import annotations
 
 from ..mesh.mesh import Mesh
 from .lattice_layout import LatticeLayout
-from .layout import Layout, PlainLayout
+from .layout import Layout
 from .manifest import Manifest
+from .plain_layout import PlainLayout
 from .runs_layout import RunsLayout
 
 
-def laid_out(mesh: Mesh, manifest: Manifest) -> Layout:
-    """The mesh as a manifest's network takes it."""
+def choose_layout(mesh: Mesh, manifest: Manifest) -> Layout:
+    """The mesh in the layout that the manifest's network takes."""
     if manifest.layout == "runs":
         return RunsLayout(mesh, manifest.model.runs)
     if manifest.layout == "lattice":
-        assert manifest.model.steps is not None  # the manifest has seen to it
+        assert manifest.model.steps is not None  # Manifest accepts this layout only for lattices.
         return LatticeLayout(mesh, manifest.model.steps)
     return PlainLayout(mesh, manifest.edge)

@@ -15,8 +15,8 @@ import numpy as np
 from ..arrays import Indices, Singles
 from ..detection.color_normalization import COLORINGS
 from ..errors import GeometryError, InputError, ModelError, unknown
+from ..geometry.make_shape import SHAPES, make_shape
 from ..geometry.shape import Shape
-from ..geometry.shapes import SHAPES, shape_named
 from ..mesh.mesh import MeshModel
 from ..mesh.models import MESH_MODELS
 from ..mesh.walls import wall_counts
@@ -220,12 +220,12 @@ class Manifest:
     @property
     def mesh_shape(self) -> Shape:
         """The shape that the mesh is made for."""
-        return shape_named(self.shape, self.radius, self.object_height)
+        return make_shape(self.shape, self.radius, self.object_height)
 
     @property
     def object_shape(self) -> Shape:
         """The shape of the real object."""
-        return shape_named(self.shape, self.object_radius, self.object_height)
+        return make_shape(self.shape, self.object_radius, self.object_height)
 
     def as_json(self) -> str:
         """The manifest as it stands in the model file."""

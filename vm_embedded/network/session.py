@@ -18,7 +18,7 @@ from ..arrays import Mask, Singles
 from ..detection.settings import Settings
 from ..errors import ModelError, one_line
 from ..mesh.mesh import Mesh
-from .choose_layout import laid_out
+from .choose_layout import choose_layout
 from .layout import Layout
 from .manifest import SelfTest
 from .model_file import ModelFile
@@ -81,7 +81,7 @@ class Session:
         """Probabilities (n, C) of an example's points."""
         mesh = Mesh(np.zeros((len(test.points) - 1, 3)), test.neighbors, test.cells)
         # The example's missing neighbors are the off-screen point, whatever the network was trained with.
-        layout = laid_out(mesh, replace(self.model.manifest, edge="hard"))
+        layout = choose_layout(mesh, replace(self.model.manifest, edge="hard"))
         points = layout.points()
         layout.colors(points)[:] = test.points[layout.slots]
         return self.run(layout, points, layout.slots < len(mesh))[layout.places]

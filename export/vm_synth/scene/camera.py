@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.config.entries import check_entries, number, share
-from vm_embedded.geometry.lens import PROJECTIONS, RadialLens, Rectilinear, Size
+from vm_embedded.geometry.lens import Size
 from vm_embedded.geometry.lens_files import lens_from_table
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import PROJECTIONS, RadialLens, Rectilinear
 
 from ..ranges import drawn, some_of, uniform
 

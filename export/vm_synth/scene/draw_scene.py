@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.geometry.lens import RadialLens
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import RadialLens
 
 from ..bodies.solids import joined
 from ..ranges import uniform

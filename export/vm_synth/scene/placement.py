@@ -7,8 +7,9 @@ import math
 import numpy as np
 
 from vm_embedded.arrays import Floats, Mask
-from vm_embedded.geometry.lens import RadialLens, Size
+from vm_embedded.geometry.lens import Size
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import RadialLens
 
 from ..balls.balls import draw_design
 from ..bodies.catalog import draw_carrier, draw_clutter, draw_distractor, draw_furniture, draw_person, draw_robot

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.geometry.lens import RadialLens, Size
+from vm_embedded.geometry.lens import Size
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import RadialLens
 
 from ..balls.design import BallDesign
 from ..bodies.solids import Joined

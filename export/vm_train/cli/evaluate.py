@@ -159,7 +159,7 @@ def _notes(options: argparse.Namespace, settings: Settings, subject: Subject, re
 def _points(options: argparse.Namespace) -> int:
     from vm_embedded.files import check_writable
     from vm_embedded.geometry.orientation import Orientation
-    from vm_embedded.geometry.shapes import Sphere
+    from vm_embedded.geometry.sphere import Sphere
     from vm_workstation.plots import check_figure_path, save_figure
 
     from ..evaluation.points_on_ball import DISTANCES, PAPER_CAMERA, Camera, points_over_distance

@@ -15,8 +15,9 @@ import numpy as np
 
 from vm_embedded.errors import VisualMeshError, unknown
 from vm_embedded.geometry.calibrated_lenses import CalibratedLens
-from vm_embedded.geometry.lens import Lens, RadialLens, Size
+from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.lens_files import LensFile
+from vm_embedded.geometry.radial_lenses import RadialLens
 from vm_workstation.worker_process import begin, shielded
 
 from .classes import Classes, Labels

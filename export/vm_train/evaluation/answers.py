@@ -23,10 +23,11 @@ from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.orientation import Orientation, rotation_z
 from vm_embedded.mesh.mesh import Mesh
-from vm_embedded.network.choose_layout import laid_out
-from vm_embedded.network.layout import Layout, PlainLayout
+from vm_embedded.network.choose_layout import choose_layout
+from vm_embedded.network.layout import Layout
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import read_model
+from vm_embedded.network.plain_layout import PlainLayout
 from vm_embedded.network.session import Session
 from vm_export.grid import VISUAL, Grid
 
@@ -140,7 +141,7 @@ def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subj
 
 def _of_session(session: Session) -> Network:
     def run(mesh: Mesh, colors: Singles) -> Singles:
-        layout = laid_out(mesh, session.model.manifest)
+        layout = choose_layout(mesh, session.model.manifest)
         return session.run(layout, _colored(layout, colors), layout.slots < len(mesh))[layout.places]
 
     return run

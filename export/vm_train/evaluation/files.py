@@ -12,7 +12,7 @@ import numpy as np
 
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.files import written_beside
-from vm_embedded.geometry.shapes import Sphere
+from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 from vm_workstation.plots import save_figure

@@ -12,9 +12,10 @@ import numpy.typing as npt
 from vm_embedded.arrays import Floats, Mask, Number, frozen
 from vm_embedded.detection.projection import project
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.lens import Equisolid, Lens, Size
+from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.orientation import Orientation
-from vm_embedded.geometry.shapes import Sphere
+from vm_embedded.geometry.radial_lenses import Equisolid
+from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import build_mesh
 

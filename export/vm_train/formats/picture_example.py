@@ -10,9 +10,9 @@ import numpy as np
 
 from vm_embedded.arrays import Image
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.lens import projection_named
 from vm_embedded.geometry.lens_files import lens_text
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import projection_named
 
 from .tfexample import BytesList, Example, FloatList
 

@@ -15,9 +15,10 @@ import numpy as np
 from vm_embedded.arrays import Floats, Image, Singles
 from vm_embedded.config.entries import check_entries, number, share
 from vm_embedded.geometry.calibrated_lenses import CalibratedLens
-from vm_embedded.geometry.lens import Lens, RadialLens, Size
+from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import RadialLens
 from vm_synth.ranges import drawn
 from vm_synth.render.image_processing import LUMINANCE
 

@@ -10,7 +10,7 @@ from typing import Any
 from vm_embedded.config.entries import check_entries, number, one_of, share
 from vm_embedded.detection.color_normalization import COLORINGS
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.shapes import SHAPES
+from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.manifest import KINDS, POINT_SAMPLINGS, Manifest, ObjectClass
 from vm_export.grid import GRIDS, Grid

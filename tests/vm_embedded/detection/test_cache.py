@@ -10,8 +10,8 @@ from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.projection import project
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import GeometryError
-from vm_embedded.geometry.lens import Equidistant, Equisolid, Rectilinear
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from vm_embedded.mesh.models import build_mesh
 from vm_embedded.network.manifest import LAYOUTS
 

@@ -15,10 +15,10 @@ from vm_embedded import Detector, GeometryError, InputError, ModelError, Orienta
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import MESH_MODELS
-from vm_embedded.network.choose_layout import laid_out
-from vm_embedded.network.layout import PlainLayout
+from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.manifest import METADATA_KEY
 from vm_embedded.network.model_file import read_model
+from vm_embedded.network.plain_layout import PlainLayout
 from vm_embedded.network.runs_layout import RunsLayout
 from vm_export.checkpoint import Checkpoint
 from vm_export.onnx_graph import export
@@ -55,7 +55,7 @@ def without_bucket(detector, image, orientation, lens):
 
     def whole(orientation, lens, size):
         view = prepared(orientation, lens, size)
-        return replace(view, layout=laid_out(fresh.cache._build(view.mesh_height), fresh.manifest))
+        return replace(view, layout=choose_layout(fresh.cache._build(view.mesh_height), fresh.manifest))
 
     fresh.cache.view = whole
     return fresh.detect(image, orientation, lens)
@@ -280,7 +280,7 @@ def test_the_edge_policy_same_links_missing_neighbors_to_the_point_itself(models
     colors = np.random.default_rng(0).random((4, 3)).astype(np.float32)
 
     def answers(session, mesh, shown=(True, True, True, True)):
-        layout = laid_out(mesh, session.model.manifest)
+        layout = choose_layout(mesh, session.model.manifest)
         points = layout.points()
         layout.colors(points)[:] = colors
         return session.run(layout, points, np.array(shown))

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from vm_embedded.detection.footprint import alike, levels_of
 from vm_embedded.detection.sampling import SAMPLINGS, checked_image, sample
-from vm_embedded.geometry.shapes import Sphere
+from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import build_mesh
 
 spheres = st.builds(Sphere, st.floats(0.03, 0.12))

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from vm_embedded.detection.objects import Scene, find_objects
 from vm_embedded.detection.projection import Projection, project, to_camera
 from vm_embedded.detection.settings import Settings
-from vm_embedded.geometry.lens import Equisolid, Rectilinear
+from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
-from vm_embedded.geometry.shapes import Circle, Sphere
+from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
+from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import build_mesh
 from vm_embedded.network.manifest import ObjectClass
 

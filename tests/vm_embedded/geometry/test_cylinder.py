@@ -6,7 +6,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError
-from vm_embedded.geometry.shapes import Circle, Cylinder, Sphere
+from vm_embedded.geometry.circle import Circle
+from vm_embedded.geometry.cylinder import Cylinder
+from vm_embedded.geometry.sphere import Sphere
 
 from ..brute_force import hits
 from ..strategies import random_direction, reals, seeds
@@ -231,5 +233,5 @@ def test_a_camera_not_above_the_top_is_told_of_walls(height):
 
 @pytest.mark.parametrize("object_height", [0.0, -0.5, math.nan, math.inf])
 def test_a_height_that_is_no_length_is_refused(object_height):
-    with pytest.raises(GeometryError, match="height of a cylinder"):
+    with pytest.raises(GeometryError, match="cylinder height"):
         Cylinder(0.05, object_height)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
-from vm_embedded.geometry.lens import PROJECTIONS, Equidistant, Equisolid, Rectilinear
 from vm_embedded.geometry.lens_files import lens_from_calibration, lens_from_table, read_lens_file
+from vm_embedded.geometry.radial_lenses import PROJECTIONS, Equidistant, Equisolid, Rectilinear
 
 from ..strategies import attempt
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.lens import Equisolid, Rectilinear
+from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.live.configuration import Configuration, angle, length, read_configuration
 from vm_embedded.network.bundled import DEFAULT, model_path
 

@@ -12,16 +12,17 @@ from hypothesis import strategies as st
 from tests.manifests import ball_manifest
 from vm_embedded.detection.projection import project
 from vm_embedded.detection.settings import Settings
-from vm_embedded.geometry.lens import Equisolid, Rectilinear
+from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
-from vm_embedded.geometry.shapes import Circle, Sphere
+from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
+from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.mesh import SELF, Mesh
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
-from vm_embedded.network.choose_layout import laid_out
+from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.lattice_layout import LatticeLayout
-from vm_embedded.network.layout import PlainLayout
 from vm_embedded.network.manifest import LAYOUTS
 from vm_embedded.network.model_file import ModelFile
+from vm_embedded.network.plain_layout import PlainLayout
 from vm_embedded.network.runs_layout import RunsLayout
 from vm_embedded.network.session import Session
 from vm_export.network import Network
@@ -133,7 +134,7 @@ def tamed(network, logits):
 
 def answers(session, mesh, colors, on_screen):
     """Probabilities (m, C) of all slots, and their layout. What is off screen gets no color at all."""
-    layout = laid_out(mesh, session.model.manifest)
+    layout = choose_layout(mesh, session.model.manifest)
     points = layout.points()
     shown = np.append(on_screen, False)[layout.slots]
     layout.colors(points)[:] = np.where(shown[:, None], np.vstack([colors, np.zeros((1, 3))])[layout.slots], np.nan)
@@ -238,7 +239,7 @@ def test_a_layout_is_used_for_one_frame_after_the_other(data, model, seed):
     shown = [data.draw(masks(len(mesh), seen)) for _ in range(2)]
     for layout in layouts_of(mesh):
         session = session_of(network, model, layout)
-        arranged = laid_out(mesh, session.model.manifest)
+        arranged = choose_layout(mesh, session.model.manifest)
         points = arranged.points()
         for each, on_screen in zip(colors, shown, strict=True):
             fresh, _ = answers(session, mesh, each, on_screen)
@@ -276,7 +277,7 @@ def arrays_of(layout):
 
 @pytest.mark.parametrize(("model", "layout"), PAIRS)
 def test_what_a_layout_holds_is_read_only_and_counted(layout, model):
-    arranged = laid_out(WHOLE[model], manifest_of(model, layout))
+    arranged = choose_layout(WHOLE[model], manifest_of(model, layout))
     for array in arrays_of(arranged):
         assert not array.flags.writeable
         with pytest.raises(ValueError, match="read-only"):
@@ -290,12 +291,12 @@ def test_what_a_layout_holds_is_read_only_and_counted(layout, model):
 def test_rays_are_column_by_column_in_memory(layout, model):
     """As of every mesh; each frame's projection goes through them by columns."""
     for mesh in (WHOLE[model], WHOLE[model].part(np.arange(50, 230))):
-        assert laid_out(mesh, manifest_of(model, layout)).rays.T.flags.c_contiguous
+        assert choose_layout(mesh, manifest_of(model, layout)).rays.T.flags.c_contiguous
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_plain_is_the_mesh_as_it_is(model):
-    layout = laid_out(WHOLE[model], manifest_of(model))
+    layout = choose_layout(WHOLE[model], manifest_of(model))
     assert isinstance(layout, PlainLayout)
     assert layout.rays is WHOLE[model].rays
     np.testing.assert_array_equal(layout.links(layout.places), WHOLE[model].neighbors[:-1])
@@ -317,7 +318,7 @@ def test_what_feeds_take_is_what_they_leave_but_for_colors_off_screen(model):
     """The network's inputs are contiguous, of the types that its file asks for, and in range whatever is on screen."""
     random = np.random.default_rng(2)
     for layout in layouts_of(WHOLE[model]):
-        arranged = laid_out(WHOLE[model], manifest_of(model, layout))
+        arranged = choose_layout(WHOLE[model], manifest_of(model, layout))
         m = len(arranged.slots)
         on_screen = np.append(random.random(len(WHOLE[model])) < 0.7, False)[arranged.slots]
         points = arranged.points()

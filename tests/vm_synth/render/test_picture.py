@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from vm_embedded import read_lens_file
-from vm_embedded.geometry.lens import Equidistant, Equisolid, Rectilinear
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from vm_synth.balls.balls import BallRanges, draw_design
 from vm_synth.bodies.clutter import carton
 from vm_synth.bodies.solids import joined

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.vm_embedded.strategies import rays_at, reals, seeds
-from vm_embedded.geometry.lens import PROJECTIONS, Equisolid, Rectilinear
+from vm_embedded.geometry.radial_lenses import PROJECTIONS, Equisolid, Rectilinear
 from vm_synth.scene.camera import CameraRanges, draw_lens, draw_orientation
 
 STRAIGHT = CameraRanges(off_center=(0.0, 0.0), distorted=0.0, image_circle=0.0)

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.vm_embedded.strategies import reals, seeds
-from vm_embedded.geometry.lens import Equidistant, Rectilinear
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import Equidistant, Rectilinear
 from vm_synth.scene.field import TURFS, FieldRanges, draw_field, ground_noise, paint_ground
 
 

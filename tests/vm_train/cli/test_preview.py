@@ -9,8 +9,8 @@ import pytest
 from tests.manifests import ball_manifest
 from vm_embedded import Orientation
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.lens import Equisolid
 from vm_embedded.geometry.lens_files import LensFile
+from vm_embedded.geometry.radial_lenses import Equisolid
 from vm_export.grid import Grid
 from vm_train.cli.preview import sheet, write_sheet
 from vm_train.cli.preview_cells import GAP, middle, point_colors

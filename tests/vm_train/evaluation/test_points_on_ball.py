@@ -6,9 +6,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError, InputError
-from vm_embedded.geometry.lens import Equisolid
 from vm_embedded.geometry.orientation import Orientation
-from vm_embedded.geometry.shapes import Sphere
+from vm_embedded.geometry.radial_lenses import Equisolid
+from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import build_mesh
 from vm_train.evaluation.points_on_ball import (
     BEARINGS,

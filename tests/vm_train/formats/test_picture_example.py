@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from vm_embedded import Orientation, read_lens_file
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.lens import Equisolid, Rectilinear
+from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_train.data.pictures import find_pictures
 from vm_train.formats.tfexample import BytesList, FloatList, Int64List, example_bytes
 from vm_train.formats.tfrecord import write_records

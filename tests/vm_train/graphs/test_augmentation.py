@@ -13,8 +13,8 @@ from vm_embedded import Orientation
 from vm_embedded.config.entries import check_entries
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
-from vm_embedded.geometry.lens import Equidistant, Equisolid, Rectilinear
 from vm_embedded.geometry.lens_files import LensFile
+from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from vm_train.data.pictures import Picture
 from vm_train.graphs.augmentation import (
     NO_AUGMENTATION,

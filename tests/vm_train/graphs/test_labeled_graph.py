@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from tests.manifests import ball_manifest
 from vm_embedded.detection.projection import project
-from vm_embedded.geometry.lens import Equidistant, Equisolid, Rectilinear
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from vm_embedded.mesh.models import build_mesh
 from vm_train.graphs.labeled_graph import seen_points
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tests.manifests import ball_manifest
-from vm_embedded.geometry.lens import Rectilinear
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.radial_lenses import Rectilinear
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_train.data.pictures import Picture
 from vm_train.graphs.labeled_graph import graph_of

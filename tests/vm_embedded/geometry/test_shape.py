@@ -5,9 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.errors import GeometryError, InputError
+from vm_embedded.errors import GeometryError
+from vm_embedded.geometry.circle import Circle
+from vm_embedded.geometry.cylinder import Cylinder
+from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.geometry.shape import tangents
-from vm_embedded.geometry.shapes import SHAPES, Circle, Cylinder, Sphere, shape_named
+from vm_embedded.geometry.sphere import Sphere
 
 from ..strategies import random_direction, reals, seeds
 
@@ -69,46 +72,10 @@ def test_phi_follows_the_conventions(case, n):
     assert float(shape.phi(n, height)) == pytest.approx(expected, rel=1e-12)
 
 
-@given(radii, clearances, reals(0.0, 1.0))
-def test_phi_of_n_and_n_plus_one_are_the_tangents_of_one_sphere_on_the_plane(radius, clearance, fraction):
-    sphere, height = Sphere(radius), 2.0 * radius * clearance
-    n = fraction * float(sphere.n(math.atan(100.0), height))
-    near, far = (float(sphere.phi(each, height)) for each in (n, n + 1.0))
-    down = height - radius  # from the camera to the height of the sphere's center
-    # The center whose distance from the nearer ray is the radius; then that from the farther one must be, too.
-    x = (radius + down * math.sin(near)) / math.cos(near)
-    assert abs(x * math.cos(far) - down * math.sin(far)) == pytest.approx(radius, rel=1e-6)
-    assert math.atan2(x, down) == pytest.approx(0.5 * (near + far), rel=1e-6)
-
-
-@given(radii, clearances, reals(0.0, 200.0))
-def test_circles_lie_side_by_side(radius, clearance, n):
-    circle, height = Circle(radius), 2.0 * radius * clearance
-    near, far = (height * math.tan(circle.phi(each, height)) for each in (n, n + 1.0))
-    assert far - near == pytest.approx(2.0 * radius, rel=1e-6)
-
-
 @given(shapes_and_heights(), reals(0.0, 0.5))
 def test_theta_grows_to_the_whole_circle_at_the_nadir(case, n):
     shape, height = case
     assert float(shape.theta(n, height)) == pytest.approx(2.0 * math.pi / (1.0 + 2.0 * n), rel=1e-12)
-
-
-@given(radii, clearances)
-def test_theta_of_a_circle_is_continuous_where_the_circle_begins_to_cover_the_nadir(radius, clearance):
-    circle, height = Circle(radius), 2.0 * radius * clearance
-    below, beyond = (float(circle.theta(n, height)) for n in (0.5, 0.5 + 1e-9))
-    assert below == pytest.approx(math.pi, abs=1e-12)
-    assert beyond == pytest.approx(math.pi, abs=2e-4)  # an arcsine starts off vertically
-
-
-@given(radii, clearances)
-def test_theta_of_a_sphere_falls_at_one_half_by_the_width_of_a_sphere_below(radius, clearance):
-    """The width beyond n = 0.5 is 2 asin(r / ((h - r) tan(phi))), which is not pi there: as in the reference."""
-    sphere, height = Sphere(radius), 2.0 * radius * clearance
-    below, beyond = (float(sphere.theta(n, height)) for n in (0.5, 0.5 + 1e-9))
-    fall = 2.0 * math.asin(radius / (height - radius))
-    assert below - beyond == pytest.approx(fall, abs=1e-6)
 
 
 @given(shapes_and_heights())
@@ -119,14 +86,6 @@ def test_theta_is_finite_and_shrinks_outwards(case):
     assert np.isfinite(theta).all()
     assert (theta > 0).all()
     assert (np.diff(theta[: len(n)]) < 0).all()
-
-
-@given(radii, clearances, reals(0.5 + 1e-6, 50.0))
-def test_theta_of_a_sphere_is_that_of_its_shadow_around_the_vertical(radius, clearance, n):
-    sphere, height = Sphere(radius), 2.0 * radius * clearance
-    n = min(n, reachable(sphere, height))
-    expected = 2.0 * math.asin(min(radius / ((height - radius) * math.tan(float(sphere.phi(n, height)))), 1.0))
-    assert float(sphere.theta(n, height)) == pytest.approx(expected, rel=1e-12)
 
 
 @given(shapes_and_heights())
@@ -227,13 +186,6 @@ def test_offset_of_several_objects_is_that_of_each(case, seed):
         np.testing.assert_allclose(row, shape.offset(rays, position[None], height)[0], rtol=1e-9)
 
 
-@given(radii, clearances)
-def test_rays_into_the_sky_are_on_no_circle(radius, clearance):
-    height = 2.0 * radius * clearance
-    rays = np.array([[1.0, 0.0, 0.0], [0.6, 0.0, 0.8], [0.0, 0.0, 1.0]])
-    assert not (Circle(radius).offset(rays, np.array([[3.0, 0.0, -height]]), height) <= 1.0).any()
-
-
 @given(centers)
 def test_center_along_finds_the_object_that_a_ray_points_at(case):
     (shape, height), distance, bearing = case
@@ -263,49 +215,3 @@ def test_tangents_are_unit_vectors_at_right_angles(seed):
 def test_a_radius_that_is_no_length_is_refused(kind, radius):
     with pytest.raises(GeometryError, match="radius"):
         kind(radius, 1.0) if kind is Cylinder else kind(radius)
-
-
-@pytest.mark.parametrize("height", [0.2, 0.1, 0.0, -1.0, math.nan, math.inf])
-def test_a_camera_not_above_the_ball_is_refused(height):
-    sphere = Sphere(0.1)
-    for formula in (sphere.spacing, lambda h: sphere.phi(1.0, h), lambda h: sphere.n(0.3, h)):
-        with pytest.raises(GeometryError, match="height"):
-            formula(height)
-    with pytest.raises(GeometryError, match="height"):
-        sphere.theta(2.0, height)
-
-
-@pytest.mark.parametrize("height", [0.0, -1.0, math.nan, math.inf])
-def test_a_camera_not_above_the_circle_is_refused(height):
-    circle = Circle(0.1)
-    for formula in (circle.spacing, lambda h: circle.phi(1.0, h), lambda h: circle.n(0.3, h)):
-        with pytest.raises(GeometryError, match="height"):
-            formula(height)
-
-
-def test_one_bad_height_of_many_is_refused():
-    with pytest.raises(GeometryError, match="height"):
-        Sphere(0.1).spacing(np.array([1.0, 0.15]))
-
-
-@pytest.mark.parametrize(("name", "kind"), [("circle", Circle), ("sphere", Sphere), ("Sphere", Sphere)])
-def test_a_shape_is_found_by_its_name(name, kind):
-    assert shape_named(name, 0.1) == kind(0.1)
-
-
-@pytest.mark.parametrize("name", ["cylinder", "Cylinder"])
-def test_a_cylinder_is_found_with_its_height(name):
-    assert shape_named(name, 0.05, 1.8) == Cylinder(0.05, 1.8)
-    with pytest.raises(GeometryError, match="height of a cylinder"):
-        shape_named(name, 0.05)
-
-
-@pytest.mark.parametrize("name", ["circle", "sphere"])
-def test_only_a_cylinder_has_a_height(name):
-    with pytest.raises(InputError, match=rf"only a cylinder has a height.*a {name} no 1\.8 m"):
-        shape_named(name, 0.05, 1.8)
-
-
-def test_an_unknown_shape_names_the_nearest():
-    with pytest.raises(InputError, match=r"'spher'.*'sphere'"):
-        shape_named("spher", 0.1)

@@ -1,0 +1,53 @@
+"""The flat disk: things painted on the plane, for example a penalty spot."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..arrays import Floats, Number
+from ..errors import GeometryError
+from .shape import Shape, all_between
+
+
+class Circle(Shape):
+    """A flat disk on the plane (paper: fig:circle_phi, fig:circle_theta).
+
+    Its recursion eqn:circle_phi1 adds the same length 2 r / h to tan(phi) for each object. So the closed form is
+    phi(n) = atan(n s) with the spacing s = 2 r / h.
+    """
+
+    @property
+    def center_height(self) -> float:
+        return 0.0
+
+    def spacing(self, height: Number) -> Number:
+        if not all_between(height, 0.0, math.inf):
+            raise GeometryError(f"camera height must be above 0 m for a circle, not {height} m")
+        return 2.0 * self.radius / height
+
+    def height_of(self, spacing: float) -> float:
+        return 2.0 * self.radius / spacing
+
+    def phi(self, n: Number, height: Number) -> Number:
+        return np.arctan(n * self.spacing(height))  # eqn:circle_phi1, applied n times
+
+    def n(self, phi: Number, height: Number) -> Number:
+        return np.tan(phi) / self.spacing(height)
+
+    def theta(self, n: Number, height: Number) -> Number:
+        # eqn:circle_dtheta with the paper's h. The reference takes h - r, which has no real answer just above n = 0.5.
+        return self._theta(n, height * np.tan(self.phi(n, height)))
+
+    def offset(self, rays: Floats, centers: Floats, height: float) -> Floats:
+        hits = self.center_along(rays, height)[:, :2]
+        away = np.linalg.norm(hits[None] - centers[:, None, :2], axis=2) / self.radius
+        return np.where(rays[:, 2] < 0, away, np.inf)
+
+    def outline(self, center: Floats, height: float, count: int = 48) -> Floats:
+        around = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+        points = np.tile(center, (count, 1))
+        points[:, 0] += self.radius * np.cos(around)
+        points[:, 1] += self.radius * np.sin(around)
+        return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))

@@ -1,0 +1,162 @@
+"""The reference's three lenses, which are symmetric around their axis: rectilinear, equisolid and equidistant.
+
+theta is the angle [rad] between a ray and the optical axis.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from ..arrays import Floats, Number
+from ..errors import InputError, unknown
+from .distortion import distort, monotone_radius, undistort
+from .lens import Lens, Size
+
+
+@dataclass(frozen=True, kw_only=True)
+class RadialLens(Lens):
+    """Base of the reference's three lenses.
+
+    focal_length [px]. center: the image center minus the optical center [px]. distortion: (k0, k1) [px^-2, px^-4] of
+    `distortion.undistort`.
+
+    Raises InputError for a focal length that is not above 0 and for numbers that are not finite.
+    """
+
+    focal_length: float
+    center: tuple[float, float] = (0.0, 0.0)
+    distortion: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (math.isfinite(self.focal_length) and self.focal_length > 0):
+            raise InputError(f"lens focal length must be above 0 px, not {self.focal_length}")
+        if not np.isfinite([*self.center, *self.distortion]).all():
+            raise InputError(f"lens center {self.center} and distortion {self.distortion} must be finite numbers")
+
+    @property
+    def scale(self) -> float:
+        return self.focal_length
+
+    @abstractmethod
+    def radius(self, theta: Number) -> Number:
+        """Undistorted radius [px] at the angle theta [rad]."""
+
+    @abstractmethod
+    def angle(self, radius: Number) -> Number:
+        """Angle theta [rad] at the undistorted radius [px]; NaN where no angle has it. Inverse of `radius`."""
+
+    @abstractmethod
+    def radius_over_sine(self, cosine: Floats) -> Floats:
+        """radius(theta) / sin(theta) [px] from cos(theta), without trigonometric functions where the lens allows it."""
+
+    @cached_property
+    def limit(self) -> float:
+        turning = monotone_radius(self.distortion)
+        if math.isinf(turning):
+            return self.fov / 2.0
+        turning_angle = float(self.angle(undistort(turning, self.distortion)))
+        return self.fov / 2.0 if math.isnan(turning_angle) else min(self.fov / 2.0, turning_angle)
+
+    def project(self, rays: Floats, size: Size) -> Floats:
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            factor = self.radius_over_sine(rays[:, 0])
+            if self.distortion != (0.0, 0.0):
+                undistorted = factor * np.hypot(rays[:, 1], rays[:, 2])
+                ratio = distort(np.nan_to_num(undistorted, posinf=0.0), self.distortion) / undistorted
+                factor = factor * np.where(undistorted > 0, ratio, 1.0)
+            pixels = np.empty((len(rays), 2))
+            pixels[:, 0] = self._origin(size)[0] - factor * rays[:, 1]
+            pixels[:, 1] = self._origin(size)[1] - factor * rays[:, 2]
+        return pixels
+
+    def unproject(self, pixels: Floats, size: Size) -> Floats:
+        left, up = (np.asarray(self._origin(size)) - pixels).T
+        distorted = np.hypot(left, up)
+        reachable = np.where(distorted <= monotone_radius(self.distortion), distorted, np.nan)
+        theta = self.angle(undistort(reachable, self.distortion))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sine = np.where(distorted > 0, np.sin(theta) / distorted, 0.0)
+        return np.stack([np.cos(theta), left * sine, up * sine], axis=1)
+
+    def scaled(self, factor: float, size: Size) -> Self:
+        k0, k1 = self.distortion
+        return replace(
+            self,
+            focal_length=self.focal_length * factor,
+            center=(self.center[0] * factor, self.center[1] * factor),
+            distortion=(k0 / factor**2, k1 / factor**4),
+            size=size,
+        )
+
+    def _origin(self, size: Size) -> tuple[float, float]:
+        return size[0] / 2.0 - self.center[0], size[1] / 2.0 - self.center[1]
+
+
+class Rectilinear(RadialLens):
+    """r = f tan(theta): straight lines stay straight. Its fov must be below pi."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.fov >= math.pi:
+            raise InputError(f"fov of a rectilinear lens must be below pi rad, not {self.fov}")
+
+    def radius(self, theta: Number) -> Number:
+        return self.focal_length * np.tan(theta)
+
+    def angle(self, radius: Number) -> Number:
+        return np.arctan(radius / self.focal_length)
+
+    def radius_over_sine(self, cosine: Floats) -> Floats:
+        return self.focal_length / cosine
+
+
+class Equisolid(RadialLens):
+    """r = 2 f sin(theta / 2): equal solid angles have equal areas in the picture."""
+
+    def radius(self, theta: Number) -> Number:
+        return 2.0 * self.focal_length * np.sin(theta / 2.0)
+
+    def angle(self, radius: Number) -> Number:
+        with np.errstate(invalid="ignore"):
+            return 2.0 * np.arcsin(radius / (2.0 * self.focal_length))
+
+    def radius_over_sine(self, cosine: Floats) -> Floats:
+        return self.focal_length * np.sqrt(2.0 / (1.0 + cosine))
+
+
+class Equidistant(RadialLens):
+    """r = f theta: the distance from the image center is proportional to the angle."""
+
+    def radius(self, theta: Number) -> Number:
+        return self.focal_length * theta
+
+    def angle(self, radius: Number) -> Number:
+        theta = np.asarray(radius / self.focal_length)
+        return np.where(theta <= np.pi, theta, np.nan)
+
+    def radius_over_sine(self, cosine: Floats) -> Floats:
+        cosine = np.clip(cosine, -1.0, 1.0)
+        sine = np.sqrt(1.0 - cosine * cosine)
+        ratio = np.arctan2(sine, cosine) / sine
+        return self.focal_length * np.where(sine > 1e-12, ratio, 1.0)
+
+
+PROJECTIONS: dict[str, type[RadialLens]] = {
+    "rectilinear": Rectilinear,
+    "equisolid": Equisolid,
+    "equidistant": Equidistant,
+}
+
+
+def projection_named(name: str) -> type[RadialLens]:
+    """The lens class of a projection name, in either case. Raises InputError for an unknown name."""
+    if str(name).lower() not in PROJECTIONS:
+        raise InputError(unknown("lens projection", name, PROJECTIONS))
+    return PROJECTIONS[str(name).lower()]

@@ -1,0 +1,48 @@
+"""Layout plain: points as rows, and a row of neighbors for each. Easy to read and to port."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from ..arrays import Indices, Mask, Singles, frozen
+from ..mesh.mesh import Mesh
+from .layout import OFF_SCREEN, Feeds, Layout
+
+
+class PlainLayout(Layout):
+    """Slot i is point i, without gaps or copies. The off-screen point is the last row of every input.
+
+    edge: the policy for a neighbor that is off screen. Policy "hard" puts the off-screen point in its place, "same" the
+    point itself.
+    """
+
+    def __init__(self, mesh: Mesh, edge: str) -> None:
+        self.slots = self.places = frozen(np.arange(len(mesh), dtype=np.int32))
+        self.original = frozen(np.ones(len(mesh), dtype=bool))
+        self.rays = mesh.rays
+        self._neighbors = mesh.neighbors
+        self._edge = edge
+
+    def links(self, members: npt.NDArray[np.integer]) -> Indices:
+        return np.take(self._neighbors, members, axis=0)
+
+    @property
+    def nbytes(self) -> int:
+        return super().nbytes + self._neighbors.nbytes
+
+    def points(self) -> Singles:
+        return np.empty((len(self) + 1, 3), dtype=np.float32)
+
+    def colors(self, points: Singles) -> Singles:
+        return points[:-1]
+
+    def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
+        points[-1] = OFF_SCREEN
+        neighbors, missing = self._neighbors, np.int32(len(self))
+        shown = np.append(on_screen, False)[neighbors]
+        instead = np.arange(missing + 1, dtype=np.int32)[:, None] if self._edge == "same" else missing
+        return {"points": points, "neighbors": np.where(shown, neighbors, instead)}
+
+    def answers(self, output: Singles) -> Singles:
+        return output[:-1]
