@@ -30,10 +30,10 @@ sys.path.insert(0, str(TOP))
 
 from vm_embedded import __version__  # noqa: E402
 from vm_embedded.cameras.camera import CameraSettings  # noqa: E402
-from vm_embedded.config.sections import documented  # noqa: E402
+from vm_embedded.config.toml_writer import to_commented_toml  # noqa: E402
 from vm_embedded.detection.settings import Settings  # noqa: E402
 from vm_embedded.errors import InputError, VisualMeshError  # noqa: E402
-from vm_embedded.files import written_beside  # noqa: E402
+from vm_embedded.files import atomic_write  # noqa: E402
 from vm_embedded.live.configuration import Configuration, read_configuration  # noqa: E402
 from vm_embedded.network.bundled import DEFAULT, model_path  # noqa: E402
 from vm_embedded.network.model_file import read_model  # noqa: E402
@@ -159,7 +159,7 @@ def configured(configuration: Path | None, model: str | None) -> dict[str, bytes
             camera=CameraSettings(source="synthetic"),
             output=OutputSettings(stdout=False, unix="/run/vm-detect/lines.sock"),
         )
-        return {CONFIGURATION: ("\n".join(documented(shown)) + "\n").encode(), MODEL: _model(model or DEFAULT)}
+        return {CONFIGURATION: to_commented_toml(shown).encode(), MODEL: _model(model or DEFAULT)}
     given = read_configuration(configuration)
     text = configuration.read_text(encoding="utf-8")
     table = tomllib.loads(text)
@@ -208,7 +208,7 @@ def bundle(target: Target, configuration: Path | None, model: str | None, wheels
     files["SHA256SUMS"] = _sums(files)
     path = dist / f"{NAME}-{__version__}-{target.name}.tar.gz"
     dist.mkdir(parents=True, exist_ok=True)
-    with written_beside(path) as part:
+    with atomic_write(path) as part:
         part.write_bytes(_packed(f"{NAME}-{release}-{target.name}", files, origin.time))
     return path
 

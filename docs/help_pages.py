@@ -15,7 +15,7 @@ from pathlib import Path
 import api_page
 
 from vm_embedded.cli import bench, detect, doctor
-from vm_embedded.config.sections import documented
+from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.live.configuration import Configuration
 from vm_export import cli as export
 from vm_mesh import cli as mesh
@@ -33,9 +33,9 @@ def pages() -> dict[Path, str]:
     return {
         DOCS / "command-line.md": command_line(),
         DOCS / "api.md": api_page.page(),
-        DOCS / "vm.toml": "\n".join(documented(Configuration())),
-        DOCS / "scene.toml": "\n".join(documented(SceneConfiguration())),
-        DOCS / "train.toml": "\n".join(documented(TrainConfiguration())),
+        DOCS / "vm.toml": to_commented_toml(Configuration()),
+        DOCS / "scene.toml": to_commented_toml(SceneConfiguration()),
+        DOCS / "train.toml": to_commented_toml(TrainConfiguration()),
     }
 
 

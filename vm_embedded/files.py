@@ -12,7 +12,7 @@ from .errors import InputError
 
 
 @contextmanager
-def written_beside(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path) -> Iterator[Path]:
     """A path to write to, in the same folder, that takes the place of `path` once all went well.
 
     What a link leads to is replaced, not the link. A file keeps its mode. What is no ordinary file, such as a pipe, is

@@ -18,7 +18,7 @@ _MASK = 0o117
 """What the mode 0660 leaves out."""
 
 
-class SocketFile:
+class UnixListener:
     """A listening stream socket with a path. Raises InputError if another process listens there, or it can't be made.
 
     A file that a process left behind which listens no more is replaced.
@@ -79,11 +79,11 @@ def checked_address(entry: Field[Any], value: object) -> str:
         raise InputError(f"{entry.name} must be a text, not {value!r}")
     for each in filter(None, value.split(",")):
         if not (each.startswith("unix:") and len(each) > len("unix:")):
-            address(each, entry.name)
+            parse_address(each, entry.name)
     return value
 
 
-def address(text: str, what: str) -> tuple[str, int]:
+def parse_address(text: str, what: str) -> tuple[str, int]:
     """Host and port of "192.168.0.20:5600" or "[::1]:5600". Raises InputError."""
     host, colon, port = text.strip().rpartition(":")
     host = host.removeprefix("[").removesuffix("]")

@@ -11,7 +11,7 @@ from pathlib import Path
 import torch
 
 from vm_embedded.errors import InputError, ModelError, one_line
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 from vm_embedded.network.manifest import Manifest
 
 from .grid import VISUAL, Grid
@@ -56,7 +56,7 @@ class Checkpoint:
             content["first"] = {"network": self.network.first.shape.as_dict(), "gate": asdict(self.network.gate)}
         file = io.BytesIO()  # on a full disk torch would fail in its own way
         torch.save(content, file)
-        with written_beside(Path(path)) as part:
+        with atomic_write(Path(path)) as part:
             part.write_bytes(file.getbuffer())
 
     @classmethod

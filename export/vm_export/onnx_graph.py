@@ -13,7 +13,7 @@ import vm_embedded
 from vm_embedded.arrays import Indices, Singles
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import ModelError
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 from vm_embedded.mesh.grids import lattice_neighbors
 from vm_embedded.network.manifest import Manifest, SelfTest
 from vm_embedded.network.model_file import ModelFile
@@ -82,7 +82,7 @@ def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) 
         raise ModelError(
             f"not written: ONNX Runtime and torch differ by {difference:.2g}, allowed are {LARGEST_DIFFERENCE:g}"
         )
-    with written_beside(Path(path)) as part:
+    with atomic_write(Path(path)) as part:
         part.write_bytes(content)
     return difference
 

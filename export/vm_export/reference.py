@@ -19,7 +19,7 @@ import yaml
 from torch import nn
 
 from vm_embedded.errors import InputError, VisualMeshError, one_line, unknown
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.manifest import Manifest, ObjectClass
 
@@ -212,7 +212,7 @@ def write_reference(checkpoint: Checkpoint, path: str | Path) -> None:
         "class_map": {each.name: position for position, each in enumerate(manifest.classes)},
         "network": groups,
     }
-    with written_beside(Path(path)) as part, part.open("w") as file:
+    with atomic_write(Path(path)) as part, part.open("w") as file:
         yaml.dump(data, file, Dumper=getattr(yaml, "CSafeDumper", yaml.SafeDumper), width=10**6)
 
 

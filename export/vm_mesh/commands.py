@@ -14,15 +14,15 @@ import numpy as np
 
 from vm_embedded.arrays import Floats
 from vm_embedded.cameras.image_files import read_image
+from vm_embedded.config.units import parse_angle, parse_length
 from vm_embedded.detection.projection import project
 from vm_embedded.errors import InputError
-from vm_embedded.files import check_writable, written_beside
+from vm_embedded.files import atomic_write, check_writable
 from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.lens import Size
 from vm_embedded.geometry.lens_files import LensFile, read_lens_file
 from vm_embedded.geometry.make_shape import make_shape
 from vm_embedded.geometry.orientation import Orientation
-from vm_embedded.live.configuration import angle, length
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
@@ -168,7 +168,7 @@ def _plan(options: argparse.Namespace, file: LensFile | None) -> tuple[Plan, str
     shape = make_shape(given["shape"], given["radius"], given["object_height"])
     height = 1.0 if file is None or file.orientation is None else file.orientation.height
     if options.height is not None:
-        height = length(options.height)
+        height = parse_length(options.height)
     plan = Plan(
         shape,
         _positive("--height", height),
@@ -222,8 +222,8 @@ def _orientation(options: argparse.Namespace, file: LensFile, height: float) -> 
     pitch, roll = (0.0, 0.0) if file.orientation is None else (file.orientation.pitch, file.orientation.roll)
     return Orientation.from_roll_pitch(
         height,
-        roll if options.roll is None else angle(options.roll),
-        pitch if options.pitch is None else angle(options.pitch),
+        roll if options.roll is None else parse_angle(options.roll),
+        pitch if options.pitch is None else parse_angle(options.pitch),
     )
 
 
@@ -272,6 +272,6 @@ def _without_nan(content: Any) -> Any:
 def _write(path: Path | None, content: Any) -> None:
     if path is None:
         return
-    with written_beside(path) as part:
+    with atomic_write(path) as part:
         part.write_text(json.dumps(_without_nan(content), indent=1, allow_nan=False) + "\n")
     print(f"{path}: written")

@@ -12,9 +12,10 @@ from pathlib import Path
 import cv2
 
 from vm_embedded.cli.progress import ProgressBar
-from vm_embedded.config.sections import documented, overrides_of, read_sections
+from vm_embedded.config.sections import parse_overrides, read_sections
+from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError, VisualMeshError
-from vm_embedded.files import check_writable, written_beside
+from vm_embedded.files import atomic_write, check_writable
 from vm_workstation.stopping import stoppable
 
 from .dataset.contact_sheet import cell, chosen, read_shown, sheet
@@ -156,7 +157,7 @@ def _render(options: argparse.Namespace) -> int:
     workers = len(os.sched_getaffinity(0)) if options.workers is None else options.workers
     if workers < 1 or options.count < 1:
         raise InputError("--workers and --count must be at least 1")
-    configuration = read_sections(SceneConfiguration, options.config, overrides_of(options.set, _EXAMPLE))
+    configuration = read_sections(SceneConfiguration, options.config, parse_overrides(options.set, _EXAMPLE))
     find_llvm()
     chosen_maps = find_maps(options.hdri, configuration.maps, options.held_out)
     absentees = absent(options.hdri, configuration.maps)
@@ -230,7 +231,7 @@ def _preview(options: argparse.Namespace) -> int:
         after = "" if options.first is None else f" from number {options.first} on"
         raise InputError(f"{options.out} has no pictures that can be shown{after}")
     made = sheet(cells, options.columns, f"{options.out.resolve().name}: {len(cells)} of {len(there)} pictures")
-    with written_beside(output) as part:
+    with atomic_write(output) as part:
         part.write_bytes(cv2.imencode(output.suffix.lower(), made)[1].tobytes())
     print(f"{output}: {len(cells)} pictures")
     return EXIT_OK
@@ -249,7 +250,7 @@ def _check(options: argparse.Namespace) -> int:
         bar.clear()
     print(tables(found, options.shards))
     if options.json is not None:
-        with written_beside(options.json) as part:
+        with atomic_write(options.json) as part:
             part.write_text(json.dumps(as_json(found), indent=1) + "\n", encoding="utf-8")
     if options.plots is not None and found.facts:
         title = f"{options.out.resolve().name}: {len(found.facts)} of {found.count} pictures"
@@ -260,5 +261,5 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _config(options: argparse.Namespace) -> int:
-    print("\n".join(documented(SceneConfiguration())))
+    print(to_commented_toml(SceneConfiguration()), end="")
     return EXIT_OK

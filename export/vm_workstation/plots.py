@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,5 +38,5 @@ def save_figure(figure: Figure, path: Path) -> None:
     check_figure_path(path)
     kind = path.suffix[1:].lower()
     # Neither date nor random names, so that the same figure gives the same file.
-    with matplotlib.rc_context({"svg.hashsalt": "vm_train"}), written_beside(path) as part:
+    with matplotlib.rc_context({"svg.hashsalt": "vm_train"}), atomic_write(path) as part:
         figure.savefig(part, dpi=_DOTS, format=kind, metadata={"Date": None} if kind == "svg" else None)

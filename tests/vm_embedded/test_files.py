@@ -7,11 +7,11 @@ import threading
 import pytest
 
 from vm_embedded import InputError
-from vm_embedded.files import check_writable, written_beside
+from vm_embedded.files import atomic_write, check_writable
 
 
 def write(path, text="new"):
-    with written_beside(path) as part:
+    with atomic_write(path) as part:
         part.write_text(text)
 
 
@@ -50,7 +50,7 @@ def test_a_pipe_is_written_to(tmp_path):
 def test_work_that_fails_leaves_the_old_file(tmp_path):
     path = tmp_path / "a.json"
     path.write_text("old")
-    with pytest.raises(ZeroDivisionError), written_beside(path) as part:
+    with pytest.raises(ZeroDivisionError), atomic_write(path) as part:
         part.write_text(f"half {1 / 0}")
     assert path.read_text() == "old"
     assert [each.name for each in tmp_path.iterdir()] == ["a.json"]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from ..arrays import Image
-from ..config.entries import check_entries, number, switch, words
+from ..config.entries import check_entries, number, switch, text_line
 from ..errors import VisualMeshError
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
@@ -59,12 +59,12 @@ class Camera(Protocol):
 class CameraSettings:
     """Section [camera]: the source, what to request from a device, and when the camera counts as lost."""
 
-    source: str = words(
+    source: str = text_line(
         "",
         "camera number, /dev/videoN or /dev/v4l/by-id/...; http, https or rtsp address; gstreamer:PIPELINE; video file "
         "or folder of images, played at their frame rate; synthetic; fault:SCRIPT",
     )
-    pixel_format: str = words("", "FOURCC to request from a device, such as MJPG or YUYV; empty keeps the device's own")
+    pixel_format: str = text_line("", "FOURCC to request from a device, such as MJPG or YUYV; empty keeps its own")
     width: int = number(0, "width to request from a device; 0 keeps its own", "px", (0, 20000))
     height: int = number(0, "height to request from a device; 0 keeps its own", "px", (0, 20000))
     fps: float = number(

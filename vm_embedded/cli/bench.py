@@ -16,14 +16,15 @@ import cv2
 
 from ..arrays import Image
 from ..cameras.image_files import check_file_format, read_image
+from ..config.units import parse_angle, parse_length
 from ..detection.detector import Detector
 from ..detection.sampling import checked_image
 from ..errors import InputError, VisualMeshError
-from ..files import check_writable, written_beside
+from ..files import atomic_write, check_writable
 from ..geometry.lens import Lens, Size
 from ..geometry.orientation import Orientation
 from ..geometry.radial_lenses import Rectilinear
-from ..live.configuration import Configuration, angle, length
+from ..live.configuration import Configuration
 from ..network.bundled import model_path
 from ..network.model_file import ModelFile, read_model
 from .measuring import STAGES, Run, cold, drawn_image, machine, measure, rss_mib, sgemm_rate, walk
@@ -122,7 +123,7 @@ def _run(options: argparse.Namespace) -> int:
     if json_to_stdout:
         print(text)
     elif options.json is not None:
-        with written_beside(options.json) as part:
+        with atomic_write(options.json) as part:
             part.write_text(text + "\n", encoding="utf-8")
     if options.tune is not None:
         write_settings(options.tune, found["tuned"])
@@ -150,7 +151,7 @@ class _Work:
 
 def _work(options: argparse.Namespace, given: Configuration) -> _Work:
     """The frame, the lens and the walk. Raises InputError."""
-    swing, sway = angle(options.swing), length(options.sway)
+    swing, sway = parse_angle(options.swing), parse_length(options.sway)
     if options.frames < 1 or (options.up_to is not None and options.up_to < 1):
         raise InputError(f"--frames and --up-to must be at least 1, not {options.frames} and {options.up_to}")
     middle = (

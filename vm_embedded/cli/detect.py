@@ -16,7 +16,7 @@ import cv2
 
 from ..cameras.image_files import Frame, check_file_format, lens_beside, open_source
 from ..cameras.open_camera import is_live
-from ..config.sections import documented
+from ..config.toml_writer import to_commented_toml
 from ..detection.detector import Detector
 from ..errors import InputError, VisualMeshError
 from ..geometry.lens import Lens
@@ -124,7 +124,7 @@ def _run(options: argparse.Namespace) -> int:
             raise
         return _refuse(error)
     if options.print_config:
-        print("\n".join(documented(given)))
+        print(to_commented_toml(given), end="")
         return EXIT_OK
     if options.ask:
         return _ask(given, options.ask)

@@ -15,7 +15,7 @@ from ..arrays import Image
 from ..detection.detector import Detector
 from ..detection.settings import Settings
 from ..errors import InputError
-from ..files import check_writable, written_beside
+from ..files import atomic_write, check_writable
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from ..network.model_file import ModelFile
@@ -78,7 +78,7 @@ def write_settings(path: Path, settings: Mapping[str, Any]) -> None:
     Raises InputError if the file can't be read or written, or its [detector] can't be edited line by line.
     """
     edited = _edited(path, settings)
-    with written_beside(path) as part:
+    with atomic_write(path) as part:
         part.write_bytes(edited.encode("utf-8"))
 
 

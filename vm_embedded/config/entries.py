@@ -1,6 +1,7 @@
-"""Entries of configurations: numbers, shares, names and switches, each with help, unit and limits in its metadata.
+"""Entries of a configuration: numbers, shares, names, switches and text.
 
-A section of a configuration is a frozen dataclass of such entries; it checks itself with `check_entries`.
+A section of a configuration is a frozen dataclass. Each of its fields is an entry whose metadata holds help text, unit,
+limits and a check. The section calls `check_entries` in `__post_init__`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ Check = Callable[[Field[Any], Any], Any]
 
 
 class EntryError(InputError):
-    """A value that its entry can't have. entry: its name."""
+    """A bad value of an entry. entry: name of the entry."""
 
     def __init__(self, entry: str, message: str) -> None:
         super().__init__(message)
@@ -26,45 +27,44 @@ class EntryError(InputError):
 
 
 def entry(check: Check, default: Any, help: str, unit: str = "", **metadata: Any) -> Any:
-    """An entry of any kind. `check` takes its field and a value, and gives the value as it is kept, or raises
-    InputError."""
+    """An entry of any kind. `check` gets the field and a value; it returns the value to store, or raises InputError."""
     return field(default=default, metadata={"check": check, "help": help, "unit": unit, **metadata})
 
 
 def number(default: float | None, help: str, unit: str = "", limits: Limits = (0.0, math.inf)) -> Any:
-    """An entry that is one number; a whole one if its default is. It may be left out if its default is None."""
+    """An entry that holds a number within limits: an integer if its default is one. A default of None allows None."""
     return entry(checked_number, default, help, unit, limits=limits)
 
 
 def share(default: float, help: str) -> Any:
-    """An entry that is a share, from 0 to 1."""
+    """An entry that holds a share, from 0 to 1."""
     return number(default, help, "", (0.0, 1.0))
 
 
 def one_of(allowed: tuple[str, ...], default: str, help: str) -> Any:
-    """An entry that is one name."""
-    return entry(_name, default, help, allowed=allowed)
+    """An entry that holds one of the allowed names."""
+    return entry(_checked_name, default, help, allowed=allowed)
 
 
 def switch(default: bool, help: str) -> Any:
-    """An entry that is true or false."""
-    return entry(_switch, default, help)
+    """An entry that holds true or false."""
+    return entry(_checked_switch, default, help)
 
 
-def words(default: str, help: str) -> Any:
-    """An entry that is a text of one line."""
-    return entry(_words, default, help)
+def text_line(default: str, help: str) -> Any:
+    """An entry that holds one line of printable text."""
+    return entry(_checked_text_line, default, help)
 
 
 def check_entries(section: Any) -> None:
-    """Check each entry of a section and keep it as its kind does. Raises EntryError naming entry and value."""
+    """Check each entry of a section and store it as its check returns it. Raises EntryError."""
     for each in fields(section):
         if "check" in each.metadata:
             object.__setattr__(section, each.name, checked(each, getattr(section, each.name)))
 
 
 def checked(entry: Field[Any], value: Any) -> Any:
-    """A value as its entry keeps it. Raises EntryError."""
+    """The value as the entry stores it. Raises EntryError with the entry's name and the value."""
     if value is None and entry.default is None:
         return None
     try:
@@ -74,7 +74,7 @@ def checked(entry: Field[Any], value: Any) -> Any:
 
 
 def checked_number(entry: Field[Any], value: Any) -> float:
-    """A number within the entry's limits. Raises InputError."""
+    """A number within the entry's limits: int if the entry's default is one, else float. Raises InputError."""
     low, high = entry.metadata["limits"]
     whole = isinstance(entry.default, int) and not isinstance(entry.default, bool)
     fits = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
@@ -85,19 +85,19 @@ def checked_number(entry: Field[Any], value: Any) -> float:
     return int(value) if whole else float(value)
 
 
-def _name(entry: Field[Any], value: Any) -> str:
+def _checked_name(entry: Field[Any], value: Any) -> str:
     if not isinstance(value, str) or value not in entry.metadata["allowed"]:
         raise InputError(unknown(entry.name, value, entry.metadata["allowed"]))
     return value
 
 
-def _switch(entry: Field[Any], value: Any) -> bool:
+def _checked_switch(entry: Field[Any], value: Any) -> bool:
     if not isinstance(value, bool):
         raise InputError(f"{entry.name} must be true or false, not {value!r}")
     return value
 
 
-def _words(entry: Field[Any], value: Any) -> str:
+def _checked_text_line(entry: Field[Any], value: Any) -> str:
     if not isinstance(value, str) or not value.isprintable():
-        raise InputError(f"{entry.name} must be a text of one line, not {value!r}")
+        raise InputError(f"{entry.name} must be one line of text, not {value!r}")
     return value

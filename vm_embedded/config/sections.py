@@ -1,14 +1,14 @@
-"""Configurations: TOML files of sections, each a dataclass of the entries of entries.py.
+"""Reading configurations: TOML files of sections, each a dataclass of entries as in entries.py.
 
-What is no such section says in its field's metadata how it is `read` from its value and `documented` again.
+A top-level value that is not such a section has two functions in its field's metadata: `read` makes the value from
+TOML, and `to_commented_toml` turns it back into text (see toml_writer.py).
 """
 
 from __future__ import annotations
 
-import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -22,12 +22,12 @@ Configuration = TypeVar("Configuration")
 def read_sections(
     kind: type[Configuration], path: Path | None, overrides: Mapping[str, Mapping[str, Any]] | None = None
 ) -> Configuration:
-    """Read a configuration, a dataclass of sections, from a TOML file, or take all defaults.
+    """Read a configuration, a dataclass of sections, from a TOML file; without a file, use all defaults.
 
-    overrides: entries by section that count instead of the file's. Raises InputError naming file, section, entry and
-    what is allowed.
+    overrides: entries by section that replace those of the file. Raises InputError naming the file, line, section and
+    entry, and the allowed values.
     """
-    text = _text(path) if path else ""
+    text = _read_text(path) if path else ""
     where = f"configuration {path}" if path else "configuration"
     try:
         table: dict[str, Any] = tomllib.loads(text)
@@ -39,14 +39,14 @@ def read_sections(
         read: Configuration = _configuration(kind, table)
         return read
     except _Fault as fault:
-        line = line_of(text, fault.section, fault.entry)
+        line = _line_number(text, fault.section, fault.entry)
         raise InputError(f"{where}{'' if line is None else f', line {line}'}: {fault}") from fault
     except VisualMeshError as error:
         raise InputError(f"{where}: {error}") from error
 
 
 class _Fault(InputError):
-    """What is wrong with a section, or with an entry of it."""
+    """An error in a section, or in one entry of it."""
 
     def __init__(self, section: str, entry: str | None, message: str) -> None:
         super().__init__(message)
@@ -57,8 +57,8 @@ _HEADER = re.compile(r"\s*\[\s*([^\[\]]+?)\s*\]\s*(#.*)?")
 _ENTRY = re.compile(r"\s*(?:\"([^\"]*)\"|'([^']*)'|([A-Za-z0-9_.-]+))\s*=")
 
 
-def line_of(text: str, section: str, entry: str | None) -> int | None:
-    """Number of the line, from 1, where an entry of a section begins, or the section itself; None if none is seen."""
+def _line_number(text: str, section: str, entry: str | None) -> int | None:
+    """Number, from 1, of the line where an entry of a section begins, or the section itself; None if not found."""
     current = ""
     for number, line in enumerate(text.splitlines(), 1):
         header, assigned = _HEADER.fullmatch(line), _ENTRY.match(line)
@@ -73,14 +73,17 @@ def line_of(text: str, section: str, entry: str | None) -> int | None:
     return None
 
 
-def overrides_of(given: Sequence[str], example: str) -> dict[str, dict[str, Any]]:
-    """Sections of entries from SECTION.ENTRY=VALUE; a value is as in TOML, or a plain word. Raises InputError."""
+def parse_overrides(given: Sequence[str], example: str) -> dict[str, dict[str, Any]]:
+    """Entries by section from texts SECTION.ENTRY=VALUE.
+
+    A value that is not valid TOML is taken as a string. example: shown in the message. Raises InputError.
+    """
     sections: dict[str, dict[str, Any]] = {}
     for each in given:
         path, equals, text = each.partition("=")
         section, dot, entry = path.strip().partition(".")
         if not (equals and dot and entry):
-            raise InputError(f"--set {each!r} is not like {example}")
+            raise InputError(f"--set {each!r} must have the form SECTION.ENTRY=VALUE, as in {example}")
         try:
             value = tomllib.loads(f"value = {text}")["value"]
         except tomllib.TOMLDecodeError:
@@ -89,12 +92,12 @@ def overrides_of(given: Sequence[str], example: str) -> dict[str, dict[str, Any]
     return sections
 
 
-def _text(path: Path) -> str:
+def _read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
         raise InputError(f"can't read configuration {path}: {error.strerror or error}") from error
-    except ValueError as error:  # not text, or a path with a zero byte
+    except ValueError as error:  # not UTF-8, or a path with a zero byte
         raise InputError(f"configuration {path}: {error}") from error
 
 
@@ -130,44 +133,3 @@ def _read(name: str, section: Field[Any], value: Any) -> Any:
         if key not in known:
             raise _Fault(name, key, unknown(f"entry in [{name}]", key, known))
     return kind(**value)
-
-
-def documented(configuration: Any) -> Iterator[str]:
-    """Lines of a TOML file with every entry, its meaning, unit and limits."""
-    for section in fields(configuration):
-        values = getattr(configuration, section.name)
-        if "read" in section.metadata:
-            yield from section.metadata["documented"](values)
-        else:
-            yield f"[{section.name}]"
-            for entry in fields(values):
-                yield from _entry(entry, getattr(values, entry.name))
-        yield ""
-
-
-def _entry(entry: Field[Any], value: Any) -> Iterator[str]:
-    unit = f" [{entry.metadata['unit']}]" if entry.metadata.get("unit") else ""
-    yield f"# {entry.metadata['help']}{unit}{_limits(entry)}"
-    yield f"# {entry.name} =" if value is None else f"{entry.name} = {_toml(value)}"
-
-
-def _limits(entry: Field[Any]) -> str:
-    if "allowed" in entry.metadata:
-        return f"; of {', '.join(entry.metadata['allowed'])}"
-    low, high = entry.metadata.get("limits", (None, None))
-    if low is None:
-        return ""
-    return f"; {low:g} to {high:g}" if high != float("inf") else f"; at least {low:g}"
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, Mapping):
-        pairs = ", ".join(f"{_toml(name)} = {_toml(each)}" for name, each in value.items())
-        return f"{{ {pairs} }}" if pairs else "{}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_toml(each) for each in value) + "]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return short if float(short := f"{value:g}") == value else repr(value)

@@ -6,16 +6,15 @@
 from __future__ import annotations
 
 import json
-import math
-import re
-from collections.abc import Iterator, Mapping
-from dataclasses import Field, dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from ..cameras.camera import CameraSettings
-from ..config.entries import check_entries, entry
+from ..config.entries import check_entries
 from ..config.sections import read_sections
+from ..config.units import angle, length
 from ..detection.settings import Settings
 from ..errors import InputError, VisualMeshError
 from ..geometry.lens_files import LensFile, lens_from_table, read_lens_file
@@ -28,51 +27,14 @@ from ..poses.buffer import PoseSettings
 from .deploy_settings import DeploySettings
 from .status_settings import StatusSettings
 
-_DEGREES = re.compile(r"\s*([-+0-9.eE]+)\s*deg\s*")
-
-
-def length(value: object) -> float:
-    """A finite number of metres, from a number or its text. Raises InputError."""
-    return _finite(value, f"{value!r} is not a number of metres")
-
-
-def angle(value: object) -> float:
-    """An angle [rad] from a number or text in radians, or from text in degrees such as "20deg". Raises InputError."""
-    what = f"{value!r} is not an angle; write radians, or degrees as in 20deg"
-    degrees = _DEGREES.fullmatch(value) if isinstance(value, str) else None
-    if degrees:
-        return math.radians(_finite(degrees.group(1), what))
-    number = _finite(value, what)
-    if abs(number) > 2.0 * math.pi:
-        raise InputError(f"{number:g} rad is more than a turn; did you mean {number:g}deg?")
-    return number
-
-
-def _finite(value: object, what: str) -> float:
-    try:
-        number = math.nan if isinstance(value, bool) else float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise InputError(what)
-    return number
-
-
-def _length(entry: Field[Any], value: object) -> float:
-    return length(value)
-
-
-def _angle(entry: Field[Any], value: object) -> float:
-    return angle(value)
-
 
 @dataclass(frozen=True)
 class FixedPose:
     """Section [orientation]: where the camera is, if neither the frames nor a pose stream say so."""
 
-    height: float | None = entry(_length, None, "height of the camera over the plane", "m")
-    pitch: float | None = entry(_angle, None, 'angle of the optical axis below the horizon, or as in "20deg"', "rad")
-    roll: float | None = entry(_angle, None, 'lean of the camera to the right, or as in "-2deg"', "rad")
+    height: float | None = length(None, "height of the camera over the plane")
+    pitch: float | None = angle(None, 'angle of the optical axis below the horizon, or as in "20deg"')
+    roll: float | None = angle(None, 'lean of the camera to the right, or as in "-2deg"')
 
     def __post_init__(self) -> None:
         check_entries(self)
@@ -92,9 +54,9 @@ def _read_model(value: object) -> str:
     return value
 
 
-def _documented_model(value: str) -> Iterator[str]:
-    yield f"# the network: a file that vm-export wrote, or one of the package: {', '.join(SHIPPED)}"
-    yield f"model = {json.dumps(value)}"
+def _commented_model(value: str) -> str:
+    comment = f"# the network: a file that vm-export wrote, or one of the package: {', '.join(SHIPPED)}"
+    return f"{comment}\nmodel = {json.dumps(value)}"
 
 
 def _read_lens(value: object) -> Path | LensFile:
@@ -105,26 +67,27 @@ def _read_lens(value: object) -> Path | LensFile:
     return LensFile(lens_from_table(value), None)
 
 
-def _documented_lens(value: LensFile | None) -> Iterator[str]:
-    yield "# the lens: a file of the reference, of OpenCV or of ROS, or TOML; or a table, [lens], with projection,"
-    yield "# focal_length [px], fov [rad], and where they matter center, distortion and size [px]"
+def _commented_lens(value: LensFile | None) -> str:
+    comment = (
+        "# the lens: a file of the reference, of OpenCV or of ROS, or TOML; or a table, [lens], with projection,\n"
+        "# focal_length [px], fov [rad], and where they matter center, distortion and size [px]\n"
+    )
     lens = value.lens if value is not None else None
-    if isinstance(lens, RadialLens):
-        size = "" if lens.size is None else f", size = {list(lens.size)}"
-        yield (
-            f'lens = {{ projection = "{type(lens).__name__.lower()}", focal_length = {lens.focal_length!r}, '
-            f"fov = {lens.fov!r}, center = {list(lens.center)}, distortion = {list(lens.distortion)}{size} }}"
-        )
-    else:
-        yield '# lens = "lens.yaml"'
+    if not isinstance(lens, RadialLens):
+        return comment + '# lens = "lens.yaml"'
+    size = "" if lens.size is None else f", size = {list(lens.size)}"
+    return comment + (
+        f'lens = {{ projection = "{type(lens).__name__.lower()}", focal_length = {lens.focal_length!r}, '
+        f"fov = {lens.fov!r}, center = {list(lens.center)}, distortion = {list(lens.distortion)}{size} }}"
+    )
 
 
 @dataclass(frozen=True)
 class Configuration:
     """All sections, and the two that are no tables of entries."""
 
-    model: str = field(default=DEFAULT, metadata={"read": _read_model, "documented": _documented_model})
-    lens: LensFile | None = field(default=None, metadata={"read": _read_lens, "documented": _documented_lens})
+    model: str = field(default=DEFAULT, metadata={"read": _read_model, "to_commented_toml": _commented_model})
+    lens: LensFile | None = field(default=None, metadata={"read": _read_lens, "to_commented_toml": _commented_lens})
     orientation: FixedPose = field(default_factory=FixedPose)
     detector: Settings = field(default_factory=Settings)
     camera: CameraSettings = field(default_factory=CameraSettings)

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..errors import InputError
-from ..sockets import SocketFile
+from ..sockets import UnixListener
 
 NAME = "vm-detect.sock"
 
@@ -39,12 +39,12 @@ class Control:
 
     def __init__(self, path: Path, commands: Mapping[str, Command]) -> None:
         self._path, self._commands = path, commands
-        self._file: SocketFile | None = None
+        self._file: UnixListener | None = None
         self._server: asyncio.Server | None = None
 
     async def open(self) -> None:
         """Listen. Raises InputError."""
-        self._file = SocketFile(self._path)
+        self._file = UnixListener(self._path)
         self._server = await asyncio.start_unix_server(self._answer, sock=self._file.socket, limit=1024)
 
     async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -24,13 +24,13 @@ import cv2
 from ..cameras.camera import Shot, without_password
 from ..cameras.grabber import MOST_HANGING, Grabber
 from ..cameras.open_camera import camera_opener, is_live
-from ..config.sections import documented
+from ..config.toml_writer import to_commented_toml
 from ..detection.detector import Detector
 from ..errors import InputError, VisualMeshError, one_line
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from ..network.bundled import model_path
-from ..output.channels import Outputs
+from ..output.channels import Channels
 from ..output.messages import Message, frame_message, state_message
 from ..output.recorder import Moment, Recorder
 from ..poses.buffer import StalePoseError
@@ -120,7 +120,7 @@ class Daemon:
         raw = self.configuration.detector.format != "bgr"
         self.grabber = Grabber(camera_opener(camera, raw), camera, self._wake)
         self.poses = PoseStream(self.configuration.pose, self._bad_pose)
-        self.outputs = Outputs(self.configuration.output)
+        self.outputs = Channels(self.configuration.output)
         self.page = StatusPage(status.picture_fps, self._told)
         commands = {"status": self._status, "record": self.record, "metrics": self.metrics}
         control = Control(Path(status.socket) if status.socket else usual_path(), commands)
@@ -132,7 +132,7 @@ class Daemon:
         replayed = Configuration(
             model=str(Path(model_path(configuration.model)).resolve()), detector=configuration.detector
         )
-        self._documented = "\n".join(documented(replayed)) + "\n"
+        self._replay_toml = to_commented_toml(replayed)
 
     async def run(self) -> int:
         """Run, and return the exit status."""
@@ -229,7 +229,7 @@ class Daemon:
         self.last = frame_message(self.figures.tally.frames, self.state, shot, detections, now)
         self._send(self.last)
         self.page.show(shot.image, detections)
-        self.recorder.keep(Moment(shot, lens, orientation, self.last), self._documented)
+        self.recorder.keep(Moment(shot, lens, orientation, self.last), self._replay_toml)
 
     def _late(self, shot: Shot) -> bool:
         """Whether a shot is too old to be reported."""
@@ -318,7 +318,7 @@ class Daemon:
     def record(self) -> str:
         """Write down the last seconds."""
         try:
-            said = self.recorder.record(self._documented)
+            said = self.recorder.record(self._replay_toml)
         except InputError as error:
             self._log("not recorded", "warning", reason=str(error))
             return f"{REFUSED}{error}"

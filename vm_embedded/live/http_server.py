@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ipaddress import ip_address
 
 from ..errors import InputError
-from ..sockets import SocketFile, address
+from ..sockets import UnixListener, parse_address
 
 _SECONDS = 5.0
 """How long a browser may take to ask, and to take a part of an answer."""
@@ -39,17 +39,17 @@ class WebServer:
 
     def __init__(self, where: str, pages: Mapping[str, Page], streams: Mapping[str, Stream] | None = None) -> None:
         self._where, self._pages, self._streams = where, pages, streams or {}
-        self._file: SocketFile | None = None
+        self._file: UnixListener | None = None
         self._server: asyncio.Server | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def open(self) -> None:
         """Listen. Raises InputError."""
         if self._where.startswith("unix:"):
-            self._file = SocketFile(self._where.removeprefix("unix:"))
+            self._file = UnixListener(self._where.removeprefix("unix:"))
             self._server = await asyncio.start_unix_server(self._serve, sock=self._file.socket, limit=8192)
             return
-        host, port = address(self._where, "[status] page and metrics")
+        host, port = parse_address(self._where, "[status] page and metrics")
         try:
             self._server = await asyncio.start_server(self._serve, host, port, limit=8192)
         except OSError as error:

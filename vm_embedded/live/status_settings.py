@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..config.entries import check_entries, entry, number, words
+from ..config.entries import check_entries, entry, number, text_line
 from ..sockets import checked_address
 
 
@@ -12,7 +12,7 @@ from ..sockets import checked_address
 class StatusSettings:
     """Who may look, and how."""
 
-    socket: str = words(
+    socket: str = text_line(
         "",
         "socket for vm-detect --status and its like; if none is named, vm-detect.sock in $RUNTIME_DIRECTORY or "
         "$XDG_RUNTIME_DIR, or else in /tmp with the user's number in its name",

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from ..config.entries import check_entries, entry, number, one_of, switch, words
+from ..config.entries import check_entries, entry, number, one_of, switch, text_line
 from ..errors import InputError
-from ..sockets import SocketFile, address, checked_address, datagram_socket
-from .messages import Message, as_line, as_ros
+from ..sockets import UnixListener, checked_address, datagram_socket, parse_address
+from .messages import Message, to_json_line, to_ros
 
 FORMATS = ("json", "ros")
 
@@ -28,13 +28,13 @@ class OutputSettings:
     """Section [output]."""
 
     stdout: bool = switch(True, "lines on standard output")
-    file: str = words("", "file that lines are appended to")
+    file: str = text_line("", "file that lines are appended to")
     udp: str = entry(
         checked_address, "", "where each line is sent as a datagram: ADDRESS:PORT, several with commas between"
     )
-    unix: str = words("", "socket that is made; every reader of it gets every line")
+    unix: str = text_line("", "socket that is made; every reader of it gets every line")
     format: str = one_of(FORMATS, "json", "json, or ros: the field names of vision_msgs and geometry_msgs of ROS 2")
-    frame_id: str = words("base_footprint", "what ROS is to call the frame on the ground below the camera")
+    frame_id: str = text_line("base_footprint", "what ROS is to call the frame on the ground below the camera")
     backlog_kib: int = number(256, "how far a reader may lag behind before it loses lines", "KiB", (1, 65536))
 
     def __post_init__(self) -> None:
@@ -55,7 +55,7 @@ class Output(Protocol):
         """Send what waits, if it goes at once, and end."""
 
 
-class Outputs:
+class Channels:
     """All ways out."""
 
     def __init__(self, settings: OutputSettings) -> None:
@@ -69,13 +69,13 @@ class Outputs:
             if settings.stdout:
                 if sys.stdout is None:
                     raise InputError("standard output is closed; --no-output-stdout goes without it")
-                self._outputs.append(DescriptorOutput(os.dup(sys.stdout.fileno()), most))
+                self._outputs.append(DescriptorChannel(os.dup(sys.stdout.fileno()), most))
             if settings.file:
-                self._outputs.append(DescriptorOutput(_opened(settings.file), most))
+                self._outputs.append(DescriptorChannel(_opened(settings.file), most))
             for each in filter(None, settings.udp.split(",")):
-                self._outputs.append(DatagramOutput(each))
+                self._outputs.append(DatagramChannel(each))
             if settings.unix:
-                self._outputs.append(await SocketOutput.open(settings.unix, most))
+                self._outputs.append(await UnixChannel.open(settings.unix, most))
         except InputError:
             await self.close()
             raise
@@ -92,7 +92,7 @@ class Outputs:
 
     def send(self, message: Message) -> None:
         """Send a message all ways."""
-        line = as_line(as_ros(message, self.settings.frame_id) if self.settings.format == "ros" else message)
+        line = to_json_line(to_ros(message, self.settings.frame_id) if self.settings.format == "ros" else message)
         for each in self._outputs:
             each.send(line)
 
@@ -110,7 +110,7 @@ def _opened(path: str) -> int:
         raise InputError(f"can't write {path}: {error.strerror or error}") from error
 
 
-class DescriptorOutput:
+class DescriptorChannel:
     """A file, pipe or terminal, written by a thread of its own: whatever it is may hold a writer up."""
 
     def __init__(self, descriptor: int, most: int) -> None:
@@ -158,13 +158,13 @@ class DescriptorOutput:
         await asyncio.to_thread(self._thread.join, 0.3)
 
 
-class DatagramOutput:
+class DatagramChannel:
     """UDP."""
 
     def __init__(self, where: str) -> None:
         self.dropped = 0
         self.failure = ""
-        self._socket, self._address = datagram_socket(*address(where, "[output] udp"), "can't send to")
+        self._socket, self._address = datagram_socket(*parse_address(where, "[output] udp"), "can't send to")
 
     def send(self, line: bytes) -> None:
         """Send a line as a datagram."""
@@ -178,10 +178,10 @@ class DatagramOutput:
         self._socket.close()
 
 
-class SocketOutput:
+class UnixChannel:
     """A Unix socket with any number of readers."""
 
-    def __init__(self, file: SocketFile, most: int) -> None:
+    def __init__(self, file: UnixListener, most: int) -> None:
         self.dropped = 0
         self.failure = ""
         self._file, self._most = file, most
@@ -189,9 +189,9 @@ class SocketOutput:
         self._server: asyncio.Server | None = None
 
     @classmethod
-    async def open(cls, path: str | Path, most: int) -> SocketOutput:
+    async def open(cls, path: str | Path, most: int) -> UnixChannel:
         """Listen at a path. Raises InputError."""
-        output = cls(SocketFile(path), most)
+        output = cls(UnixListener(path), most)
         output._server = await asyncio.start_unix_server(output._serve, sock=output._file.socket)
         return output
 

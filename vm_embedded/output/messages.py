@@ -44,12 +44,12 @@ def state_message(state: str, reason: str) -> Message:
     return {"type": "state", "state": state, **times, "reason": reason}
 
 
-def as_line(message: Message) -> bytes:
+def to_json_line(message: Message) -> bytes:
     """A message as a line (RFC 8259: no NaN)."""
     return json.dumps(message, allow_nan=False, separators=(",", ":")).encode() + b"\n"
 
 
-def as_ros(message: Message, frame_id: str) -> Message:
+def to_ros(message: Message, frame_id: str) -> Message:
     """A message with the field names of ROS 2: vision_msgs/Detection2DArray, and a geometry_msgs/PointStamped for each
     detection, in the plane's frame `frame_id`. The state goes along, which ROS does not know."""
     seconds, rest = divmod(round(1e9 * message["wall"]), 10**9)

@@ -19,12 +19,12 @@ from pathlib import Path
 import cv2
 
 from ..cameras.camera import Shot
-from ..config.entries import check_entries, number, words
+from ..config.entries import check_entries, number, text_line
 from ..errors import InputError
 from ..geometry.lens import Lens
 from ..geometry.lens_files import lens_text
 from ..geometry.orientation import Orientation
-from .messages import Message, as_line
+from .messages import Message, to_json_line
 
 _PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1)
 CONFIGURATION, MESSAGES = "vm.toml", "recording.jsonl"
@@ -34,11 +34,11 @@ CONFIGURATION, MESSAGES = "vm.toml", "recording.jsonl"
 class RecorderSettings:
     """Section [recorder]: what is kept, and when it is written."""
 
-    folder: str = words("", "where recordings go, a folder each; none: nothing is kept")
+    folder: str = text_line("", "where recordings go, a folder each; none: nothing is kept")
     seconds: float = number(5.0, "how far back a recording reaches", "s", (0.1, 600))
     memory_mib: float = number(256.0, "memory for it; less far back once that is full", "MiB", (1, 65536))
     disk_mib: float = number(1024.0, "disk for all recordings; the oldest make room", "MiB", (1, 1e6))
-    trigger_class: str = words("", "class whose sight makes a recording, as signal USR1 and vm-detect --record do")
+    trigger_class: str = text_line("", "class whose sight makes a recording, as signal USR1 and vm-detect --record do")
     pause: float = number(60.0, "shortest time between two recordings that a class makes", "s", (0, 1e6))
 
     def __post_init__(self) -> None:
@@ -123,9 +123,9 @@ class Recorder:
                 if written > 2**20 * self.settings.disk_mib:
                     raise InputError(f"more than {self.settings.disk_mib:g} MiB")
             (part / CONFIGURATION).write_text(configuration, encoding="utf-8")
-            (part / MESSAGES).write_bytes(b"".join(as_line(each.message) for each in moments))
+            (part / MESSAGES).write_bytes(b"".join(to_json_line(each.message) for each in moments))
             part.rename(folder)
-            make_room(folder.parent, 2**20 * self.settings.disk_mib)
+            delete_oldest_recordings(folder.parent, 2**20 * self.settings.disk_mib)
         except (OSError, InputError) as error:
             shutil.rmtree(part, ignore_errors=True)
             self._report("recording failed", f"{folder}: {getattr(error, 'strerror', None) or error}")
@@ -156,7 +156,7 @@ def _write_moment(folder: Path, index: int, moment: Moment) -> int:
     return len(content)
 
 
-def make_room(folder: Path, limit: float) -> None:
+def delete_oldest_recordings(folder: Path, limit: float) -> None:
     """Remove the oldest recordings of a folder until the others take no more than `limit` [bytes]."""
     recordings = sorted(each for each in folder.iterdir() if (each / MESSAGES).is_file())
     sizes = [sum(file.stat().st_size for file in each.iterdir()) for each in recordings]

@@ -14,7 +14,7 @@ from ..arrays import Image
 from ..cameras.image_files import Frame
 from ..detection.detections import Detections
 from ..errors import InputError
-from ..files import written_beside
+from ..files import atomic_write
 from .overlay import draw
 
 
@@ -53,7 +53,7 @@ def frame_name(frame: Frame) -> str:
 def save_points(folder: Path, frame: Frame, detections: Detections) -> Path:
     """Write NAME.npz with pixels (n, 2), rays (n, 3) in the frame's observation plane, probabilities (n, C)."""
     path = folder / f"{frame_name(frame)}.npz"
-    with written_beside(path) as part, part.open("wb") as file:
+    with atomic_write(path) as part, part.open("wb") as file:
         np.savez(file, pixels=detections.pixels, rays=detections.rays, probabilities=detections.probabilities)
     return path
 
@@ -62,7 +62,7 @@ def save_overlay(folder: Path, frame: Frame, image: Image, detections: Detection
     """Write NAME.jpg with mesh points and detections drawn into the image."""
     path = folder / f"{frame_name(frame)}.jpg"
     _, content = cv2.imencode(".jpg", draw(image, detections), [cv2.IMWRITE_JPEG_QUALITY, 92])
-    with written_beside(path) as part:
+    with atomic_write(path) as part:
         part.write_bytes(content.tobytes())
     return path
 

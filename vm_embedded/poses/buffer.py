@@ -18,7 +18,7 @@ from ..arrays import Floats
 from ..config.entries import check_entries, entry, number, one_of, switch
 from ..errors import GeometryError, InputError, VisualMeshError
 from ..geometry.orientation import Orientation
-from ..sockets import address
+from ..sockets import parse_address
 
 CLOCKS = ("monotonic", "wall", "arrival")
 FRAMES = ("camera", "optical")
@@ -37,7 +37,7 @@ class StalePoseError(VisualMeshError):
 def _source(entry: Field[Any], value: object) -> str:
     kind, _, rest = value.partition(":") if isinstance(value, str) else ("", "", "")
     if kind == "udp":
-        address(rest, "source udp:ADDRESS:PORT")
+        parse_address(rest, "source udp:ADDRESS:PORT")
     elif not (value in ("fixed", "stdin") or (kind == "unix" and rest)):
         raise InputError(f"source must be fixed, stdin, unix:PATH or udp:ADDRESS:PORT, not {value!r}")
     return str(value)
@@ -76,7 +76,7 @@ class PoseSettings:
         check_entries(self)
 
 
-class Poses:
+class PoseBuffer:
     """The poses of the last seconds, in the order of their times."""
 
     def __init__(self, settings: PoseSettings) -> None:
@@ -143,10 +143,10 @@ class Poses:
         time = min(max(time, times[0]), times[-1] + 1e-3 * self.settings.extrapolate_ms)
         after = min(max(bisect_right(times, time), 1), len(times) - 1)
         (start, one), (end, other) = self._poses[after - 1], self._poses[after]
-        return between(one, other, (time - start) / (end - start))
+        return interpolate(one, other, (time - start) / (end - start))
 
 
-def between(one: Orientation, other: Orientation, share: float) -> Orientation:
+def interpolate(one: Orientation, other: Orientation, share: float) -> Orientation:
     """The orientation on the straight way from one to another, slerp; shares above 1 go on beyond it."""
     turn = cv2.Rodrigues(one.rotation.T @ other.rotation)[0]
     rotation: Floats = one.rotation @ cv2.Rodrigues(share * turn)[0]

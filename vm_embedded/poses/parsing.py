@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import InputError, VisualMeshError, unknown
 from ..geometry.orientation import OPTICAL_TO_CAMERA, Orientation
 
-LONGEST = 4096
+MAX_LINE_BYTES = 4096
 """Bytes of a line."""
 
 _KEYS = ("t", "height", "quaternion", "Hoc")
@@ -31,10 +31,10 @@ class PoseLine:
     orientation: Orientation
 
 
-def read_pose_line(line: bytes, optical: bool = False) -> PoseLine:
+def parse_pose_line(line: bytes, optical: bool = False) -> PoseLine:
     """Read a line. `optical` says that rotations turn an optical frame. Raises InputError."""
-    if len(line) > LONGEST:
-        raise InputError(f"pose of {len(line)} bytes, more than {LONGEST}")
+    if len(line) > MAX_LINE_BYTES:
+        raise InputError(f"pose of {len(line)} bytes, more than {MAX_LINE_BYTES}")
     try:
         data = json.loads(line)
     except (ValueError, RecursionError) as error:

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from ..errors import InputError, VisualMeshError
-from ..sockets import SocketFile, address, datagram_socket
-from .buffer import Poses, PoseSettings
-from .parsing import LONGEST, read_pose_line
+from ..sockets import UnixListener, datagram_socket, parse_address
+from .buffer import PoseBuffer, PoseSettings
+from .parsing import MAX_LINE_BYTES, parse_pose_line
 
 Report = Callable[[str], None]
 """Takes what was wrong with a pose."""
@@ -24,14 +24,14 @@ class PoseStream:
 
     def __init__(self, settings: PoseSettings, report: Report) -> None:
         self.settings = settings
-        self.poses = Poses(settings)
+        self.poses = PoseBuffer(settings)
         self.received = 0
         self.bad = 0
         self.arrived = asyncio.Event()
         """Set whenever there is a new pose."""
         self._report = report
         self._transports: list[asyncio.BaseTransport] = []
-        self._file: SocketFile | None = None
+        self._file: UnixListener | None = None
         self._server: asyncio.Server | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -40,17 +40,17 @@ class PoseStream:
         kind, _, rest = self.settings.source.partition(":")
         loop = asyncio.get_running_loop()
         if kind == "unix":
-            self._file = SocketFile(rest)
-            self._server = await asyncio.start_unix_server(self._converse, sock=self._file.socket, limit=LONGEST)
+            self._file = UnixListener(rest)
+            self._server = await asyncio.start_unix_server(self._converse, sock=self._file.socket, limit=MAX_LINE_BYTES)
         elif kind == "udp":
-            host, port = address(rest, "source of poses")
+            host, port = parse_address(rest, "source of poses")
             listening, _ = datagram_socket(host, port, "poses from", listen=True)
             transport, _ = await loop.create_datagram_endpoint(lambda: _Datagrams(self.take), sock=listening)
             self._transports.append(transport)
         elif self.settings.source == "stdin":
             if sys.stdin is None or not _can_be_waited_for(sys.stdin.fileno()):
                 raise InputError("poses from stdin need a pipe, a socket or a terminal there")
-            reader = asyncio.StreamReader(limit=LONGEST)
+            reader = asyncio.StreamReader(limit=MAX_LINE_BYTES)
             pipe, _ = await loop.connect_read_pipe(
                 lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(os.dup(sys.stdin.fileno()))
             )
@@ -79,7 +79,7 @@ class PoseStream:
         try:
             return await reader.readline()
         except ValueError:
-            self._refuse(f"pose of more than {LONGEST} bytes")
+            self._refuse(f"pose of more than {MAX_LINE_BYTES} bytes")
             return b"\n"
 
     def take(self, line: bytes) -> None:
@@ -88,7 +88,7 @@ class PoseStream:
         if not line.strip():
             return
         try:
-            read = read_pose_line(line, self.settings.frame == "optical")
+            read = parse_pose_line(line, self.settings.frame == "optical")
             self.poses.add(self._time(read.time, now), read.orientation)
         except VisualMeshError as error:
             self._refuse(str(error))

@@ -21,7 +21,7 @@ import numpy as np
 
 from vm_embedded.arrays import Image
 from vm_embedded.errors import InputError
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 from vm_embedded.geometry.lens_files import lens_text
 
 from ..render.image_processing import developed, encoded
@@ -102,7 +102,7 @@ class Plan:
                 f"{folder} holds {strangers[0].name} and no set.json, so it is no set of vm-synth: pictures would be "
                 "lost or mixed; write to another folder"
             )
-        with written_beside(path) as part:
+        with atomic_write(path) as part:
             part.write_text(self.as_json(), encoding="utf-8")
 
 
@@ -151,7 +151,7 @@ def write_picture(folder: Path, index: int, map_name: str, scene: Scene, picture
         "scene": (json.dumps(truth(index, map_name, scene, picture), allow_nan=False) + "\n").encode(),
     }
     for part, content in contents.items():
-        with written_beside(file_of(folder, part, index)) as path:
+        with atomic_write(file_of(folder, part, index)) as path:
             path.write_bytes(content)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 from vm_embedded.geometry.lens import Size
 
 from ..scene.configuration import CLASSES
@@ -71,7 +71,7 @@ def plot(facts: Sequence[Facts], size: Size, title: str, path: Path) -> None:
     for each in axes:
         each.spines[["top", "right"]].set_visible(False)
         each.tick_params(labelsize=8)
-    with written_beside(path) as part:
+    with atomic_write(path) as part:
         figure.savefig(part, dpi=110, format=path.suffix[1:].lower())
     pyplot.close(figure)
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.cli.progress import ProgressBar
-from vm_embedded.files import check_writable, written_beside
+from vm_embedded.files import atomic_write, check_writable
 from vm_workstation.option_types import at_least
 from vm_workstation.text_tables import aligned, summary
 
@@ -72,7 +72,7 @@ def run_check(options: argparse.Namespace, classes: Classes, objects: Sequence[s
         bar.clear()
     print("\n".join(tables(found)))
     if options.json is not None:
-        with written_beside(options.json) as part:
+        with atomic_write(options.json) as part:
             part.write_text(json.dumps(as_json(found), indent=1) + "\n", encoding="utf-8")
     for line in complaints(found):
         print(f"vm-train: {line}", file=sys.stderr)

@@ -14,7 +14,7 @@ import numpy as np
 
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.errors import InputError
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 
@@ -81,7 +81,7 @@ def write_sheet(path: Path, image: Image) -> None:
     if max(image.shape) > _LARGEST:
         size = f"{image.shape[1]} x {image.shape[0]} px"
         raise InputError(f"a sheet of {size} is too large: show fewer pictures or smaller ones")
-    with written_beside(path) as part:
+    with atomic_write(path) as part:
         part.write_bytes(cv2.imencode(path.suffix.lower(), image)[1].tobytes())
 
 

@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vm_embedded.cli.progress import ProgressBar
-from vm_embedded.config.sections import documented, overrides_of, read_sections
+from vm_embedded.config.sections import parse_overrides, read_sections
+from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import check_writable
 from vm_workstation.stopping import stoppable
@@ -93,7 +94,7 @@ def _on_request() -> Iterator[Callable[[], bool]]:
 
 
 def _configuration(options: argparse.Namespace) -> TrainConfiguration:
-    configuration = read_sections(TrainConfiguration, options.config, overrides_of(options.set, "training.epochs=5"))
+    configuration = read_sections(TrainConfiguration, options.config, parse_overrides(options.set, "training.epochs=5"))
     _ = configuration.manifest  # raises ModelError for what fits no model file, before anything takes time
     return configuration
 
@@ -268,7 +269,7 @@ def _rate(options: argparse.Namespace) -> int:
 
 
 def _config(options: argparse.Namespace) -> int:
-    print("\n".join(documented(TrainConfiguration())))
+    print(to_commented_toml(TrainConfiguration()), end="")
     return EXIT_OK
 
 

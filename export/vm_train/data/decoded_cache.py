@@ -18,7 +18,7 @@ from urllib.parse import quote
 import numpy as np
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 
 from .classes import Classes
 from .picture_files import PARTS, PictureFiles
@@ -81,7 +81,7 @@ class DecodedCache:
             text = files.read("lens")
             header = _HEADER.pack(_MAGIC, fingerprint(files, classes), width, height, len(text), 0)
             # Opened with x: where two processes put the same picture, neither writes into the other's file.
-            with written_beside(self._path(files)) as part, part.open("xb") as file:
+            with atomic_write(self._path(files)) as part, part.open("xb") as file:
                 for each in (header, text, picture.image.tobytes(), picture.labels.tobytes()):
                     file.write(each)
         except (OSError, InputError) as error:

@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from vm_embedded.errors import InputError, one_line
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 
 from .picture_files import IMAGES
 
@@ -111,7 +111,7 @@ def _checked(split: Split, count: int, remedy: str) -> Split:
 
 def save(path: Path, split: Split) -> None:
     """Write pictures.json. Raises InputError if it can't be written."""
-    with written_beside(path) as part:
+    with atomic_write(path) as part:
         part.write_text(json.dumps(asdict(split), indent=1) + "\n", encoding="utf-8")
 
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from vm_embedded.errors import GeometryError, InputError
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
@@ -62,7 +62,7 @@ def write_evaluation(
     images = {name: (out / "plots" / f"{name}.svg").read_bytes() for name in figures}
     texts["report.html"] = page(scores, images, _strips(evaluation))
     for file_name, text in texts.items():
-        with written_beside(out / file_name) as part:
+        with atomic_write(out / file_name) as part:
             part.write_text(text, encoding="utf-8")
     for stale in {f"{name}.csv" for name in _TABLES}.difference(texts):
         (out / stale).unlink(missing_ok=True)

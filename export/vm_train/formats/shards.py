@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 
 from ..data.picture_files import PARTS, PictureFiles
 
@@ -38,7 +38,7 @@ def write_shards(pictures: Sequence[PictureFiles], out: Path, per_shard: int, re
         shard = out / f"pictures-{position:06d}.tar"
         if not shard.exists():
             with (
-                written_beside(shard) as part,
+                atomic_write(shard) as part,
                 tarfile.open(part, "w", format=tarfile.PAX_FORMAT, encoding="utf-8") as tar,
             ):
                 for picture in pictures[start : start + per_shard]:
@@ -74,5 +74,5 @@ def _prepare(out: Path, pictures: Sequence[PictureFiles], per_shard: int) -> Non
         raise InputError(f"can't use folder {out}: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is damaged: write to another folder") from error
-    with written_beside(path) as part:
+    with atomic_write(path) as part:
         part.write_text(json.dumps(plan, indent=1) + "\n", encoding="utf-8")

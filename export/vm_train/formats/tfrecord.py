@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vm_embedded.errors import InputError, one_line
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 
 from .crc32c import masked_crc32c
 from .tfexample import Example, parse_example
@@ -91,7 +91,7 @@ def read_records(path: Path) -> Iterator[Record]:
 
 def write_records(path: Path, payloads: Iterable[bytes], compressed: bool = False) -> None:
     """Write a TFRecord file, plain or gzip, that takes its place once it is whole. Raises InputError if it can't."""
-    with written_beside(path) as part, part.open("wb") as file:
+    with atomic_write(path) as part, part.open("wb") as file:
         # Without time and name, so that the same records make the same file. Pictures are compressed already.
         packed = gzip.GzipFile("", "wb", compresslevel=1, fileobj=file, mtime=0) if compressed else nullcontext(file)
         with packed as stream:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.errors import InputError, VisualMeshError, unknown
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 
 from ..data.picture_files import IMAGES
 from .picture_example import KEYS, SUFFIXES, ExamplePicture, WrongUnitError, picture_of
@@ -146,5 +146,5 @@ def _is_done(out: Path, number: int) -> bool:
 
 
 def _write(path: Path, data: bytes) -> None:
-    with written_beside(path) as part:
+    with atomic_write(path) as part:
         part.write_bytes(data)

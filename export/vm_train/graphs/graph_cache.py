@@ -19,7 +19,7 @@ from urllib.parse import quote
 import numpy as np
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 
@@ -98,7 +98,7 @@ class GraphCache:
                 graph.labels,
             )
             # Opened with x: where two processes put the same view, neither writes into the other's file.
-            with written_beside(self._path(files, number)) as part, part.open("xb") as file:
+            with atomic_write(self._path(files, number)) as part, part.open("xb") as file:
                 for each in (header, *(array.tobytes() for array in parts)):
                     file.write(each)
         except (OSError, InputError):

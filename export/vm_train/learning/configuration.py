@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,13 +58,13 @@ class ClassTable:
             colors[name], kinds[name] = tuple(_color(name, each) for each in _listed(name, entry)), entry["kind"]
         return cls(colors, kinds)
 
-    def documented(self) -> Iterator[str]:
-        """The section's lines."""
-        yield "[classes]"
-        yield f"# each class: its kind, of {', '.join(KINDS)}, and its RGB colors in masks"
+    def to_commented_toml(self) -> str:
+        """The section as TOML with a comment."""
+        lines = ["[classes]", f"# each class: its kind, one of {', '.join(KINDS)}, and its RGB colors in masks"]
         for name, colors in self.colors.items():
             shown = ", ".join(str(list(each)) for each in colors)
-            yield f'{name} = {{ kind = "{self.kinds[name]}", colors = [{shown}] }}'
+            lines.append(f'{name} = {{ kind = "{self.kinds[name]}", colors = [{shown}] }}')
+        return "\n".join(lines)
 
     def mask_classes(self) -> Classes:
         """The classes as masks show them. Raises InputError for shared colors, or fewer than two classes."""
@@ -174,7 +174,7 @@ class TrainConfiguration:
     data: DataSettings = dataclasses.field(default_factory=DataSettings)
     classes: ClassTable = dataclasses.field(
         default_factory=ClassTable.default,
-        metadata={"read": ClassTable.from_table, "documented": ClassTable.documented},
+        metadata={"read": ClassTable.from_table, "to_commented_toml": ClassTable.to_commented_toml},
     )
     mesh: MeshSettings = dataclasses.field(default_factory=MeshSettings)
     network: NetworkSettings = dataclasses.field(default_factory=NetworkSettings)

@@ -11,7 +11,7 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
-from vm_embedded.files import check_writable, written_beside
+from vm_embedded.files import atomic_write, check_writable
 from vm_export.network import Network
 
 from ..graphs.loading import load_batches
@@ -88,5 +88,5 @@ def plot_rates(found: RateSearch, path: Path) -> None:
     axes.set_ylabel("loss, moving average")
     axes.set_ylim(top=min(found.losses.max(), 1.5 * found.losses[0]))
     axes.spines[["top", "right"]].set_visible(False)
-    with written_beside(path) as part:
+    with atomic_write(path) as part:
         figure.savefig(part, dpi=110, format=path.suffix[1:].lower())

@@ -21,9 +21,10 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded import __version__
-from vm_embedded.config.sections import documented, read_sections
+from vm_embedded.config.sections import read_sections
+from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 
 from ..data.decoded_cache import DecodedCache
 from ..data.picture_files import PictureFiles
@@ -97,9 +98,9 @@ class TrainingRun:
         save(folder / "pictures.json", split)
         for name, path in (("first.pt", first), ("teacher.pt", teacher)):
             if path is not None:
-                with written_beside(folder / name) as part:
+                with atomic_write(folder / name) as part:
                     part.write_bytes(path.read_bytes())
-        _write(folder / "train.toml", "\n".join(documented(configuration)))
+        _write(folder / "train.toml", to_commented_toml(configuration))
         content = {
             "format": _FORMAT,
             "version": __version__,
@@ -297,5 +298,5 @@ def _named(unpacked: Path, folder: Path) -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    with written_beside(path) as part:
+    with atomic_write(path) as part:
         part.write_text(text, encoding="utf-8")

@@ -22,7 +22,7 @@ from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from vm_embedded.arrays import Floats, Singles
 from vm_embedded.errors import InputError, one_line
-from vm_embedded.files import written_beside
+from vm_embedded.files import atomic_write
 from vm_export.network import Network
 
 from ..graphs.labeled_graph import LabeledGraph, join_graphs
@@ -171,7 +171,7 @@ class Trainer:
         }
         content = io.BytesIO()  # on a full disk torch would fail in its own way
         torch.save(state, content)
-        with written_beside(path) as part:
+        with atomic_write(path) as part:
             part.write_bytes(content.getbuffer())
 
     def load(self, state: Mapping[str, Any]) -> None:

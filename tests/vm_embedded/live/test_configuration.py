@@ -6,10 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vm_embedded.config.units import parse_angle, parse_length
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
-from vm_embedded.live.configuration import Configuration, angle, length, read_configuration
+from vm_embedded.live.configuration import Configuration, read_configuration
 from vm_embedded.network.bundled import DEFAULT, model_path
 
 FULL = """\
@@ -135,10 +136,10 @@ WRONG = {
     "orientation that is no table": ("orientation = 0.8\n", r"\[orientation\], not 0\.8"),
     "detector that is no table": ('detector = "fast"\n', r"\[detector\], not 'fast'"),
     "list of tables": ("[[detector]]\nthreads = 1\n", r"\[detector\]"),
-    "height in words": ("[orientation]\nheight = 'tall'\n", "'tall' is not a number of metres"),
-    "infinite height": ("[orientation]\nheight = inf\n", "not a number of metres"),
-    "height of many digits": (f"[orientation]\nheight = {'9' * 400}\n", "not a number of metres"),
-    "true height": ("[orientation]\nheight = true\n", "True is not a number of metres"),
+    "height in words": ("[orientation]\nheight = 'tall'\n", "'tall' is not a number of meters"),
+    "infinite height": ("[orientation]\nheight = inf\n", "not a number of meters"),
+    "height of many digits": (f"[orientation]\nheight = {'9' * 400}\n", "not a number of meters"),
+    "true height": ("[orientation]\nheight = true\n", "True is not a number of meters"),
     "pitch in words": ("[orientation]\npitch = 'down'\n", "'down' is not an angle.*20deg"),
     "pitch that is NaN": ("[orientation]\npitch = nan\n", "not an angle"),
     "threads out of range": ("[detector]\nthreads = 0\n", "threads .*from 1 to 256.*not 0"),
@@ -180,19 +181,19 @@ def test_a_binary_file_is_refused(tmp_path):
 
 @given(st.floats(-1e6, 1e6), st.sampled_from(["{}deg", "{} deg", " {}deg ", "{}  deg"]))
 def test_an_angle_in_degrees_is_made_radians(degrees, form):
-    assert angle(form.format(degrees)) == math.radians(degrees)
+    assert parse_angle(form.format(degrees)) == math.radians(degrees)
 
 
 @given(st.floats(-6.28, 6.28))
 def test_an_angle_without_a_unit_is_in_radians(radians):
-    assert angle(radians) == radians
-    assert angle(repr(radians)) == radians
+    assert parse_angle(radians) == radians
+    assert parse_angle(repr(radians)) == radians
 
 
 @given(st.floats(6.29, 1000.0), st.sampled_from([1, -1]))
 def test_more_than_a_turn_of_radians_was_meant_in_degrees(number, sign):
     with pytest.raises(InputError, match="deg"):
-        angle(sign * number)
+        parse_angle(sign * number)
 
 
 @pytest.mark.parametrize(
@@ -201,13 +202,13 @@ def test_more_than_a_turn_of_radians_was_meant_in_degrees(number, sign):
 )
 def test_what_is_no_angle_is_refused_by_value(value):
     with pytest.raises(InputError, match=re.escape(repr(value))):
-        angle(value)
+        parse_angle(value)
 
 
 @given(st.floats(-1e6, 1e6))
 def test_a_length_is_a_number_or_its_text(metres):
-    assert length(metres) == metres
-    assert length(repr(metres)) == metres
+    assert parse_length(metres) == metres
+    assert parse_length(repr(metres)) == metres
 
 
 @pytest.mark.parametrize(
@@ -215,7 +216,7 @@ def test_a_length_is_a_number_or_its_text(metres):
 )
 def test_what_is_no_length_is_refused_by_value(value):
     with pytest.raises(InputError, match=re.escape(repr(value)[:20])):
-        length(value)
+        parse_length(value)
 
 
 KEY = "ssh-ed25519 AAAAC3NzaC1lZDI1NTE5AAAAIHUIVGyk+Y3q5gJGRmdb2XkJYJEv1vZ3l5Y5sQ4c1a9k"

@@ -8,7 +8,7 @@ import pytest
 
 from tests.vm_embedded.live.running import COMMAND
 from tests.vm_embedded.live.test_faults import resident
-from vm_embedded.config.sections import documented
+from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.detection.detector import Detector
 from vm_embedded.errors import VisualMeshError
 from vm_embedded.live.configuration import Configuration, read_configuration
@@ -49,7 +49,9 @@ def refused(work):
 def test_ten_thousand_damaged_configurations_are_read_or_refused_in_a_line(tmp_path):
     chance = random.Random(1)
     path = tmp_path / "vm.toml"
-    whole = "\n".join(line for line in documented(Configuration()) if not line.startswith("#")).encode()
+    whole = "\n".join(
+        line for line in to_commented_toml(Configuration()).splitlines() if not line.startswith("#")
+    ).encode()
     outcomes = []
     for at in range(10000):
         path.write_bytes(damaged(chance, whole, 3))

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError, InputError, VisualMeshError
 from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA, Orientation
-from vm_embedded.poses.buffer import Poses, PoseSettings, StalePoseError, between
-from vm_embedded.poses.parsing import LONGEST, read_pose_line
+from vm_embedded.poses.buffer import PoseBuffer, PoseSettings, StalePoseError, interpolate
+from vm_embedded.poses.parsing import MAX_LINE_BYTES, parse_pose_line
 
 ANGLES = st.floats(-math.pi, math.pi)
 ORIENTATIONS = st.builds(
@@ -46,7 +46,7 @@ def test_the_way_between_two_orientations_is_straight_and_even(one, other, share
     whole = turn_between(one, other)
     if whole > 3.0:
         return  # the other way round is as short
-    found = between(one, other, share)
+    found = interpolate(one, other, share)
     assert turn_between(one, found) == pytest.approx(share * whole, abs=2e-5)
     assert turn_between(found, other) == pytest.approx((1.0 - share) * whole, abs=2e-5)
     assert found.height == pytest.approx(one.height + share * (other.height - one.height))
@@ -54,7 +54,7 @@ def test_the_way_between_two_orientations_is_straight_and_even(one, other, share
 
 @given(st.floats(-10.0, 10.0), st.floats(0.05, 0.95))
 def test_a_steady_turn_is_met_at_every_moment(rate, moment):
-    poses = Poses(PoseSettings(max_age_ms=200.0, extrapolate_ms=50.0))
+    poses = PoseBuffer(PoseSettings(max_age_ms=200.0, extrapolate_ms=50.0))
     for at in np.linspace(0.0, 0.9, 10).tolist():
         poses.add(at, Orientation.from_roll_pitch(0.6, 0.0, 0.3, rate * at))
     expected = Orientation.from_roll_pitch(0.6, 0.0, 0.3, rate * moment)
@@ -62,7 +62,7 @@ def test_a_steady_turn_is_met_at_every_moment(rate, moment):
 
 
 def test_motion_goes_on_for_as_long_as_it_may_and_then_stands():
-    poses = Poses(PoseSettings(extrapolate_ms=10.0, max_age_ms=100.0))
+    poses = PoseBuffer(PoseSettings(extrapolate_ms=10.0, max_age_ms=100.0))
     for at in (1.0, 1.02):
         poses.add(at, Orientation.from_roll_pitch(0.6, 0.0, at))
     assert poses.at(1.025).pitch == pytest.approx(1.025)
@@ -73,14 +73,14 @@ def test_motion_goes_on_for_as_long_as_it_may_and_then_stands():
 
 
 def test_without_interpolation_the_newest_pose_counts():
-    poses = Poses(PoseSettings(interpolate=False))
+    poses = PoseBuffer(PoseSettings(interpolate=False))
     for at in (1.0, 1.02):
         poses.add(at, Orientation.from_roll_pitch(0.6, 0.0, at))
     assert poses.at(1.01).pitch == pytest.approx(1.02)
 
 
 def test_there_is_no_pose_before_the_first_and_none_long_before_it():
-    poses = Poses(PoseSettings())
+    poses = PoseBuffer(PoseSettings())
     with pytest.raises(StalePoseError, match="no pose"):
         poses.at(1.0)
     for at in (5.0, 5.01):
@@ -98,7 +98,7 @@ JUMPS = {
 
 @pytest.mark.parametrize("jump", JUMPS.values(), ids=JUMPS)
 def test_a_jump_is_refused_until_the_pose_before_it_is_stale(jump):
-    poses = Poses(PoseSettings(max_age_ms=100.0))
+    poses = PoseBuffer(PoseSettings(max_age_ms=100.0))
     poses.add(1.0, Orientation.from_roll_pitch(0.6))
     for at in (1.01, 1.02, 1.03):
         with pytest.raises(GeometryError, match=r"in .* ms, faster than"):
@@ -110,14 +110,14 @@ def test_a_jump_is_refused_until_the_pose_before_it_is_stale(jump):
 
 @given(st.floats(-math.pi, math.pi))
 def test_a_turn_around_the_vertical_is_no_jump(yaw):
-    poses = Poses(PoseSettings())
+    poses = PoseBuffer(PoseSettings())
     poses.add(1.0, Orientation.from_roll_pitch(0.6, 0.0, 0.3))
     poses.add(1.01, Orientation.from_roll_pitch(0.6, 0.0, 0.3, yaw))
     assert len(poses) == 2
 
 
 def test_times_only_go_on_unless_a_clock_was_set_back():
-    poses = Poses(PoseSettings())
+    poses = PoseBuffer(PoseSettings())
     poses.add(100.0, Orientation.from_roll_pitch(0.6))
     for at in (100.0, 99.9):
         with pytest.raises(GeometryError, match="not newer"):
@@ -127,7 +127,7 @@ def test_times_only_go_on_unless_a_clock_was_set_back():
 
 
 def test_only_the_last_seconds_are_kept():
-    poses = Poses(PoseSettings())
+    poses = PoseBuffer(PoseSettings())
     for at in range(2000):
         poses.add(0.01 * at, Orientation.from_roll_pitch(0.6))
     assert len(poses) <= 302
@@ -141,7 +141,7 @@ def test_a_line_says_what_it_was_made_from(orientation, at, optical):
     hoc = np.eye(4)
     hoc[:3, :3], hoc[2, 3] = turned.rotation, turned.height
     for pose in ({"height": turned.height, "quaternion": quaternion(turned)}, {"Hoc": hoc.tolist()}):
-        found = read_pose_line(json.dumps({"t": at, **pose}).encode(), optical)
+        found = parse_pose_line(json.dumps({"t": at, **pose}).encode(), optical)
         assert found.time == at
         assert found.orientation.height == orientation.height
         assert np.abs(found.orientation.rotation - orientation.rotation).max() < 1e-9
@@ -161,7 +161,7 @@ WRONG = {
     "half a matrix": (b'{"t": 1, "Hoc": [[1, 0, 0, 0]]}', "Hoc must be a list of 4"),
     "a mirror": (b'{"Hoc": [[1,0,0,0],[0,1,0,0],[0,0,-1,1],[0,0,0,1]]}', "mirrors"),
     "both": (b'{"height": 1, "Hoc": []}', "not both"),
-    "long": (b" " * (LONGEST + 1), "more than"),
+    "long": (b" " * (MAX_LINE_BYTES + 1), "more than"),
     "deep": (b"[" * 4000, "pose"),
     "bytes": (bytes(range(128, 256)), "JSON"),
 }
@@ -170,7 +170,7 @@ WRONG = {
 @pytest.mark.parametrize(("line", "says"), WRONG.values(), ids=WRONG)
 def test_what_is_wrong_with_a_line_is_said(line, says):
     with pytest.raises(InputError, match=says):
-        read_pose_line(line)
+        parse_pose_line(line)
 
 
 VALUES = st.recursive(
@@ -197,10 +197,10 @@ LINES = (
 @settings(max_examples=2000)
 @given(st.lists(LINES, min_size=5, max_size=5))
 def test_ten_thousand_lines_of_anything_are_read_or_refused(lines):
-    poses, refusals = Poses(PoseSettings()), []
+    poses, refusals = PoseBuffer(PoseSettings()), []
     for line in lines:
         try:
-            poses.add(time.monotonic(), read_pose_line(line).orientation)
+            poses.add(time.monotonic(), parse_pose_line(line).orientation)
         except VisualMeshError as error:
             refusals.append(str(error))
     assert len(poses) + len(refusals) == len(lines)

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 import vm_synth
 from vm_embedded.config.entries import check_entries, number, one_of, share
-from vm_embedded.config.sections import documented, read_sections
+from vm_embedded.config.sections import read_sections
+from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_synth.bodies.solids import LABELS
 from vm_synth.ranges import drawn, log_uniform, some_of, uniform
@@ -98,7 +99,7 @@ def configurations(draw):
 
 
 def test_the_documented_defaults_are_read_as_the_defaults(write):
-    assert read_sections(SceneConfiguration, write("\n".join(documented(DEFAULT)))) == DEFAULT
+    assert read_sections(SceneConfiguration, write(to_commented_toml(DEFAULT))) == DEFAULT
     assert read_sections(SceneConfiguration, None) == DEFAULT
     assert read_sections(SceneConfiguration, write("")) == DEFAULT
 
@@ -107,11 +108,11 @@ def test_the_documented_defaults_are_read_as_the_defaults(write):
 @settings(max_examples=30)
 def test_a_documented_configuration_is_read_as_it_was(write, configuration):
     """To the last digit, whatever the maps are called."""
-    assert read_sections(SceneConfiguration, write("\n".join(documented(configuration)))) == configuration
+    assert read_sections(SceneConfiguration, write(to_commented_toml(configuration))) == configuration
 
 
 def test_every_entry_is_documented_by_a_line_of_its_own():
-    lines = list(documented(DEFAULT))
+    lines = to_commented_toml(DEFAULT).split("\n")
     for section in fields(DEFAULT):
         after = lines[lines.index(f"[{section.name}]") + 1 :]
         own = after[: after.index("")]
@@ -144,10 +145,10 @@ def test_lengths_and_angles_have_a_unit():
 
 
 def test_the_unit_and_the_limits_are_documented():
-    lines = list(documented(DEFAULT))
+    lines = to_commented_toml(DEFAULT).split("\n")
     assert lines[lines.index("height = [0.3, 1.6]") - 1] == "# height over the plane [m]; 0.05 to 20"
     assert lines[lines.index("missing = 0.1") - 1] == "# pictures without a ball; 0 to 1"
-    assert lines[lines.index('off_plane_label = "environment"') - 1].endswith(f"; of {', '.join(CLASSES)}")
+    assert lines[lines.index('off_plane_label = "environment"') - 1].endswith(f"; allowed: {', '.join(CLASSES)}")
 
 
 @pytest.mark.parametrize(("section", "entry"), RANGES + NUMBERS)

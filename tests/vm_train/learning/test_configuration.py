@@ -2,7 +2,8 @@
 
 import pytest
 
-from vm_embedded.config.sections import documented, overrides_of, read_sections
+from vm_embedded.config.sections import parse_overrides, read_sections
+from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_train.learning.configuration import TrainConfiguration
 from vm_train.learning.recipe import Recipe
@@ -21,7 +22,7 @@ def write(tmp_path):
 
 
 def test_the_documented_defaults_are_read_as_the_defaults(write):
-    assert read_sections(TrainConfiguration, write("\n".join(documented(DEFAULT)))) == DEFAULT
+    assert read_sections(TrainConfiguration, write(to_commented_toml(DEFAULT))) == DEFAULT
     assert read_sections(TrainConfiguration, None) == DEFAULT
 
 
@@ -34,7 +35,7 @@ def test_classes_come_in_their_order_with_their_colors(write):
     assert [(each.name, each.kind) for each in found.manifest.classes] == [("field", "area"), ("ball", "object")]
     assert found.classes.mask_classes().colors["field"] == ((0, 255, 0), (9, 9, 9))
     assert found.network_shape.classes == 2
-    assert read_sections(TrainConfiguration, write("\n".join(documented(found)))) == found
+    assert read_sections(TrainConfiguration, write(to_commented_toml(found))) == found
 
 
 @pytest.mark.parametrize(
@@ -65,7 +66,7 @@ def test_what_is_wrong_is_said(write, text, said):
 
 def test_entries_can_be_overridden(write):
     path = write("[training]\nepochs = 3\nbatch = 2\n")
-    given = overrides_of(["training.epochs=7", "training.selection=balanced", "mesh.radius = 0.1"], "a.b=c")
+    given = parse_overrides(["training.epochs=7", "training.selection=balanced", "mesh.radius = 0.1"], "a.b=c")
     found = read_sections(TrainConfiguration, path, given)
     assert (found.training.epochs, found.training.batch) == (7, 2)
     assert (found.training.selection, found.mesh.radius) == ("balanced", 0.1)
@@ -74,7 +75,7 @@ def test_entries_can_be_overridden(write):
 @pytest.mark.parametrize("text", ["epochs=7", "training.epochs", "training.=7", "=7"])
 def test_an_override_that_is_none_is_refused(text):
     with pytest.raises(InputError, match=r"training\.epochs=5"):
-        overrides_of([text], "training.epochs=5")
+        parse_overrides([text], "training.epochs=5")
 
 
 def test_only_hard_selection_has_rounds():

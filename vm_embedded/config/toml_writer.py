@@ -1,0 +1,49 @@
+"""Writing a configuration as TOML text with a comment for every entry."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import Field, fields
+from typing import Any
+
+
+def to_commented_toml(configuration: Any) -> str:
+    """A TOML file with every entry of a configuration, its meaning, unit and limits; `read_sections` reads it back."""
+    blocks = []
+    for each in fields(configuration):
+        value = getattr(configuration, each.name)
+        if "read" in each.metadata:
+            blocks.append(each.metadata["to_commented_toml"](value))
+        else:
+            entries = [_commented_entry(entry, getattr(value, entry.name)) for entry in fields(value)]
+            blocks.append("\n".join([f"[{each.name}]", *entries]))
+    return "\n\n".join(blocks) + "\n"
+
+
+def _commented_entry(entry: Field[Any], value: Any) -> str:
+    unit = f" [{entry.metadata['unit']}]" if entry.metadata.get("unit") else ""
+    comment = f"# {entry.metadata['help']}{unit}{_limits(entry)}"
+    return f"{comment}\n" + (f"# {entry.name} =" if value is None else f"{entry.name} = {_toml(value)}")
+
+
+def _limits(entry: Field[Any]) -> str:
+    if "allowed" in entry.metadata:
+        return f"; allowed: {', '.join(entry.metadata['allowed'])}"
+    low, high = entry.metadata.get("limits", (None, None))
+    if low is None:
+        return ""
+    return f"; {low:g} to {high:g}" if high != float("inf") else f"; at least {low:g}"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, Mapping):
+        pairs = ", ".join(f"{_toml(name)} = {_toml(each)}" for name, each in value.items())
+        return f"{{ {pairs} }}" if pairs else "{}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml(each) for each in value) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return short if float(short := f"{value:g}") == value else repr(value)
