@@ -18,7 +18,7 @@ ROOMS = {
     " > sockets+files+errors+arrays",
     "vm_workstation": "",
     "vm_export": "",
-    "vm_synth": "__main__ > cli > dataset > render > scene > balls, bodies > ranges",
+    "vm_synth": "__main__ > cli > dataset > render > scene > balls, bodies",
     "vm_mesh": "",
     "vm_train": "__main__ > cli > evaluation > learning > graphs > formats > data, scores",
 }

@@ -9,16 +9,16 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import cv2
-
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.files import atomic_write, check_writable
+from vm_workstation.contact_sheet import check_sheet_path, choose_indices, write_sheet
+from vm_workstation.option_types import at_least
 from vm_workstation.stopping import stoppable
 
-from .dataset.contact_sheet import cell, chosen, read_shown, sheet
+from .dataset.contact_sheet import cell, read_shown, sheet
 from .dataset.files import Plan, digest, indices_in, is_done, shard_of
 from .dataset.inspection import indices_of, inspect
 from .dataset.plots import load_matplotlib, plot
@@ -52,9 +52,9 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     made.add_argument("out", type=Path, metavar="OUT", help="folder to write to; made if it is not there")
-    made.add_argument("--count", type=_whole, required=True, metavar="N", help="pictures in the whole set")
+    made.add_argument("--count", type=at_least(0), required=True, metavar="N", help="pictures in the whole set")
     made.add_argument("--hdri", type=Path, required=True, metavar="DIR", help="folder of maps (.hdr, .exr, .pfm)")
-    made.add_argument("--seed", type=_whole, default=0, metavar="S", help="same seed, same pictures; default 0")
+    made.add_argument("--seed", type=at_least(0), default=0, metavar="S", help="same seed, same pictures; default 0")
     made.add_argument("--config", type=Path, metavar="FILE", help="scene.toml; what it leaves out keeps its default")
     made.add_argument(
         "--set",
@@ -63,7 +63,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="SECTION.ENTRY=VALUE",
         help=f"override an entry of the configuration, as in --set {_EXAMPLE}; give it once for each",
     )
-    made.add_argument("--workers", type=_whole, metavar="W", help="processes, of one core each; default all cores")
+    made.add_argument("--workers", type=at_least(0), metavar="W", help="processes, of one core each; default all cores")
     made.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="render only part I of N, 1 to N")
     made.add_argument("--held-out", action="store_true", help="render only the maps that are held out for testing")
     return made
@@ -78,12 +78,14 @@ def preview_parser() -> argparse.ArgumentParser:
         "Small balls are shown magnified too. A set that is still being rendered can be looked at.",
     )
     made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
-    made.add_argument("--count", type=_positive, default=24, metavar="N", help="pictures to show; default 24")
-    made.add_argument("--columns", type=_positive, default=6, metavar="N", help="pictures in a row; default 6")
-    made.add_argument("--width", type=_positive, default=320, metavar="PX", help="width of each picture; default 320")
+    made.add_argument("--count", type=at_least(1), default=24, metavar="N", help="pictures to show; default 24")
+    made.add_argument("--columns", type=at_least(1), default=6, metavar="N", help="pictures in a row; default 6")
+    made.add_argument("--width", type=at_least(1), default=320, metavar="PX", help="width of each picture; default 320")
     which = made.add_mutually_exclusive_group()
-    which.add_argument("--first", type=_whole, metavar="I", help="show number I and those after it; default all over")
-    which.add_argument("--seed", type=_whole, metavar="S", help="choose by chance; same seed, same choice")
+    which.add_argument(
+        "--first", type=at_least(0), metavar="I", help="show number I and those after it; default all over"
+    )
+    which.add_argument("--seed", type=at_least(0), metavar="S", help="choose by chance; same seed, same choice")
     made.add_argument("--output", type=Path, metavar="FILE", help="a .jpg or .png; default OUT/preview.jpg")
     return made
 
@@ -97,7 +99,7 @@ def check_parser() -> argparse.ArgumentParser:
     )
     made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
     made.add_argument("--quick", action="store_true", help="read only lenses and truth, no images and masks")
-    made.add_argument("--shards", type=_positive, default=1, metavar="N", help="count each of N shards by itself")
+    made.add_argument("--shards", type=at_least(1), default=1, metavar="N", help="count each of N shards by itself")
     made.add_argument("--plots", type=Path, metavar="FILE", help="histograms; .png, .svg or .pdf; needs matplotlib")
     made.add_argument("--json", type=Path, metavar="FILE", help="all findings, and the numbers of each picture")
     return made
@@ -114,18 +116,6 @@ def config_parser() -> argparse.ArgumentParser:
 def parsers() -> dict[str, argparse.ArgumentParser]:
     """All parsers, by what is typed."""
     return {each.prog: each for each in (parser(), preview_parser(), check_parser(), config_parser())}
-
-
-def _positive(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of at least 1")
-    return int(text)
-
-
-def _whole(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
-    return int(text)
 
 
 def _shard(text: str) -> tuple[int, int]:
@@ -215,14 +205,13 @@ def _good_maps(paths: Sequence[Path], configuration: SceneConfiguration) -> list
 
 def _preview(options: argparse.Namespace) -> int:
     output = options.out / "preview.jpg" if options.output is None else options.output
-    if output.suffix.lower() not in (".jpg", ".jpeg", ".png"):
-        raise InputError(f"can't write {output}: a sheet is a .jpg or a .png")
+    check_sheet_path(output)
     if not options.out.is_dir():
         raise InputError(f"there is no folder {options.out}")
     check_writable(output)
     there = indices_in(options.out)
     cells = []
-    for index in chosen(there, options.count, options.first, options.seed):
+    for index in choose_indices(there, options.count, options.first, options.seed):
         try:
             cells.append(cell(read_shown(options.out, index), options.width))
         except InputError as error:
@@ -231,8 +220,7 @@ def _preview(options: argparse.Namespace) -> int:
         after = "" if options.first is None else f" from number {options.first} on"
         raise InputError(f"{options.out} has no pictures that can be shown{after}")
     made = sheet(cells, options.columns, f"{options.out.resolve().name}: {len(cells)} of {len(there)} pictures")
-    with atomic_write(output) as part:
-        part.write_bytes(cv2.imencode(output.suffix.lower(), made)[1].tobytes())
+    write_sheet(output, made)
     print(f"{output}: {len(cells)} pictures")
     return EXIT_OK
 

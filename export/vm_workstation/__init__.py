@@ -1,1 +1,1 @@
-"""What the programs of the workstation share: stopping, worker processes and plots."""
+"""Shared by the programs that run on a workstation: arguments, ranges, worker processes, tables, plots and pictures."""

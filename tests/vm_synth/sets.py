@@ -4,12 +4,12 @@ import cv2
 import numpy as np
 
 from vm_synth.dataset.files import Plan, write_picture
-from vm_synth.render.outlines import outline
 from vm_synth.render.picture import UNLABELED, Picture
 from vm_synth.scene.camera import CameraRanges
 from vm_synth.scene.configuration import CLASSES, GroundRanges, SceneConfiguration, TargetRanges, ThingRanges
 from vm_synth.scene.draw_scene import draw_scene
 from vm_synth.scene.environment import Environment
+from vm_workstation.sphere_outline import sphere_outline
 
 SIZE = (96, 64)
 
@@ -37,7 +37,7 @@ def picture_of(scene):
     classes[:, 0] = UNLABELED
     coverage = np.zeros((height, width), dtype=np.float32)
     if scene.ball is not None:
-        pixels = outline(scene.lens, scene.orientation, scene.ball.center, scene.ball.radius, scene.size)
+        pixels = sphere_outline(scene.lens, scene.orientation, scene.ball.center, scene.ball.radius, scene.size)
         if np.isfinite(pixels).all():
             area = np.zeros((height, width), dtype=np.uint8)
             cv2.fillPoly(area, [np.rint(np.clip(pixels, -999, 999) * 16).astype(np.int32)], 1, shift=4)

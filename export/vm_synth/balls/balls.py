@@ -9,8 +9,8 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Singles
 from vm_embedded.config.entries import check_entries, share
+from vm_workstation.ranges import range_of, some_of, uniform
 
-from ..ranges import drawn, some_of, uniform
 from .design import BallDesign, Color
 from .painting_sphere import Sphere, directions_of, unit
 from .patterns import KINDS
@@ -43,10 +43,10 @@ class BallRanges:
     bright: float = share(0.06, "over-exposed designs: all albedo near 1, hardly any contrast")
     marked: float = share(0.4, "designs with small printed marks over the pattern")
     worn: float = share(0.45, "designs with wear")
-    wear: tuple[float, float] = drawn(
+    wear: tuple[float, float] = range_of(
         0.05, 0.9, "wear of the worn designs: dirt, scratches, lost ink", limits=(0.0, 1.0)
     )
-    roughness: tuple[float, float] = drawn(0.08, 0.9, "roughness of the surface", limits=(0.05, 1.0))
+    roughness: tuple[float, float] = range_of(0.08, 0.9, "roughness of the surface", limits=(0.05, 1.0))
 
     def __post_init__(self) -> None:
         check_entries(self)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vm_embedded.config.entries import check_entries, share
+from vm_workstation.ranges import log_uniform, range_of, some_of, uniform
 
-from ..ranges import drawn, log_uniform, some_of, uniform
 from .carrier import CARRIERS, carriers, own_body
 from .clutter import CLUTTER, FURNITURE, pedestal
 from .distractors import DISTRACTORS, distractor_ball
@@ -60,16 +60,16 @@ KINDS: dict[str, Draw] = {**CLUTTER, "shoes": shoes, **FURNITURE, **DISTRACTORS,
 class BodyRanges:
     """Section `[bodies]`: sizes and kinds of what stands on and around the field."""
 
-    clutter_size: tuple[float, float] = drawn(0.05, 0.5, "longest side of small things", "m", (0.01, 5.0))
+    clutter_size: tuple[float, float] = range_of(0.05, 0.5, "longest side of small things", "m", (0.01, 5.0))
     clutter_kinds: tuple[str, ...] = some_of((*CLUTTER, "shoes"), "small things to draw")
-    shoe_length: tuple[float, float] = drawn(0.2, 0.33, "length of a shoe", "m", (0.1, 0.5))
-    furniture_size: tuple[float, float] = drawn(0.6, 2.5, "longest side of large things", "m", (0.1, 20.0))
+    shoe_length: tuple[float, float] = range_of(0.2, 0.33, "length of a shoe", "m", (0.1, 0.5))
+    furniture_size: tuple[float, float] = range_of(0.6, 2.5, "longest side of large things", "m", (0.1, 20.0))
     furniture_kinds: tuple[str, ...] = some_of(tuple(FURNITURE), "large things to draw")
-    robot_height: tuple[float, float] = drawn(0.4, 1.6, "height of robots", "m", (0.1, 3.0))
+    robot_height: tuple[float, float] = range_of(0.4, 1.6, "height of robots", "m", (0.1, 3.0))
     robot_kinds: tuple[str, ...] = some_of(tuple(ROBOTS), "robots to draw; a nao is always 0.58 m tall")
-    person_height: tuple[float, float] = drawn(1.5, 1.95, "height of people", "m", (0.5, 2.5))
+    person_height: tuple[float, float] = range_of(1.5, 1.95, "height of people", "m", (0.5, 2.5))
     legs_share: float = share(0.7, "share of people of whom only the legs are drawn")
-    distractor_radius: tuple[float, float] = drawn(
+    distractor_radius: tuple[float, float] = range_of(
         0.02, 0.25, "radius of round things that are not the ball", "m", (0.005, 2.0)
     )
     distractor_kinds: tuple[str, ...] = some_of(tuple(DISTRACTORS), "round things that are not the ball")

@@ -15,8 +15,19 @@ from vm_embedded.arrays import Floats, Image
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.errors import InputError, VisualMeshError, one_line
 from vm_embedded.geometry.lens_files import read_lens_file
+from vm_workstation.contact_sheet import (
+    FAINT_INK,
+    GAP,
+    INK,
+    LINE,
+    PAPER,
+    check_sheet_size,
+    draw_legend,
+    scaled_pixels,
+    write_text,
+)
+from vm_workstation.sphere_outline import sphere_outline
 
-from ..render.outlines import outline
 from .files import COLORS, file_of, read_truth
 
 OUTLINE = (255, 0, 255)
@@ -25,9 +36,6 @@ OUTLINE = (255, 0, 255)
 _TINT, _CONTOUR = 0.16, 0.8  # how much of a class's color its area and its rim get
 _SMALL = 1.0 / 20.0  # balls of a smaller radius, in widths of the tile, are shown magnified too
 _INSET = 0.3  # widths of the tile
-_GAP, _LINE = 6, 16  # [px] between cells, and of a line of text
-_PAPER, _INK, _FAINT = (32, 32, 32), (235, 235, 235), (160, 160, 160)
-_LARGEST = 65500  # [px] that a JPEG can have
 
 
 @dataclass(frozen=True)
@@ -59,7 +67,7 @@ def read_shown(folder: Path, index: int) -> Shown:
         found = None
         if ball is not None:
             center, radius = np.array(ball["center"], dtype=np.float64), float(ball["radius"])
-            found = outline(lens.lens.for_image(size), lens.orientation, center, radius, size)
+            found = sphere_outline(lens.lens.for_image(size), lens.orientation, center, radius, size)
         shown = Shown(index, image, mask, truth, found)
         captions(shown)
     except VisualMeshError:
@@ -67,16 +75,6 @@ def read_shown(folder: Path, index: int) -> Shown:
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"{file_of(folder, 'scene', index)} is damaged: {one_line(error)}") from error
     return shown
-
-
-def chosen(indices: Sequence[int], count: int, first: int | None = None, seed: int | None = None) -> list[int]:
-    """At most `count` of the sorted indices: those from `first` on, or by chance with a seed, else evenly spaced."""
-    if first is not None:
-        return [index for index in indices if index >= first][:count]
-    count = min(count, len(indices))
-    if seed is not None:
-        return sorted(int(each) for each in np.random.default_rng(seed).choice(indices, count, replace=False))
-    return [indices[round(place)] for place in np.linspace(0, len(indices) - 1, count)]
 
 
 def captions(shown: Shown) -> tuple[str, str]:
@@ -114,18 +112,13 @@ def cell(shown: Shown, width: int) -> Image:
     upper = cv2.resize(shown.image, size, interpolation=how)
     lower = np.asarray(cv2.resize(tinted(shown.image, shown.mask), size, interpolation=how), dtype=np.uint8)
     if shown.outline is not None:
-        _draw_outline(lower, placed(shown.outline, (0.0, 0.0), zoom))
+        _draw_outline(lower, scaled_pixels(shown.outline, (0.0, 0.0), zoom))
         _add_inset(lower, shown, zoom)
-    text = np.full((2 * _LINE + 4, width, 3), _PAPER, dtype=np.uint8)
-    for row, (line, color) in enumerate(zip(captions(shown), (_INK, _FAINT), strict=True)):
-        _write(text, line, (2, (row + 1) * _LINE - 3), color)
-    seam = np.full((1, width, 3), _PAPER, dtype=np.uint8)
+    text = np.full((2 * LINE + 4, width, 3), PAPER, dtype=np.uint8)
+    for row, (line, color) in enumerate(zip(captions(shown), (INK, FAINT_INK), strict=True)):
+        write_text(text, line, (2, (row + 1) * LINE - 3), color)
+    seam = np.full((1, width, 3), PAPER, dtype=np.uint8)
     return np.vstack([upper, seam, lower, text])
-
-
-def placed(pixels: Floats, corner: tuple[float, float], zoom: float) -> Floats:
-    """Pixels (n, 2) of a picture on its part that begins at the corner's outer edges [px], enlarged by a factor."""
-    return np.asarray((pixels + 0.5 - np.array(corner)) * zoom - 0.5)
 
 
 def _draw_outline(canvas: Image, pixels: Floats) -> None:
@@ -154,10 +147,10 @@ def _add_inset(canvas: Image, shown: Shown, zoom: float) -> None:
     shift = [0.5 * scale - 0.5 - corner[0] * scale, 0.5 * scale - 0.5 - corner[1] * scale]
     matrix = np.array([[scale, 0.0, shift[0]], [0.0, scale, shift[1]]])
     inset = np.asarray(
-        cv2.warpAffine(shown.image, matrix, (side, side), flags=cv2.INTER_NEAREST, borderValue=_PAPER), dtype=np.uint8
+        cv2.warpAffine(shown.image, matrix, (side, side), flags=cv2.INTER_NEAREST, borderValue=PAPER), dtype=np.uint8
     )
-    _draw_outline(inset, placed(shown.outline, corner, scale))
-    inset[[0, -1]] = inset[:, [0, -1]] = _INK
+    _draw_outline(inset, scaled_pixels(shown.outline, corner, scale))
+    inset[[0, -1]] = inset[:, [0, -1]] = INK
     left = 0 if middle[0] * zoom > width / 2.0 else width - side
     top = 0 if middle[1] * zoom > height / 2.0 else height - side
     canvas[top : top + side, left : left + side] = inset
@@ -168,29 +161,15 @@ def sheet(cells: Sequence[Image], columns: int, title: str) -> Image:
     height, width = cells[0].shape[:2]
     columns = min(columns, len(cells))
     rows = math.ceil(len(cells) / columns)
-    head = _LINE + 2 * _GAP
-    size = (head + rows * (height + _GAP), _GAP + columns * (width + _GAP))
-    if max(size) > _LARGEST:
-        raise InputError(f"a sheet of {size[1]} x {size[0]} px is too large: show fewer pictures or smaller ones")
-    canvas = np.full((*size, 3), _PAPER, dtype=np.uint8)
-    place = _GAP + _write(canvas, title, (_GAP, head - _GAP - 3), _INK) + 3 * _GAP
+    head = LINE + 2 * GAP
+    size = (head + rows * (height + GAP), GAP + columns * (width + GAP))
+    check_sheet_size(size[1], size[0])
+    canvas = np.full((*size, 3), PAPER, dtype=np.uint8)
+    place = GAP + write_text(canvas, title, (GAP, head - GAP - 3), INK) + 3 * GAP
     legend = {name: COLORS[name] for name in ("field", "line", "goal", "robot", "ball")}
-    for name, color in {**legend, "true outline of the ball": OUTLINE}.items():
-        cv2.rectangle(canvas, (place, head - _GAP - 12), (place + 9, head - _GAP - 3), color[::-1], -1)
-        place += 14 + _write(canvas, name, (place + 14, head - _GAP - 3), _FAINT) + 2 * _GAP
+    draw_legend(canvas, {**legend, "true outline of the ball": OUTLINE}, (place, head - GAP - 3))
     for number, each in enumerate(cells):
         row, column = divmod(number, columns)
-        top, left = head + row * (height + _GAP), _GAP + column * (width + _GAP)
+        top, left = head + row * (height + GAP), GAP + column * (width + GAP)
         canvas[top : top + height, left : left + width] = each
     return canvas
-
-
-def _write(canvas: Image, text: str, at: tuple[int, int], color: tuple[int, int, int]) -> int:
-    """Write text from a point at its lower left on, shortened to what fits, and return how wide it is [px]."""
-    font, size = cv2.FONT_HERSHEY_SIMPLEX, 0.4
-    room = canvas.shape[1] - at[0]
-    text = text.encode("ascii", "replace").decode()
-    while len(text) > 2 and cv2.getTextSize(text, font, size, 1)[0][0] > room:
-        text = text.removesuffix("..")[:-1] + ".."
-    cv2.putText(canvas, text, at, font, size, color, 1, cv2.LINE_AA)
-    return int(cv2.getTextSize(text, font, size, 1)[0][0])

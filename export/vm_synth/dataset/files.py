@@ -23,9 +23,9 @@ from vm_embedded.arrays import Image
 from vm_embedded.errors import InputError
 from vm_embedded.files import atomic_write
 from vm_embedded.geometry.lens_files import lens_text
+from vm_workstation.sphere_outline import polygon_area, sphere_outline
 
-from ..render.image_processing import developed, encoded
-from ..render.outlines import outline, polygon_area
+from ..render.image_processing import encode_jpeg, process_image
 from ..render.picture import UNLABELED, Picture
 from ..scene.configuration import CLASSES, SceneConfiguration
 from ..scene.scene import PlacedBall, Scene
@@ -142,9 +142,9 @@ def digest(path: Path) -> str:
 
 def write_picture(folder: Path, index: int, map_name: str, scene: Scene, picture: Picture) -> None:
     """Write all parts of a picture, each beside and renamed, the scene last. Raises InputError if it can't."""
-    image = developed(picture.radiance, scene.sensor)
+    image = process_image(picture.radiance, scene.sensor)
     contents = {
-        "image": encoded(image, scene.sensor),
+        "image": encode_jpeg(image, scene.sensor),
         "mask": _png(mask_colors(picture)),
         "coverage": _png(np.rint(picture.coverage * 255.0).astype(np.uint8)),
         "lens": lens_text(replace(scene.lens, size=None), scene.orientation).encode(),
@@ -198,7 +198,7 @@ def _placed(ball: PlacedBall) -> dict[str, Any]:
 
 
 def _ball_truth(scene: Scene, ball: PlacedBall, picture: Picture) -> dict[str, Any]:
-    pixels = outline(scene.lens, scene.orientation, ball.center, ball.radius, scene.size, unseen=True)
+    pixels = sphere_outline(scene.lens, scene.orientation, ball.center, ball.radius, scene.size, unseen=True)
     toward = (ball.center - scene.camera) @ scene.orientation.rotation
     center = scene.lens.project((toward / np.linalg.norm(toward))[None], scene.size)[0]
     area = polygon_area(pixels)

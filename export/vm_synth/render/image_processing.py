@@ -1,160 +1,43 @@
-"""From light to the JPEG of a robot's camera: exposure, lens, noise, mosaic, white balance, tone curve, compression.
+"""Turns rendered light into the JPEG of a robot's camera.
 
-`draw_sensor` decides once what a picture's camera is like; all else follows from that Sensor, its noise included.
-Nothing here moves a thing: blurs are centered and green stays in place, so that masks of the scene stay right.
+The steps: auto exposure, lens, noise, Bayer mosaic, white balance, tone curve and compression. A `Sensor` holds all
+parameters and the seed of the noise. No step shifts the picture, so the scene's masks stay valid: blurs are centered,
+and color fringes move red and blue but not green.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Image, Singles
-from vm_embedded.config.entries import check_entries, share
+from vm_workstation.colors import LUMINANCE, saturation_matrix
 
-from ..ranges import Range, drawn, log_uniform, some_of, uniform
+from ..scene.sensor import Sensor
 
-TONES = ("srgb", "gamma", "filmic")
-PATTERNS = {
+_DEMOSAICING = {
     "RGGB": cv2.COLOR_BayerRGGB2RGB_EA,
     "BGGR": cv2.COLOR_BayerBGGR2RGB_EA,
     "GRBG": cv2.COLOR_BayerGRBG2RGB_EA,
     "GBRG": cv2.COLOR_BayerGBRG2RGB_EA,
 }
-CHROMAS = {"4:2:0": cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420, "4:4:4": cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444}
+_CHROMA_SAMPLING = {"4:2:0": cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420, "4:4:4": cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444}
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 RESPONSE = np.array([0.55, 1.0, 0.7], np.float32)
-"""How sensitive the chip is to red, green and blue: white balance amplifies red and blue, and their noise."""
+"""Sensitivity of the chip to red, green and blue: white balance amplifies red and blue with their noise."""
 
-MID_GRAY = 0.18
+_MID_GRAY = 0.18
+
 BRIGHTEST = 64.0
-"""Light above this many times white is cut off before the lens: a sun of 1e5 would turn the picture into glare."""
+"""Limit of the light before the lens, in multiples of white: a sun of 1e5 would fill the picture with glare."""
 
 
-@dataclass(frozen=True)
-class SensorRanges:
-    """Section [sensor]: what the cameras are like that take the pictures. Lengths are in pixels of the picture."""
+def apply_exposure(radiance: Singles, sensor: Sensor) -> Singles:
+    """Scale radiance (h, w, 3) so that its log-average becomes mid gray, times 2 ** exposure error.
 
-    exposure: tuple[float, float] = drawn(-2.6, 0.9, "exposure error, mostly near the middle", "EV", (-8.0, 8.0))
-    balance: tuple[float, float] = drawn(0.4, 1.0, "how much of the light's color is removed", "", (0.0, 1.0))
-    gains: tuple[float, float] = drawn(0.93, 1.07, "error of the gains of red and blue", "", (0.1, 10.0))
-    cast_share: float = share(0.2, "share of pictures that keep a color cast")
-    cast: tuple[float, float] = drawn(0.75, 1.33, "gains of red and blue where it stays", "", (0.1, 10.0))
-    tones: tuple[str, ...] = some_of(TONES, "tone curves to choose from")
-    gamma: tuple[float, float] = drawn(1.8, 2.4, "exponent of the tone curve gamma", "", (1.0, 4.0))
-    shoulder: tuple[float, float] = drawn(0.4, 2.5, "bend of highlights of the tone curve filmic", "", (0.0, 20.0))
-    saturation: tuple[float, float] = drawn(0.65, 1.35, "saturation, mostly near the middle", "", (0.0, 3.0))
-    contrast: tuple[float, float] = drawn(-0.25, 0.45, "S-curve, mostly near the middle", "", (-1.0, 1.0))
-    vignetting: tuple[float, float] = drawn(0.0, 0.45, "part of the light lost in the corners", "", (0.0, 1.0))
-    defocus_share: float = share(0.45, "share of pictures out of focus")
-    defocus: tuple[float, float] = drawn(0.3, 2.2, "radius of the blur where out of focus", "px", (0.01, 50.0))
-    motion_share: float = share(0.25, "share of pictures with motion blur")
-    motion: tuple[float, float] = drawn(1.0, 12.0, "length of motion blur, mostly short", "px", (0.01, 100.0))
-    fringe: tuple[float, float] = drawn(-0.8, 0.8, "how far out red lies in the corners", "px", (-20.0, 20.0))
-    glare: tuple[float, float] = drawn(0.0, 0.05, "part of the light that the lens scatters", "", (0.0, 1.0))
-    full_well: tuple[float, float] = drawn(4000.0, 20000.0, "charge of a white pixel at gain 1", "e-", (10.0, 1e7))
-    gain: tuple[float, float] = drawn(1.0, 12.0, "amplification (ISO / 100), mostly low", "", (1.0, 1000.0))
-    read_noise: tuple[float, float] = drawn(1.5, 6.0, "noise of reading a pixel", "e-", (0.0, 1000.0))
-    row_noise: tuple[float, float] = drawn(0.0, 1.2, "noise that a whole row shares", "e-", (0.0, 1000.0))
-    mosaic_share: float = share(0.7, "share of pictures taken through a Bayer mosaic at full resolution")
-    patterns: tuple[str, ...] = some_of(tuple(PATTERNS), "Bayer mosaics to choose from")
-    sharpening: tuple[float, float] = drawn(0.0, 0.8, "strength of the sharpening halo", "", (0.0, 5.0))
-    quality: tuple[float, float] = drawn(55.0, 97.0, "JPEG quality", "", (1.0, 100.0))
-    chromas: tuple[str, ...] = some_of(tuple(CHROMAS), "JPEG chroma sampling to choose from")
-    again_share: float = share(0.15, "share of pictures compressed once before")
-    again: tuple[float, float] = drawn(40.0, 90.0, "JPEG quality of that compression", "", (1.0, 100.0))
-
-    def __post_init__(self) -> None:
-        check_entries(self)
-
-
-@dataclass(frozen=True)
-class Sensor:
-    """The camera of one picture; names and units are those of SensorRanges. Defaults are an ideal camera."""
-
-    exposure: float = 0.0
-    balance: float = 0.0
-    red: float = 1.0
-    """Gain on top of white balance, as `blue`."""
-    blue: float = 1.0
-    tone: str = "srgb"
-    gamma: float = 2.2
-    shoulder: float = 1.0
-    saturation: float = 1.0
-    contrast: float = 0.0
-    vignetting: float = 0.0
-    defocus: float = 0.0
-    motion: float = 0.0
-    direction: float = 0.0
-    """Of motion [rad], from right to down."""
-    fringe: float = 0.0
-    glare: float = 0.0
-    full_well: float = 1e7
-    gain: float = 1.0
-    read_noise: float = 0.0
-    row_noise: float = 0.0
-    mosaic: str = ""
-    """Empty for three chips: no mosaic."""
-    sharpening: float = 0.0
-    quality: int = 95
-    chroma: str = "4:4:4"
-    earlier_quality: int = 0
-    """0 for a picture compressed only once."""
-    seed: int = 0
-
-
-def draw_sensor(random: np.random.Generator, ranges: SensorRanges) -> Sensor:
-    """The camera of one picture."""
-    # Every number is drawn whether it's used or not: a share that changes leaves the other draws as they were.
-    cast = random.random() < ranges.cast_share
-    defocused, moved = random.random() < ranges.defocus_share, random.random() < ranges.motion_share
-    mosaic, again = random.random() < ranges.mosaic_share, random.random() < ranges.again_share
-    gains = ranges.cast if cast else ranges.gains
-    return Sensor(
-        exposure=_middling(random, ranges.exposure),
-        balance=uniform(random, ranges.balance),
-        red=log_uniform(random, gains),
-        blue=log_uniform(random, gains),
-        tone=_choice(random, ranges.tones),
-        gamma=uniform(random, ranges.gamma),
-        shoulder=uniform(random, ranges.shoulder),
-        saturation=_middling(random, ranges.saturation),
-        contrast=_middling(random, ranges.contrast),
-        vignetting=uniform(random, ranges.vignetting),
-        defocus=log_uniform(random, ranges.defocus) * defocused,
-        motion=log_uniform(random, ranges.motion) * moved,
-        direction=uniform(random, (0.0, math.pi)),
-        fringe=_middling(random, ranges.fringe),
-        glare=uniform(random, ranges.glare),
-        full_well=log_uniform(random, ranges.full_well),
-        gain=log_uniform(random, ranges.gain),
-        read_noise=uniform(random, ranges.read_noise),
-        row_noise=uniform(random, ranges.row_noise),
-        mosaic=_choice(random, ranges.patterns) * mosaic,
-        sharpening=uniform(random, ranges.sharpening),
-        quality=round(uniform(random, ranges.quality)),
-        chroma=_choice(random, ranges.chromas),
-        earlier_quality=round(uniform(random, ranges.again)) * again,
-        seed=int(random.integers(2**32)),
-    )
-
-
-def _middling(random: np.random.Generator, span: Range) -> float:
-    return (uniform(random, span) + uniform(random, span)) / 2.0
-
-
-def _choice(random: np.random.Generator, names: tuple[str, ...]) -> str:
-    return names[int(random.integers(len(names)))]
-
-
-def metered(radiance: Singles, sensor: Sensor) -> Singles:
-    """Radiance (h, w, 3), scaled by auto exposure: its log-average becomes mid gray, times 2 ** exposure error.
-
-    Lamps, deep shadows and whatever is black, as around the circle of a fisheye, don't count.
+    The average ignores lamps, deep shadows and black pixels, as around the circle of a fisheye.
     """
     luminance = radiance[::4, ::4] @ LUMINANCE
     seen = luminance[luminance > 0]
@@ -164,33 +47,34 @@ def metered(radiance: Singles, sensor: Sensor) -> Singles:
     average = float(np.clip(logarithm, *np.percentile(logarithm, [15, 95])).mean())
     bend = sensor.shoulder if sensor.tone == "filmic" else 0.0
     # A filmic camera exposes lower and lifts the shadows again.
-    gray = MID_GRAY / (1.0 + bend - MID_GRAY * bend)
+    gray = _MID_GRAY / (1.0 + bend - _MID_GRAY * bend)
     return np.asarray(radiance * np.float32(gray * 2.0**sensor.exposure / math.exp(average)))
 
 
-def white_gains(light: Singles, sensor: Sensor) -> Singles:
-    """Gains (3,) of white balance for metered light (h, w, 3): what might be white or gray becomes a bit more so.
+def white_balance_gains(light: Singles, sensor: Sensor) -> Singles:
+    """Gains (3,) of red, green and blue that remove part of the color of the light from exposed light (h, w, 3).
 
-    Only colors that lamps have count, below white: turf is too green, so a picture of nothing else stays green.
+    They are estimated from pixels below white whose color a lamp can have. Turf is greener than any lamp, so a picture
+    of turf alone stays green.
     """
     colors = np.clip(light[::4, ::4].reshape(-1, 3), 1e-4, 1.0)
     logs = np.log(colors)
     tint = 2.0 * logs[:, 1] - logs[:, 0] - logs[:, 2]
     weights = np.exp(-((tint / 0.6) ** 2)) * (colors @ LUMINANCE) * (colors.max(axis=1) < 1.0)
     red, green, blue = weights @ logs / (weights.sum() + 0.01 * len(weights))
-    # More than the difference between daylight and a light bulb isn't the light's color.
+    # The limits span daylight to light bulb; a stronger tint is not the color of the light.
     red_gain, blue_gain = np.exp(np.clip(sensor.balance * np.array([green - red, green - blue]), -0.7, 1.2))
     return np.array([red_gain * sensor.red, 1.0, blue_gain * sensor.blue], np.float32)
 
 
-def developed(radiance: Singles, sensor: Sensor) -> Image:
-    """The picture (h, w, 3) BGR that the camera takes of linear RGB radiance (h, w, 3), in whatever unit."""
-    light = np.clip(metered(np.asarray(radiance, np.float32), sensor), 0.0, BRIGHTEST)
-    gains = white_gains(light, sensor)
-    signal = _read(_through_lens(light, sensor) * RESPONSE, sensor)
-    # Green fills up first: what it lacks then must be cut from red and blue too, or lamps turn pink.
+def process_image(radiance: Singles, sensor: Sensor) -> Image:
+    """The 8-bit picture (h, w, 3) BGR that the camera takes of linear RGB radiance (h, w, 3), in any unit."""
+    light = np.clip(apply_exposure(np.asarray(radiance, np.float32), sensor), 0.0, BRIGHTEST)
+    gains = white_balance_gains(light, sensor)
+    signal = _read_chip(_through_lens(light, sensor) * RESPONSE, sensor)
+    # Green saturates first. Red and blue are cut at the same level, or lamps would turn pink.
     balanced = np.minimum(signal * (gains / RESPONSE), 1.0)
-    color = np.clip(cv2.transform(balanced, _saturation_matrix(sensor.saturation)), 0.0, 1.0)
+    color = np.clip(cv2.transform(balanced, saturation_matrix(sensor.saturation).astype(np.float32)), 0.0, 1.0)
     table = _tone_table(sensor)
     levels = table[(color * np.float32(len(table) - 1) + np.float32(0.5)).astype(np.uint16)]
     if sensor.sharpening > 0:
@@ -199,8 +83,8 @@ def developed(radiance: Singles, sensor: Sensor) -> Image:
     return np.asarray(cv2.cvtColor(cv2.convertScaleAbs(np.maximum(levels, 0.0)), cv2.COLOR_RGB2BGR), np.uint8)
 
 
-def encoded(picture: Image, sensor: Sensor) -> bytes:
-    """A picture (h, w, 3) BGR as JPEG file."""
+def encode_jpeg(picture: Image, sensor: Sensor) -> bytes:
+    """The JPEG file of a picture (h, w, 3) BGR, compressed once or twice."""
     if sensor.earlier_quality:
         once = _jpeg(picture, sensor.earlier_quality, sensor.chroma)
         picture = np.asarray(cv2.imdecode(np.frombuffer(once, np.uint8), cv2.IMREAD_COLOR), np.uint8)
@@ -208,14 +92,15 @@ def encoded(picture: Image, sensor: Sensor) -> bytes:
 
 
 def _jpeg(picture: Image, quality: int, chroma: str) -> bytes:
-    options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, CHROMAS[chroma]]
+    options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, _CHROMA_SAMPLING[chroma]]
     return cv2.imencode(".jpg", picture, options)[1].tobytes()
 
 
 def blur_kernel(sensor: Sensor) -> Singles:
-    """Weights (k, k), k odd, of defocus (a disk) and motion (a line) at once; sum 1, centered to the last digit.
+    """Weights (k, k), k odd, of defocus (a disk) and motion (a line) together; their sum is 1.
 
-    Sample points of the blur are shared out among the pixels around them, which keeps their center of mass.
+    Each sample point is split among the four pixels around it in proportion (bilinear), so that the center of mass
+    stays exactly in the middle.
     """
     index = np.arange(96)
     turn, radius = index * math.pi * (3.0 - math.sqrt(5.0)), sensor.defocus * np.sqrt((index + 0.5) / len(index))
@@ -233,7 +118,7 @@ def blur_kernel(sensor: Sensor) -> Singles:
 
 
 def _through_lens(light: Singles, sensor: Sensor) -> Singles:
-    """Light (h, w, 3) on the chip: blurred, darker and fringed in the corners, with glare around lamps."""
+    """Light (h, w, 3) that reaches the chip, after blur, vignetting, color fringes and glare."""
     height, width = light.shape[:2]
     if sensor.defocus > 0 or sensor.motion > 0:
         # The kernel of a wide blur is applied by Fourier transform, which may leave tiny negative numbers.
@@ -259,8 +144,8 @@ def _through_lens(light: Singles, sensor: Sensor) -> Singles:
     return light
 
 
-def _read(light: Singles, sensor: Sensor) -> Singles:
-    """What the chip makes of light (h, w, 3): full at 1, with the noise of light and electronics, and demosaiced."""
+def _read_chip(light: Singles, sensor: Sensor) -> Singles:
+    """Signal (h, w, 3) of the chip for light (h, w, 3): saturated at 1, with shot and read noise, demosaiced."""
     random = np.random.Generator(np.random.PCG64(sensor.seed))
     height, width = light.shape[:2]
     if sensor.mosaic:
@@ -280,16 +165,12 @@ def _read(light: Singles, sensor: Sensor) -> Singles:
     # Noise below black survives until demosaicing, as behind the black level of a real chip.
     black, white = 6000.0, 65000.0
     counts = np.clip(signal * (white - black) + (black + 0.5), 0.0, white).astype(np.uint16)
-    colors = cv2.demosaicing(counts, PATTERNS[sensor.mosaic])
+    colors = cv2.demosaicing(counts, _DEMOSAICING[sensor.mosaic])
     return np.asarray((colors.astype(np.float32) - black) / (white - black), np.float32)
 
 
-def _saturation_matrix(saturation: float) -> Singles:
-    return np.asarray(saturation * np.eye(3) + (1.0 - saturation) * np.tile(LUMINANCE, (3, 1)), np.float32)
-
-
 def _tone_table(sensor: Sensor) -> Singles:
-    """Levels from 0 to 255, not yet rounded, of linear light from 0 to 1 in equal steps."""
+    """Unrounded levels from 0 to 255 for linear light from 0 to 1 in equal steps."""
     light = np.linspace(0.0, 1.0, 1 << 15)
     if sensor.tone == "filmic":
         light = light * (1.0 + sensor.shoulder) / (1.0 + sensor.shoulder * light)

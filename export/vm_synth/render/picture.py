@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Mask, Singles
+from vm_workstation.ranges import uniform
 
-from ..ranges import uniform
 from ..scene.configuration import CLASSES, GroundRanges
 from ..scene.environment import Environment
 from ..scene.field import ground_noise, paint_ground

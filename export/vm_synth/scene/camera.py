@@ -14,8 +14,7 @@ from vm_embedded.geometry.lens import Size
 from vm_embedded.geometry.lens_files import lens_from_table
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import PROJECTIONS, RadialLens, Rectilinear
-
-from ..ranges import drawn, some_of, uniform
+from vm_workstation.ranges import range_of, some_of, uniform
 
 
 @dataclass(frozen=True)
@@ -25,24 +24,30 @@ class CameraRanges:
     picture_width: int = number(640, "width of pictures", "px", (64, 8192))
     picture_height: int = number(512, "height of pictures", "px", (64, 8192))
     projections: tuple[str, ...] = some_of(tuple(PROJECTIONS), "lenses to draw")
-    rectilinear_view: tuple[float, float] = drawn(
+    rectilinear_view: tuple[float, float] = range_of(
         50.0, 110.0, "angle from the left to the right edge, rectilinear", "deg", (5.0, 150.0)
     )
-    fisheye_view: tuple[float, float] = drawn(
+    fisheye_view: tuple[float, float] = range_of(
         80.0, 185.0, "angle from the left to the right edge, equisolid and equidistant", "deg", (5.0, 300.0)
     )
     image_circle: float = share(0.2, "fisheyes whose image is a circle with black around it")
-    circle: tuple[float, float] = drawn(0.5, 1.15, "diameter of that circle, in widths of the picture", "", (0.1, 2.0))
-    off_center: tuple[float, float] = drawn(-0.02, 0.02, "optical center off the picture's, in widths", "", (-0.3, 0.3))
-    distortion: tuple[float, float] = drawn(
+    circle: tuple[float, float] = range_of(
+        0.5, 1.15, "diameter of that circle, in widths of the picture", "", (0.1, 2.0)
+    )
+    off_center: tuple[float, float] = range_of(
+        -0.02, 0.02, "optical center off the picture's, in widths", "", (-0.3, 0.3)
+    )
+    distortion: tuple[float, float] = range_of(
         -0.04, 0.04, "k0 f^2, the first distortion coefficient times the focal length squared", "", (-0.2, 0.2)
     )
     distorted: float = share(0.5, "lenses with distortion")
-    height: tuple[float, float] = drawn(0.3, 1.6, "height over the plane", "m", (0.05, 20.0))
-    pitch: tuple[float, float] = drawn(-5.0, 50.0, "angle of the optical axis below the horizon", "deg", (-45.0, 90.0))
+    height: tuple[float, float] = range_of(0.3, 1.6, "height over the plane", "m", (0.05, 20.0))
+    pitch: tuple[float, float] = range_of(
+        -5.0, 50.0, "angle of the optical axis below the horizon", "deg", (-45.0, 90.0)
+    )
     steep: float = share(0.2, "pictures that look down steeply")
-    steep_pitch: tuple[float, float] = drawn(40.0, 90.0, "their pitch", "deg", (-45.0, 90.0))
-    roll: tuple[float, float] = drawn(-10.0, 10.0, "lean to the right", "deg", (-180.0, 180.0))
+    steep_pitch: tuple[float, float] = range_of(40.0, 90.0, "their pitch", "deg", (-45.0, 90.0))
+    roll: tuple[float, float] = range_of(-10.0, 10.0, "lean to the right", "deg", (-180.0, 180.0))
     tumbled: float = share(0.04, "pictures with any roll")
 
     lens: Mapping[str, Any] = field(

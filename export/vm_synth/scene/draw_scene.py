@@ -9,16 +9,16 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import RadialLens
+from vm_workstation.ranges import uniform
 
 from ..bodies.solids import joined
-from ..ranges import uniform
-from ..render.image_processing import draw_sensor
 from .camera import draw_lens, draw_orientation
 from .configuration import SceneConfiguration
 from .environment import Environment
 from .field import Field, draw_field
 from .placement import NEAREST, TRIES, Things, in_picture, pierces, placed
 from .scene import Scene
+from .sensor import draw_sensor
 
 
 def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environment: Environment) -> Scene:

@@ -11,8 +11,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Singles
 from vm_embedded.config.entries import check_entries, share
-
-from ..ranges import drawn, log_uniform, some_of, uniform
+from vm_workstation.ranges import log_uniform, range_of, some_of, uniform
 
 TURFS = ("blades", "felt", "natural")
 
@@ -25,24 +24,26 @@ _DEVIATION = 0.32  # of the ground from its mean color
 class FieldRanges:
     """Section [field]."""
 
-    length: tuple[float, float] = drawn(5.0, 14.0, "length of a field; 9 x 6 m is the authors'", "m", (1.0, 120.0))
-    proportion: tuple[float, float] = drawn(0.6, 0.75, "width of a field, in lengths", "", (0.3, 1.0))
-    line_width: tuple[float, float] = drawn(0.045, 0.085, "width of lines", "m", (0.01, 0.5))
-    border: tuple[float, float] = drawn(0.3, 2.0, "carpet beyond the outer lines", "m", (0.0, 20.0))
+    length: tuple[float, float] = range_of(5.0, 14.0, "length of a field; 9 x 6 m is the authors'", "m", (1.0, 120.0))
+    proportion: tuple[float, float] = range_of(0.6, 0.75, "width of a field, in lengths", "", (0.3, 1.0))
+    line_width: tuple[float, float] = range_of(0.045, 0.085, "width of lines", "m", (0.01, 0.5))
+    border: tuple[float, float] = range_of(0.3, 2.0, "carpet beyond the outer lines", "m", (0.0, 20.0))
     endless: float = share(0.25, "fields whose grass goes on to the horizon")
     turfs: tuple[str, ...] = some_of(TURFS, "kinds of ground")
-    hue: tuple[float, float] = drawn(60.0, 165.0, "hue of the grass; 120 is green", "deg", (0.0, 360.0))
-    saturation: tuple[float, float] = drawn(0.5, 1.0, "saturation of the grass, in linear light", "", (0.0, 1.0))
-    albedo: tuple[float, float] = drawn(0.05, 0.3, "brightness of the grass", "", (0.01, 0.95))
+    hue: tuple[float, float] = range_of(60.0, 165.0, "hue of the grass; 120 is green", "deg", (0.0, 360.0))
+    saturation: tuple[float, float] = range_of(0.5, 1.0, "saturation of the grass, in linear light", "", (0.0, 1.0))
+    albedo: tuple[float, float] = range_of(0.05, 0.3, "brightness of the grass", "", (0.01, 0.95))
     odd_colors: float = share(0.08, "fields of any other color")
-    texture: tuple[float, float] = drawn(0.4, 1.3, "strength of blades and patches", "", (0.0, 2.0))
+    texture: tuple[float, float] = range_of(0.4, 1.3, "strength of blades and patches", "", (0.0, 2.0))
     stripes: float = share(0.2, "fields that are mown in stripes")
-    paint: tuple[float, float] = drawn(0.45, 0.9, "albedo of lines", "", (0.1, 1.0))
-    cover: tuple[float, float] = drawn(0.3, 1.0, "how much of the ground paint covers; the rest shows", "", (0.0, 1.0))
+    paint: tuple[float, float] = range_of(0.45, 0.9, "albedo of lines", "", (0.1, 1.0))
+    cover: tuple[float, float] = range_of(
+        0.3, 1.0, "how much of the ground paint covers; the rest shows", "", (0.0, 1.0)
+    )
     thin: float = share(0.5, "fields whose paint does not cover fully")
-    wear: tuple[float, float] = drawn(0.0, 0.6, "share of paint that is worn off", "", (0.0, 1.0))
-    goal_height: tuple[float, float] = drawn(0.8, 2.0, "height of goals", "m", (0.2, 3.0))
-    goal_width: tuple[float, float] = drawn(1.4, 3.0, "width of goals", "m", (0.3, 8.0))
+    wear: tuple[float, float] = range_of(0.0, 0.6, "share of paint that is worn off", "", (0.0, 1.0))
+    goal_height: tuple[float, float] = range_of(0.8, 2.0, "height of goals", "m", (0.2, 3.0))
+    goal_width: tuple[float, float] = range_of(1.4, 3.0, "width of goals", "m", (0.3, 8.0))
     goals: float = share(0.85, "fields with goals")
 
     def __post_init__(self) -> None:

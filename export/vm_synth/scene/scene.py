@@ -16,8 +16,8 @@ from vm_embedded.geometry.radial_lenses import RadialLens
 
 from ..balls.design import BallDesign
 from ..bodies.solids import Joined
-from ..render.image_processing import Sensor
 from .field import Field
+from .sensor import Sensor
 
 
 @dataclass(frozen=True)

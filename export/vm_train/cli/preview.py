@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import Field, fields, replace
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -14,9 +13,9 @@ import numpy as np
 
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
+from vm_workstation.contact_sheet import GAP
 
 from ..data.pictures import Picture
 from ..graphs.augmentation import (
@@ -29,11 +28,10 @@ from ..graphs.augmentation import (
     soften,
     with_camera_error,
 )
-from .preview_cells import CIRCLES, GAP, add_circles, cell, legend, middle, padded, point_colors, scaled, with_points
+from .preview_cells import CIRCLES, add_circles, cell, legend, middle, padded, point_colors, scaled, with_points
 
 _DEVIATIONS = 2.0  # of errors of the camera, shown as their ends
 _TRUE, _TOLD = (190, 190, 190), (255, 150, 0)  # RGB colors of circles
-_LARGEST = 65500  # [px] that a JPEG can have
 
 
 def sheet(
@@ -72,17 +70,6 @@ def sheet(
         rows.append(legend(names, [_TRUE, _TOLD], columns * (width + GAP)))
     rows += [np.hstack(alone[start : start + columns]) for start in range(0, len(alone), columns)]
     return np.vstack([padded(row, len(row), rows[0].shape[1]) for row in rows])
-
-
-def write_sheet(path: Path, image: Image) -> None:
-    """Write a sheet as .jpg or .png. Raises InputError if that can't be done."""
-    if path.suffix.lower() not in (".jpg", ".jpeg", ".png"):
-        raise InputError(f"can't write {path}: a sheet is a .jpg or a .png")
-    if max(image.shape) > _LARGEST:
-        size = f"{image.shape[1]} x {image.shape[0]} px"
-        raise InputError(f"a sheet of {size} is too large: show fewer pictures or smaller ones")
-    with atomic_write(path) as part:
-        part.write_bytes(cv2.imencode(path.suffix.lower(), image)[1].tobytes())
 
 
 def _switched_on(augmentation: Augmentation) -> list[Field[Any]]:

@@ -14,14 +14,11 @@ from vm_embedded.errors import GeometryError
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
-from vm_synth.dataset.contact_sheet import placed
+from vm_workstation.contact_sheet import GAP, INK, LINE, PAPER, draw_legend, scaled_pixels, write_text
 
 from ..data.classes import Color
 from ..data.pictures import Picture
 from ..graphs.labeled_graph import seen_points
-
-GAP = 6
-"""Between cells [px]."""
 
 CIRCLES = (1.0, 2.0, 4.0, 8.0)
 """Radii of circles around the camera's foot [m]."""
@@ -41,9 +38,7 @@ _PALETTE = (
 
 _STRENGTH = 0.7  # how much of its class's color a point gets
 _SPACING = 4  # [px] of the sheet, a square of which shows one point of a class
-_LINE = 16  # [px] of text
 _CROSS = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
-_PAPER, _INK, _FAINT = (32, 32, 32), (235, 235, 235), (160, 160, 160)
 
 
 def scaled(image: Image, width: int) -> Image:
@@ -106,14 +101,14 @@ def add_circles(canvas: Image, lens: LensFile, shape: tuple[int, ...], color: Co
 
 def _places(pixels: Floats, full: int, canvas: Image) -> npt.NDArray[np.intp]:
     """Pixels (n, 2) of an image `full` wide as columns and rows (2, n) of a canvas that shows it."""
-    x, y = np.rint(placed(pixels, (0.0, 0.0), canvas.shape[1] / full)).astype(np.intp).T
+    x, y = np.rint(scaled_pixels(pixels, (0.0, 0.0), canvas.shape[1] / full)).astype(np.intp).T
     return np.stack([np.clip(x, 0, canvas.shape[1] - 1), np.clip(y, 0, canvas.shape[0] - 1)])
 
 
 def cell(image: Image, caption: str) -> Image:
     """An image above a line of text, with a gap to its right."""
-    text = np.full((_LINE + 4, image.shape[1], 3), _PAPER, dtype=np.uint8)
-    _write(text, caption, (2, _LINE - 3), _INK)
+    text = np.full((LINE + 4, image.shape[1], 3), PAPER, dtype=np.uint8)
+    write_text(text, caption, (2, LINE - 3), INK)
     return padded(np.vstack([image, text]), len(image) + len(text), image.shape[1] + GAP)
 
 
@@ -128,22 +123,12 @@ def point_colors(manifest: Manifest) -> list[Color]:
 
 def legend(names: Sequence[str], colors: Sequence[Color], width: int) -> Image:
     """A line of text that says what colors mean."""
-    line = np.full((_LINE + 2 * GAP, width, 3), _PAPER, dtype=np.uint8)
-    place, base = GAP, len(line) - GAP - 3
-    for name, color in zip(names, colors, strict=True):
-        cv2.rectangle(line, (place, base - 9), (place + 9, base), color[::-1], cv2.FILLED)
-        place += 14 + _write(line, name, (place + 14, base), _FAINT) + 2 * GAP
+    line = np.full((LINE + 2 * GAP, width, 3), PAPER, dtype=np.uint8)
+    draw_legend(line, dict(zip(names, colors, strict=True)), (GAP, len(line) - GAP - 3))
     return line
 
 
 def padded(image: Image, height: int, width: int) -> Image:
     """The image with paper to its right and below it."""
     below, right = height - image.shape[0], width - image.shape[1]
-    return np.asarray(cv2.copyMakeBorder(image, 0, below, 0, right, cv2.BORDER_CONSTANT, value=_PAPER), dtype=np.uint8)
-
-
-def _write(canvas: Image, text: str, at: tuple[int, int], color: Color) -> int:
-    """Write text from a point at its lower left on, and return how wide it is [px]."""
-    font, size = cv2.FONT_HERSHEY_SIMPLEX, 0.4
-    cv2.putText(canvas, text, at, font, size, color, 1, cv2.LINE_AA)
-    return int(cv2.getTextSize(text, font, size, 1)[0][0])
+    return np.asarray(cv2.copyMakeBorder(image, 0, below, 0, right, cv2.BORDER_CONSTANT, value=PAPER), dtype=np.uint8)

@@ -215,16 +215,16 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _preview(options: argparse.Namespace) -> int:
-    from vm_synth.dataset.contact_sheet import chosen
+    from vm_workstation.contact_sheet import choose_indices, write_sheet
 
     from ..data.pictures import read_picture
-    from .preview import sheet, write_sheet
+    from .preview import sheet
 
     configuration = _configuration(options)
     check_writable(options.output)
     pictures = find_pictures(options.data)
     classes = configuration.classes.mask_classes()
-    picked = [pictures[each] for each in chosen(range(len(pictures)), options.count, None, options.seed)]
+    picked = [pictures[each] for each in choose_indices(range(len(pictures)), options.count, None, options.seed)]
     shown = [read_picture(each, classes) for each in picked]
     made = sheet(
         shown,

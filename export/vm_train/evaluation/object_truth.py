@@ -15,7 +15,7 @@ from vm_embedded.arrays import Floats, Mask
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.shape import Shape
 from vm_embedded.network.manifest import Manifest
-from vm_synth.render.outlines import outline, polygon_area
+from vm_workstation.sphere_outline import polygon_area, sphere_outline
 
 from ..data.pictures import Picture
 from ..scores.overlaps import TrueObject, coverage
@@ -92,10 +92,10 @@ def _of_scene(picture: Picture, ball: SceneBall) -> TrueObject:
     assert orientation is not None
     lens = picture.lens.lens.for_image(size)
     whole: dict[str, Any] = {"center": ball.center, "radius": ball.radius, "size": size}
-    window, share = coverage(outline(lens, orientation, **whole), size)
+    window, share = coverage(sphere_outline(lens, orientation, **whole), size)
     mask = np.zeros((height, width), dtype=np.float32)
     mask[window] = share
-    radius = math.sqrt(polygon_area(outline(lens, orientation, **whole, unseen=True)) / math.pi)
+    radius = math.sqrt(polygon_area(sphere_outline(lens, orientation, **whole, unseen=True)) / math.pi)
     return TrueObject(mask, ball.center, radius, ball.visible)
 
 

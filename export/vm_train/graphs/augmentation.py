@@ -19,8 +19,8 @@ from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import RadialLens
-from vm_synth.ranges import drawn
-from vm_synth.render.image_processing import LUMINANCE
+from vm_workstation.colors import saturation_matrix
+from vm_workstation.ranges import range_of
 
 from ..data.pictures import Picture
 
@@ -44,9 +44,9 @@ class Augmentation:
     gamma: float = number(0.15, "exponent of colors is up to this share above 1, or as much below", "", (0.0, 4.0))
     noise: float = number(0.03, "noise is up to this strong, standard deviation as a share of white", "", (0.0, 1.0))
     blur_share: float = share(0.15, "share of pictures that are blurred")
-    blur: tuple[float, float] = drawn(0.4, 1.2, "blur where there is one, standard deviation", "px", (0.1, 20.0))
+    blur: tuple[float, float] = range_of(0.4, 1.2, "blur where there is one, standard deviation", "px", (0.1, 20.0))
     jpeg_share: float = share(0.15, "share of pictures that are compressed again")
-    jpeg: tuple[float, float] = drawn(40.0, 90.0, "JPEG quality of those", "", (1.0, 100.0))
+    jpeg: tuple[float, float] = range_of(40.0, 90.0, "JPEG quality of those", "", (1.0, 100.0))
 
     def __post_init__(self) -> None:
         check_entries(self)
@@ -176,7 +176,7 @@ def soften(image: Image, blur: float = 0.0, jpeg: int = 0) -> Image:
 
 def apply_tone(colors: Singles, tone: Tone, random: np.random.Generator) -> Singles:
     """Colors (n, 3), RGB from 0 to 1, with another tone, within the same limits. `random` is for the noise."""
-    saturated = tone.saturation * np.eye(3) + (1.0 - tone.saturation) * LUMINANCE
+    saturated = saturation_matrix(tone.saturation)
     matrix = tone.brightness * tone.contrast * saturated @ _hue_turn(math.radians(tone.hue))
     found = np.asarray(colors @ matrix.T.astype(np.float32), dtype=np.float32)
     found += np.float32(0.5 * (1.0 - tone.contrast))

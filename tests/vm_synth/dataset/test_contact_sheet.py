@@ -10,9 +10,10 @@ import pytest
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_synth.cli import main, parsers
-from vm_synth.dataset.contact_sheet import OUTLINE, captions, cell, chosen, placed, read_shown, sheet, tinted
+from vm_synth.dataset.contact_sheet import OUTLINE, captions, cell, read_shown, sheet, tinted
 from vm_synth.dataset.files import PARTS, file_of, read_truth
-from vm_synth.render.outlines import outline, polygon_area
+from vm_workstation.contact_sheet import scaled_pixels
+from vm_workstation.sphere_outline import polygon_area, sphere_outline
 
 from ..sets import SIZE, scene_of, write_set
 
@@ -30,7 +31,7 @@ def with_ball(least=4.0):
     for index in range(COUNT):
         scene = scene_of(index)
         if scene.ball is not None:
-            pixels = outline(scene.lens, scene.orientation, scene.ball.center, scene.ball.radius, SIZE)
+            pixels = sphere_outline(scene.lens, scene.orientation, scene.ball.center, scene.ball.radius, SIZE)
             inside = np.isfinite(pixels).all() and (pixels > 0).all() and (pixels < np.array(SIZE) - 1).all()
             if inside and polygon_area(pixels) > np.pi * least**2:
                 found.append(index)
@@ -43,7 +44,7 @@ def test_the_outline_from_the_files_is_the_scene_s(folder):
         scene, shown = scene_of(index), read_shown(folder, index)
         assert (scene.ball is None) == (shown.outline is None)
         if scene.ball is not None:
-            straight = outline(scene.lens, scene.orientation, scene.ball.center, scene.ball.radius, SIZE)
+            straight = sphere_outline(scene.lens, scene.orientation, scene.ball.center, scene.ball.radius, SIZE)
             np.testing.assert_allclose(shown.outline, straight, atol=1e-9)
 
 
@@ -66,7 +67,7 @@ def test_a_cell_draws_the_outline_on_the_ball_s_rim(folder, width):
     assert made.shape[1] == width
     assert not (plain == OUTLINE[::-1]).all(axis=-1).any()
     difference = np.abs(lower.astype(int) - OUTLINE[::-1]).sum(axis=-1)
-    rim = np.rint(placed(shown.outline, (0.0, 0.0), width / SIZE[0])).astype(int)
+    rim = np.rint(scaled_pixels(shown.outline, (0.0, 0.0), width / SIZE[0])).astype(int)
     near = [difference[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].min() for x, y in rim]
     assert np.mean(np.array(near) < 200) > 0.95
 
@@ -77,18 +78,6 @@ def test_tints_leave_the_environment_and_unlabeled_pixels_alone(folder):
     bare = (shown.mask[..., 3] == 0) | ~shown.mask[..., :3].any(axis=-1)
     assert (made[bare] == shown.image[bare]).all()
     assert (made[~bare] != shown.image[~bare]).any(axis=-1).mean() > 0.95
-
-
-def test_which_pictures_are_chosen():
-    numbers = [0, 1, 4, 5, 6, 9, 12]
-    assert chosen(numbers, 3) == [0, 5, 12]
-    assert chosen(numbers, 99) == numbers
-    assert chosen(numbers, 1) == [0]
-    assert chosen([], 5) == []
-    assert chosen(numbers, 3, first=2) == [4, 5, 6]
-    assert chosen(numbers, 3, first=13) == []
-    assert chosen(numbers, 4, seed=1) == chosen(numbers, 4, seed=1) == sorted(set(chosen(numbers, 4, seed=1)))
-    assert len({tuple(chosen(numbers, 3, seed=seed)) for seed in range(20)}) > 5
 
 
 def test_captions_say_which_picture_and_which_ball(folder):
@@ -150,7 +139,7 @@ def test_wrong_truth_is_named(folder, tmp_path, damage):
     ("arguments", "text"),
     [
         (["nowhere"], "there is no folder nowhere"),
-        (["{set}", "--output", "sheet.gif"], "a sheet is a .jpg or a .png"),
+        (["{set}", "--output", "sheet.gif"], "must be a .jpg or a .png"),
         (["{set}", "--output", "no/such/sheet.jpg"], "there is no folder"),
         (["{set}", "--first", "900"], "no pictures that can be shown from number 900 on"),
     ],

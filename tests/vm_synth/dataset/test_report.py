@@ -15,7 +15,6 @@ from vm_synth.dataset.files import PARTS, file_of, read_truth
 from vm_synth.dataset.inspection import inspect, shard_that_lacks, spans
 from vm_synth.dataset.report import as_json, categories, complaints, quantities, tables
 from vm_synth.scene.configuration import CLASSES
-from vm_workstation.text_tables import summary
 
 from ..sets import SIZE, picture_of, scene_of, write_set
 
@@ -197,17 +196,6 @@ def test_numbers_are_those_of_the_pictures(folder):
     assert quantities(found.facts)["ball distance [m]"] == [each.distance for each in balls]
     assert sum(categories(found.facts)["ball"].values()) == COUNT
     assert sum(categories(found.facts)["ball design"].values()) == len(balls)
-
-
-def test_a_summary_is_right():
-    assert summary([float(each) for each in range(101)]) == {
-        "least": 0.0,
-        "5 %": 5.0,
-        "median": 50.0,
-        "mean": 50.0,
-        "95 %": 95.0,
-        "largest": 100.0,
-    }
 
 
 def test_a_set_that_has_just_begun(tmp_path, capsys):

@@ -14,11 +14,11 @@ from vm_synth.balls.balls import BallRanges, draw_design
 from vm_synth.bodies.clutter import carton
 from vm_synth.bodies.solids import joined
 from vm_synth.dataset.files import COLORS, file_of, write_picture
-from vm_synth.render.image_processing import Sensor
 from vm_synth.render.picture import UNLABELED, pixel_grid, render
 from vm_synth.scene.configuration import CLASSES, GroundRanges
 from vm_synth.scene.environment import Environment
 from vm_synth.scene.scene import PlacedBall, Scene
+from vm_synth.scene.sensor import Sensor
 
 SIZE = (320, 256)
 LENSES = {

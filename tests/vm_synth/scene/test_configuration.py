@@ -17,9 +17,9 @@ from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_synth.bodies.solids import LABELS
-from vm_synth.ranges import drawn, log_uniform, some_of, uniform
 from vm_synth.scene.configuration import CLASSES, SceneConfiguration
 from vm_synth.scene.environment import MapRanges
+from vm_workstation.ranges import log_uniform, range_of, some_of, uniform
 
 DEFAULT = SceneConfiguration()
 ENTRIES = [
@@ -274,7 +274,7 @@ def test_floors_and_held_out_maps_are_read(write):
 
 @dataclass(frozen=True)
 class Section:
-    span: tuple[float, float] = drawn(1.0, 2.0, "a range")
+    span: tuple[float, float] = range_of(1.0, 2.0, "a range")
     part: float = share(0.5, "a share")
     count: int = number(3, "a number of things")
     some: tuple[str, ...] = some_of(("a", "b"), "names", ("b",))

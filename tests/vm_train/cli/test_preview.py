@@ -12,10 +12,11 @@ from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.radial_lenses import Equisolid
 from vm_export.grid import Grid
-from vm_train.cli.preview import sheet, write_sheet
-from vm_train.cli.preview_cells import GAP, middle, point_colors
+from vm_train.cli.preview import sheet
+from vm_train.cli.preview_cells import middle, point_colors
 from vm_train.data.pictures import Picture
 from vm_train.graphs.augmentation import NO_AUGMENTATION, Augmentation
+from vm_workstation.contact_sheet import GAP, write_sheet
 
 MANIFEST = ball_manifest("ball", "environment", "field", max_distance=6.0)
 GRID = Grid()
@@ -98,7 +99,7 @@ def test_a_sheet_is_written_as_picture(tmp_path):
     made = sheet([picture()], MANIFEST, GRID, NO_AUGMENTATION, seed=0, versions=1, width=80)
     write_sheet(tmp_path / "preview.png", made)
     assert np.array_equal(cv2.imread(str(tmp_path / "preview.png")), made)
-    with pytest.raises(InputError, match=r"a sheet is a \.jpg or a \.png"):
+    with pytest.raises(InputError, match=r"must be a \.jpg or a \.png"):
         write_sheet(tmp_path / "preview.txt", made)
     with pytest.raises(InputError, match="70000 px is too large"):
         write_sheet(tmp_path / "preview.jpg", np.zeros((70000, 2, 3), np.uint8))

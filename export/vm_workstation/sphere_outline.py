@@ -1,4 +1,4 @@
-"""The exact outline of a sphere in a picture: where the rays that touch it meet the picture."""
+"""The exact outline of a sphere in a picture."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.orientation import Orientation
 
 
-def outline(
+def sphere_outline(
     lens: Lens,
     orientation: Orientation,
     center: Floats,
@@ -20,9 +20,12 @@ def outline(
     corners: int = 256,
     unseen: bool = False,
 ) -> Floats:
-    """Pixels (corners, 2) of the outline of a sphere around center (3,) [m], as the lens maps it to a picture of this
-    size; NaN where the lens does not see it, unless `unseen` asks for that part too. The camera stands over the
-    world's origin."""
+    """Project the rays that touch a sphere: the outline as a polygon, pixels (corners, 2).
+
+    center (3,) and radius [m] of the sphere; the world's origin is on the plane below the camera. size: width and
+    height of the picture [px]. Corners outside of the lens's field of view are NaN; with `unseen` they are projected
+    too.
+    """
     toward = (center - np.array([0.0, 0.0, orientation.height])) @ orientation.rotation
     distance = float(np.linalg.norm(toward))
     axis = toward / distance
@@ -30,7 +33,7 @@ def outline(
     side /= np.linalg.norm(side)
     turn = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)[:, None]
     around = np.cos(turn) * side + np.sin(turn) * np.cross(axis, side)
-    sine = min(radius / distance, 1.0)
+    sine = min(radius / distance, 1.0)  # of the angle between the axis and the rays that touch the sphere
     rays = math.sqrt(1.0 - sine * sine) * axis + sine * around
     pixels = lens.project(rays, size)
     if not unseen:
@@ -39,6 +42,6 @@ def outline(
 
 
 def polygon_area(pixels: Floats) -> float:
-    """Area [px^2] of a polygon (n, 2), without its corners that are NaN."""
+    """Area [px^2] of a polygon (n, 2); corners that are NaN are skipped."""
     x, y = pixels[np.isfinite(pixels).all(axis=1)].T
     return float(abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / 2.0)

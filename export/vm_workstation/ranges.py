@@ -1,4 +1,4 @@
-"""Entries of the scene configuration that are drawn from: ranges, and lists of names."""
+"""Configuration entries that values are drawn from: ranges of numbers and lists of names."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ Range = tuple[float, float]
 """Lowest and highest value to draw."""
 
 
-def drawn(low: float, high: float, help: str, unit: str = "", limits: Range = (0.0, np.inf)) -> Any:
-    """An entry that is a Range; both ends stay within the limits."""
-    return entry(_range, (low, high), help, unit, limits=limits)
+def range_of(low: float, high: float, help: str, unit: str = "", limits: Range = (0.0, np.inf)) -> Any:
+    """An entry that is a Range with this default; both ends must be within the limits."""
+    return entry(_checked_range, (low, high), help, unit, limits=limits)
 
 
 def some_of(allowed: tuple[str, ...], help: str, default: tuple[str, ...] | None = None) -> Any:
-    """An entry that lists names to choose from."""
-    return entry(_names, allowed if default is None else default, help, allowed=allowed)
+    """An entry that lists some of the allowed names; all of them by default."""
+    return entry(_checked_names, allowed if default is None else default, help, allowed=allowed)
 
 
-def _range(entry: Field[Any], value: Any) -> Range:
+def _checked_range(entry: Field[Any], value: Any) -> Range:
     if not isinstance(value, list | tuple) or len(value) != 2:
         raise InputError(f"{entry.name} must be a range [low, high], not {value!r}")
     low, high = (checked_number(entry, each) for each in value)
@@ -33,7 +33,7 @@ def _range(entry: Field[Any], value: Any) -> Range:
     return (low, high)
 
 
-def _names(entry: Field[Any], value: Any) -> tuple[str, ...]:
+def _checked_names(entry: Field[Any], value: Any) -> tuple[str, ...]:
     allowed = entry.metadata["allowed"]
     if not isinstance(value, list | tuple) or not value:
         raise InputError(f"{entry.name} must be a list of some of {', '.join(allowed)}, not {value!r}")
@@ -44,10 +44,10 @@ def _names(entry: Field[Any], value: Any) -> tuple[str, ...]:
 
 
 def uniform(random: np.random.Generator, span: Range) -> float:
-    """A number of a range, all alike."""
+    """A number from a uniform distribution over the range."""
     return float(random.uniform(*span))
 
 
 def log_uniform(random: np.random.Generator, span: Range) -> float:
-    """A positive number of a range, all its factors alike."""
+    """A number whose logarithm has a uniform distribution over a range above 0."""
     return float(np.exp(random.uniform(np.log(span[0]), np.log(span[1]))))
