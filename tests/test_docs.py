@@ -11,6 +11,8 @@ import pytest
 
 import vm_embedded
 
+from .rooms import ROOMS
+
 TOP = Path(__file__).parents[1]
 DOCS = TOP / "docs"
 README = TOP / "README.md"
@@ -70,6 +72,16 @@ def test_the_python_of_the_readme_works(monkeypatch, capsys):
     monkeypatch.chdir(TOP)
     exec(program, {})
     assert capsys.readouterr().out.startswith("ball 0.")
+
+
+def test_the_design_has_a_line_for_each_room():
+    design = (DOCS / "design.md").read_text()
+    parts = dict(re.findall(r"^\*\*(vm_\w+)\*\*(.*?)(?=^\*\*vm_|^## )", design, re.MULTILINE | re.DOTALL))
+    assert set(parts) == set(ROOMS)
+    for package, order in ROOMS.items():
+        lines = re.findall(r"^\| (`.*`) \| \w", parts[package], re.MULTILINE)
+        rooms = [room for room in re.split(r" > |, |\+", order) if room and room != "__main__"]
+        assert re.findall(r"`(\w+)`", " ".join(lines)) == rooms, package
 
 
 def test_every_page_is_in_the_index():
