@@ -16,8 +16,8 @@ from ..cameras.open_camera import camera_opener
 from ..cameras.opencv import device_path
 from ..errors import VisualMeshError, one_line
 from ..live.configuration import Configuration
-from ..live.control import usual_path
-from ..live.daemon import ready
+from ..live.control import default_socket_path
+from ..live.load_detector import load_checked_detector
 
 GOOD, WARNING, BAD = "ok", "warning", "failure"
 
@@ -113,7 +113,7 @@ def wheels(installed: set[str]) -> Finding:
 def network(configuration: Configuration) -> Finding:
     """Whether the model loads and answers its self-test."""
     try:
-        detector = ready(configuration)
+        detector = load_checked_detector(configuration)
     except VisualMeshError as error:
         return Finding("model", BAD, str(error), "vm-detect --check-config says whether it is mended")
     digest = detector.session.model.sha256
@@ -217,7 +217,7 @@ def clock(source: Path, now: float) -> Finding:
 
 def socket_folder(configuration: Configuration) -> Finding:
     """Whether the status socket can be made."""
-    path = Path(configuration.status.socket) if configuration.status.socket else usual_path()
+    path = Path(configuration.status.socket) if configuration.status.socket else default_socket_path()
     if not os.access(path.parent, os.W_OK):
         return Finding(
             "status socket", BAD, f"{path.parent} can't be written", f"sudo install -d -o $USER {path.parent}"

@@ -23,8 +23,9 @@ from ..geometry.lens import Lens
 from ..geometry.lens_files import read_lens_file
 from ..geometry.orientation import Orientation
 from ..live.configuration import Configuration
-from ..live.control import ask, usual_path
-from ..live.daemon import EXIT_CONFIGURATION, REFUSED, Daemon, ready
+from ..live.control import REFUSED, ask, default_socket_path
+from ..live.daemon import EXIT_CONFIGURATION, Daemon
+from ..live.load_detector import load_checked_detector
 from ..live.log import EventLog
 from ..output.result_files import json_line, make_folder, save_overlay, save_points
 from .options import ANGLES, add_live, add_model, add_pose, add_settings, read_options
@@ -139,7 +140,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _ask(given: Configuration, word: str) -> int:
     """Print the answer of a running detector. Fails if it is not well."""
-    answer = ask(Path(given.status.socket) if given.status.socket else usual_path(), word)
+    answer = ask(Path(given.status.socket) if given.status.socket else default_socket_path(), word)
     if answer.startswith(REFUSED):
         raise InputError(answer.removeprefix(REFUSED))
     try:
@@ -152,7 +153,7 @@ def _ask(given: Configuration, word: str) -> int:
 
 def _check(given: Configuration) -> int:
     """Say whether a detector would run with what is configured."""
-    detector = ready(given)
+    detector = load_checked_detector(given)
     print(f"{given.model}: {len(detector.manifest.classes)} classes, self-test passed; the configuration is good")
     return EXIT_OK
 

@@ -11,8 +11,7 @@ from typing import Any
 from ..cameras.camera import CameraSettings
 from ..detection.settings import Settings
 from ..geometry.lens_files import read_lens_file
-from ..live.configuration import Configuration, FixedPose, overridden, read_configuration
-from ..live.status_settings import StatusSettings
+from ..live.configuration import Configuration, FixedPose, StatusSettings, read_configuration, with_overrides
 from ..network.bundled import DEFAULT, SHIPPED
 from ..output.channels import OutputSettings
 from ..output.recorder import CONFIGURATION, MESSAGES, RecorderSettings
@@ -92,7 +91,7 @@ def read_options(options: argparse.Namespace) -> Configuration:
     given = {name: _given(options, section, prefix) for name, (section, prefix) in sections.items()}
     if getattr(options, "camera", None) is not None:
         given["camera"]["source"] = options.camera
-    configured = overridden(configured, given)
+    configured = with_overrides(configured, given)
     if options.model is not None:
         configured = replace(configured, model=options.model)
     if options.lens is not None:

@@ -1,6 +1,6 @@
-"""vm.toml: everything about a detector that is to run, a section each, checked at the border.
+"""The configuration vm.toml: all its sections, read and checked.
 
-`vm-detect --print-config` writes it with all defaults. Paths of model and lens count from the file's own folder.
+`vm-detect --print-config` prints it with all defaults. Paths of model and lens are relative to the file's folder.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..cameras.camera import CameraSettings
-from ..config.entries import check_entries
+from ..config.entries import check_entries, entry, number, text_line
 from ..config.sections import read_sections
 from ..config.units import angle, length
 from ..detection.settings import Settings
@@ -24,28 +24,54 @@ from ..network.bundled import DEFAULT, SHIPPED, model_path
 from ..output.channels import OutputSettings
 from ..output.recorder import RecorderSettings
 from ..poses.buffer import PoseSettings
+from ..sockets import checked_address
 from .deploy_settings import DeploySettings
-from .status_settings import StatusSettings
 
 
 @dataclass(frozen=True)
 class FixedPose:
-    """Section [orientation]: where the camera is, if neither the frames nor a pose stream say so."""
+    """Section [orientation]: the pose of the camera if neither the frames nor a pose stream give it."""
 
-    height: float | None = length(None, "height of the camera over the plane")
-    pitch: float | None = angle(None, 'angle of the optical axis below the horizon, or as in "20deg"')
-    roll: float | None = angle(None, 'lean of the camera to the right, or as in "-2deg"')
+    height: float | None = length(None, "height of the camera above the plane")
+    pitch: float | None = angle(None, 'angle of the optical axis below the horizon, in radians or as in "20deg"')
+    roll: float | None = angle(None, 'roll of the camera to the right, in radians or as in "-2deg"')
 
     def __post_init__(self) -> None:
         check_entries(self)
 
     def orientation(self) -> Orientation | None:
-        """The orientation, or None if no height is given. Raises InputError for angles without one."""
+        """The orientation, or None without a height. Raises InputError for angles without a height."""
         if self.height is None:
             if self.pitch is not None or self.roll is not None:
                 raise InputError("pitch and roll need a height: give --height")
             return None
         return Orientation.from_roll_pitch(self.height, self.roll or 0.0, self.pitch or 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StatusSettings:
+    """Section [status]: the control socket, the status page and the metrics."""
+
+    socket: str = text_line(
+        "",
+        "Unix socket for vm-detect --status and --record; empty: vm-detect.sock in $RUNTIME_DIRECTORY or "
+        "$XDG_RUNTIME_DIR, otherwise /tmp/vm-detect-UID.sock",
+    )
+    page: str = entry(checked_address, "", "ADDRESS:PORT of the status page, such as 127.0.0.1:8080; empty: no page")
+    metrics: str = entry(
+        checked_address, "", "ADDRESS:PORT or unix:PATH of the metrics for Prometheus; empty: no metrics"
+    )
+    budget_ms: float = number(
+        0.0,
+        "longest time from a frame's arrival to its message; above it, at the median of fifteen frames, the state is "
+        "degraded; 0: no limit",
+        "ms",
+        (0, 10000),
+    )
+    picture_fps: float = number(10.0, "frame rate of the status page", "1/s", (0.1, 100))
+
+    def __post_init__(self) -> None:
+        check_entries(self)
 
 
 def _read_model(value: object) -> str:
@@ -55,7 +81,7 @@ def _read_model(value: object) -> str:
 
 
 def _commented_model(value: str) -> str:
-    comment = f"# the network: a file that vm-export wrote, or one of the package: {', '.join(SHIPPED)}"
+    comment = f"# the network: a file written by vm-export, or one that comes with the package: {', '.join(SHIPPED)}"
     return f"{comment}\nmodel = {json.dumps(value)}"
 
 
@@ -63,14 +89,14 @@ def _read_lens(value: object) -> Path | LensFile:
     if isinstance(value, str):
         return Path(value)
     if not isinstance(value, Mapping):
-        raise InputError(f"lens must be a table, [lens], not {value!r}")
+        raise InputError(f"lens must be a path or a table, [lens], not {value!r}")
     return LensFile(lens_from_table(value), None)
 
 
 def _commented_lens(value: LensFile | None) -> str:
     comment = (
-        "# the lens: a file of the reference, of OpenCV or of ROS, or TOML; or a table, [lens], with projection,\n"
-        "# focal_length [px], fov [rad], and where they matter center, distortion and size [px]\n"
+        "# the lens: a calibration file of the Visual Mesh reference, OpenCV or ROS, or a TOML file; or a table,\n"
+        "# [lens], with projection, focal_length [px] and fov [rad], and optionally center, distortion and size [px]\n"
     )
     lens = value.lens if value is not None else None
     if not isinstance(lens, RadialLens):
@@ -84,7 +110,7 @@ def _commented_lens(value: LensFile | None) -> str:
 
 @dataclass(frozen=True)
 class Configuration:
-    """All sections, and the two that are no tables of entries."""
+    """All sections. model and lens are not sections of entries, so they bring their own reader and writer."""
 
     model: str = field(default=DEFAULT, metadata={"read": _read_model, "to_commented_toml": _commented_model})
     lens: LensFile | None = field(default=None, metadata={"read": _read_lens, "to_commented_toml": _commented_lens})
@@ -99,8 +125,8 @@ class Configuration:
 
 
 def read_configuration(path: str | Path) -> Configuration:
-    """Read a vm.toml. Raises InputError naming the file, the line, an unknown key with the nearest known one, or a bad
-    value."""
+    """Read a vm.toml. Raises InputError with the file, the line, and the bad value or the unknown key and its nearest
+    known one."""
     path = Path(path)
     read = read_sections(Configuration, path)
     try:
@@ -112,7 +138,8 @@ def read_configuration(path: str | Path) -> Configuration:
         raise InputError(f"configuration {path}: {error}") from error
 
 
-def overridden(configuration: Configuration, sections: Mapping[str, Mapping[str, Any]]) -> Configuration:
-    """A configuration in which the given entries of the given sections count instead. Raises InputError."""
+def with_overrides(configuration: Configuration, sections: Mapping[str, Mapping[str, Any]]) -> Configuration:
+    """The configuration with the given entries of the given sections replaced. Raises InputError."""
+
     changed = {name: replace(getattr(configuration, name), **entries) for name, entries in sections.items()}
     return replace(configuration, **changed)

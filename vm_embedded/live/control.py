@@ -1,4 +1,4 @@
-"""A socket to ask a running detector how it is and to tell it what to do: a word in, one answer out."""
+"""The control socket: it asks a running detector for its status and sends it commands, one word for one reply."""
 
 from __future__ import annotations
 
@@ -15,18 +15,21 @@ from ..sockets import UnixListener
 
 NAME = "vm-detect.sock"
 
-_SECONDS = 2.0
-"""How long who asks waits for an answer."""
+REFUSED = "refused: "
+"""Prefix of the reply to a command that could not be carried out."""
 
-_LARGEST = 2**20
-"""Bytes of an answer."""
+_TIMEOUT = 2.0
+"""How long a client waits for the reply, and the server for the command [s]."""
+
+_LARGEST_REPLY = 2**20
+"""Bytes."""
 
 Command = Callable[[], str]
-"""Does what a word says, and answers with text."""
+"""Carries out a command and returns the reply."""
 
 
-def usual_path() -> Path:
-    """Where the socket is unless the configuration says otherwise: where systemd or the session keeps such things."""
+def default_socket_path() -> Path:
+    """Path of the socket if none is configured: in the runtime folder of systemd or of the user session."""
     for variable in ("RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"):
         folder = os.environ.get(variable, "").split(":")[0]
         if folder:
@@ -34,8 +37,8 @@ def usual_path() -> Path:
     return Path(f"/tmp/vm-detect-{os.getuid()}.sock")
 
 
-class Control:
-    """Answers at a socket."""
+class ControlServer:
+    """Replies to commands on a Unix socket."""
 
     def __init__(self, path: Path, commands: Mapping[str, Command]) -> None:
         self._path, self._commands = path, commands
@@ -45,16 +48,16 @@ class Control:
     async def open(self) -> None:
         """Listen. Raises InputError."""
         self._file = UnixListener(self._path)
-        self._server = await asyncio.start_unix_server(self._answer, sock=self._file.socket, limit=1024)
+        self._server = await asyncio.start_unix_server(self._reply, sock=self._file.socket, limit=1024)
 
-    async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        # asyncio takes a handler that was cancelled for one that failed, and says so at length.
+    async def _reply(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        # asyncio logs a traceback for a cancelled handler, so suppress that too.
         with suppress(OSError, ValueError, TimeoutError, asyncio.CancelledError):
-            word = (await asyncio.wait_for(reader.readline(), _SECONDS)).decode("ascii", "replace").strip()
+            word = (await asyncio.wait_for(reader.readline(), _TIMEOUT)).decode("ascii", "replace").strip()
             command = self._commands.get(word)
-            answer = command() if command else f"unknown command {word!r}; known are {', '.join(self._commands)}"
-            writer.write(answer.encode() + b"\n")
-            await asyncio.wait_for(writer.drain(), _SECONDS)
+            reply = command() if command else f"unknown command {word!r}; allowed: {', '.join(self._commands)}"
+            writer.write(reply.encode() + b"\n")
+            await asyncio.wait_for(writer.drain(), _TIMEOUT)
         writer.close()
 
     async def close(self) -> None:
@@ -66,17 +69,17 @@ class Control:
 
 
 def ask(path: Path, word: str) -> str:
-    """The answer of the detector that listens at a path. Raises InputError if none does, or none comes."""
+    """Send a command to the detector that listens at a path, and return its reply. Raises InputError without one."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
-        connection.settimeout(_SECONDS)
+        connection.settimeout(_TIMEOUT)
         try:
             connection.connect(str(path))
             connection.sendall(word.encode() + b"\n")
-            answer, deadline = b"", time.monotonic() + _SECONDS
-            while (part := connection.recv(65536)) and len(answer) < _LARGEST:
-                answer += part
+            reply, deadline = b"", time.monotonic() + _TIMEOUT
+            while (part := connection.recv(65536)) and len(reply) < _LARGEST_REPLY:
+                reply += part
                 connection.settimeout(max(deadline - time.monotonic(), 1e-3))
         except (OSError, ValueError) as error:
-            why = getattr(error, "strerror", None) or str(error) or "no answer"
-            raise InputError(f"no detector answers at {path}: {why}") from error
-    return answer.decode("utf-8", "replace").strip()
+            reason = getattr(error, "strerror", None) or str(error) or "no reply"
+            raise InputError(f"no detector replies at {path}: {reason}") from error
+    return reply.decode("utf-8", "replace").strip()

@@ -1,4 +1,4 @@
-"""What a running detector counts and times, as its status and Prometheus get it."""
+"""Counters and stage times of a running detector, for its status and for Prometheus."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from ..cameras.grabber import CameraCounts
 from ..detection.cache import MeshCache
 from ..detection.detections import Detections
 from ..output.messages import STATES
-from .prometheus import Histogram, exposition, resident_bytes
+from .prometheus import Histogram, resident_bytes, to_prometheus_text
 
 
 @dataclass
-class Tally:
-    """What became of frames after the camera. late: older than max_age_ms. stale: without a pose. failed: of a wrong
-    size, or unanswered. poses came; poses_bad were refused. dropped: lines that slow readers lost."""
+class Outcomes:
+    """Counts of what happened to frames after the camera, to poses and to messages; _HELP has the meanings."""
 
     frames: int = 0
     detections: int = 0
@@ -27,54 +26,55 @@ class Tally:
     dropped: int = 0
 
 
-_MEANINGS = {
-    "frames": "frames that were answered",
+_HELP = {
+    "frames": "frames in which objects were searched and reported",
     "detections": "objects that were reported",
     "late": "frames that were too old to be reported",
-    "stale": "frames for which there was no pose",
-    "failed": "frames that could not be answered",
-    "poses": "poses that came",
-    "poses_bad": "poses that were refused",
-    "dropped": "lines that slow readers lost",
+    "stale": "frames without a matching pose",
+    "failed": "frames of a wrong size, or with an error in the detection",
+    "poses": "poses that were accepted",
+    "poses_bad": "poses that were rejected",
+    "dropped": "messages that slow readers lost",
     "grabbed": "new frames of the camera",
-    "skipped": "frames that gave way to newer ones",
+    "skipped": "frames replaced by a newer frame before they were used",
     "broken": "frames that could not be decoded",
-    "frozen": "frames that equalled the one before",
-    "ahead": "frames from the future",
+    "frozen": "frames identical to the one before",
+    "ahead": "frames with a time in the future",
     "reconnects": "times that the camera was opened again",
-    "cache_hits": "frames whose mesh was prepared",
-    "cache_misses": "frames whose mesh was not",
+    "cache_hits": "frames whose mesh was in the cache",
+    "cache_misses": "frames whose mesh had to be prepared",
 }
 
 
-class Figures:
-    """All of them, since the process began."""
+class Counters:
+    """All counters and stage times since the process started."""
 
     def __init__(self) -> None:
-        self.tally = Tally()
+        self.outcomes = Outcomes()
         self._stages: dict[str, Histogram] = {}
-        self._began = time.monotonic()
+        self._started = time.monotonic()
 
-    def answered(self, detections: Detections, took: float, age: float) -> None:
-        """A frame was answered: it took so long, and was so old then [s]."""
-        self.tally.frames += 1
-        self.tally.detections += len(detections)
+    def answered(self, detections: Detections, duration: float, age: float) -> None:
+        """Count an answered frame: how long the answer took, and how old the frame was at its end [s]."""
+        self.outcomes.frames += 1
+        self.outcomes.detections += len(detections)
         stages = {name: 1e-3 * value for name, value in detections.timing_ms.items()}
-        for name, seconds in {**stages, "answer": took, "age": age}.items():
+        for name, seconds in {**stages, "answer": duration, "age": age}.items():
             self._stages.setdefault(name, Histogram()).add(seconds)
 
     def counts(self, camera: CameraCounts) -> dict[str, int]:
-        """All counts by name."""
-        return {**asdict(self.tally), **asdict(camera)}
+        """All counts by name, with those of the camera."""
+        return {**asdict(self.outcomes), **asdict(camera)}
 
-    def metrics(self, state: str, camera: CameraCounts, cache: MeshCache, since: float) -> str:
-        """For Prometheus. since: when the last frame was answered, in monotonic time [s]."""
+    def metrics(self, state: str, camera: CameraCounts, cache: MeshCache, answered: float) -> str:
+        """All metrics in Prometheus's text format. answered: monotonic time of the last answered frame [s]."""
+
         now = time.monotonic()
         counts = {**self.counts(camera), "cache_hits": cache.hits, "cache_misses": cache.misses}
         gauges = {
-            "frame_age_seconds": ("since a frame was answered last", now - max(since, self._began)),
+            "frame_age_seconds": ("time since the last frame was answered", now - max(answered, self._started)),
             "resident_bytes": ("memory of the process", resident_bytes()),
-            "uptime_seconds": ("since the process began", now - self._began),
+            "uptime_seconds": ("time since the process started", now - self._started),
         }
-        counters = {name: (_MEANINGS[name], float(value)) for name, value in counts.items()}
-        return exposition(counters, gauges, state, STATES, self._stages)
+        counters = {name: (_HELP[name], float(value)) for name, value in counts.items()}
+        return to_prometheus_text(counters, gauges, state, STATES, self._stages)

@@ -1,4 +1,4 @@
-"""Section [deploy]: what vm-deploy asks of a release before it stays, and of a model before it is taken."""
+"""Section [deploy]: when vm-deploy keeps a new release, and which models it accepts."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from ..config.entries import check_entries, entry, number
 from ..errors import InputError
 
 _ED25519 = b"\x00\x00\x00\x0bssh-ed25519\x00\x00\x00\x20"
-"""How the bytes of such a key begin (RFC 8709); 32 bytes follow."""
+"""First bytes of such a public key (RFC 8709); its 32 bytes follow."""
 
 
-def checked_signer(entry: Field[Any], value: Any) -> str:
-    """An Ed25519 public key as ssh-keygen writes it, its comment left out, or nothing. Raises InputError."""
+def check_signer(entry: Field[Any], value: Any) -> str:
+    """An Ed25519 public key in ssh-keygen's format, without its comment, or an empty string. Raises InputError."""
     words = value.split()[:2] if isinstance(value, str) else [value]
     if not words:
         return ""
@@ -25,7 +25,7 @@ def checked_signer(entry: Field[Any], value: Any) -> str:
         key = b""
     if not key.startswith(_ED25519) or len(key) != len(_ED25519) + 32:
         raise InputError(
-            f"{entry.name} must be an Ed25519 public key as in ssh-keygen's .pub file, 'ssh-ed25519 AAAA...', "
+            f"{entry.name} must be an Ed25519 public key from ssh-keygen's .pub file, 'ssh-ed25519 AAAA...', "
             f"not {str(value)[:60]!r}"
         )
     return " ".join(words)
@@ -33,16 +33,16 @@ def checked_signer(entry: Field[Any], value: Any) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class DeploySettings:
-    """When a release is kept, and whose models are taken."""
+    """How long a new release has to become healthy, and who must sign models."""
 
     healthy_s: float = number(
-        30.0, "time in which a new release must be ready and ok before the old one comes back", "s", (5, 600)
+        30.0, "time within which a new release must be ready and ok; otherwise vm-deploy rolls it back", "s", (5, 600)
     )
     signer: str = entry(
-        checked_signer,
+        check_signer,
         "",
-        "Ed25519 public key, as in ssh-keygen's .pub file, with which models for vm-deploy model must be signed; none: "
-        "they need not be",
+        "Ed25519 public key, from ssh-keygen's .pub file, that must have signed models for vm-deploy model; empty "
+        "accepts unsigned models",
     )
 
     def __post_init__(self) -> None:

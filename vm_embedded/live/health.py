@@ -1,4 +1,4 @@
-"""What state a detector is in, and why: it is ok only while new frames come and are answered."""
+"""Determine the state of a detector and the reason: it is ok only while new frames arrive and are answered."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from collections import deque
 from dataclasses import dataclass
 from statistics import median
 
-_SHOWN = 0.5
-"""Seconds for which a single trouble shows."""
+_TROUBLE_LASTS = 0.5
+"""How long a single trouble degrades the state [s]."""
 
 _TIMED = 15
-"""Frames whose median latency must be within the budget. Before there are as many it is not ok: who asks three times in
-two seconds would take a network of five frames a second for one that is fast enough."""
+"""Number of frames whose median latency must be within the budget. Until there are as many, the state is `starting`:
+vm-deploy, which asks three times in two seconds, would else accept a slow network after its first five frames."""
 
 
 @dataclass
 class Health:
-    """Told what happens, says how it is. Times in monotonic seconds.
+    """Collects events and gives the state. All times are monotonic [s].
 
-    limit: without an answered frame for so long the detector is not ok [s].
-    budget: so long may frames wait for their answer [s]; infinite for any time.
+    limit: time without an answered frame after which the detector is not ok [s].
+    budget: longest median latency of frames [s]; infinite for no limit.
     """
 
     limit: float
@@ -29,25 +29,25 @@ class Health:
     answered: float = -math.inf
     """When the last frame was answered."""
     pose_trouble: str = ""
-    """Why the last frame had no pose; nothing if it had one."""
+    """Why the last frame had no pose; empty if it had one."""
 
     def __post_init__(self) -> None:
         self._troubles: deque[tuple[float, str]] = deque(maxlen=32)
         self._latencies: deque[float] = deque(maxlen=_TIMED)
 
-    def trouble(self, now: float, what: str) -> None:
-        """Something went wrong with a frame, a pose or a message."""
-        self._troubles.append((now, what))
+    def trouble(self, now: float, reason: str) -> None:
+        """Note that something is wrong with a frame, a pose or an output."""
+        self._troubles.append((now, reason))
 
     def answer(self, now: float, latency: float) -> None:
-        """A fresh frame was answered, so long after its arrival [s]."""
+        """Note that a frame was answered, `latency` after its arrival [s]."""
         self.answered = now
         self._latencies.append(latency)
         self.pose_trouble = ""
 
     def state(self, now: float, camera_lost: bool, camera_trouble: str) -> tuple[str, str]:
-        """The state, of messages.STATES, and the reason."""
-        while self._troubles and now - self._troubles[0][0] > _SHOWN:
+        """The state, one of messages.STATES, and the reason."""
+        while self._troubles and now - self._troubles[0][0] > _TROUBLE_LASTS:
             self._troubles.popleft()
         if self.stopping:
             return "stopping", ""
@@ -68,5 +68,5 @@ class Health:
             if len(self._latencies) < _TIMED:
                 return "starting", f"timing the first {_TIMED} frames"
             if (latency := median(self._latencies)) > self.budget:
-                return "degraded", f"frames take {1e3 * latency:.1f} ms, the budget is {1e3 * self.budget:g} ms"
+                return "degraded", f"frames take {1e3 * latency:.1f} ms, but the budget is {1e3 * self.budget:g} ms"
         return "ok", ""

@@ -1,4 +1,4 @@
-"""The smallest HTTP server that shows a state, a moving picture and figures. It answers GET and nothing else."""
+"""A small HTTP server for the status page, its video stream and the metrics. It supports GET only."""
 
 from __future__ import annotations
 
@@ -11,28 +11,27 @@ from ipaddress import ip_address
 from ..errors import InputError
 from ..sockets import UnixListener, parse_address
 
-_SECONDS = 5.0
-"""How long a browser may take to ask, and to take a part of an answer."""
+_TIMEOUT = 5.0
+"""How long a browser may take to send its request, and to receive each part of the response [s]."""
 
-_MOST = 16
-"""Connections at a time."""
+_MOST_CONNECTIONS = 16
 
 
 @dataclass(frozen=True)
-class Answer:
-    """kind: its media type."""
+class Response:
+    """A response. media_type: such as text/plain."""
 
-    kind: str
+    media_type: str
     content: bytes
 
 
 Write = Callable[[bytes], Awaitable[None]]
-Page = Callable[[], Answer]
+Page = Callable[[], Response]
 Stream = Callable[[Write], Awaitable[None]]
 
 
-class WebServer:
-    """Serves pages, and streams that go on for as long as somebody looks.
+class HttpServer:
+    """Serves pages, and streams that last as long as the browser is connected.
 
     where: ADDRESS:PORT or unix:PATH.
     """
@@ -49,7 +48,7 @@ class WebServer:
             self._file = UnixListener(self._where.removeprefix("unix:"))
             self._server = await asyncio.start_unix_server(self._serve, sock=self._file.socket, limit=8192)
             return
-        host, port = parse_address(self._where, "[status] page and metrics")
+        host, port = parse_address(self._where, "[status] page or metrics")
         try:
             self._server = await asyncio.start_server(self._serve, host, port, limit=8192)
         except OSError as error:
@@ -60,34 +59,34 @@ class WebServer:
         assert task is not None
         self._tasks.add(task)
         try:
-            # asyncio takes a handler that was cancelled for one that failed, and says so at length.
+            # asyncio logs a traceback for a cancelled handler, so suppress that too.
             with suppress(OSError, ValueError, EOFError, asyncio.LimitOverrunError, asyncio.CancelledError):
-                head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _SECONDS)
-                await self._answer(head.decode("latin-1").split("\r\n"), writer)
+                head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _TIMEOUT)
+                await self._respond(head.decode("latin-1").split("\r\n"), writer)
         finally:
             self._tasks.discard(task)
             writer.close()
 
-    async def _answer(self, head: list[str], writer: asyncio.StreamWriter) -> None:
+    async def _respond(self, head: list[str], writer: asyncio.StreamWriter) -> None:
         async def write(content: bytes) -> None:
             writer.write(content)
-            await asyncio.wait_for(writer.drain(), _SECONDS)
+            await asyncio.wait_for(writer.drain(), _TIMEOUT)
 
         method, path, *_ = [*head[0].split(" "), "", ""]
         path = path.partition("?")[0]
         if method != "GET":
-            await write(_response("405 Method Not Allowed", Answer("text/plain", b"GET only\n")))
-        elif self._file is None and not _is_own(head):
-            await write(_response("403 Forbidden", Answer("text/plain", b"ask by address, not by name\n")))
+            await write(_encode("405 Method Not Allowed", Response("text/plain", b"only GET is supported\n")))
+        elif self._file is None and not _has_numeric_host(head):
+            await write(_encode("403 Forbidden", Response("text/plain", b"use the IP address, not a host name\n")))
         elif path in self._pages:
-            await write(_response("200 OK", self._pages[path]()))
-        elif path in self._streams and len(self._tasks) <= _MOST:
+            await write(_encode("200 OK", self._pages[path]()))
+        elif path in self._streams and len(self._tasks) <= _MOST_CONNECTIONS:
             await self._streams[path](write)
         else:
-            await write(_response("404 Not Found", Answer("text/plain", b"there is no such page\n")))
+            await write(_encode("404 Not Found", Response("text/plain", b"page not found\n")))
 
     async def close(self) -> None:
-        """Stop listening, and end all streams."""
+        """Stop listening and end all streams."""
         if self._server is not None:
             self._server.close()
         for task in list(self._tasks):
@@ -97,8 +96,9 @@ class WebServer:
             self._file.close()
 
 
-def _is_own(head: list[str]) -> bool:
-    """Whether a browser asks for this machine by address: a name could be another site's that was turned to it."""
+def _has_numeric_host(head: list[str]) -> bool:
+    """Whether a browser uses localhost or an IP address. Another web site could point its own name at this machine and
+    read the responses (DNS rebinding), so names are rejected."""
     hosts = [line.partition(":")[2].strip() for line in head[1:] if line.lower().startswith("host:")]
     if not hosts:
         return True
@@ -109,9 +109,9 @@ def _is_own(head: list[str]) -> bool:
         return False
 
 
-def _response(status: str, answer: Answer) -> bytes:
+def _encode(status: str, response: Response) -> bytes:
     head = (
-        f"HTTP/1.1 {status}\r\nContent-Type: {answer.kind}\r\nContent-Length: {len(answer.content)}\r\n"
+        f"HTTP/1.1 {status}\r\nContent-Type: {response.media_type}\r\nContent-Length: {len(response.content)}\r\n"
         "Cache-Control: no-store\r\nConnection: close\r\n\r\n"
     )
-    return head.encode() + answer.content
+    return head.encode() + response.content

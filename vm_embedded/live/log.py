@@ -1,4 +1,4 @@
-"""What happens, a line each on standard error: text for people at a terminal, JSON for everything else."""
+"""Log events on standard error, one line each: text on a terminal, JSON otherwise."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, TextIO
 
 
 class EventLog:
-    """Writes events. A log that can't be written is no reason to stop."""
+    """Writes events. If the log can't be written, it is silent from then on; the detector keeps running."""
 
     def __init__(self, program: str, stream: TextIO | None = None) -> None:
         self.program = program
@@ -18,10 +18,11 @@ class EventLog:
         self._text = self._stream.isatty()
 
     def __call__(self, event: str, level: str = "info", **fields: Any) -> None:
-        """One event, with what belongs to it."""
+        """Log an event with its fields."""
         if self._text:
-            said = ", ".join(f"{name} {value}" for name, value in fields.items())
-            line = f"{time.strftime('%H:%M:%S')} {level:7} {event}{': ' if said else ''}{said}"
+            details = ", ".join(f"{name} {value}" for name, value in fields.items())
+            line = f"{time.strftime('%H:%M:%S')} {level:7} {event}{': ' if details else ''}{details}"
+
         else:
             now = round(time.time(), 3)
             line = json.dumps({"time": now, "level": level, "event": event, **fields}, default=str)

@@ -1,4 +1,4 @@
-"""Counts and durations for Prometheus, in its text format."""
+"""Counters, gauges and histograms in Prometheus's text format."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 BUCKETS = (0.0005, 0.001, 0.002, 0.003, 0.005, 0.008, 0.012, 0.02, 0.033, 0.05, 0.1, 0.25, 1.0, math.inf)
-"""Upper ends of histograms [s]."""
+"""Upper bounds of the histogram buckets [s]."""
 
 
 class Histogram:
-    """How many durations fell into each bucket, and their sum [s]."""
+    """Counts of durations in each bucket, and their sum [s]."""
 
     def __init__(self) -> None:
         self.counts = [0] * len(BUCKETS)
         self.sum = 0.0
 
     def add(self, seconds: float) -> None:
-        """One more."""
+        """Add a duration [s]."""
         self.counts[bisect_left(BUCKETS, seconds)] += 1
         self.sum += seconds
 
     def lines(self, name: str, labels: str) -> Iterator[str]:
-        """Of the text format."""
+        """Lines of the text format."""
         total = 0
         comma = "," if labels else ""
         for end, count in zip(BUCKETS, self.counts, strict=True):
@@ -36,14 +36,14 @@ class Histogram:
         yield f"{name}_count{{{labels}}} {total}"
 
 
-def exposition(
+def to_prometheus_text(
     counters: Mapping[str, tuple[str, float]],
     gauges: Mapping[str, tuple[str, float]],
     state: str,
     states: tuple[str, ...],
     stages: Mapping[str, Histogram],
 ) -> str:
-    """All of it. counters, gauges: help and value by name."""
+    """Format all metrics. counters, gauges: help and value by name. stages: the histogram of each stage."""
     lines = []
     for kind, values in (("counter", counters), ("gauge", gauges)):
         for name, (help, value) in values.items():

@@ -1,4 +1,4 @@
-"""The page that shows how a detector is: its state, its figures, and what it sees with what it found."""
+"""The status page: state, counters, and the camera's images with the detections drawn into them."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from ..arrays import Image
 from ..detection.detections import Detections
 from ..output.messages import Message
 from ..output.overlay import draw
-from .http_server import Answer, Write
+from .http_server import Response, Write
 
 _PAGE = Path(__file__).with_name("status_page.html")
 _BOUNDARY = b"--picture"
 _QUALITY = 80
 
-_STILL = 2.0
-"""Seconds after which a picture is sent again, if there is no new one."""
+_REPEAT = 2.0
+"""Time after which the last image is sent again, if there is no new one [s]."""
 
 
 class StatusPage:
-    """Pages and the stream of pictures. state: what /state gives.
+    """Pages and the video stream. state: returns the content of /state.
 
-    A picture is drawn only while somebody looks, in another thread, and once for all who do.
+    It draws images only while a browser is connected: in another thread, and once for all browsers.
     """
 
     def __init__(self, fps: float, state: Callable[[], Message]) -> None:
@@ -40,20 +40,20 @@ class StatusPage:
         self._page = _PAGE.read_bytes()
 
     def show(self, image: Image, detections: Detections) -> None:
-        """What is to be seen from now on."""
+        """Set the image and the detections to show."""
         self._latest = image, detections
         self._changed.set()
 
-    def page(self) -> Answer:
+    def page(self) -> Response:
         """The page itself."""
-        return Answer("text/html; charset=utf-8", self._page)
+        return Response("text/html; charset=utf-8", self._page)
 
-    def state(self) -> Answer:
-        """State and figures."""
-        return Answer("application/json", json.dumps(self._state(), allow_nan=False).encode())
+    def state(self) -> Response:
+        """State and counters as JSON."""
+        return Response("application/json", json.dumps(self._state(), allow_nan=False).encode())
 
     async def stream(self, write: Write) -> None:
-        """Motion JPEG, until who looks has gone."""
+        """Send Motion JPEG until the browser disconnects."""
         await write(
             b"HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=picture\r\n"
             b"Cache-Control: no-store\r\nConnection: close\r\n\r\n"
@@ -65,11 +65,12 @@ class StatusPage:
                 await write(_BOUNDARY + head + picture + b"\r\n")
             await asyncio.sleep(self._period)
             self._changed.clear()
-            with suppress(TimeoutError):  # then the same picture again: who has gone is noticed by writing only
-                await asyncio.wait_for(self._changed.wait(), _STILL)
+            with suppress(TimeoutError):  # then send the same image: only a write notices a closed connection
+                await asyncio.wait_for(self._changed.wait(), _REPEAT)
 
     async def _picture(self) -> bytes | None:
-        """The latest picture as a JPEG."""
+        """The latest image as a JPEG."""
+
         async with self._drawing:
             if self._latest is not None and (self._shown is None or self._shown[0] is not self._latest[0]):
                 image, detections = self._latest

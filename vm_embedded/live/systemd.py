@@ -1,4 +1,4 @@
-"""Telling systemd how a service is: sd_notify, a datagram to the socket that $NOTIFY_SOCKET names."""
+"""Notify systemd of the service's state as sd_notify does: with datagrams to the socket in $NOTIFY_SOCKET."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import socket
 from contextlib import suppress
 
 
-class Notifier:
-    """Sends states to systemd, or to nobody if it did not start this process."""
+class SystemdNotifier:
+    """Sends states to systemd; does nothing if systemd did not start this process."""
 
     def __init__(self) -> None:
         address = os.environ.get("NOTIFY_SOCKET", "")
@@ -19,16 +19,17 @@ class Notifier:
         period = os.environ.get("WATCHDOG_USEC", "")
         own = os.environ.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
         self.watchdog = 1e-6 * int(period) if period.isdigit() and own else None
-        """Seconds within which the watchdog wants to hear something, or None."""
+        """Period within which the watchdog expects a notification [s]; None without a watchdog."""
 
     def send(self, **states: str | int) -> None:
-        """As send(READY=1, STATUS="ok"). Who does not listen is not waited for."""
+        """Send states, as in send(READY=1, STATUS="ok"). It never blocks."""
         if self._socket is not None:
             lines = "\n".join(f"{name}={' '.join(str(value).split())}" for name, value in states.items())
             with suppress(OSError):
                 self._socket.sendto(lines.encode(), self._address)
 
     def close(self) -> None:
-        """Give the socket back."""
+        """Close the socket."""
+
         if self._socket is not None:
             self._socket.close()

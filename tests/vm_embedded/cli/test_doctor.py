@@ -12,8 +12,7 @@ from vm_embedded.cli import checks as doctor
 from vm_embedded.cli.checks import BAD, GOOD, WARNING
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.radial_lenses import Equisolid
-from vm_embedded.live.configuration import Configuration
-from vm_embedded.live.status_settings import StatusSettings
+from vm_embedded.live.configuration import Configuration, StatusSettings
 
 COMMAND = Path(sys.executable).parent / "vm-doctor"
 MENDED = Configuration(

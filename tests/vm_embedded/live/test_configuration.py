@@ -129,7 +129,7 @@ def test_an_unknown_key_names_itself_and_the_nearest_known_one(write, text, says
 
 WRONG = {
     "model that is no path": ("model = 5\n", "model must be a path, not 5"),
-    "lens that is neither path nor table": ("lens = 5\n", r"lens must be a table, \[lens\], not 5"),
+    "lens that is neither path nor table": ("lens = 5\n", r"lens must be a path or a table, \[lens\], not 5"),
     "lens file that is missing": ('lens = "none.yaml"\n', r"none\.yaml.*No such file"),
     "lens that lacks a key": ("[lens]\nprojection = 'equisolid'\nfov = 1\n", "lacks focal_length"),
     "lens out of range": (FULL.replace("fov = 1.8", "fov = 103"), "fov .*103"),

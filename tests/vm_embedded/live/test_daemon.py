@@ -155,7 +155,7 @@ def test_what_can_never_work_ends_it_at_the_start_with_a_status_of_its_own(tmp_p
         (("--camera", "/dev/video-none"), "needs a lens"),
         (("--config", tmp_path / "none.toml"), "none.toml"),
         (("--camera", "fault:none.toml"), "none.toml"),
-        (("--camera", "http://"), "no address"),
+        (("--camera", "http://"), "not a valid address"),
         (("--camera", "synthetic", "--pose-source", "udp:nowhere"), "127.0.0.1:5600"),
         (("--camera", "synthetic", "--pose-source", "radio"), "radio"),
         (("--camera", "synthetic", "--output-udp", "here"), "here"),
@@ -369,7 +369,7 @@ def test_asking_what_is_no_detector_ends(tmp_path):
         command = [COMMAND, "--status", "--status-socket", path]
         done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
     assert done.returncode == 1
-    assert "no detector answers" in done.stderr
+    assert "no detector replies" in done.stderr
 
 
 def test_passwords_of_cameras_are_not_shown(tmp_path):

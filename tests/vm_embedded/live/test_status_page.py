@@ -80,4 +80,4 @@ def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_cam
         wait(lambda: text("state") == "ok")
         assert moves()
         found.stop()
-        wait(lambda: text("state") == "no answer")
+        wait(lambda: text("state") == "no response")

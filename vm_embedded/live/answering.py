@@ -1,0 +1,109 @@
+"""Answer one shot: find its lens and orientation, and detect the objects in it."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from dataclasses import dataclass
+
+import cv2
+
+from ..cameras.camera import Shot
+from ..detection.detections import Detections
+from ..detection.detector import Detector
+from ..errors import InputError, VisualMeshError, one_line
+from ..geometry.lens import Lens
+from ..geometry.orientation import Orientation
+from ..poses.buffer import StalePoseError
+from ..poses.stream import PoseStream
+from .configuration import Configuration
+from .counters import Counters
+from .health import Health
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The detections of a shot, and the lens and orientation they were computed with. time: monotonic [s]."""
+
+    shot: Shot
+    lens: Lens
+    orientation: Orientation
+    detections: Detections
+    time: float
+
+
+class Answerer:
+    """Answers shots with the current configuration, which the daemon replaces on reload, and counts the outcomes."""
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        detector: Detector,
+        poses: PoseStream,
+        counters: Counters,
+        health: Health,
+    ) -> None:
+        self.configuration, self.detector = configuration, detector
+        self._poses, self._counters, self._health = poses, counters, health
+
+    async def answer(self, shot: Shot) -> Answer | None:
+        """Detect the objects in a shot; None if it is too old, has no pose, or the detection fails."""
+        if self._is_late(shot):
+            return None
+        try:
+            lens, orientation = self._lens(shot), await self._orientation(shot)
+            self._health.pose_trouble = ""
+            started = time.perf_counter()
+            detections = self.detector.detect(shot.image, orientation, lens)
+        except StalePoseError as error:
+            self._counters.outcomes.stale += 1
+            self._health.pose_trouble = str(error)
+            return None
+        except (VisualMeshError, cv2.error, ValueError) as error:
+            self._counters.outcomes.failed += 1
+            self._health.trouble(time.monotonic(), one_line(error))
+            return None
+        if self._is_late(shot):
+            return None
+        now = time.monotonic()
+        self._health.answer(now, now - shot.arrived)
+        self._counters.answered(detections, time.perf_counter() - started, now - shot.captured)
+        return Answer(shot, lens, orientation, detections, now)
+
+    def _is_late(self, shot: Shot) -> bool:
+        """Whether a shot is too old to be reported; if so, count it."""
+        age, limit = time.monotonic() - shot.captured, self.configuration.camera.max_age_ms
+        late = age > 1e-3 * limit
+        if late:
+            self._counters.outcomes.late += 1
+            self._health.trouble(time.monotonic(), f"frame is {1e3 * age:.0f} ms old, allowed are {limit:g} ms")
+        return late
+
+    def _lens(self, shot: Shot) -> Lens:
+        """The shot's own lens, or the configured one. Raises InputError."""
+        configured = self.configuration.lens
+        lens = shot.lens or (configured.lens if configured is not None else None)
+        if lens is None:
+            raise InputError("no lens: give --lens")
+        return lens
+
+    async def _orientation(self, shot: Shot) -> Orientation:
+        """The camera's orientation when the shot was taken. It waits up to wait_ms for a pose as new as the shot.
+
+        Raises StalePoseError or InputError.
+        """
+        settings = self.configuration.pose
+        if settings.source == "fixed":
+            fixed = shot.orientation or self.configuration.orientation.orientation()
+            if fixed is None:
+                raise InputError("no orientation: give --height or --pose-source")
+            return fixed
+        poses, arrived = self._poses.poses, self._poses.arrived
+        deadline = time.monotonic() + 1e-3 * settings.wait_ms
+        while settings.interpolate and poses.newest < shot.captured and (left := deadline - time.monotonic()) > 0.0:
+            arrived.clear()
+            try:
+                await asyncio.wait_for(arrived.wait(), left)
+            except TimeoutError:
+                break
+        return poses.at(shot.captured)

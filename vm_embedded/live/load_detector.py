@@ -1,0 +1,28 @@
+"""Load the configured detector and check that the configuration fits together."""
+
+from __future__ import annotations
+
+from ..cameras.camera import without_password
+from ..cameras.open_camera import camera_opener, is_live
+from ..detection.detector import Detector
+from ..errors import InputError
+from .configuration import Configuration
+
+
+def load_checked_detector(configuration: Configuration) -> Detector:
+    """Load the configured network, run its self-test, and check camera, lens, poses and trigger class.
+
+    Raises VisualMeshError for the first thing that is missing or invalid.
+    """
+    detector = Detector.from_file(configuration.model, configuration.detector)
+    camera, fixed = configuration.camera.source, configuration.orientation.orientation()
+    if is_live(camera):
+        camera_opener(configuration.camera, configuration.detector.format != "bgr")
+    if configuration.recorder.trigger_class:
+        detector.manifest.column(configuration.recorder.trigger_class)
+    if is_live(camera) and camera.partition(":")[0] not in ("synthetic", "fault"):
+        if configuration.lens is None:
+            raise InputError(f"camera {without_password(camera)} needs a lens: give --lens")
+        if configuration.pose.source == "fixed" and fixed is None:
+            raise InputError(f"camera {without_password(camera)} needs poses: give --height or --pose-source")
+    return detector
