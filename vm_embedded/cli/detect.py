@@ -27,7 +27,8 @@ from ..live.control import REFUSED, ask, default_socket_path
 from ..live.daemon import EXIT_CONFIGURATION, Daemon
 from ..live.load_detector import load_checked_detector
 from ..live.log import EventLog
-from ..output.result_files import json_line, make_folder, save_overlay, save_points
+from ..output.messages import file_message
+from ..output.result_files import make_folder, save_overlay, save_points
 from .options import ANGLES, add_live, add_model, add_pose, add_settings, read_options
 from .progress import ProgressBar
 
@@ -217,7 +218,7 @@ def _process(frame: Frame, detector: Detector, pose: _Pose, options: argparse.Na
         save_points(options.save_points, frame, detections)
     if options.save_overlay is not None:
         save_overlay(options.save_overlay, frame, image, detections)
-    return json_line(frame, detections, emit, options.explain)
+    return json.dumps(file_message(frame, detections, emit, options.explain), allow_nan=False)
 
 
 def _complain(message: str) -> None:

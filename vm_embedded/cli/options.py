@@ -15,7 +15,7 @@ from ..live.configuration import Configuration, FixedPose, StatusSettings, read_
 from ..network.bundled import DEFAULT, SHIPPED
 from ..output.channels import OutputSettings
 from ..output.recorder import CONFIGURATION, MESSAGES, RecorderSettings
-from ..poses.buffer import PoseSettings
+from ..poses.settings import PoseSettings
 
 LIVE = {
     "camera": CameraSettings,

@@ -23,7 +23,7 @@ from ..geometry.radial_lenses import RadialLens
 from ..network.bundled import DEFAULT, SHIPPED, model_path
 from ..output.channels import OutputSettings
 from ..output.recorder import RecorderSettings
-from ..poses.buffer import PoseSettings
+from ..poses.settings import PoseSettings
 from ..sockets import checked_address
 from .deploy_settings import DeploySettings
 

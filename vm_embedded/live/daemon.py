@@ -27,7 +27,7 @@ from ..config.toml_writer import to_commented_toml
 from ..errors import InputError, VisualMeshError
 from ..network.bundled import model_path
 from ..output.channels import Channels
-from ..output.messages import Message, frame_message, state_message
+from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
 from ..poses.stream import PoseStream
 from .answering import Answer, Answerer
@@ -188,7 +188,7 @@ class Daemon:
         """Send an answer to the outputs, and hand it to the status page and the recorder."""
         self._update_state()
         shot, detections = answer.shot, answer.detections
-        self.last = frame_message(self.counters.outcomes.frames, self.state, shot, detections, answer.time)
+        self.last = live_message(self.counters.outcomes.frames, self.state, shot, detections, answer.time)
         self._send(self.last)
         self.page.show(shot.image, detections)
         self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._toml)

@@ -13,7 +13,7 @@ import cv2
 from ..arrays import Image
 from ..detection.detections import Detections
 from ..output.messages import Message
-from ..output.overlay import draw
+from ..output.overlay import draw_overlay
 from .http_server import Response, Write
 
 _PAGE = Path(__file__).with_name("status_page.html")
@@ -79,4 +79,4 @@ class StatusPage:
 
 
 def _jpeg(image: Image, detections: Detections) -> bytes:
-    return cv2.imencode(".jpg", draw(image, detections), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+    return cv2.imencode(".jpg", draw_overlay(image, detections), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()

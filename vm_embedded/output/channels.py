@@ -1,6 +1,6 @@
-"""Where messages go, several ways at once: standard output, a file, UDP, a Unix socket with many readers.
+"""The channels that send messages: standard output, a file, UDP, and a Unix socket with any number of readers.
 
-Nobody who reads slowly holds the detector up: what does not fit is dropped and counted.
+A slow reader never blocks the detector: lines that exceed its backlog are dropped and counted.
 """
 
 from __future__ import annotations
@@ -25,85 +25,82 @@ FORMATS = ("json", "ros")
 
 @dataclass(frozen=True, kw_only=True)
 class OutputSettings:
-    """Section [output]."""
+    """Section [output]: the channels, the format of the lines, and the backlog of slow readers."""
 
-    stdout: bool = switch(True, "lines on standard output")
-    file: str = text_line("", "file that lines are appended to")
-    udp: str = entry(
-        checked_address, "", "where each line is sent as a datagram: ADDRESS:PORT, several with commas between"
-    )
-    unix: str = text_line("", "socket that is made; every reader of it gets every line")
-    format: str = one_of(FORMATS, "json", "json, or ros: the field names of vision_msgs and geometry_msgs of ROS 2")
-    frame_id: str = text_line("base_footprint", "what ROS is to call the frame on the ground below the camera")
-    backlog_kib: int = number(256, "how far a reader may lag behind before it loses lines", "KiB", (1, 65536))
+    stdout: bool = switch(True, "write lines to standard output")
+    file: str = text_line("", "file to append lines to")
+    udp: str = entry(checked_address, "", "UDP receivers, one datagram per line: ADDRESS:PORT, separated by commas")
+    unix: str = text_line("", "Unix socket to create; each reader gets every line")
+    format: str = one_of(FORMATS, "json", "json, or ros for the field names of vision_msgs and geometry_msgs in ROS 2")
+    frame_id: str = text_line("base_footprint", "ROS name of the frame on the ground below the camera")
+    backlog_kib: int = number(256, "backlog after which a slow reader loses lines", "KiB", (1, 65536))
 
     def __post_init__(self) -> None:
         check_entries(self)
 
 
-class Output(Protocol):
-    """One way out. dropped: lines that were lost on it. failure: why the last one was, if not because of a slow
-    reader."""
+class Channel(Protocol):
+    """One channel. dropped: number of lines lost. failure: why the last line was lost; empty for slow readers."""
 
     dropped: int
     failure: str
 
     def send(self, line: bytes) -> None:
-        """Send a line, or drop it; never wait."""
+        """Send a line or drop it; never block."""
 
     async def close(self) -> None:
-        """Send what waits, if it goes at once, and end."""
+        """Send the backlog if that is possible at once, and close."""
 
 
 class Channels:
-    """All ways out."""
+    """All channels of the settings."""
 
     def __init__(self, settings: OutputSettings) -> None:
         self.settings = settings
-        self._outputs: list[Output] = []
+        self._channels: list[Channel] = []
 
     async def open(self) -> None:
-        """Make sockets and open files. Raises InputError."""
-        settings, most = self.settings, 1024 * self.settings.backlog_kib
+        """Create sockets and open files. Raises InputError."""
+        settings, backlog = self.settings, 1024 * self.settings.backlog_kib
         try:
             if settings.stdout:
                 if sys.stdout is None:
-                    raise InputError("standard output is closed; --no-output-stdout goes without it")
-                self._outputs.append(DescriptorChannel(os.dup(sys.stdout.fileno()), most))
+                    raise InputError("standard output is closed; use --no-output-stdout")
+                self._channels.append(DescriptorChannel(os.dup(sys.stdout.fileno()), backlog))
             if settings.file:
-                self._outputs.append(DescriptorChannel(_opened(settings.file), most))
+                self._channels.append(DescriptorChannel(_open_to_append(settings.file), backlog))
             for each in filter(None, settings.udp.split(",")):
-                self._outputs.append(DatagramChannel(each))
+                self._channels.append(DatagramChannel(each))
             if settings.unix:
-                self._outputs.append(await UnixChannel.open(settings.unix, most))
+                self._channels.append(await UnixChannel.open(settings.unix, backlog))
         except InputError:
             await self.close()
             raise
 
     @property
     def dropped(self) -> int:
-        """Lines that were lost, over all ways."""
-        return sum(each.dropped for each in self._outputs)
+        """Number of lines lost, over all channels."""
+        return sum(each.dropped for each in self._channels)
 
     @property
     def failure(self) -> str:
-        """Why lines are lost; nothing if they are not, or only to slow readers."""
-        return next((each.failure for each in self._outputs if each.failure), "")
+        """Why lines are lost; empty if none are, or only those of slow readers."""
+        return next((each.failure for each in self._channels if each.failure), "")
 
     def send(self, message: Message) -> None:
-        """Send a message all ways."""
+        """Send a message on all channels."""
         line = to_json_line(to_ros(message, self.settings.frame_id) if self.settings.format == "ros" else message)
-        for each in self._outputs:
+        for each in self._channels:
             each.send(line)
 
     async def close(self) -> None:
-        """End all of them."""
-        for each in self._outputs:
+        """Close all channels."""
+        for each in self._channels:
             await each.close()
-        self._outputs.clear()
+        self._channels.clear()
 
 
-def _opened(path: str) -> int:
+def _open_to_append(path: str) -> int:
     try:
         return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o644)
     except OSError as error:
@@ -111,41 +108,42 @@ def _opened(path: str) -> int:
 
 
 class DescriptorChannel:
-    """A file, pipe or terminal, written by a thread of its own: whatever it is may hold a writer up."""
+    """A file, pipe or terminal. A separate thread writes, because a write may block."""
 
-    def __init__(self, descriptor: int, most: int) -> None:
+    def __init__(self, descriptor: int, backlog: int) -> None:
         self.dropped = 0
         self.failure = ""
         self._descriptor = descriptor
-        self._most, self._given, self._written = most, 0, 0  # bytes; each is changed by one thread only
+        self._backlog = backlog
+        self._accepted = self._written = 0  # bytes; each is changed by one thread only
         self._lines: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._write, name="output", daemon=True)
         self._thread.start()
 
     def send(self, line: bytes) -> None:
-        """Hand a line to the thread."""
-        if self._given - self._written + len(line) > self._most:
+        """Pass a line to the thread, unless its backlog is full."""
+        if self._accepted - self._written + len(line) > self._backlog:
             self.dropped += 1
             return
-        self._given += len(line)
+        self._accepted += len(line)
         self._lines.put(line)
 
     def _write(self) -> None:
         torn = False
         while (line := self._lines.get()) is not None:
-            rest = memoryview(b"\n" + line if torn else line)  # nobody should take the next line for more of this one
+            rest = memoryview(b"\n" + line if torn else line)  # end the torn line before the next
             try:
                 while rest:
-                    rest = rest[self._some(rest) :]
+                    rest = rest[self._write_some(rest) :]
                 self.failure, torn = "", False
-            except OSError as error:  # a full disk, or a reader that has gone: the others go on
+            except OSError as error:  # a full disk, or the reader is gone; other channels go on
                 self.failure, torn = error.strerror or str(error), torn or len(rest) < len(line)
                 self.dropped += 1
             self._written += len(line)
         os.close(self._descriptor)
 
-    def _some(self, rest: memoryview) -> int:
-        """Write what can be written, once something can."""
+    def _write_some(self, rest: memoryview) -> int:
+        """Write as many bytes as possible, waiting until at least one can be written; return their number."""
         while True:
             try:
                 return os.write(self._descriptor, rest)
@@ -153,71 +151,71 @@ class DescriptorChannel:
                 select.select([], [self._descriptor], [])
 
     async def close(self) -> None:
-        """Give the thread a moment; one that hangs in a write ends with the process."""
+        """Give the thread a moment to finish; one that blocks in a write ends with the process."""
         self._lines.put(None)
         await asyncio.to_thread(self._thread.join, 0.3)
 
 
 class DatagramChannel:
-    """UDP."""
+    """UDP datagrams to one address, ADDRESS:PORT."""
 
-    def __init__(self, where: str) -> None:
+    def __init__(self, destination: str) -> None:
         self.dropped = 0
         self.failure = ""
-        self._socket, self._address = datagram_socket(*parse_address(where, "[output] udp"), "can't send to")
+        self._socket, self._address = datagram_socket(*parse_address(destination, "[output] udp"), "can't send to")
 
     def send(self, line: bytes) -> None:
         """Send a line as a datagram."""
         try:
             self._socket.sendto(line, self._address)
-        except OSError:  # nobody listens, no route, or the line is too long for a datagram
+        except OSError:  # no listener, no route, or the line is too long for a datagram
             self.dropped += 1
 
     async def close(self) -> None:
-        """Give the socket back."""
+        """Close the socket."""
         self._socket.close()
 
 
 class UnixChannel:
     """A Unix socket with any number of readers."""
 
-    def __init__(self, file: UnixListener, most: int) -> None:
+    def __init__(self, listener: UnixListener, backlog: int) -> None:
         self.dropped = 0
         self.failure = ""
-        self._file, self._most = file, most
+        self._listener, self._backlog = listener, backlog
         self._writers: set[asyncio.StreamWriter] = set()
         self._server: asyncio.Server | None = None
 
     @classmethod
-    async def open(cls, path: str | Path, most: int) -> UnixChannel:
+    async def open(cls, path: str | Path, backlog: int) -> UnixChannel:
         """Listen at a path. Raises InputError."""
-        output = cls(UnixListener(path), most)
-        output._server = await asyncio.start_unix_server(output._serve, sock=output._file.socket)
-        return output
+        channel = cls(UnixListener(path), backlog)
+        channel._server = await asyncio.start_unix_server(channel._serve, sock=channel._listener.socket)
+        return channel
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._writers.add(writer)
         try:
-            while await reader.read(4096):  # readers have nothing to say; the end of it says that they left
+            while await reader.read(4096):  # readers send nothing; an empty read means that they left
                 pass
-        except (ConnectionError, asyncio.CancelledError):  # the latter asyncio would take for a failure
+        except (ConnectionError, asyncio.CancelledError):  # asyncio would report the latter as a failure
             pass
         finally:
             self._writers.discard(writer)
             writer.close()
 
     def send(self, line: bytes) -> None:
-        """Send a line to all who keep up."""
+        """Send a line to all readers that keep up."""
         for writer in self._writers:
-            if writer.transport.get_write_buffer_size() + len(line) > self._most:
+            if writer.transport.get_write_buffer_size() + len(line) > self._backlog:
                 self.dropped += 1
             else:
                 writer.write(line)
 
     async def close(self) -> None:
-        """Stop listening, and let go of the readers."""
+        """Stop listening and disconnect the readers."""
         if self._server is not None:
             self._server.close()
         for writer in list(self._writers):
             writer.close()
-        self._file.close()
+        self._listener.close()

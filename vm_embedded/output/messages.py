@@ -1,16 +1,20 @@
-"""What a running detector says: a line of JSON for each frame, and one whenever its state changes.
+"""The messages of a detector: one line of JSON for each frame, and one for each change of state.
 
-Each has a state; a frame's has detections, and only a frame's has any.
+`frame_fields` holds the fields that frames of files and of live cameras have in common. Every message of a live
+detector has a state; only frames have detections.
 """
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from ..cameras.camera import Shot
+from ..cameras.image_files import Frame
 from ..detection.detections import Detections
 
 STATES = ("starting", "ok", "degraded", "camera_lost", "pose_stale", "stopping")
@@ -18,9 +22,43 @@ STATES = ("starting", "ok", "degraded", "camera_lost", "pose_stale", "stopping")
 Message = dict[str, Any]
 
 
-def frame_message(number: int, state: str, shot: Shot, detections: Detections, now: float) -> Message:
-    """What a frame shows. t: when it was taken, monotonic [s]; wall: the same since 1970 [s]; age_ms: since
-    then; latency_ms: since it had arrived."""
+def frame_fields(detections: Detections, emit_points: Sequence[str] = (), explain: bool = False) -> Message:
+    """The result of a frame: number of mesh points, detections, and time of each stage [ms].
+
+    emit_points: classes whose points are listed with bearings [rad] and probabilities.
+    explain: list rejected clusters too.
+    """
+    fields: Message = {"points": len(detections.pixels), "detections": [each.as_dict() for each in detections]}
+    if emit_points:
+        fields["class_points"] = {
+            name: {
+                "bearings": np.round(points.bearings, 4).tolist(),
+                "probabilities": np.round(points.probabilities.astype(float), 3).tolist(),
+            }
+            for name in emit_points
+            for points in [detections.points_of(name)]
+        }
+    if explain:
+        fields["rejected"] = [each.as_dict() for each in detections.rejected]
+    fields["timing_ms"] = {stage: round(value, 3) for stage, value in detections.timing_ms.items()}
+    return fields
+
+
+def file_message(
+    frame: Frame, detections: Detections, emit_points: Sequence[str] = (), explain: bool = False
+) -> Message:
+    """A frame of a file or folder. stamp: time in the video [s]; other fields as in `frame_fields`."""
+    stamp = None if frame.stamp is None else round(frame.stamp, 6)
+    origin = {"frame": frame.index, "source": frame.source, "stamp": stamp}
+    return origin | frame_fields(detections, emit_points, explain)
+
+
+def live_message(number: int, state: str, shot: Shot, detections: Detections, now: float) -> Message:
+    """A frame of a live camera; now: current monotonic time [s].
+
+    t: capture time, monotonic [s]. wall: the same since 1970 [s]. age_ms: time since capture. latency_ms: time since
+    arrival. truth: what a synthetic camera knows about the frame.
+    """
     message: Message = {
         "type": "frame",
         "state": state,
@@ -29,9 +67,7 @@ def frame_message(number: int, state: str, shot: Shot, detections: Detections, n
         "wall": round(time.time() - (time.monotonic() - shot.captured), 6),
         "age_ms": round(1e3 * (now - shot.captured), 3),
         "latency_ms": round(1e3 * (now - shot.arrived), 3),
-        "points": len(detections.pixels),
-        "detections": [each.as_dict() for each in detections],
-        "timing_ms": {stage: round(value, 3) for stage, value in detections.timing_ms.items()},
+        **frame_fields(detections),
     }
     if shot.truth:
         message["truth"] = shot.truth
@@ -39,48 +75,48 @@ def frame_message(number: int, state: str, shot: Shot, detections: Detections, n
 
 
 def state_message(state: str, reason: str) -> Message:
-    """How the detector is, and no detections. t as in frames."""
+    """The state of a live detector, without detections. t and wall: now, as in frames."""
     times = {"t": round(time.monotonic(), 6), "wall": round(time.time(), 6)}
     return {"type": "state", "state": state, **times, "reason": reason}
 
 
 def to_json_line(message: Message) -> bytes:
-    """A message as a line (RFC 8259: no NaN)."""
+    """A message as one line of compact JSON (RFC 8259: no NaN)."""
     return json.dumps(message, allow_nan=False, separators=(",", ":")).encode() + b"\n"
 
 
 def to_ros(message: Message, frame_id: str) -> Message:
-    """A message with the field names of ROS 2: vision_msgs/Detection2DArray, and a geometry_msgs/PointStamped for each
-    detection, in the plane's frame `frame_id`. The state goes along, which ROS does not know."""
+    """A message with the field names of ROS 2: a vision_msgs/Detection2DArray, and a geometry_msgs/PointStamped for
+    each detection, in the plane's frame `frame_id`. The state, which those types lack, is added."""
     seconds, rest = divmod(round(1e9 * message["wall"]), 10**9)
     header = {"stamp": {"sec": seconds, "nanosec": rest}, "frame_id": frame_id}
-    found = message.get("detections", [])
+    detections = message.get("detections", [])
     return {
         "state": message["state"],
-        "detections": {"header": header, "detections": [_detection(header, each) for each in found]},
-        "points": [{"header": header, "point": _point(each["position"])} for each in found],
+        "detections": {"header": header, "detections": [_ros_detection(header, each) for each in detections]},
+        "points": [{"header": header, "point": _ros_point(each["position"])} for each in detections],
     }
 
 
-def _detection(header: Message, found: Mapping[str, Any]) -> Message:
-    pose = {"position": _point(found["position"]), "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
-    x, y = found["center"]
+def _ros_detection(header: Message, detection: Mapping[str, Any]) -> Message:
+    pose = {"position": _ros_point(detection["position"]), "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+    x, y = detection["center"]
     return {
         "header": header,
         "id": "",
         "results": [
             {
-                "hypothesis": {"class_id": found["class"], "score": found["confidence"]},
+                "hypothesis": {"class_id": detection["class"], "score": detection["confidence"]},
                 "pose": {"pose": pose, "covariance": [0.0] * 36},
             }
         ],
         "bbox": {
             "center": {"position": {"x": x, "y": y}, "theta": 0.0},
-            "size_x": 2.0 * found["radius"],
-            "size_y": 2.0 * found["radius"],
+            "size_x": 2.0 * detection["radius"],
+            "size_y": 2.0 * detection["radius"],
         },
     }
 
 
-def _point(position: list[float]) -> Message:
+def _ros_point(position: list[float]) -> Message:
     return dict(zip("xyz", position, strict=True))

@@ -1,4 +1,4 @@
-"""Pictures with the mesh and what was found drawn in."""
+"""Drawing mesh points and detections into images."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ import numpy as np
 from ..arrays import Floats, Image
 from ..detection.detections import Detection, Detections
 
-# BGR. Objects stand out, classes that cover areas stay in the background.
+_Color = tuple[int, int, int]
+
+# Colors are BGR. Objects stand out; classes that cover areas are pale.
 _OBJECT, _REJECTED, _INK = (60, 220, 255), (90, 90, 255), (30, 30, 30)
 _UPRIGHT, _OTHER = (255, 120, 60), (140, 140, 140)
 _AREAS = ((255, 255, 255), (190, 255, 170), (230, 160, 230), (220, 220, 120))
 
 
-def draw(image: Image, detections: Detections) -> Image:
-    """A copy of a BGR, BGRA or grey image with mesh points in the color of their class, and objects with outline,
+def draw_overlay(image: Image, detections: Detections) -> Image:
+    """A copy of a BGR, BGRA or gray image with mesh points in the color of their class, and objects with outline,
     confidence and distance."""
     colors = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image[:, :, :3]
     canvas = np.array(colors, dtype=np.uint8, order="C")
@@ -29,28 +31,28 @@ def draw(image: Image, detections: Detections) -> Image:
 
 
 def _draw_points(canvas: Image, detections: Detections) -> None:
-    """Mesh points: those of objects and uprights as crosses of five pixels, all others as one."""
+    """Draw mesh points: crosses of five pixels for objects and uprights, single pixels for the rest."""
     pixels = np.rint(detections.pixels).astype(np.intp)
-    _dot(canvas, pixels, _OTHER)
+    _draw_pixels(canvas, pixels, _OTHER)
     areas = 0
     for column, each in enumerate(detections.manifest.classes):
         chosen = pixels[detections.probabilities[:, column] > detections.threshold]
         if each.kind == "area":
-            _dot(canvas, chosen, _AREAS[areas % len(_AREAS)])
+            _draw_pixels(canvas, chosen, _AREAS[areas % len(_AREAS)])
             areas += 1
         elif each.kind != "background":
             for shift in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)):
-                _dot(canvas, chosen + shift, _OBJECT if each.kind == "object" else _UPRIGHT)
+                _draw_pixels(canvas, chosen + shift, _OBJECT if each.kind == "object" else _UPRIGHT)
 
 
-def _dot(canvas: Image, pixels: np.ndarray, color: tuple[int, int, int]) -> None:
+def _draw_pixels(canvas: Image, pixels: np.ndarray, color: _Color) -> None:
     x = np.clip(pixels[:, 0], 0, canvas.shape[1] - 1)
     y = np.clip(pixels[:, 1], 0, canvas.shape[0] - 1)
     canvas[y, x] = color
 
 
-def _draw_object(canvas: Image, detection: Detection, color: tuple[int, int, int], scale: float) -> None:
-    if np.abs(detection.outline).max(initial=0.0) > 1e4:  # beyond what OpenCV draws
+def _draw_object(canvas: Image, detection: Detection, color: _Color, scale: float) -> None:
+    if np.abs(detection.outline).max(initial=0.0) > 1e4:  # OpenCV cannot draw so far outside
         return
     thickness = max(1, round(2 * scale))
     points = np.rint(detection.outline * 16).astype(np.int32).reshape(-1, 1, 2)
@@ -59,11 +61,11 @@ def _draw_object(canvas: Image, detection: Detection, color: tuple[int, int, int
     text = f"{detection.class_name} {detection.confidence:.2f}  {detection.distance:.2f} m"
     if detection.reason is not None:
         text = f"{detection.class_name}? {detection.confidence:.2f}"
-    _label(canvas, text, detection.center, detection.radius, color, scale)
+    _draw_label(canvas, text, detection.center, detection.radius, color, scale)
 
 
-def _label(canvas: Image, text: str, center: Floats, radius: float, color: tuple[int, int, int], scale: float) -> None:
-    """A line of text beside an object, where there is room for it."""
+def _draw_label(canvas: Image, text: str, center: Floats, radius: float, color: _Color, scale: float) -> None:
+    """Write a line of text beside an object, inside the image."""
     font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.6 * scale, max(1, round(1.5 * scale))
     (width, height), base = cv2.getTextSize(text, font, size, thickness)
     pad = round(4 * scale)

@@ -1,8 +1,8 @@
-"""The last seconds, kept in memory, and written to disk when it was worth it.
+"""The recorder: it keeps the last seconds in memory and writes them to disk on request.
 
-A recording is a folder of images without loss, each with a lens file that says where the camera was, as vm-detect
---camera takes any folder; vm.toml with the network and the settings; and recording.jsonl with what was found. Detecting
-in it again finds the same to the last bit.
+A recording is a folder that vm-detect --camera reads like any folder of images. It holds lossless images, each with a
+lens file for lens and pose; vm.toml with the network and the settings; and recording.jsonl with the messages. Running
+the detector on a recording gives the same detections to the last bit.
 """
 
 from __future__ import annotations
@@ -32,14 +32,16 @@ CONFIGURATION, MESSAGES = "vm.toml", "recording.jsonl"
 
 @dataclass(frozen=True, kw_only=True)
 class RecorderSettings:
-    """Section [recorder]: what is kept, and when it is written."""
+    """Section [recorder]: where recordings go, their limits, and the class that triggers one."""
 
-    folder: str = text_line("", "where recordings go, a folder each; none: nothing is kept")
-    seconds: float = number(5.0, "how far back a recording reaches", "s", (0.1, 600))
-    memory_mib: float = number(256.0, "memory for it; less far back once that is full", "MiB", (1, 65536))
-    disk_mib: float = number(1024.0, "disk for all recordings; the oldest make room", "MiB", (1, 1e6))
-    trigger_class: str = text_line("", "class whose sight makes a recording, as signal USR1 and vm-detect --record do")
-    pause: float = number(60.0, "shortest time between two recordings that a class makes", "s", (0, 1e6))
+    folder: str = text_line("", "folder for recordings, each a folder inside it; empty records nothing")
+    seconds: float = number(5.0, "length of a recording", "s", (0.1, 600))
+    memory_mib: float = number(256.0, "memory for recent frames; a full memory shortens recordings", "MiB", (1, 65536))
+    disk_mib: float = number(1024.0, "disk space for all recordings; the oldest are deleted", "MiB", (1, 1e6))
+    trigger_class: str = text_line(
+        "", "class whose detection triggers a recording, like signal USR1 and vm-detect --record"
+    )
+    pause: float = number(60.0, "shortest time between two recordings that the class triggers", "s", (0, 1e6))
 
     def __post_init__(self) -> None:
         check_entries(self)
@@ -47,7 +49,7 @@ class RecorderSettings:
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """A frame with all that its detections came from, and the message about them."""
+    """A frame with its lens, orientation and message."""
 
     shot: Shot
     lens: Lens
@@ -56,14 +58,14 @@ class Moment:
 
     @property
     def nbytes(self) -> int:
-        """Memory that it takes."""
+        """Memory of the image and its JPEG [bytes]."""
         return self.shot.image.nbytes + len(self.shot.encoded or b"")
 
 
 class Recorder:
-    """Keeps moments, and writes them in a thread of its own.
+    """Keeps the moments of the last seconds and writes them in a separate thread.
 
-    report: takes an event and what belongs to it, in that thread.
+    report: gets an event and its detail; that thread calls it.
     """
 
     def __init__(self, settings: RecorderSettings, report: Callable[[str, str], None]) -> None:
@@ -71,12 +73,15 @@ class Recorder:
         self._report = report
         self._moments: deque[Moment] = deque()
         self._nbytes = 0
-        self._ends = False
-        self._writing: threading.Thread | None = None
-        self._last = -float("inf")  # when a class last made a recording
+        self._closing = False
+        self._writer: threading.Thread | None = None
+        self._last_trigger = -float("inf")  # when a class last triggered a recording [s]
 
     def keep(self, moment: Moment, configuration: str) -> None:
-        """Keep a moment, let go of those that are too old, and record if its class is the one that is waited for."""
+        """Keep a moment and drop those that are too old. Record if the trigger class was detected.
+
+        configuration: text of the vm.toml of a recording.
+        """
         if not self.settings.folder:
             return
         self._moments.append(moment)
@@ -86,29 +91,32 @@ class Recorder:
             self._nbytes -= self._moments.popleft().nbytes
             if not self._moments:
                 return
-        wanted = self.settings.trigger_class
-        if wanted and any(each["class"] == wanted for each in moment.message["detections"]):
+        trigger = self.settings.trigger_class
+        if trigger and any(each["class"] == trigger for each in moment.message["detections"]):
             now = time.monotonic()
-            if now - self._last >= self.settings.pause:
-                self._last = now
+            if now - self._last_trigger >= self.settings.pause:
+                self._last_trigger = now
                 with suppress(InputError):
                     self.record(configuration)
 
     def record(self, configuration: str) -> str:
-        """Begin to write what is kept, with a vm.toml, and say so. Raises InputError if nothing is written."""
+        """Start to write the kept moments, and return a line that says so. Raises InputError if it can't start.
+
+        configuration: text of the recording's vm.toml.
+        """
         if not self.settings.folder:
-            raise InputError("nothing is kept: [recorder] has no folder")
-        if self._writing is not None and self._writing.is_alive():
-            raise InputError("the last recording is still being written")
+            raise InputError("recording is off: set [recorder] folder")
+        if self._writer is not None and self._writer.is_alive():
+            raise InputError("the previous recording is still being written; try again later")
         if not self._moments:
-            raise InputError("nothing is kept yet")
+            raise InputError("no frame to record yet")
         now = time.time()
         name = f"{time.strftime('%Y-%m-%dT%H-%M-%S', time.localtime(now))}.{int(1e3 * now) % 1000:03d}"
         folder = Path(self.settings.folder) / name
         moments = list(self._moments)
         arguments = (folder, moments, configuration)
-        self._writing = threading.Thread(target=self._write, args=arguments, name="recorder", daemon=True)
-        self._writing.start()
+        self._writer = threading.Thread(target=self._write, args=arguments, name="recorder", daemon=True)
+        self._writer.start()
         return f"recording {len(moments)} frames to {folder}"
 
     def _write(self, folder: Path, moments: Sequence[Moment], configuration: str) -> None:
@@ -117,11 +125,11 @@ class Recorder:
             part.mkdir(parents=True)
             written = 0
             for index, each in enumerate(moments):
-                if self._ends:
-                    raise InputError("the detector stops")
+                if self._closing:
+                    raise InputError("the detector is stopping")
                 written += _write_moment(part, index, each)
                 if written > 2**20 * self.settings.disk_mib:
-                    raise InputError(f"more than {self.settings.disk_mib:g} MiB")
+                    raise InputError(f"it is larger than [recorder] disk_mib, {self.settings.disk_mib:g} MiB")
             (part / CONFIGURATION).write_text(configuration, encoding="utf-8")
             (part / MESSAGES).write_bytes(b"".join(to_json_line(each.message) for each in moments))
             part.rename(folder)
@@ -133,19 +141,19 @@ class Recorder:
             self._report("recorded", str(folder))
 
     def forget(self) -> None:
-        """Let go of all moments, because what follows comes of other settings."""
+        """Drop all moments; call it when settings change, since a recording has one vm.toml."""
         self._moments.clear()
         self._nbytes = 0
 
     def close(self, seconds: float) -> None:
-        """Give up a recording that is being written, and wait so long until its half is removed."""
-        self._ends = True
-        if self._writing is not None:
-            self._writing.join(seconds)
+        """Abort a recording in progress, and wait up to `seconds` until its files are deleted."""
+        self._closing = True
+        if self._writer is not None:
+            self._writer.join(seconds)
 
 
 def _write_moment(folder: Path, index: int, moment: Moment) -> int:
-    """Write image and lens file, and return the bytes of the image."""
+    """Write image and lens file of a moment, and return the size of the image [bytes]."""
     encoded = moment.shot.encoded
     if encoded is None:
         content, suffix = cv2.imencode(".png", moment.shot.image, _PNG)[1].tobytes(), "png"
@@ -157,7 +165,7 @@ def _write_moment(folder: Path, index: int, moment: Moment) -> int:
 
 
 def delete_oldest_recordings(folder: Path, limit: float) -> None:
-    """Remove the oldest recordings of a folder until the others take no more than `limit` [bytes]."""
+    """Delete the oldest recordings in a folder until the rest take at most `limit` [bytes]; keep the newest."""
     recordings = sorted(each for each in folder.iterdir() if (each / MESSAGES).is_file())
     sizes = [sum(file.stat().st_size for file in each.iterdir()) for each in recordings]
     while len(recordings) > 1 and sum(sizes) > limit:

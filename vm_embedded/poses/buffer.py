@@ -1,6 +1,6 @@
-"""Where the camera was at the moment of a frame: the robot's own poses, kept for a while and interpolated.
+"""The robot's poses of the last seconds, and the pose at the time of a frame.
 
-Times are seconds of the monotonic clock, as time.monotonic() gives them.
+All times are seconds of the monotonic clock, as time.monotonic() returns them.
 """
 
 from __future__ import annotations
@@ -8,72 +8,24 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections import deque
-from dataclasses import Field, dataclass
-from typing import Any
 
 import cv2
 import numpy as np
 
 from ..arrays import Floats
-from ..config.entries import check_entries, entry, number, one_of, switch
-from ..errors import GeometryError, InputError, VisualMeshError
+from ..errors import GeometryError, VisualMeshError
 from ..geometry.orientation import Orientation
-from ..sockets import parse_address
-
-CLOCKS = ("monotonic", "wall", "arrival")
-FRAMES = ("camera", "optical")
+from .settings import PoseSettings
 
 _KEPT = 3.0
-"""Seconds of poses that are kept; no frame is that old."""
+"""How long poses are kept [s]; every frame is newer."""
 
-_SHORTEST = 0.005
-"""Seconds between two poses at least, as far as jumps go: lines that wait together arrive at one moment."""
+_MIN_INTERVAL = 0.005
+"""Least time between two poses that the jump check assumes [s]: lines that waited together arrive at one moment."""
 
 
 class StalePoseError(VisualMeshError):
-    """There is no pose for the moment of a frame."""
-
-
-def _source(entry: Field[Any], value: object) -> str:
-    kind, _, rest = value.partition(":") if isinstance(value, str) else ("", "", "")
-    if kind == "udp":
-        parse_address(rest, "source udp:ADDRESS:PORT")
-    elif not (value in ("fixed", "stdin") or (kind == "unix" and rest)):
-        raise InputError(f"source must be fixed, stdin, unix:PATH or udp:ADDRESS:PORT, not {value!r}")
-    return str(value)
-
-
-@dataclass(frozen=True, kw_only=True)
-class PoseSettings:
-    """Section [pose]: where poses come from, and how far they are trusted."""
-
-    source: str = entry(
-        _source,
-        "fixed",
-        "fixed: as [orientation] says; or lines of JSON from stdin, from unix:PATH, a socket that is made there, or "
-        "from udp:ADDRESS:PORT",
-    )
-    clock: str = one_of(
-        CLOCKS,
-        "monotonic",
-        "what t counts in: the machine's monotonic clock, its wall clock, or arrival: the moment when the line arrives "
-        "counts instead",
-    )
-    frame: str = one_of(
-        FRAMES,
-        "camera",
-        "what is turned: camera, x forward and y left; optical, as OpenCV's and ROS's, z forward and x right",
-    )
-    latency_ms: float = number(0.0, "how much earlier than its t a pose was true", "ms", (-1000, 1000))
-    wait_ms: float = number(40.0, "how long a frame waits for a pose as new as itself", "ms", (0, 1000))
-    interpolate: bool = switch(True, "take the pose of the frame's moment between two others, not the newest one")
-    extrapolate_ms: float = number(5.0, "how far the motion goes on behind the newest pose", "ms", (0, 100))
-    max_age_ms: float = number(100.0, "how much older than the frame the newest pose may be", "ms", (1, 10000))
-    max_climb: float = number(5.0, "height that changes faster is a jump, which is refused", "m/s", (0.01, 1000))
-    max_turn: float = number(30.0, "gravity that turns faster is a jump, which is refused", "rad/s", (0.1, 1000))
-
-    def __post_init__(self) -> None:
-        check_entries(self)
+    """No pose is near enough to the time of a frame."""
 
 
 class PoseBuffer:
@@ -92,10 +44,10 @@ class PoseBuffer:
         return self._poses[-1][0] if self._poses else -math.inf
 
     def add(self, time: float, orientation: Orientation) -> None:
-        """Keep a pose.
+        """Add a pose that is newer than the last one.
 
-        Raises GeometryError for one that is not newer than the last, or that jumps. If no other comes before the last
-        is stale, the next one is taken as it is: the robot was carried, or its sensors began anew.
+        Raises GeometryError if it is not newer, or if it jumps: height or gravity changes faster than the settings
+        allow. Once the last pose is stale, the next one is accepted anyway: the robot may have been carried.
         """
         self._check(time, orientation)
         self._poses.append((time, orientation))
@@ -103,6 +55,7 @@ class PoseBuffer:
             self._poses.popleft()
 
     def _check(self, time: float, orientation: Orientation) -> None:
+        """Raise GeometryError for a pose that `add` rejects; clear the buffer where the poses start anew."""
         if not self._poses:
             return
         last, before = self._poses[-1]
@@ -111,11 +64,11 @@ class PoseBuffer:
             if elapsed < -_KEPT:  # the clock of the poses was set back
                 self._poses.clear()
                 return
-            raise GeometryError(f"pose of {time:.3f} s is not newer than the last one, {last:.3f} s")
+            raise GeometryError(f"pose at {time:.3f} s is not newer than the last one, at {last:.3f} s")
         if elapsed > 1e-3 * self.settings.max_age_ms:
             self._poses.clear()
             return
-        elapsed = max(elapsed, _SHORTEST)
+        elapsed = max(elapsed, _MIN_INTERVAL)
         climb = abs(orientation.height - before.height)
         if climb > self.settings.max_climb * elapsed:
             raise GeometryError(
@@ -129,9 +82,12 @@ class PoseBuffer:
             )
 
     def at(self, time: float) -> Orientation:
-        """The orientation at a time [s]. Raises StalePoseError if no pose is near enough."""
+        """The orientation at a time [s], interpolated if the settings say so.
+
+        Raises StalePoseError if no pose is near enough.
+        """
         if not self._poses:
-            raise StalePoseError("no pose has come yet")
+            raise StalePoseError("no pose received yet")
         ahead = time - self.newest
         if ahead > 1e-3 * self.settings.max_age_ms:
             raise StalePoseError(f"newest pose is {1e3 * ahead:.0f} ms older than the frame")
@@ -147,7 +103,10 @@ class PoseBuffer:
 
 
 def interpolate(one: Orientation, other: Orientation, share: float) -> Orientation:
-    """The orientation on the straight way from one to another, slerp; shares above 1 go on beyond it."""
+    """The orientation at a share of the way from one to the other; shares above 1 extrapolate.
+
+    The height changes linearly and stays positive; the rotation follows the shortest arc (slerp).
+    """
     turn = cv2.Rodrigues(one.rotation.T @ other.rotation)[0]
     rotation: Floats = one.rotation @ cv2.Rodrigues(share * turn)[0]
     return Orientation(max(one.height + share * (other.height - one.height), 1e-3), rotation)

@@ -1,9 +1,9 @@
-"""Lines in which a robot says where its camera is.
+"""Parsing of pose lines: JSON objects with which a robot sends the pose of its camera.
 
-{"t": 12.345, "height": 0.8, "quaternion": [w, x, y, z]}    rotation of the camera to the observation plane
-{"t": 12.345, "Hoc": [[...], [...], [...], [0, 0, 0, 1]]}   the same with the height in row 2, column 3
+{"t": 12.345, "height": 0.8, "quaternion": [w, x, y, z]}    rotation from the camera to the observation plane
+{"t": 12.345, "Hoc": [[...], [...], [...], [0, 0, 0, 1]]}   the same as a matrix, with the height in row 2, column 3
 
-t in seconds, lengths in meters. Lines from a robot are not trusted: numbers are numbers, rotations are rotations.
+t is in seconds, lengths are in meters. The parser does not trust the robot: it checks every number and rotation.
 """
 
 from __future__ import annotations
@@ -18,32 +18,32 @@ from ..errors import InputError, VisualMeshError, unknown
 from ..geometry.orientation import OPTICAL_TO_CAMERA, Orientation
 
 MAX_LINE_BYTES = 4096
-"""Bytes of a line."""
+"""A longer line is rejected [bytes]."""
 
 _KEYS = ("t", "height", "quaternion", "Hoc")
 
 
 @dataclass(frozen=True)
 class PoseLine:
-    """time [s], None if it has none; orientation of the camera."""
+    """time: t [s], None if the line has none. orientation: of the camera."""
 
     time: float | None
     orientation: Orientation
 
 
 def parse_pose_line(line: bytes, optical: bool = False) -> PoseLine:
-    """Read a line. `optical` says that rotations turn an optical frame. Raises InputError."""
+    """Parse a line. optical: the rotation is that of an optical frame (z forward, x right). Raises InputError."""
     if len(line) > MAX_LINE_BYTES:
-        raise InputError(f"pose of {len(line)} bytes, more than {MAX_LINE_BYTES}")
+        raise InputError(f"pose line has {len(line)} bytes, more than {MAX_LINE_BYTES}")
     try:
         data = json.loads(line)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"pose is no line of JSON: {_shown(line)}") from error
+        raise InputError(f"pose is not valid JSON: {_shown(line)}") from error
     if not isinstance(data, dict):
         raise InputError(f'pose must be like {{"t": 1.0, "height": 0.8, "quaternion": [1, 0, 0, 0]}}: {_shown(line)}')
     for key in data:
         if key not in _KEYS:
-            raise InputError(unknown("key of a pose", key[:40], _KEYS))
+            raise InputError(unknown("key in a pose", key[:40], _KEYS))
     try:
         return PoseLine(None if data.get("t") is None else _number(data["t"], "t"), _orientation(data, optical))
     except VisualMeshError as error:
@@ -53,7 +53,7 @@ def parse_pose_line(line: bytes, optical: bool = False) -> PoseLine:
 def _orientation(data: dict[str, Any], optical: bool) -> Orientation:
     if "Hoc" in data:
         if "quaternion" in data or "height" in data:
-            raise InputError("either Hoc, or height and quaternion, not both")
+            raise InputError("give either Hoc, or height and quaternion, not both")
         hoc = np.array([_numbers(row, "a row of Hoc", 4) for row in _list(data["Hoc"], "Hoc", 4)])
         if optical:
             hoc[:3, :3] = hoc[:3, :3] @ OPTICAL_TO_CAMERA.T
@@ -73,7 +73,7 @@ def _number(value: Any, name: str) -> float:
 
 def _list(value: Any, name: str, count: int) -> list[Any]:
     if not isinstance(value, list) or len(value) != count:
-        raise InputError(f"{name} must be a list of {count}, not {str(value)[:40]}")
+        raise InputError(f"{name} must be a list of {count} values, not {str(value)[:40]}")
     return value
 
 

@@ -1,4 +1,4 @@
-"""Poses as they come: from a Unix socket, from UDP or from standard input, into the ring buffer."""
+"""Receiving poses: lines from a Unix socket, UDP or standard input go into the buffer."""
 
 from __future__ import annotations
 
@@ -12,15 +12,19 @@ from contextlib import suppress
 
 from ..errors import InputError, VisualMeshError
 from ..sockets import UnixListener, datagram_socket, parse_address
-from .buffer import PoseBuffer, PoseSettings
+from .buffer import PoseBuffer
 from .parsing import MAX_LINE_BYTES, parse_pose_line
+from .settings import PoseSettings
 
 Report = Callable[[str], None]
-"""Takes what was wrong with a pose."""
+"""Gets the reason why a pose was rejected."""
 
 
 class PoseStream:
-    """Listens for poses while an event loop runs."""
+    """Receives poses in an event loop.
+
+    poses: the accepted ones. received, bad: number of accepted and rejected lines. arrived: set at each new pose.
+    """
 
     def __init__(self, settings: PoseSettings, report: Report) -> None:
         self.settings = settings
@@ -28,62 +32,63 @@ class PoseStream:
         self.received = 0
         self.bad = 0
         self.arrived = asyncio.Event()
-        """Set whenever there is a new pose."""
         self._report = report
         self._transports: list[asyncio.BaseTransport] = []
-        self._file: UnixListener | None = None
+        self._listener: UnixListener | None = None
         self._server: asyncio.Server | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def open(self) -> None:
-        """Begin to listen. Raises InputError for a source that can't be had."""
+        """Start to listen. Raises InputError if the source is not available."""
         kind, _, rest = self.settings.source.partition(":")
         loop = asyncio.get_running_loop()
         if kind == "unix":
-            self._file = UnixListener(rest)
-            self._server = await asyncio.start_unix_server(self._converse, sock=self._file.socket, limit=MAX_LINE_BYTES)
+            self._listener = UnixListener(rest)
+            self._server = await asyncio.start_unix_server(
+                self._serve, sock=self._listener.socket, limit=MAX_LINE_BYTES
+            )
         elif kind == "udp":
-            host, port = parse_address(rest, "source of poses")
-            listening, _ = datagram_socket(host, port, "poses from", listen=True)
+            host, port = parse_address(rest, "pose source")
+            listening, _ = datagram_socket(host, port, "can't receive poses at", listen=True)
             transport, _ = await loop.create_datagram_endpoint(lambda: _Datagrams(self.take), sock=listening)
             self._transports.append(transport)
         elif self.settings.source == "stdin":
-            if sys.stdin is None or not _can_be_waited_for(sys.stdin.fileno()):
-                raise InputError("poses from stdin need a pipe, a socket or a terminal there")
+            if sys.stdin is None or not _is_waitable(sys.stdin.fileno()):
+                raise InputError("pose source stdin needs a pipe, a socket or a terminal as standard input")
             reader = asyncio.StreamReader(limit=MAX_LINE_BYTES)
             pipe, _ = await loop.connect_read_pipe(
                 lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(os.dup(sys.stdin.fileno()))
             )
             self._transports.append(pipe)
-            self._keep(asyncio.ensure_future(self._lines(reader)))
+            self._keep(asyncio.ensure_future(self._take_lines(reader)))
 
     def _keep(self, task: asyncio.Task[None]) -> None:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _converse(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
         self._keep(task)
-        with suppress(asyncio.CancelledError):  # which asyncio would take for a failure
-            await self._lines(reader)
+        with suppress(asyncio.CancelledError):  # asyncio would report it as a failure
+            await self._take_lines(reader)
         writer.close()
 
-    async def _lines(self, reader: asyncio.StreamReader) -> None:
-        """Take lines until the end. One that is too long is left out."""
+    async def _take_lines(self, reader: asyncio.StreamReader) -> None:
+        """Take lines until the end, except those that are too long."""
         with suppress(ConnectionError):
-            while line := await self._line(reader):
+            while line := await self._read_line(reader):
                 self.take(line)
 
-    async def _line(self, reader: asyncio.StreamReader) -> bytes:
+    async def _read_line(self, reader: asyncio.StreamReader) -> bytes:
         try:
             return await reader.readline()
         except ValueError:
-            self._refuse(f"pose of more than {MAX_LINE_BYTES} bytes")
+            self._reject(f"pose line has more than {MAX_LINE_BYTES} bytes")
             return b"\n"
 
     def take(self, line: bytes) -> None:
-        """A line as it came. What is wrong with it is reported and counted."""
+        """Parse a received line and add its pose; report and count it if it is bad."""
         now = time.monotonic()
         if not line.strip():
             return
@@ -91,28 +96,29 @@ class PoseStream:
             read = parse_pose_line(line, self.settings.frame == "optical")
             self.poses.add(self._time(read.time, now), read.orientation)
         except VisualMeshError as error:
-            self._refuse(str(error))
+            self._reject(str(error))
             return
         self.received += 1
         self.arrived.set()
 
-    def _refuse(self, why: str) -> None:
+    def _reject(self, reason: str) -> None:
         self.bad += 1
-        self._report(why)
+        self._report(reason)
 
-    def _time(self, stated: float | None, now: float) -> float:
-        """When a pose was true, in monotonic time [s]. Raises InputError for a time that can't be."""
-        if self.settings.clock != "arrival" and stated is None:
-            raise InputError('pose lacks t; without a clock set clock = "arrival"')
-        if self.settings.clock == "arrival" or stated is None:
+    def _time(self, t: float | None, now: float) -> float:
+        """Monotonic time of a pose [s] from its t and its arrival at `now`. Raises InputError for an impossible t."""
+        if self.settings.clock != "arrival" and t is None:
+            raise InputError('pose lacks t; send t, or set [pose] clock = "arrival"')
+        if self.settings.clock == "arrival" or t is None:
             return now - 1e-3 * self.settings.latency_ms
         if self.settings.clock == "wall":
-            stated += now - time.time()
-        if not now - 10.0 < stated < now + 1.0:
+            t += now - time.time()
+        if not now - 10.0 < t < now + 1.0:
             raise InputError(
-                f"pose is of {stated - now:+.1f} s from now; does the robot count in {self.settings.clock} time?"
+                f"t of the pose is {t - now:+.1f} s from now on the {self.settings.clock} clock; "
+                "send t of that clock, or change [pose] clock"
             )
-        return stated - 1e-3 * self.settings.latency_ms
+        return t - 1e-3 * self.settings.latency_ms
 
     async def close(self) -> None:
         """Stop listening."""
@@ -122,20 +128,20 @@ class PoseStream:
         for transport in self._transports:
             transport.close()
         if self.settings.source == "stdin" and sys.stdin is not None:
-            os.set_blocking(sys.stdin.fileno(), True)  # a terminal is shared with whoever comes after
+            os.set_blocking(sys.stdin.fileno(), True)  # programs that run later share the terminal
         if self._server is not None:
             self._server.close()
-        if self._file is not None:
-            self._file.close()
+        if self._listener is not None:
+            self._listener.close()
 
 
-def _can_be_waited_for(descriptor: int) -> bool:
+def _is_waitable(descriptor: int) -> bool:
     mode = os.fstat(descriptor).st_mode
     return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode) or os.isatty(descriptor)
 
 
 class _Datagrams(asyncio.DatagramProtocol):
-    """Hands each line of each datagram on."""
+    """Passes on each line of each datagram."""
 
     def __init__(self, take: Callable[[bytes], None]) -> None:
         self._take = take

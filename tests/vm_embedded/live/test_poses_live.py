@@ -167,5 +167,5 @@ def test_what_the_line_of_a_pose_lacks_is_said_in_the_state(tmp_path):
     with running(tmp_path, "--camera", "synthetic", "--pose-source", f"udp:127.0.0.1:{port}") as found:
         found.wait_for_state("pose_stale")
         asked = subprocess.run(arguments(tmp_path, "--status"), capture_output=True, text=True, timeout=60, check=False)
-        assert json.loads(asked.stdout)["reason"] == "no pose has come yet"
+        assert json.loads(asked.stdout)["reason"] == "no pose received yet"
         found.stop()

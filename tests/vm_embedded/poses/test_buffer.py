@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError, InputError, VisualMeshError
 from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA, Orientation
-from vm_embedded.poses.buffer import PoseBuffer, PoseSettings, StalePoseError, interpolate
+from vm_embedded.poses.buffer import PoseBuffer, StalePoseError, interpolate
 from vm_embedded.poses.parsing import MAX_LINE_BYTES, parse_pose_line
+from vm_embedded.poses.settings import PoseSettings
 
 ANGLES = st.floats(-math.pi, math.pi)
 ORIENTATIONS = st.builds(
@@ -148,7 +149,7 @@ def test_a_line_says_what_it_was_made_from(orientation, at, optical):
 
 
 WRONG = {
-    "no JSON": (b"{", "no line of JSON"),
+    "no JSON": (b"{", "not valid JSON"),
     "a list": (b"[1, 2]", "must be like"),
     "another key": (b'{"t": 1, "hight": 1, "quaternion": [1, 0, 0, 0]}', "did you mean 'height'"),
     "no height": (b'{"t": 1, "quaternion": [1, 0, 0, 0]}', "lacks height"),
@@ -158,7 +159,7 @@ WRONG = {
     "time in words": (b'{"t": "now", "height": 1, "quaternion": [1, 0, 0, 0]}', "t must be"),
     "below the ground": (b'{"t": 1, "height": -1, "quaternion": [1, 0, 0, 0]}', "height"),
     "many digits": (b'{"t": 1, "height": ' + b"9" * 400 + b', "quaternion": [1, 0, 0, 0]}', "height"),
-    "half a matrix": (b'{"t": 1, "Hoc": [[1, 0, 0, 0]]}', "Hoc must be a list of 4"),
+    "half a matrix": (b'{"t": 1, "Hoc": [[1, 0, 0, 0]]}', "Hoc must be a list of 4 values"),
     "a mirror": (b'{"Hoc": [[1,0,0,0],[0,1,0,0],[0,0,-1,1],[0,0,0,1]]}', "mirrors"),
     "both": (b'{"height": 1, "Hoc": []}', "not both"),
     "long": (b" " * (MAX_LINE_BYTES + 1), "more than"),

@@ -1,0 +1,57 @@
+"""Section [pose]: where poses come from, and how the detector uses them."""
+
+from __future__ import annotations
+
+from dataclasses import Field, dataclass
+from typing import Any
+
+from ..config.entries import check_entries, entry, number, one_of, switch
+from ..errors import InputError
+from ..sockets import parse_address
+
+CLOCKS = ("monotonic", "wall", "arrival")
+FRAMES = ("camera", "optical")
+
+
+def _checked_source(field: Field[Any], value: object) -> str:
+    kind, _, rest = value.partition(":") if isinstance(value, str) else ("", "", "")
+    if kind == "udp":
+        parse_address(rest, f"{field.name} udp:ADDRESS:PORT")
+    elif not (value in ("fixed", "stdin") or (kind == "unix" and rest)):
+        raise InputError(f"{field.name} must be fixed, stdin, unix:PATH or udp:ADDRESS:PORT, not {value!r}")
+    return str(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseSettings:
+    """Source, clock and frame of the poses, interpolation, and limits beyond which a pose is rejected."""
+
+    source: str = entry(
+        _checked_source,
+        "fixed",
+        "fixed: the pose in [orientation]; or JSON lines from stdin, from unix:PATH, a socket to create, or from "
+        "udp:ADDRESS:PORT",
+    )
+    clock: str = one_of(
+        CLOCKS,
+        "monotonic",
+        "clock of t: the machine's monotonic clock or its wall clock; arrival ignores t and uses the time of arrival",
+    )
+    frame: str = one_of(
+        FRAMES,
+        "camera",
+        "camera frame of the rotation: camera has x forward and y left; optical, as in OpenCV and ROS, has z forward "
+        "and x right",
+    )
+    latency_ms: float = number(0.0, "time to subtract from t", "ms", (-1000, 1000))
+    wait_ms: float = number(40.0, "longest time that a frame waits for a pose at least as new", "ms", (0, 1000))
+    interpolate: bool = switch(True, "interpolate between the poses before and after the frame; else use the newest")
+    extrapolate_ms: float = number(5.0, "longest time to extrapolate beyond the newest pose", "ms", (0, 100))
+    max_age_ms: float = number(100.0, "how much older than the frame the newest pose may be", "ms", (1, 10000))
+    max_climb: float = number(5.0, "fastest change of the height; a faster pose is rejected", "m/s", (0.01, 1000))
+    max_turn: float = number(
+        30.0, "fastest turn of the gravity direction; a faster pose is rejected", "rad/s", (0.1, 1000)
+    )
+
+    def __post_init__(self) -> None:
+        check_entries(self)
