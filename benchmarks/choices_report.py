@@ -36,7 +36,7 @@ BASE = {
     "width": "width 4",
     "rings across a ball": "k = 4",
     "what a point gives": "relative colors, footprints, to 14 m",
-    "points that give gradients": "weighed, balance 0.3",
+    "points that give gradients": "weighted, balance 0.3",
     "classes": "ball and other",
     "augmentation": "all augmentation",
 }
@@ -80,7 +80,7 @@ def group(results: dict[str, Any], name: str) -> str:
                 shown(values(scores, "iou_0.5", "false_per_picture"), 2),
             ]
         )
-    return table(["", "seeds", "AP of points", "AP50", "AP75", "recall", "false a picture"], rows)
+    return table(["", "seeds", "AP of points", "AP50", "AP75", "recall", "false per picture"], rows)
 
 
 def transfer(results: dict[str, Any], kinds: tuple[str, ...]) -> str:

@@ -42,7 +42,7 @@ def networks(found: dict[str, Any], each_set: str) -> str:
             ]
         )
     heads = ["network", "AP50, 0.5 to 6 m", "6 to 10 m", "AP75, 0.5 to 6 m", "6 to 10 m"]
-    heads += ["found [%], 0.5 to 6 m", "6 to 10 m", "false a picture", "error of distance [%]"]
+    heads += ["found [%], 0.5 to 6 m", "6 to 10 m", "false per picture", "distance error [%]"]
     return table(heads, rows)
 
 
@@ -100,7 +100,7 @@ def by_distance(scores: dict[str, Any]) -> str:
                 number(scores["used 0.5"][meters]["distance_error"], 2, 100.0),
             ]
         )
-    return table(["distance", "balls", "AP50", "AP75", "found [%]", "error of distance [%]"], rows)
+    return table(["distance", "balls", "AP50", "AP75", "found [%]", "distance error [%]"], rows)
 
 
 def plot(found: dict[str, Any]) -> None:
@@ -133,13 +133,15 @@ def plot(found: dict[str, Any]) -> None:
 
 
 def card(found: dict[str, Any], name: str) -> str:
-    """What a network is, what it was made of, how good it is and what it can't do."""
+    """A network's model card: contents, training data, accuracy and limits."""
     model = read_model(model_path(name))
     manifest = model.manifest
     configuration = tomllib.loads((NETWORKS / f"{name}.toml").read_text())
     depth, width = (configuration["network"][each] for each in ("depth", "width"))
     activation = configuration["network"]["activation"].upper()
-    first = "For what `ball-5x4` does not take for lawn: " if "second_look" in configuration else ""
+    first = (
+        "It looks again at the points that `ball-5x4` does not take for lawn." if "second_look" in configuration else ""
+    )
     scores, clutter = (found["networks"][name][each] for each in SETS)
     ranges = table(
         ["distance", "balls", "AP50", "AP75", "found [%]"],
@@ -160,31 +162,31 @@ def card(found: dict[str, Any], name: str) -> str:
     size = " x ".join(map(str, scores["size"]))
     return f"""# {name}
 
-Finds balls on a soccer field. {first}{depth} graph convolutions
-of {width} channels, {activation}; ring6 mesh with k = {manifest.intersections:g} out to {manifest.max_distance:g} m,
-for balls of any radius (`--object-radius`,
-{manifest.object_radius:g} m if nothing is said). {kilobytes:.0f} kB. Classes: ball, other.
+Finds balls on a soccer field. {first}
+{depth} graph convolutions of {width} channels, {activation}. The mesh is ring6 with k = {manifest.intersections:g} and
+reaches to {manifest.max_distance:g} m. It suits balls of any radius (`--object-radius`, default
+{manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: ball, other.
 
-- **Made from** {made["training_pictures"]} rendered pictures of 30 maps (`export/vm_synth/soccer.toml`, seed 1), chosen
-  by {made["validation_pictures"]} others: epoch {made["epoch"]} of {made["epochs"]}, seed {made["seed"]}, configuration
-  `export/networks/{name}.toml`.
-- **To make it again**: `make networks HDRI=folder-of-maps`; the file's SHA-256 is
+- **Training data:** {made["training_pictures"]} rendered pictures under 30 panoramas (`export/vm_synth/soccer.toml`,
+  seed 1). {made["validation_pictures"]} other pictures selected epoch {made["epoch"]} of {made["epochs"]}.
+  Seed {made["seed"]}, configuration `export/networks/{name}.toml`.
+- **To make it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
   {model.sha256}.
 
-On {scores["pictures"]} rendered pictures of fields under six maps that it has not seen, {size} px, with balls of 0.05
-to 0.12 m:
+On {scores["pictures"]} rendered pictures of fields under six panoramas that it has not seen, {size} px, with balls of
+0.05 to 0.12 m radius:
 
 {ranges}
 
-With the default settings there are {number(scores["all"]["false_per_picture"], 3)} false balls a picture, and the
-median error of distance of balls from 0.5 to 6 m is {number(used["distance_error"], 1, 100.0)} %. On
-{clutter["pictures"]} pictures that are full of things that look like balls, AP50 from 0.5 to 6 m is
-{number(hard["average_precision"], 3)}, with {number(clutter["all"]["false_per_picture"], 3)} false balls a picture.
-More in docs/results.md.
+With the default settings there are {number(scores["all"]["false_per_picture"], 3)} false balls per picture, and the
+median distance error of balls from 0.5 to 6 m is {number(used["distance_error"], 1, 100.0)} %. On
+{clutter["pictures"]} pictures full of things that look like balls, AP50 from 0.5 to 6 m is
+{number(hard["average_precision"], 3)}, with {number(clutter["all"]["false_per_picture"], 3)} false balls per picture.
+docs/results.md has more figures.
 
-**Limits.** Trained on rendered pictures alone, with balls that are mostly white, or orange, yellow and other bright
-colors, on the plane. Balls darker than the field, balls in the air, and cameras below 0.35 m or above 1.3 m were rare
-or absent.
+**Limits.** It was trained on rendered pictures only. The balls were mostly white, orange, yellow or of other bright
+colors, and lay on the plane. Balls darker than the field, balls in the air, and cameras below 0.35 m or above 1.3 m
+were rare or absent.
 """
 
 
@@ -198,7 +200,7 @@ def main() -> None:
     if found["grid"]:
         made["grid"] = grid(found)
     made["false an hour"] = table(
-        ["network", "test pictures", "false balls a picture", "an hour at 30 frames a second"],
+        ["network", "test pictures", "false balls per picture", "per hour at 30 frames per second"],
         [
             [name, each, number(sets[each]["all"]["false_per_picture"], 3), f"{sets[each]['false_an_hour']:,}"]
             for name, sets in found["networks"].items()
