@@ -140,7 +140,7 @@ def card(found: dict[str, Any], name: str) -> str:
     depth, width = (configuration["network"][each] for each in ("depth", "width"))
     activation = configuration["network"]["activation"].upper()
     first = (
-        "It looks again at the points that `ball-5x4` does not take for lawn." if "second_look" in configuration else ""
+        " It looks again at the points that `ball-5x4` does not take for lawn." if "second_look" in configuration else ""
     )
     scores, clutter = (found["networks"][name][each] for each in SETS)
     ranges = table(
@@ -162,7 +162,7 @@ def card(found: dict[str, Any], name: str) -> str:
     size = " x ".join(map(str, scores["size"]))
     return f"""# {name}
 
-Finds balls on a soccer field. {first}
+Finds balls on a soccer field.{first}
 {depth} graph convolutions of {width} channels, {activation}. The mesh is ring6 with k = {manifest.intersections:g} and
 reaches to {manifest.max_distance:g} m. It suits balls of any radius (`--object-radius`, default
 {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: ball, other.

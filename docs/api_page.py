@@ -24,6 +24,7 @@ GROUPS = {
     "Camera pose": ("Orientation",),
     "Lenses": ("Lens", "Rectilinear", "Equisolid", "Equidistant", "BrownLens", "FisheyeLens", "read_lens_file"),
     "Several cameras and planes": ("detect_views", "View", "Sighting", "Plane", "GROUND", "Pose"),
+    "Meshes": ("build_mesh", "Circle", "Sphere", "Cylinder"),
     "Errors": ("VisualMeshError", "GeometryError", "InputError", "ModelError"),
 }
 """The order of the page. A test checks that it holds every public name."""
