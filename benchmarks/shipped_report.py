@@ -139,9 +139,8 @@ def card(found: dict[str, Any], name: str) -> str:
     configuration = tomllib.loads((NETWORKS / f"{name}.toml").read_text())
     depth, width = (configuration["network"][each] for each in ("depth", "width"))
     activation = configuration["network"]["activation"].upper()
-    first = (
-        " It looks again at the points that `ball-5x4` does not take for lawn." if "second_look" in configuration else ""
-    )
+    again = " It looks again at the points that `ball-5x4` does not take for lawn."
+    first = again if "second_look" in configuration else ""
     scores, clutter = (found["networks"][name][each] for each in SETS)
     ranges = table(
         ["distance", "balls", "AP50", "AP75", "found [%]"],

@@ -18,16 +18,29 @@ from typing import Any
 
 import vm_embedded
 from vm_embedded import arrays
+from vm_embedded.geometry.calibrated_lenses import CalibratedLens
+from vm_embedded.geometry.lens_files import LensFile
+from vm_embedded.geometry.radial_lenses import RadialLens
+from vm_embedded.geometry.shape import Shape
+from vm_embedded.mesh.mesh import Mesh
+
+OTHERS: dict[str, type] = {each.__name__: each for each in (CalibratedLens, LensFile, Mesh, RadialLens, Shape)}
+"""Types that public names return or share as their base."""
 
 GROUPS = {
     "Detect": ("Detector", "Settings", "Detections", "Detection", "ClassPoints"),
     "Camera pose": ("Orientation",),
-    "Lenses": ("Lens", "Rectilinear", "Equisolid", "Equidistant", "BrownLens", "FisheyeLens", "read_lens_file"),
+    "Lenses": (
+        *("read_lens_file", "LensFile", "Lens", "RadialLens", "Rectilinear", "Equisolid", "Equidistant"),
+        *("CalibratedLens", "BrownLens", "FisheyeLens"),
+    ),
     "Several cameras and planes": ("detect_views", "View", "Sighting", "Plane", "GROUND", "Pose"),
-    "Meshes": ("build_mesh", "Circle", "Sphere", "Cylinder"),
+    "Meshes": ("build_mesh", "Mesh", "Shape", "Circle", "Sphere", "Cylinder"),
     "Errors": ("VisualMeshError", "GeometryError", "InputError", "ModelError"),
 }
 """The order of the page. A test checks that it holds every public name."""
+
+_NAMES = {name for names in GROUPS.values() for name in names}
 
 HEAD = """# API reference
 
@@ -43,7 +56,7 @@ def page() -> str:
     """The page's text."""
     parts = [HEAD]
     for title, names in GROUPS.items():
-        parts += [f"## {title}", *(_entry(name, getattr(vm_embedded, name)) for name in names)]
+        parts += [f"## {title}", *(_entry(name) for name in names)]
     parts.append("## Array types")
     notes = _attribute_docs(arrays)
     types = [
@@ -54,8 +67,9 @@ def page() -> str:
     return re.sub(r"\n{3,}", "\n\n", "\n\n".join(parts)) + "\n"
 
 
-def _entry(name: str, value: Any) -> str:
-    """The section of a public name."""
+def _entry(name: str) -> str:
+    """The section of a name."""
+    value: Any = OTHERS[name] if name in OTHERS else getattr(vm_embedded, name)
     if not inspect.isclass(value) and not inspect.isfunction(value):
         note = _attribute_docs(inspect.getmodule(type(value))).get(name, "")
         return f"### {name}\n\n{_code(f'{name}: {type(value).__name__}')}\n\n{note}"
@@ -64,7 +78,7 @@ def _entry(name: str, value: Any) -> str:
     if issubclass(value, BaseException):
         head = f"class {name}({value.__bases__[0].__name__})"
         return f"### {name}\n\n{_code(head)}\n\n{_markdown(value.__doc__)}"
-    base = next((each.__name__ for each in value.__mro__[1:] if each.__name__ in vm_embedded.__all__), None)
+    base = next((each.__name__ for each in value.__mro__[1:] if each.__name__ in _NAMES), None)
     head = f"class {name}({base or ''})".replace("()", "")
     fields = dataclasses.is_dataclass(value)
     if not fields:
@@ -78,8 +92,10 @@ def _entry(name: str, value: Any) -> str:
         own, text = _field_meanings(value)
         meanings |= own
     parts = [f"### {name}", _code(head), _markdown(text)]
+    if name in OTHERS:
+        parts.append(f"It is in `{value.__module__}`.")
     if base:
-        parts.append(f"It has the methods of [{base}](#{base.lower()}), too.")
+        parts.append(f"[{base}](#{base.lower()}) has more methods.")
     if fields:
         parts += [_field_table(value, meanings)]
     parts += [_member(name, value, member) for member in _members(value)]
@@ -89,11 +105,12 @@ def _entry(name: str, value: Any) -> str:
 def _field_meanings(value: type) -> tuple[dict[str, str], str]:
     """What a dataclass's docstring says about each field, and the docstring without that.
 
-    Docstrings describe fields as `name: text. name (n, 3), name [m]: text.`, in paragraphs that start with a name.
+    Docstrings describe fields as `name: text. name (n, 3), name [m]: text. name [m].`, in paragraphs that start with a
+    name.
     """
     names = "|".join(each.name for each in _fields(value))
     label = rf"(?:{names})(?: \([^)]*\))?(?: \[[^\]]*\])?"
-    labels = re.compile(rf"(?:^|(?<=\. )|(?<=; ))({label}(?:(?:, | and ){label})*): ")
+    labels = re.compile(rf"(?:^|(?<=\. )|(?<=; ))({label}(?:(?:, | and ){label})*)(?:: |\. )")
     meanings: dict[str, str] = {}
     kept = []
     for paragraph in _docstring(value).split("\n\n"):
@@ -134,8 +151,8 @@ def _fields(value: type) -> list[dataclasses.Field[Any]]:
 
 
 def _members(value: type) -> list[str]:
-    """Names of a class's public methods and properties, in their order, without those of public base classes."""
-    listed = {name for each in value.__mro__[1:] if each.__name__ in vm_embedded.__all__ for name in vars(each)}
+    """Names of a class's public methods and properties, in their order, without those of base classes on this page."""
+    listed = {name for each in value.__mro__[1:] if each.__name__ in _NAMES for name in vars(each)}
     listed |= {each.name for each in _fields(value)} if dataclasses.is_dataclass(value) else set()
     kinds = (FunctionType, classmethod, staticmethod, property, cached_property)
     return list(
