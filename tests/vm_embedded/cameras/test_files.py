@@ -1,10 +1,14 @@
 """Video files that are played as a camera would deliver them."""
 
+import json
+import subprocess
+import time
+
 import cv2
 import numpy as np
 import pytest
 
-from tests.vm_embedded.live.running import LENS, running
+from tests.vm_embedded.live.running import DEMO, LENS, arguments, running
 from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cameras.grabber import same_image
 from vm_embedded.cameras.open_camera import camera_opener
@@ -33,3 +37,14 @@ def test_a_video_is_played_at_its_rate_again_and_again(tmp_path):
     with running(tmp_path, "--config", tmp_path / "vm.toml", "--camera", path, "--live") as found:
         assert found.process.wait(60) == 0
     assert 0 < len(found.frames) <= 10
+
+
+def test_files_may_be_played_as_a_camera_gives_them_and_end(tmp_path):
+    lens = ("--lens", DEMO / "lens0000000.yaml", "--height", "0.6")
+    options = ("--camera", DEMO, "--live", "--camera-fps", "20", *lens)
+    started = time.monotonic()
+    done = subprocess.run(arguments(tmp_path, *options), capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert time.monotonic() - started > 12 / 20
+    frames = [json.loads(line) for line in done.stdout.splitlines()]
+    assert 0 < sum(each["type"] == "frame" for each in frames) <= 12

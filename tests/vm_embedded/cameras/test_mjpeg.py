@@ -1,12 +1,13 @@
 """Motion JPEG from a real HTTP server that dies and comes back."""
 
+import json
 import threading
 import time
 
 import pytest
 
 from tests.vm_embedded.cameras.mjpeg_server import Server
-from tests.vm_embedded.live.running import LENS, running
+from tests.vm_embedded.live.running import DEMO, LENS, running
 from vm_embedded.cameras.camera import BrokenFrameError, CameraError, CameraSettings
 from vm_embedded.cameras.mjpeg import MjpegCamera, NotMotionJpegError, parse_url
 from vm_embedded.cameras.synthetic import SIZE
@@ -86,3 +87,12 @@ def test_a_server_that_is_killed_and_started_again_is_found_again(tmp_path, pict
 
 def test_a_url_is_split_into_its_parts():
     assert parse_url("http://user:pass@[::1]:81/a?b").port == 81
+
+
+def test_passwords_of_cameras_are_not_shown(tmp_path):
+    pose = ("--lens", DEMO / "lens0000000.yaml", "--height", 0.6)
+    with running(tmp_path, "--camera", "http://user:secret@127.0.0.1:9/x", *pose) as found:
+        found.wait_for_state("camera_lost")
+        found.stop()
+    assert "secret" not in json.dumps([found.messages, found.events])
+    assert "no response from http://127.0.0.1:9/x" in json.dumps(found.messages)

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 COMMAND = Path(sys.executable).parent / "vm-detect"
+DEMO = Path(__file__).parents[2] / "fixtures" / "demo"
 LENS = '[lens]\nprojection = "rectilinear"\nfocal_length = 448\nfov = 1.75\n[orientation]\nheight = 0.8\npitch = 0.4\n'
 """A vm.toml for the images of a synthetic camera of 640 pixels."""
 

@@ -169,3 +169,16 @@ def test_what_the_line_of_a_pose_lacks_is_said_in_the_state(tmp_path):
         asked = subprocess.run(arguments(tmp_path, "--status"), capture_output=True, text=True, timeout=60, check=False)
         assert json.loads(asked.stdout)["reason"] == "no pose received yet"
         found.stop()
+
+
+def test_a_long_line_on_standard_input_is_left_out_and_the_next_one_is_read(tmp_path):
+    with running(tmp_path, "--camera", "synthetic", "--pose-source", "stdin", stdin=subprocess.PIPE) as found:
+        found.wait_for_state("pose_stale")
+        found.process.stdin.write(b"x" * 9000 + b"\n")
+        for _ in range(200):
+            pose = {"t": time.monotonic(), "height": 0.8, "quaternion": [0.98, 0.0, 0.199, 0.0]}
+            found.process.stdin.write(json.dumps(pose).encode() + b"\n")
+            found.process.stdin.flush()
+            time.sleep(0.01)
+        found.wait_for_state("ok")
+        found.stop()

@@ -1,0 +1,38 @@
+"""The metrics of a real vm-detect over HTTP."""
+
+import socket
+
+from tests.vm_embedded.live.running import running
+
+
+def test_figures_are_given_by_address_only_and_nothing_else_is(tmp_path):
+    with socket.socket() as made:
+        made.bind(("127.0.0.1", 0))
+        port = made.getsockname()[1]
+
+    def asked(request):
+        with socket.create_connection(("127.0.0.1", port), 10.0) as connection:
+            connection.sendall(request)
+            return b"".join(iter(lambda: connection.recv(65536), b"")).decode()
+
+    local = ("--status-metrics", f"unix:{tmp_path / 'figures'}", "--status-page", f"127.0.0.1:{port}")
+    with running(tmp_path, "--camera", "synthetic", *local) as found:
+        found.wait_for_state("ok")
+        found.wait(lambda: len(found.frames) > 5)
+        text = asked(b"GET /metrics HTTP/1.1\r\nHost: 127.0.0.1:1\r\n\r\n")
+        assert text.startswith("HTTP/1.1 200 OK")
+        assert 'vm_state{state="ok"} 1' in text
+        figures = dict(line.rsplit(" ", 1) for line in text.splitlines() if line.startswith("vm_"))
+        assert float(figures["vm_frames_total"]) >= 5
+        assert float(figures['vm_stage_seconds_count{stage="infer"}']) == float(figures["vm_frames_total"])
+        assert float(figures['vm_stage_seconds_bucket{stage="age",le="+Inf"}']) == float(figures["vm_frames_total"])
+        assert float(figures["vm_resident_bytes"]) > 2e7
+        assert asked(b"GET /metrics HTTP/1.1\r\nHost: robot.example\r\n\r\n").startswith("HTTP/1.1 403")
+        assert asked(b"POST / HTTP/1.1\r\nHost: localhost\r\n\r\n").startswith("HTTP/1.1 405")
+        assert asked(b"GET /etc/passwd HTTP/1.1\r\nHost: [::1]:1\r\n\r\n").startswith("HTTP/1.1 404")
+        assert asked(b"\r\n\r\n").startswith("HTTP/1.1 405")
+        with socket.socket(socket.AF_UNIX) as connection:
+            connection.connect(str(tmp_path / "figures"))
+            connection.sendall(b"GET /metrics HTTP/1.1\r\n\r\n")
+            assert "vm_frames_total" in b"".join(iter(lambda: connection.recv(65536), b"")).decode()
+        found.stop()
