@@ -26,7 +26,8 @@ from .dataset.report import as_json, complaints, tables
 from .dataset.workers import Done, Job, render_all
 from .render.mitsuba import find_llvm, load_mitsuba
 from .scene.configuration import SceneConfiguration
-from .scene.environment import Environment, absent, find_maps
+from .scene.environment import Environment
+from .scene.maps import find_maps, missing_held_out
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
@@ -150,9 +151,9 @@ def _render(options: argparse.Namespace) -> int:
     configuration = read_sections(SceneConfiguration, options.config, parse_overrides(options.set, _EXAMPLE))
     find_llvm()
     chosen_maps = find_maps(options.hdri, configuration.maps, options.held_out)
-    absentees = absent(options.hdri, configuration.maps)
-    if absentees:
-        print(f"vm-synth: held out, but not in {options.hdri}: {', '.join(absentees)}", file=sys.stderr)
+    missing = missing_held_out(options.hdri, configuration.maps)
+    if missing:
+        print(f"vm-synth: held out, but not in {options.hdri}: {', '.join(missing)}", file=sys.stderr)
     maps = _good_maps(chosen_maps, configuration)
     load_mitsuba()
     if configuration.ground.photographed and not any(path.stem in configuration.maps.floors for path in maps):

@@ -91,7 +91,7 @@ def test_a_damaged_map_is_named_and_left_out(maps, tmp_path, capsys):
     assert main([str(tmp_path / "out"), "--hdri", str(folder), *arguments]) == 0
     said = capsys.readouterr().err
     assert "skipped map cut.hdr" in said
-    assert "skipped map square.hdr: 64 x 64 px is no 360 degree picture" in said
+    assert "skipped map square.hdr: its size is 64 x 64 px; it must be twice as wide as high" in said
     (folder / "good.hdr").unlink()
     assert main([str(tmp_path / "other"), "--hdri", str(folder), *arguments]) == 1
     assert "no map is left" in capsys.readouterr().err

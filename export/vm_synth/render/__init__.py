@@ -1,1 +1,1 @@
-"""From a scene to pixels: ray tracing, light, the camera's sensor, masks and outlines."""
+"""Turns a scene into pixels: ray tracing, ground, masks and the camera's image processing."""

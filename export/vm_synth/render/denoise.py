@@ -1,4 +1,4 @@
-"""Taking the grain out of traced light, which no camera shows in that way."""
+"""Removes the noise of path tracing from the light on surfaces."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 from vm_embedded.arrays import Singles
 
 _STEPS = (1, 2, 4)
-_NORMALS = 16.0  # how sharply other directions are told apart
-_DEPTHS = 30.0  # and other distances, as a share of the distance
+_NORMALS = 16.0  # how strongly a difference of directions lowers the weight of a neighbor
+_DEPTHS = 30.0  # the same for a relative difference of distances
 
 
-def smoothed(light: Singles, albedo: Singles, normal: Singles, depth: Singles, share: Singles) -> Singles:
-    """Light (h, w, 3) without grain where share (h, w) is above 0.
+def denoise(light: Singles, albedo: Singles, normal: Singles, depth: Singles, share: Singles) -> Singles:
+    """Light (h, w, 3) with less noise where share (h, w) is above 0; unchanged elsewhere.
 
-    The light that falls on a surface, light over albedo (h, w, 3), is averaged with that on the neighbors that face
-    the same way, normal (h, w, 3), at the same distance, depth (h, w); in three rounds, each reaching twice as far
-    (the edge-avoiding a-trous wavelet transform of Dammertz et al.).
+    The incoming light (light divided by albedo (h, w, 3)) of a pixel is averaged with that of neighbors with a similar
+    normal (h, w, 3) and depth (h, w). Three rounds double the distance of the neighbors each time: the edge-avoiding
+    a-trous wavelet transform (Dammertz et al., 2010).
     """
     color = albedo + np.float32(0.03)
     falling = light / color
@@ -30,21 +30,23 @@ def smoothed(light: Singles, albedo: Singles, normal: Singles, depth: Singles, s
         for down in (-step, 0, step):
             for right in (-step, 0, step):
                 if down or right:
-                    apart = _moved(around[0], down, right) - guide
-                    weight = cv2.exp(-np.einsum("...c,...c->...", apart, apart)) * _moved(around[1], down, right)
-                    total += _moved(lit, down, right) * weight[..., None]
+                    difference = _shifted(around[0], down, right) - guide
+                    similarity = cv2.exp(-np.einsum("...c,...c->...", difference, difference))
+                    weight = similarity * _shifted(around[1], down, right)
+                    total += _shifted(lit, down, right) * weight[..., None]
                     weights += weight
         falling = total / np.maximum(weights, 1e-6)[..., None]
     return np.where(share[..., None] > 0, falling * color, light)
 
 
 def _padded(values: Singles) -> Singles:
+    """Values (h, w) or (h, w, c) with a border that repeats the edge."""
     edge = max(_STEPS)
     return np.pad(values, ((edge, edge), (edge, edge), (0, 0))[: values.ndim], mode="edge")
 
 
-def _moved(padded: Singles, down: int, right: int) -> Singles:
-    """The values at (row + down, column + right)."""
+def _shifted(padded: Singles, down: int, right: int) -> Singles:
+    """The unpadded values at (row + down, column + right)."""
     edge = max(_STEPS)
     rows, columns = padded.shape[0] - edge, padded.shape[1] - edge
     return padded[edge + down : rows + down, edge + right : columns + right]

@@ -1,4 +1,4 @@
-"""Mitsuba 3, and the LLVM library that it compiles its programs with."""
+"""Loads Mitsuba 3 and finds the LLVM library that it compiles with."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from vm_embedded.errors import InputError
 
 VARIANT = "llvm_ad_rgb"
 
-_GOOD = (19, 20, 18, 17, 16)
-"""Versions of LLVM by how well they are tried with Mitsuba; 14 is refused, 15 crashes on processors with AVX-512."""
+_VERSIONS = (19, 20, 18, 17, 16)
+"""Versions of LLVM, best tested first. Mitsuba rejects 14; 15 crashes on processors with AVX-512."""
 
 _PLACES = (
     "/usr/lib/*/libLLVM*.so*",
@@ -27,10 +27,10 @@ _VERSION = re.compile(r"libLLVM(?:-|\.so\.)(\d+)")
 
 
 def load_mitsuba() -> ModuleType:
-    """The module mitsuba, on one processor core. Raises InputError naming what is missing and how to get it."""
+    """Import mitsuba and limit it to one processor core. Raises InputError that says what to install."""
     library = find_llvm()
     os.environ["DRJIT_LIBLLVM_PATH"] = str(library)
-    with _interrupted_afterwards():
+    with _deferred_interrupt():
         try:
             import drjit
             import mitsuba
@@ -45,8 +45,8 @@ def load_mitsuba() -> ModuleType:
 
 
 @contextmanager
-def _interrupted_afterwards() -> Iterator[None]:
-    """Ctrl-C waits until the end: an import that is torn apart tells of other faults."""
+def _deferred_interrupt() -> Iterator[None]:
+    """Delay Ctrl-C until the end: an interrupted import would report misleading errors."""
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
@@ -64,11 +64,11 @@ _ADVICE = "install LLVM 19 (Debian, Ubuntu: apt install libllvm19) or set DRJIT_
 
 
 def find_llvm() -> Path:
-    """The LLVM library that DRJIT_LIBLLVM_PATH names, or the best one installed. Raises InputError."""
+    """The LLVM library of DRJIT_LIBLLVM_PATH, or else the best installed one. Raises InputError if there is none."""
     named = os.environ.get("DRJIT_LIBLLVM_PATH")
     if named:
         if not Path(named).is_file():
-            raise InputError(f"DRJIT_LIBLLVM_PATH is {named}, where there is no file; {_ADVICE}")
+            raise InputError(f"DRJIT_LIBLLVM_PATH is {named}, but there is no such file; {_ADVICE}")
         return Path(named)
     found: dict[int, Path] = {}
     for pattern in _PLACES:
@@ -76,7 +76,7 @@ def find_llvm() -> Path:
             named_version = _VERSION.search(path.name)
             if named_version and path.is_file():
                 found.setdefault(int(named_version.group(1)), path)
-    for version in _GOOD:
+    for version in _VERSIONS:
         if version in found:
             return found[version]
     seen = f"found only LLVM {', '.join(map(str, sorted(found)))}" if found else "found none"

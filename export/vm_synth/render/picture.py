@@ -1,8 +1,8 @@
-"""From a scene to its picture: what each pixel meets, the light that it gets, and what it counts as.
+"""Renders a scene: the light and the class of each pixel, and how much of it the ball covers.
 
-Ground and sky are computed for each pixel without noise: the sky is a look-up in the map, and on the plane under a far
-map the irradiance E is constant, so ground = albedo E / pi, times the traced share of light that gets past all things.
-Only the pixels that things reach are traced (things.py).
+Ground and sky are computed without noise. The sky is looked up in the map. Under a distant map the irradiance E is the
+same on the whole plane, so the ground's radiance is albedo E / pi, times the share of light that objects do not block.
+Only objects and their shadows are traced.
 """
 
 from __future__ import annotations
@@ -18,21 +18,26 @@ from vm_workstation.ranges import uniform
 
 from ..scene.configuration import CLASSES, GroundRanges
 from ..scene.environment import Environment
-from ..scene.field import ground_noise, paint_ground
 from ..scene.scene import Scene
-from .foreground import pixel_angle, pixel_grid, rays_through, trace_things
+from .foreground import trace_foreground
+from .ground import ground_light, paint_ground
+from .rays import pixel_angle, pixel_grid, rays_through
 from .tracer import Tracer
+from .turf import ground_noise
 
 UNLABELED = 255
-"""Where the lens sees nothing."""
+"""Class of pixels outside of the lens's field of view."""
 
 _SHADOW_STEP = 2  # pixels between traced shadows
 
 
 @dataclass(frozen=True)
 class Picture:
-    """What was rendered: radiance (h, w, 3) in linear RGB, 0 where the lens sees nothing; classes (h, w) by position
-    in CLASSES or UNLABELED; coverage (h, w) of each pixel by the ball, 0 to 1."""
+    """A rendered scene.
+
+    radiance: linear RGB (h, w, 3), 0 outside of the lens's field of view. classes: position in CLASSES of each pixel
+    (h, w), or UNLABELED. coverage: share (h, w) of each pixel that the ball covers.
+    """
 
     radiance: Singles
     classes: npt.NDArray[np.uint8]
@@ -40,30 +45,30 @@ class Picture:
 
 
 def render(scene: Scene, environment: Environment, tracer: Tracer, ground: GroundRanges) -> Picture:
-    """Render a scene; the same scene gives the same picture."""
+    """Render a scene. The same scene gives the same picture."""
     random = np.random.default_rng(scene.seed)
-    tracer.set(scene, environment)
+    tracer.load_scene(scene, environment)
     rays = rays_through(scene, pixel_grid(scene.size))
     seen = np.isfinite(rays[..., 0])
     radiance, classes = _background(scene, environment, rays, random, ground)
     if scene.ball is not None or scene.other is not None or len(scene.mesh.triangles):
         below = seen & (rays[..., 2] < -1e-3)
         radiance *= _shadows(scene, rays, below, tracer, random)
-    things = trace_things(scene, tracer, rays, 30.0 * max(float(radiance.mean()), 1e-6))
-    radiance += things.share[..., None] * (things.light - radiance)
-    classes = things.classes_before(classes)
+    foreground = trace_foreground(scene, tracer, rays, 30.0 * max(float(radiance.mean()), 1e-6))
+    radiance += foreground.share[..., None] * (foreground.light - radiance)
+    classes = foreground.classes_over(classes)
     radiance[~seen] = 0.0
     classes[~seen] = UNLABELED
-    return Picture(radiance, classes, things.coverage)
+    return Picture(radiance, classes, foreground.coverage)
 
 
 def _background(
     scene: Scene, environment: Environment, rays: Floats, random: np.random.Generator, ground: GroundRanges
 ) -> tuple[Singles, npt.NDArray[np.uint8]]:
-    """Radiance (h, w, 3) and classes (h, w) of a scene without things and shadows."""
+    """Radiance (h, w, 3) and classes (h, w) of a scene without objects and shadows."""
     up = np.array([0.0, 0.0, 1.0])
     safe = np.where(np.isfinite(rays), rays, up)
-    radiance = environment.toward(safe)
+    radiance = environment.radiance_along(safe)
     classes = np.full(rays.shape[:2], CLASSES.index("environment"), dtype=np.uint8)
     below = safe[..., 2] < -1e-4
     with np.errstate(divide="ignore"):
@@ -84,27 +89,16 @@ def _background(
     return radiance, classes
 
 
-def ground_light(points: Floats, seed: int) -> Singles:
-    """Slow changes (h, w) of the light over the plane, within -1 to 1."""
-    random = np.random.default_rng(seed)
-    turn, length = random.uniform(0.0, 2.0 * np.pi, 3), random.uniform(3.0, 9.0, 3)
-    safe = np.where(np.isfinite(points), points, 0.0)
-    waves = [
-        np.sin((safe @ [np.cos(a), np.sin(a)]) * (2.0 * np.pi / each) + a) for a, each in zip(turn, length, strict=True)
-    ]
-    return np.asarray(sum(waves) / 3.0, dtype=np.float32)
-
-
 def _shadows(scene: Scene, rays: Floats, below: Mask, tracer: Tracer, random: np.random.Generator) -> Singles:
-    """Share (h, w, 3) of light that reaches what the pixels see of the plane; 1 elsewhere."""
+    """Share (h, w, 3) of the map's light that reaches the plane at each pixel; 1 for pixels above the horizon."""
     step = _SHADOW_STEP
     offset = step // 2
     coarse, here = rays[offset::step, offset::step], below[offset::step, offset::step]
     points = coarse[here][:, :2] * (scene.orientation.height / -coarse[here][:, 2])[:, None]
-    near = _near(scene, points)
+    possible = _maybe_shadowed(scene, points)
     share = np.ones((*here.shape, 3), dtype=np.float32)
     found = np.ones((len(points), 3), dtype=np.float32)
-    found[near] = tracer.shadows(points[near], random)
+    found[possible] = tracer.unblocked_light(points[possible], random)
     share[here] = found
     share = cv2.GaussianBlur(share, (0, 0), 0.8)
     height, width = below.shape
@@ -116,8 +110,8 @@ def _shadows(scene: Scene, rays: Floats, below: Mask, tracer: Tracer, random: np
     return np.asarray(share, dtype=np.float32)
 
 
-def _near(scene: Scene, points: Floats) -> Mask:
-    """Which places (n, 2) can be in a shadow: those not farther from all things than six times their height."""
+def _maybe_shadowed(scene: Scene, points: Floats) -> Mask:
+    """Which points (n, 2) [m] of the plane can be in a shadow: those within six heights of an object."""
     near = np.zeros(len(points), dtype=bool)
     for ball in (scene.ball, scene.other):
         if ball is not None:

@@ -1,8 +1,10 @@
-"""Ray tracing with Mitsuba 3: what rays from the camera meet, the light that comes back, and shadows on the plane.
+"""Ray tracing with Mitsuba 3: which objects the camera's rays hit, the light they return, and shadows on the plane.
 
-One scene is built once: two spheres with textures, one mesh of triangles for everything else, the plane, and the
-environment. For each picture its buffers are filled anew. All launches have fixed sizes, short ones are padded, so
-that Dr.Jit compiles each program once.
+The Mitsuba scene is built once: two textured spheres, one triangle mesh for all other objects, the plane and the
+environment. Each picture only refills its buffers. Dr.Jit compiles a program for each size of arrays, so all arrays
+have fixed sizes and are padded.
+
+The module is long because all methods of its one class share these buffers.
 """
 
 from __future__ import annotations
@@ -24,20 +26,20 @@ from .mitsuba import load_mitsuba
 _TEXTURE = 512  # rows of a ball's texture
 _LIGHT = (1024, 512)  # columns and rows of the environment that lights a scene
 _VERTICES, _TRIANGLES = 90_000, 60_000
-_BATCH = 1 << 17  # rays a launch
-_LIGHTS = 1 << 15  # entries of the table that lights are drawn from
-_SHADOW_RAYS = 48
-_BOUNCED = 0.1  # light in a full shadow that comes from the things around
+_BATCH = 1 << 17  # rays that are traced together
+_LIGHTS = 1 << 15  # entries of the table of lights for shadows
+_SHADOW_RAYS = 48  # per point of the plane
+_BOUNCED = 0.1  # share of light in a full shadow, reflected by objects around
 
 NOTHING, BALL, OTHER = -1, -2, -3
-"""What a ray can meet besides triangles, which have numbers from 0 on."""
+"""What a ray hits if it is not a triangle; triangles have numbers from 0."""
 
 Hits = npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True)
 class Surfaces:
-    """First surfaces that n rays meet: albedo (n, 3), normal (n, 3) and distance (n,) [m]; infinite if none."""
+    """The first surfaces that n rays hit: albedo (n, 3), normal (n, 3), and distance (n,) [m] or infinity."""
 
     albedo: Singles
     normal: Singles
@@ -45,7 +47,7 @@ class Surfaces:
 
 
 class Tracer:
-    """Renders scenes of one process."""
+    """Traces one scene at a time; a process needs only one tracer."""
 
     def __init__(self) -> None:
         self._mi = mi = load_mitsuba()
@@ -86,24 +88,24 @@ class Tracer:
             }
         )
         self._parameters = mi.traverse(self._scene)
-        shapes = [_numbers(drjit.reinterpret_array(mi.UInt32, mi.ShapePtr(each)))[0] for each in self._scene.shapes()]
-        self._meets = {
+        shapes = [_to_numpy(drjit.reinterpret_array(mi.UInt32, mi.ShapePtr(each)))[0] for each in self._scene.shapes()]
+        self._meanings = {
             int(number): {"ball": BALL, "other": OTHER, "plane": NOTHING}.get(each.id(), 0)
             for number, each in zip(shapes, self._scene.shapes(), strict=True)
         }
         self._integrator = mi.load_dict({"type": "path", "max_depth": 3, "rr_depth": 10})
         self._lit_by = ""
 
-    def set(self, scene: Scene, environment: Environment) -> None:
-        """Fill the buffers with a scene. Raises InputError if it has more triangles than there is room for."""
+    def load_scene(self, scene: Scene, environment: Environment) -> None:
+        """Fill the buffers with a scene. Raises InputError if it has too many triangles or vertices."""
         p, mi = self._parameters, self._mi
         for name, ball in (("ball", scene.ball), ("other", scene.other)):
             self._set_ball(name, ball)
         mesh = scene.mesh
         if len(mesh.vertices) > _VERTICES or len(mesh.triangles) > _TRIANGLES:
             raise InputError(
-                f"a scene of {len(mesh.triangles)} triangles and {len(mesh.vertices)} vertices is too large; there "
-                f"is room for {_TRIANGLES} and {_VERTICES}: lower the numbers of things in [things]"
+                f"a scene has {len(mesh.triangles)} triangles and {len(mesh.vertices)} vertices; the limits are "
+                f"{_TRIANGLES} and {_VERTICES}: lower the numbers in section [things]"
             )
         p["bodies.vertex_positions"] = self._float(_padded(mesh.vertices, _VERTICES))
         p["bodies.vertex_normals"] = self._float(_padded(mesh.normals, _VERTICES))
@@ -117,7 +119,7 @@ class Tracer:
             sky = np.concatenate([light.sky[:, -1:], light.sky, light.sky[:, :1]], axis=1)
             p["env.data"] = mi.TensorXf(self._float(sky), sky.shape)
             p["sun.irradiance.value"] = mi.Color3f(*(self._opaque(float(each)) for each in light.sun))
-            p["sun.to_world"] = self._transform(_facing(-light.toward_sun))
+            p["sun.to_world"] = self._transform(_rotation_to(-light.toward_sun))
             self._set_lights(environment)
         p.update()
 
@@ -136,7 +138,7 @@ class Tracer:
         p[f"{name}.to_world"] = self._transform(matrix)
 
     def _set_lights(self, environment: Environment) -> None:
-        """Draw a table of lights, each as often as it is bright on the plane."""
+        """Fill the table of lights; each occurs in proportion to its irradiance on the plane."""
         directions, irradiance = environment.lights
         weight = irradiance.sum(axis=1, dtype=np.float64)
         edges = np.cumsum(weight) / weight.sum()
@@ -144,8 +146,8 @@ class Tracer:
         self._light_directions = np.ascontiguousarray(directions[chosen])
         self._light_colors = (irradiance[chosen] / weight[chosen, None]).astype(np.float32)
 
-    def meets(self, origin: Floats, rays: Singles) -> Hits:
-        """What each ray (n, 3) from the origin (3,) meets first: NOTHING, BALL, OTHER or a triangle's number (n,)."""
+    def first_hits(self, origin: Floats, rays: Singles) -> Hits:
+        """What each ray (n, 3) from the origin (3,) hits first (n,): NOTHING, BALL, OTHER or a triangle's number."""
         found = np.empty(len(rays), dtype=np.int32)
         for part in _batches(len(rays)):
             ray = self._ray(origin, rays[part])
@@ -153,34 +155,34 @@ class Tracer:
             shape = self._dr.reinterpret_array(self._mi.UInt32, hit.shape)
             self._dr.eval(shape, hit.prim_index)
             size = part.stop - part.start
-            shapes, triangles = _numbers(shape)[:size], _numbers(hit.prim_index)[:size]
+            shapes, triangles = _to_numpy(shape)[:size], _to_numpy(hit.prim_index)[:size]
             what = np.full(size, NOTHING, dtype=np.int32)
-            for number, meaning in self._meets.items():
+            for number, meaning in self._meanings.items():
                 if meaning != NOTHING:
                     here = shapes == number
                     what[here] = triangles[here] if meaning == 0 else meaning
             found[part] = what
         return found
 
-    def radiance(self, origin: Floats, rays: Singles, together: int, seed: int) -> Singles:
-        """Light (n, 3) that comes back along the rays (n, 3), one path each.
+    def trace_light(self, origin: Floats, rays: Singles, per_pixel: int, seed: int) -> Singles:
+        """Radiance (n, 3) that returns along rays (n, 3) from the origin (3,), one path per ray.
 
-        So many rays, one after the other, belong to the same pixel; a power of 4. Their paths spread evenly.
+        per_pixel: number of successive rays of the same pixel, a power of 4. Their paths are spread evenly.
         """
         mi = self._mi
-        evenly = mi.load_dict({"type": "ldsampler", "sample_count": together})
-        evenly.set_samples_per_wavefront(together)
+        evenly = mi.load_dict({"type": "ldsampler", "sample_count": per_pixel})
+        evenly.set_samples_per_wavefront(per_pixel)
         found = np.empty((len(rays), 3), dtype=np.float32)
         for number, part in enumerate(_batches(len(rays))):
             sampler = evenly.clone()
             sampler.seed(self._dr.opaque(mi.UInt32, (seed + 7919 * number) & 0xFFFFFFFF), _BATCH)
             ray = mi.RayDifferential3f(self._ray(origin, rays[part]))
             light, _, _ = self._integrator.sample(self._scene, sampler, ray)
-            found[part] = _numbers(self._dr.ravel(light)).reshape(-1, 3)[: part.stop - part.start]
+            found[part] = _to_numpy(self._dr.ravel(light)).reshape(-1, 3)[: part.stop - part.start]
         return np.nan_to_num(found, copy=False, posinf=0.0, neginf=0.0)
 
-    def surfaces(self, origin: Floats, rays: Singles) -> Surfaces:
-        """What the rays (n, 3) show of the first surface that they meet."""
+    def first_surfaces(self, origin: Floats, rays: Singles) -> Surfaces:
+        """The first surfaces that rays (n, 3) from the origin (3,) hit."""
         mi, dr = self._mi, self._dr
         albedo, normal = np.empty((len(rays), 3), np.float32), np.empty((len(rays), 3), np.float32)
         depth = np.empty(len(rays), np.float32)
@@ -190,13 +192,13 @@ class Tracer:
             color = met.bsdf(ray).eval_diffuse_reflectance(met, met.is_valid())
             dr.eval(color, met.n, met.t)
             size = part.stop - part.start
-            albedo[part] = _numbers(dr.ravel(color)).reshape(-1, 3)[:size]
-            normal[part] = _numbers(dr.ravel(met.sh_frame.n)).reshape(-1, 3)[:size]
-            depth[part] = _numbers(met.t)[:size]
+            albedo[part] = _to_numpy(dr.ravel(color)).reshape(-1, 3)[:size]
+            normal[part] = _to_numpy(dr.ravel(met.sh_frame.n)).reshape(-1, 3)[:size]
+            depth[part] = _to_numpy(met.t)[:size]
         return Surfaces(albedo, normal, depth)
 
-    def shadows(self, points: Floats, random: np.random.Generator) -> Singles:
-        """Share (n, 3) of the environment's light that reaches places (n, 2) of the plane past all things."""
+    def unblocked_light(self, points: Floats, random: np.random.Generator) -> Singles:
+        """Share (n, 3) of the environment's light that reaches points (n, 2) [m] of the plane past all objects."""
         mi, dr = self._mi, self._dr
         result = np.empty((len(points), 3), dtype=np.float32)
         for part in _batches(len(points)):
@@ -218,7 +220,7 @@ class Tracer:
                 dr.eval(blocked)
                 color = self._light_colors[chosen]
                 full += color
-                lit += color * ~_numbers(blocked)[:size, None]
+                lit += color * ~_to_numpy(blocked)[:size, None]
             result[part] = lit / np.maximum(full, 1e-9)
         return _BOUNCED + (1.0 - _BOUNCED) * result
 
@@ -228,7 +230,7 @@ class Tracer:
         return mi.Ray3f(place, mi.Vector3f(*(self._float(column) for column in _padded(rays, _BATCH, 1.0).T)))
 
     def _float(self, array: npt.NDArray[Any]) -> Any:
-        """A buffer of Dr.Jit's own; one over numpy's memory may be aligned otherwise, which compiles anew."""
+        """A copy in Dr.Jit's own memory: NumPy's may have another alignment, for which Dr.Jit compiles again."""
         buffer = self._mi.Float(np.ascontiguousarray(array, dtype=np.float32).ravel()) + self._opaque(0.0)
         self._dr.eval(buffer)
         return buffer
@@ -256,12 +258,12 @@ def _sphere(mi: Any) -> dict[str, Any]:
     }
 
 
-def _numbers(array: Any) -> npt.NDArray[Any]:
+def _to_numpy(array: Any) -> npt.NDArray[Any]:
     return np.asarray(array.numpy())
 
 
-def _facing(direction: Floats) -> Floats:
-    """A transform (4, 4) that turns z to a direction (3,)."""
+def _rotation_to(direction: Floats) -> Floats:
+    """A transform (4, 4) that rotates z to a direction (3,)."""
     side = np.cross([1.0, 0.0, 0.0] if abs(direction[0]) < 0.9 else [0.0, 1.0, 0.0], direction)
     side /= np.linalg.norm(side)
     matrix = np.eye(4)
@@ -270,6 +272,7 @@ def _facing(direction: Floats) -> Floats:
 
 
 def _padded(array: npt.NDArray[Any], count: int, value: float = 0.0) -> npt.NDArray[Any]:
+    """The array (n, ...) with `value` in further rows up to `count`."""
     padded = np.full((count, *array.shape[1:]), value, dtype=array.dtype)
     padded[: len(array)] = array
     return padded

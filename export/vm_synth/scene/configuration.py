@@ -11,8 +11,8 @@ from vm_workstation.ranges import range_of
 from ..balls.balls import BallRanges
 from ..bodies.catalog import BodyRanges
 from .camera import CameraRanges
-from .environment import MapRanges
 from .field import FieldRanges
+from .maps import MapRanges
 from .sensor import SensorRanges
 
 CLASSES = ("ball", "goal", "line", "field", "environment", "robot")

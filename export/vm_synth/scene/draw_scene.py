@@ -53,7 +53,7 @@ def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environm
         names=tuple(each.name for each in bodies),
         counts=tuple(len(each.vertices) for each in bodies),
         mesh=joined(bodies),
-        ground_albedo=field.grass if field else environment.ground,
+        ground_albedo=field.grass if field else environment.floor_albedo,
         sensor=draw_sensor(random, ranges.sensor),
         seed=int(random.integers(1 << 31)),
     )

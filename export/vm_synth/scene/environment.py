@@ -1,14 +1,13 @@
 """Environment maps: 360 degree photographs that light a scene and are its background.
 
 A map is an equirectangular picture, row 0 at the zenith. World frame: z up, azimuth a = atan2(y, x); the map's column
-is u = 1/2 - a / 2 pi of its width, so that turning to the left moves left in the picture.
+is u = 1/2 - a / 2 pi of its width, so a turn to the left moves left in the picture.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -18,70 +17,23 @@ import numpy as np
 from vm_embedded.arrays import Floats, Singles
 from vm_embedded.errors import InputError
 
-SUFFIXES = (".hdr", ".exr", ".pfm")
+from .maps import MapRanges
 
 _BINS = (256, 128)
-"""Columns and rows of the upper half of a map when it is taken apart into lights."""
+"""Columns and rows into which the upper half of a map is divided; each is a light."""
 
 _SUN_RADIUS = math.radians(4.0)
-_SUN_CONTRAST = 60.0  # times the median of the upper half
 
-
-@dataclass(frozen=True)
-class MapRanges:
-    """Section [maps]: what is known of the maps of a folder, by their names without suffix."""
-
-    held_out: tuple[str, ...] = field(
-        default=(),
-        metadata={"help": "maps that are never rendered unless --held-out asks for them, and then only they"},
-    )
-    floors: Mapping[str, float] = field(
-        default_factory=dict,
-        metadata={
-            "help": "maps whose real floor is flat and empty from so many degrees below the horizon on",
-            "unit": "deg",
-        },
-    )
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.held_out, list | tuple) or not all(isinstance(each, str) for each in self.held_out):
-            raise InputError(f"held_out must be a list of names of maps, not {self.held_out!r}")
-        object.__setattr__(self, "held_out", tuple(self.held_out))
-        if not isinstance(self.floors, Mapping):
-            raise InputError(f"floors must be a table of maps and angles, not {self.floors!r}")
-        for name, angle in self.floors.items():
-            if isinstance(angle, bool) or not isinstance(angle, int | float) or not 1.0 <= angle <= 80.0:
-                raise InputError(f"the floor of map {name} must be an angle from 1 to 80 deg, not {angle!r}")
-
-
-def find_maps(folder: Path, ranges: MapRanges, held_out: bool) -> list[Path]:
-    """The maps of a folder that are to be rendered, by name. Raises InputError if there is none."""
-    if not folder.is_dir():
-        raise InputError(f"there is no folder of maps {folder}")
-    found: dict[str, Path] = {}
-    for path in sorted(folder.iterdir()):
-        if path.suffix.lower() in SUFFIXES:
-            if path.stem in found:
-                raise InputError(f"maps {found[path.stem].name} and {path.name} of {folder} have one name; rename one")
-            found[path.stem] = path
-    if not found:
-        raise InputError(f"no maps ({', '.join(SUFFIXES)}) in {folder}")
-    chosen = [path for name, path in found.items() if (name in ranges.held_out) == held_out]
-    if not chosen:
-        raise InputError(f"no map of {folder} is left: {'none is' if held_out else 'all are'} held out")
-    return chosen
-
-
-def absent(folder: Path, ranges: MapRanges) -> list[str]:
-    """Names that are held out but are no maps of the folder: maps of other folders, or slips."""
-    found = {path.stem for path in folder.iterdir() if path.suffix.lower() in SUFFIXES}
-    return [name for name in ranges.held_out if name not in found]
+_SUN_CONTRAST = 60.0  # the sun is brighter than this many times the median of the upper half
 
 
 @dataclass(frozen=True)
 class Lighting:
-    """A map as rays are traced with it: radiance (h, w, 3) without the sun; the sun's irradiance (3,) on a surface
-    that faces it, and the unit vector (3,) to it."""
+    """A map prepared for ray tracing.
+
+    sky: radiance (h, w, 3) without the sun. sun: its irradiance (3,) on a surface that faces it. toward_sun: unit
+    vector (3,) to it.
+    """
 
     sky: Singles
     sun: Floats
@@ -90,8 +42,10 @@ class Lighting:
 
 @dataclass(frozen=True)
 class Environment:
-    """A map: radiance (height, width, 3), linear RGB, and the angle [rad] below the horizon from which its floor is
-    flat and empty, or None."""
+    """A map: linear RGB radiance (height, width, 3).
+
+    floor: angle below the horizon [rad] where its flat and empty floor begins, or None without such a floor.
+    """
 
     name: str
     radiance: Singles
@@ -99,29 +53,32 @@ class Environment:
 
     @classmethod
     def read(cls, path: Path, ranges: MapRanges) -> Environment:
-        """Read a map. Raises InputError naming the file and its fault."""
+        """Read a map. Raises InputError that names the file and what is wrong with it."""
         try:
             picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-        except cv2.error:  # some builds raise where EXR is switched off
+        except cv2.error:  # some builds of OpenCV raise an error if EXR is disabled
             picture = None
         if picture is None:
-            hint = "; many builds of OpenCV lack EXR, save it as .hdr" if path.suffix.lower() == ".exr" else ""
-            raise InputError(f"map {path.name}: can't be read, it is damaged or not what its suffix says{hint}")
+            hint = "; many builds of OpenCV can't read EXR: save it as .hdr" if path.suffix.lower() == ".exr" else ""
+            raise InputError(f"map {path.name}: can't be read; it is damaged or has the wrong suffix{hint}")
         if picture.ndim != 3 or picture.shape[2] < 3 or picture.dtype != np.float32:
-            raise InputError(f"map {path.name}: not a high-dynamic-range color picture")
+            raise InputError(f"map {path.name}: not a high-dynamic-range color picture (floating point RGB)")
         height, width = picture.shape[:2]
         if width != 2 * height or height < 64:
-            raise InputError(f"map {path.name}: {width} x {height} px is no 360 degree picture, twice as wide as high")
+            raise InputError(
+                f"map {path.name}: its size is {width} x {height} px; it must be "
+                "twice as wide as high and at least 128 x 64 px"
+            )
         radiance = np.ascontiguousarray(picture[..., 2::-1], dtype=np.float32)
         if not np.isfinite(radiance).all() or radiance.min() < 0.0:
-            raise InputError(f"map {path.name}: holds numbers that are no light (negative, infinite or NaN)")
+            raise InputError(f"map {path.name}: contains negative, infinite or NaN values")
         if not np.median(radiance) > 0.0:
-            raise InputError(f"map {path.name}: more than half of it is black; the end of the file may be missing")
+            raise InputError(f"map {path.name}: more than half of it is black; the file may be incomplete")
         floor = ranges.floors.get(path.stem)
         return cls(path.stem, radiance, None if floor is None else math.radians(floor))
 
-    def toward(self, rays: Floats) -> Singles:
-        """Radiance (h, w, 3) in the directions of unit rays (h, w, 3) of the world."""
+    def radiance_along(self, rays: Floats) -> Singles:
+        """Radiance (h, w, 3) along unit rays (h, w, 3) in the world frame."""
         height, width = self.radiance.shape[:2]
         turn = np.arctan2(rays[..., 1], rays[..., 0]) / (2.0 * np.pi)
         column = (0.5 - turn) * width - 0.5
@@ -136,7 +93,7 @@ class Environment:
 
     @cached_property
     def lights(self) -> tuple[Singles, Singles]:
-        """Directions (n, 3) of the upper half, and the irradiance (n, 3) of each on the plane."""
+        """The upper half as n lights: their directions (n, 3) and their irradiance (n, 3) on the plane."""
         upper = self.radiance[: self.radiance.shape[0] // 2]
         small = cv2.resize(upper, _BINS, interpolation=cv2.INTER_AREA)
         polar = (np.arange(_BINS[1]) + 0.5) / _BINS[1] * np.pi / 2.0
@@ -151,21 +108,21 @@ class Environment:
 
     @cached_property
     def irradiance(self) -> Floats:
-        """Light (3,) that falls on a square metre of the plane, pi times the radiance of a white one."""
+        """Irradiance (3,) on the plane: pi times the radiance of a white plane."""
         return np.asarray(self.lights[1].sum(axis=0, dtype=np.float64))
 
     @cached_property
-    def ground(self) -> tuple[float, float, float]:
-        """Albedo of the floor of the photograph, its mean radiance times pi / E, at most 0.9."""
+    def floor_albedo(self) -> tuple[float, float, float]:
+        """Albedo of the floor in the photograph: its median radiance times pi / irradiance, from 0.02 to 0.9."""
         lower = self.radiance[self.radiance.shape[0] * 5 // 8 :].reshape(-1, 3)
         albedo = np.median(lower, axis=0) * np.pi / np.maximum(self.irradiance, 1e-6)
         red, green, blue = np.clip(albedo, 0.02, 0.9).tolist()
         return red, green, blue
 
     def lighting(self, size: tuple[int, int]) -> Lighting:
-        """The map in the size (columns, rows) that rays are traced with, its sun taken out.
+        """The map resized to (columns, rows), with the sun as a separate light.
 
-        Paths that choose their light by its strength would hardly ever choose the sky beside a sun.
+        A path tracer picks lights by their strength: with the sun in the map it would hardly ever pick the sky.
         """
         sky = self.radiance
         if sky.shape[1] != size[0]:

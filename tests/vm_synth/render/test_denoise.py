@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.vm_embedded.strategies import reals, seeds
-from vm_synth.render.denoise import smoothed
+from vm_synth.render.denoise import denoise
 
 SHAPE = (40, 48)
 INNER = (slice(8, -8), slice(8, -8))
@@ -19,7 +19,7 @@ def plain(values):
 
 
 def flat(light, albedo=0.5, normal=(0.0, 0.0, 1.0), depth=2.0, share=1.0):
-    """All arguments of `smoothed` for a flat patch; each a number, a color or an array."""
+    """All arguments of `denoise` for a flat patch; each a number, a color or an array."""
     return (
         np.asarray(light, dtype=np.float32),
         plain(albedo) if np.size(albedo) <= 3 else np.asarray(albedo, dtype=np.float32),
@@ -42,7 +42,7 @@ def test_even_light_stays_whatever_the_shape(color, albedo, depth, seed):
     distance = depth * random.uniform(1.0, 5.0, SHAPE)
     share = random.uniform(0.0, 1.0, SHAPE)
     light = plain(color)
-    np.testing.assert_allclose(smoothed(*flat(light, albedo, normal, distance, share)), light, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(denoise(*flat(light, albedo, normal, distance, share)), light, rtol=1e-4, atol=1e-6)
 
 
 @given(seeds)
@@ -50,13 +50,13 @@ def test_a_pattern_of_the_surface_under_even_light_stays(seed):
     """Albedo is no grain: light that falls evenly shows it as it is."""
     albedo = np.random.default_rng(seed).uniform(0.0, 0.9, (*SHAPE, 3)).astype(np.float32)
     light = 2.0 * (albedo + np.float32(0.03))
-    np.testing.assert_allclose(smoothed(*flat(light, albedo)), light, rtol=1e-4)
+    np.testing.assert_allclose(denoise(*flat(light, albedo)), light, rtol=1e-4)
 
 
 @given(seeds, reals(0.01, 100.0))
 def test_grain_shrinks_and_the_light_of_a_flat_patch_stays(seed, brightness):
     light = brightness * grainy(seed)
-    found = smoothed(*flat(light))
+    found = denoise(*flat(light))
     assert found.shape == light.shape
     assert found.dtype == np.float32
     assert found[INNER].var() <= light[INNER].var() / 20.0
@@ -82,14 +82,14 @@ BORDERS = {
 @pytest.mark.parametrize("border", BORDERS.values(), ids=BORDERS)
 def test_light_does_not_cross(border):
     light = halves((1.0, 1.0, 1.0), (5.0, 4.0, 3.0))
-    np.testing.assert_allclose(smoothed(*flat(light, **border)), light, rtol=0.02)
+    np.testing.assert_allclose(denoise(*flat(light, **border)), light, rtol=0.02)
 
 
 @pytest.mark.parametrize("border", BORDERS.values(), ids=BORDERS)
 @given(seeds)
 def test_grain_shrinks_on_both_sides(border, seed):
     light = grainy(seed)
-    found = smoothed(*flat(light, **border))
+    found = denoise(*flat(light, **border))
     for side in (slice(0, SHAPE[1] // 2), slice(SHAPE[1] // 2, None)):
         assert found[:, side].var() <= light[:, side].var() / 5.0
         assert found[:, side].mean() == pytest.approx(light[:, side].mean(), rel=0.02)
@@ -98,7 +98,7 @@ def test_grain_shrinks_on_both_sides(border, seed):
 def test_without_a_border_light_is_spread():
     """So that the tests above are no accident."""
     light = halves((1.0, 1.0, 1.0), (5.0, 4.0, 3.0))
-    found = smoothed(*flat(light))
+    found = denoise(*flat(light))
     assert found[20, SHAPE[1] // 2 - 1, 0] > 1.3
 
 
@@ -107,7 +107,7 @@ def test_where_nothing_is_covered_nothing_changes(seed):
     random = np.random.default_rng(seed)
     share = random.uniform(0.0, 1.0, SHAPE) * (random.random(SHAPE) < 0.5)
     light = grainy(seed)
-    found = smoothed(*flat(light, share=share))
+    found = denoise(*flat(light, share=share))
     np.testing.assert_array_equal(found[share == 0.0], light[share == 0.0])
     assert not np.array_equal(found[share > 0.0], light[share > 0.0])
 
@@ -119,14 +119,14 @@ def test_what_is_not_covered_does_not_shine_on_the_rest(seed):
     other = np.where(share[..., None] > 0.0, light, 1000.0).astype(np.float32)
     covered = share > 0.0
     np.testing.assert_array_equal(
-        smoothed(*flat(light, share=share))[covered], smoothed(*flat(other, share=share))[covered]
+        denoise(*flat(light, share=share))[covered], denoise(*flat(other, share=share))[covered]
     )
 
 
 def test_what_goes_in_is_left_as_it_is():
     arguments = flat(grainy(0), share=0.5)
     before = [each.copy() for each in arguments]
-    smoothed(*arguments)
+    denoise(*arguments)
     for each, was in zip(arguments, before, strict=True):
         np.testing.assert_array_equal(each, was)
 
@@ -135,5 +135,5 @@ def test_what_goes_in_is_left_as_it_is():
 def test_pictures_smaller_than_the_reach_are_smoothed(size):
     light = np.random.default_rng(0).random((*size, 3)).astype(np.float32)
     ones = np.ones(size, dtype=np.float32)
-    found = smoothed(light, np.ones_like(light), np.ones_like(light), ones, ones)
+    found = denoise(light, np.ones_like(light), np.ones_like(light), ones, ones)
     assert light.min() <= found.min() <= found.max() <= light.max()

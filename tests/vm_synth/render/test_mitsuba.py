@@ -1,4 +1,4 @@
-"""Which LLVM library Mitsuba is given."""
+"""Which LLVM library Mitsuba uses."""
 
 import os
 import re
@@ -100,7 +100,7 @@ def test_a_named_library_that_is_no_file_is_refused(system, monkeypatch, tmp_pat
     system(f"{DEBIAN}libLLVM-19.so.1")
     named = f"{tmp_path}/{what}"
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", named)
-    with pytest.raises(InputError, match=rf"DRJIT_LIBLLVM_PATH is {re.escape(named)}, where there is no file"):
+    with pytest.raises(InputError, match=rf"DRJIT_LIBLLVM_PATH is {re.escape(named)}, but there is no such file"):
         find_llvm()
 
 

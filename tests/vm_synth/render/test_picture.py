@@ -14,7 +14,8 @@ from vm_synth.balls.balls import BallRanges, draw_design
 from vm_synth.bodies.clutter import carton
 from vm_synth.bodies.solids import joined
 from vm_synth.dataset.files import COLORS, file_of, write_picture
-from vm_synth.render.picture import UNLABELED, pixel_grid, render
+from vm_synth.render.picture import UNLABELED, render
+from vm_synth.render.rays import pixel_grid
 from vm_synth.scene.configuration import CLASSES, GroundRanges
 from vm_synth.scene.environment import Environment
 from vm_synth.scene.scene import PlacedBall, Scene
@@ -99,7 +100,7 @@ def test_the_written_lens_projects_the_true_center_onto_the_masks_center(name, d
     ray = (made.ball.center - [0.0, 0.0, file.orientation.height]) @ file.orientation.rotation
     pixel = file.lens.project((ray / np.linalg.norm(ray))[None], SIZE)[0]
 
-    # The mask's center is the axis of the cone of its rays, each weighed by the solid angle of its pixel.
+    # The mask's center is the axis of the cone of its rays, each weighted by the solid angle of its pixel.
     mask = cv2.imread(str(file_of(tmp_path, "coverage", 12)), cv2.IMREAD_UNCHANGED) / 255.0
     rays = file.lens.unproject(pixel_grid(SIZE).reshape(-1, 2), SIZE).reshape(*SIZE[::-1], 3)
     solid = np.linalg.norm(np.cross(np.gradient(rays, axis=0), np.gradient(rays, axis=1)), axis=-1)
@@ -144,21 +145,21 @@ def test_a_ball_off_the_plane_counts_as_configured(label, tracer, environment):
 def test_traced_ground_is_as_bright_as_computed_ground(tracer, environment):
     """The map's irradiance E gives the plane the radiance albedo E / pi, whether it is traced or not."""
     made = replace(scene(LENSES["rectilinear"]), ball=None)
-    tracer.set(made, environment)
+    tracer.load_scene(made, environment)
     ray = np.array([0.3, 0.2, -0.9], dtype=np.float32)
     rays = np.tile(ray / np.linalg.norm(ray), (1 << 14, 1))
-    light = tracer.radiance(made.camera, rays, 16, seed=1).mean(axis=0)
+    light = tracer.trace_light(made.camera, rays, 16, seed=1).mean(axis=0)
     assert light == pytest.approx(0.3 * environment.irradiance / np.pi, rel=0.02)
 
 
 def test_shadows_are_dark_under_the_ball_and_away_from_the_sun(tracer, environment):
     made = scene(LENSES["rectilinear"], spot=(1.0, 0.0))
-    tracer.set(made, environment)
+    tracer.load_scene(made, environment)
     sun = environment.lighting((1024, 512)).toward_sun
     away = -sun[:2] / np.linalg.norm(sun[:2])
     cast = 0.1 / math.tan(math.asin(sun[2]))  # from the foot to the shadow's middle
     places = np.array([[1.0, 0.0], [1.0, 0.0] + cast * away, [1.0, 0.0] - 3.0 * cast * away, [1.0, 3.0]])
-    contact, shade, sunny, far = tracer.shadows(places, np.random.default_rng(0)).mean(axis=1)
+    contact, shade, sunny, far = tracer.unblocked_light(places, np.random.default_rng(0)).mean(axis=1)
     assert contact < 0.2
     assert shade < 0.6
     assert sunny > 0.9

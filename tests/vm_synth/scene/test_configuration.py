@@ -18,7 +18,7 @@ from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_synth.bodies.solids import LABELS
 from vm_synth.scene.configuration import CLASSES, SceneConfiguration
-from vm_synth.scene.environment import MapRanges
+from vm_synth.scene.maps import MapRanges
 from vm_workstation.ranges import log_uniform, range_of, some_of, uniform
 
 DEFAULT = SceneConfiguration()
@@ -235,10 +235,16 @@ MESSAGES = {
     "list of sections": ("[[camera]]\nsteep = 1\n", r"camera must be a section, \[camera\]"),
     "one name of many": ("[ball]\noff_plane_label = 'rbot'\n", r"\[ball\] unknown off_plane_label 'rbot'.*'robot'"),
     "no name": ("[ball]\noff_plane_label = ['robot']\n", r"\[ball\] unknown off_plane_label \['robot'\]"),
-    "held out by one name": ("[maps]\nheld_out = 'a'\n", r"\[maps\] held_out must be a list of names of maps, not 'a'"),
+    "held out by one name": ("[maps]\nheld_out = 'a'\n", r"\[maps\] held_out must be a list of map names, not 'a'"),
     "held out by number": ("[maps]\nheld_out = [1]\n", r"\[maps\] held_out .*not \[1\]"),
-    "floors that are no table": ("[maps]\nfloors = 3\n", r"\[maps\] floors must be a table of maps and angles, not 3"),
-    "floor at the horizon": ("[maps.floors]\na = 0\n", r"\[maps\] the floor of map a .*from 1 to 80 deg, not 0"),
+    "floors that are no table": (
+        "[maps]\nfloors = 3\n",
+        r"\[maps\] floors must be a table of map names and angles, not 3",
+    ),
+    "floor at the horizon": (
+        "[maps.floors]\na = 0\n",
+        r"\[maps\] the floor of map a must begin 1 to 80 deg below the horizon, not 0",
+    ),
     "floor in words": ("[maps.floors]\na = 'low'\n", r"\[maps\] the floor of map a .*not 'low'"),
     "floor that is true": ("[maps.floors]\na = true\n", r"\[maps\] the floor of map a .*not True"),
     "floor that is NaN": ("[maps.floors]\na = nan\n", r"\[maps\] the floor of map a .*not nan"),

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from tests.vm_embedded.strategies import reals
 from vm_embedded.errors import InputError
-from vm_synth.scene.environment import Environment, MapRanges, absent, find_maps
+from vm_synth.scene.environment import Environment
+from vm_synth.scene.maps import MapRanges
 
 SIZE = (256, 128)
 """Columns and rows of the maps of these tests."""
@@ -87,7 +88,7 @@ AT_THE_SEAMS = [
 def test_a_spot_of_a_file_is_seen_where_it_was_put(folder, azimuth, elevation, suffix):
     middle = toward(azimuth, elevation)
     path = written(folder, spot(middle), f"spot{suffix}")
-    found = Environment.read(path, MapRanges()).toward(middle[None, None])[0, 0]
+    found = Environment.read(path, MapRanges()).radiance_along(middle[None, None])[0, 0]
     np.testing.assert_allclose(found, (3.05, 2.05, 1.05), rtol=0.1)
 
 
@@ -99,7 +100,7 @@ def test_the_brightest_ray_points_at_the_spot(place):
     rays = middle + 0.06 * np.random.default_rng(0).normal(size=(40, 40, 3))
     rays[0, 0] = middle
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    light = made.toward(rays)
+    light = made.radiance_along(rays)
     expected = 0.05 + np.exp((rays @ middle - 1.0) / 0.05**2)[..., None] * (3.0, 2.0, 1.0)
     assert np.abs(light - expected).max() < 0.4
     assert np.abs(light - expected).mean() < 0.05
@@ -109,15 +110,15 @@ def test_the_brightest_ray_points_at_the_spot(place):
 
 def test_each_texel_is_seen_at_its_center():
     radiance = np.random.default_rng(0).random((SIZE[1], SIZE[0], 3))
-    np.testing.assert_allclose(environment(radiance).toward(directions()), radiance, atol=0.07)
-    assert np.abs(environment(radiance).toward(directions()) - radiance).mean() < 0.01
+    np.testing.assert_allclose(environment(radiance).radiance_along(directions()), radiance, atol=0.07)
+    assert np.abs(environment(radiance).radiance_along(directions()) - radiance).mean() < 0.01
 
 
 @given(reals(-1.5, 1.5))
 def test_nothing_jumps_at_the_wrap_around(elevation):
     made = environment(spot(toward(math.pi - 0.02, elevation)))
     left, right = (toward(turn, elevation) for turn in (math.pi - 1e-6, -math.pi + 1e-6))
-    first, second = made.toward(np.stack([left, right])[None])[0]
+    first, second = made.radiance_along(np.stack([left, right])[None])[0]
     np.testing.assert_allclose(first, second, rtol=1e-3)
 
 
@@ -126,7 +127,7 @@ def test_nothing_jumps_at_the_wrap_around(elevation):
 def test_a_constant_sky_throws_pi_times_its_radiance_on_the_plane(color):
     made = environment(constant(*color))
     np.testing.assert_allclose(made.irradiance, np.multiply(np.pi, color), rtol=5e-3)
-    np.testing.assert_allclose(made.ground, 0.9, rtol=1e-6)
+    np.testing.assert_allclose(made.floor_albedo, 0.9, rtol=1e-6)
 
 
 @pytest.mark.parametrize("power", [1, 2, 5])
@@ -160,7 +161,7 @@ def test_the_ground_s_albedo_is_that_of_an_evenly_lit_floor(albedo, light):
     radiance = constant(light, light, light)
     below = directions()[..., 2:] < 0
     made = environment(np.where(below, light * np.array(albedo), radiance))
-    np.testing.assert_allclose(made.ground, albedo, rtol=1e-2)
+    np.testing.assert_allclose(made.floor_albedo, albedo, rtol=1e-2)
 
 
 @pytest.mark.parametrize("size", [(256, 128), (1024, 512), (512, 256)])
@@ -254,9 +255,9 @@ DAMAGE = {
         ["truncated 1", "truncated 40", "truncated 99", "empty", "junk", "folder", "missing"], "can't be read"
     ),
     "8-bit": "not a high-dynamic-range color picture",
-    "wrong aspect": "200 x 128 px is no 360 degree picture, twice as wide as high",
-    "tiny": "64 x 32 px is no 360 degree picture",
-    **dict.fromkeys(["NaN", "infinite", "negative"], "holds numbers that are no light"),
+    "wrong aspect": "200 x 128 px; it must be twice as wide as high",
+    "tiny": "64 x 32 px; it must be .* at least 128 x 64 px",
+    **dict.fromkeys(["NaN", "infinite", "negative"], "contains negative, infinite or NaN values"),
     **dict.fromkeys(["black", "half black"], "more than half of it is black"),
 }
 
@@ -273,7 +274,7 @@ def test_an_unreadable_exr_says_what_may_be_missing(folder):
     path = folder / "broken.exr"
     path.write_bytes(bytes.fromhex("762f3101") + bytes(300))
     with pytest.raises(
-        InputError, match=r"broken\.exr: can't be read.*many builds of OpenCV lack EXR, save it as \.hdr"
+        InputError, match=r"broken\.exr: can't be read.*many builds of OpenCV can't read EXR: save it as \.hdr"
     ):
         Environment.read(path, MapRanges())
 
@@ -283,45 +284,3 @@ def test_a_gray_map_is_refused(folder):
     cv2.imwrite(str(path), noisy()[..., 0].astype(np.float32))
     with pytest.raises(InputError, match=r"gray\.pfm: not a high-dynamic-range color picture"):
         Environment.read(path, MapRanges())
-
-
-@pytest.fixture
-def maps(tmp_path):
-    for name in ("c.hdr", "a.HDR", "b.exr", "d.pfm", "notes.txt", "preview.png"):
-        (tmp_path / name).write_bytes(b"")
-    return tmp_path
-
-
-def names(paths):
-    return [path.name for path in paths]
-
-
-def test_all_maps_of_a_folder_are_found_by_suffix_in_order_of_their_names(maps):
-    assert names(find_maps(maps, MapRanges(), held_out=False)) == ["a.HDR", "b.exr", "c.hdr", "d.pfm"]
-
-
-def test_held_out_maps_are_found_only_when_they_are_asked_for(maps):
-    ranges = MapRanges(held_out=("b", "d"))
-    assert names(find_maps(maps, ranges, held_out=False)) == ["a.HDR", "c.hdr"]
-    assert names(find_maps(maps, ranges, held_out=True)) == ["b.exr", "d.pfm"]
-
-
-def test_a_folder_may_lack_maps_that_are_held_out(maps):
-    assert names(find_maps(maps, MapRanges(held_out=("elsewhere", "b")), held_out=False)) == ["a.HDR", "c.hdr", "d.pfm"]
-
-
-def test_names_that_are_held_out_and_no_maps_of_the_folder_are_told(maps):
-    assert absent(maps, MapRanges(held_out=("b", "elsewhere", "c"))) == ["elsewhere"]
-
-
-def test_no_folder_no_map_and_no_map_left_are_said(maps, tmp_path_factory):
-    empty = tmp_path_factory.mktemp("empty")
-    with pytest.raises(InputError, match=r"no maps \(\.hdr, \.exr, \.pfm\) in .*empty"):
-        find_maps(empty, MapRanges(), held_out=False)
-    for path in (empty / "none", maps / "c.hdr"):
-        with pytest.raises(InputError, match=rf"there is no folder of maps {re.escape(str(path))}"):
-            find_maps(path, MapRanges(), held_out=False)
-    with pytest.raises(InputError, match=r"no map of .* is left: all are held out"):
-        find_maps(maps, MapRanges(held_out=("a", "b", "c", "d")), held_out=False)
-    with pytest.raises(InputError, match=r"no map of .* is left: none is held out"):
-        find_maps(maps, MapRanges(), held_out=True)

@@ -243,7 +243,7 @@ def test_the_ground_s_color_is_that_of_field_or_floor():
     environment = under(FLOOR)
     configuration = replace(bare(), ground=replace(DEFAULT.ground, photographed=0.5))
     for scene in scenes(10, configuration, FLOOR):
-        expected = environment.ground if scene.field is None else scene.field.grass
+        expected = environment.floor_albedo if scene.field is None else scene.field.grass
         assert scene.ground_albedo == expected
 
 
