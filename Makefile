@@ -102,7 +102,7 @@ docs: .venv/dev demo ## write the generated pages of docs/ and the demo's pictur
 
 site: .venv/docs ## build docs/ as a web site in build/site
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --config-file docs/site/mkdocs.yml
-	@echo "Open $(CURDIR)/build/site/index.html"
+	@echo "Open $(CURDIR)/build/site/index.html, or with search: $(BIN)/python -m http.server --directory build/site"
 
 clean: ## remove everything that make made
 	rm -rf .venv demo-out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
