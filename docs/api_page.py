@@ -11,6 +11,7 @@ import dataclasses
 import inspect
 import re
 import textwrap
+from collections.abc import Iterable
 from functools import cached_property
 from itertools import pairwise
 from types import FunctionType, ModuleType
@@ -74,7 +75,7 @@ def _entry(name: str) -> str:
         note = _attribute_docs(inspect.getmodule(type(value))).get(name, "")
         return f"### {name}\n\n{_code(f'{name}: {type(value).__name__}')}\n\n{note}"
     if inspect.isfunction(value):
-        return f"### {name}\n\n{_code(name + _signature(value))}\n\n{_markdown(value.__doc__)}"
+        return f"### {name}\n\n{_code(name + _signature(value))}\n\n{_markdown(value.__doc__, _parameters(value))}"
     if issubclass(value, BaseException):
         head = f"class {name}({value.__bases__[0].__name__})"
         return f"### {name}\n\n{_code(head)}\n\n{_markdown(value.__doc__)}"
@@ -103,28 +104,35 @@ def _entry(name: str) -> str:
 
 
 def _field_meanings(value: type) -> tuple[dict[str, str], str]:
-    """What a dataclass's docstring says about each field, and the docstring without that.
-
-    Docstrings describe fields as `name: text. name (n, 3), name [m]: text. name [m].`, in paragraphs that start with a
-    name.
-    """
-    names = "|".join(each.name for each in _fields(value))
-    label = rf"(?:{names})(?: \([^)]*\))?(?: \[[^\]]*\])?"
-    labels = re.compile(rf"(?:^|(?<=\. )|(?<=; ))({label}(?:(?:, | and ){label})*)(?:: |\. )")
+    """What a dataclass's docstring says about each field, and the docstring without that."""
     meanings: dict[str, str] = {}
     kept = []
     for paragraph in _docstring(value).split("\n\n"):
-        pieces = labels.split(" ".join(paragraph.split()))
-        if pieces[0] or len(pieces) < 3:
-            kept.append(paragraph)
-            continue
-        for head, text in zip(pieces[1::2], pieces[2::2], strict=True):
-            text, _, raised = text.partition(" Raises ")
-            kept += [f"Raises {raised}"] if raised else []
-            for one in re.finditer(rf"({names})((?: \([^)]*\))?(?: \[[^\]]*\])?)(?=,|$| and )", head):
-                shape = one[2].strip()
-                meanings[one[1]] = (f"{shape} " if shape else "") + text.strip().rstrip(".")
+        found, rest = _labeled(paragraph, [each.name for each in _fields(value)])
+        meanings |= found
+        kept += [rest] if rest else []
     return meanings, "\n\n".join(kept)
+
+
+def _labeled(paragraph: str, names: Iterable[str]) -> tuple[dict[str, str], str]:
+    """What a paragraph says about each of some names, and the rest of it.
+
+    Docstrings describe fields and parameters as `name: text. name (n, 3), name [m]: text. name [m].`, in paragraphs
+    that start with a name. The errors that they raise come last.
+    """
+    any_name = "|".join(names) or "(?!)"
+    label = rf"(?:{any_name})(?: \([^)]*\))?(?: \[[^\]]*\])?"
+    labels = re.compile(rf"(?:^|(?<=\. )|(?<=; ))({label}(?:(?:, | and ){label})*)(?:: |\. )")
+    start, *pieces = labels.split(" ".join(paragraph.split()))
+    if start or not pieces:
+        return {}, paragraph
+    pieces[-1], _, raised = pieces[-1].partition(" Raises ")
+    found = {}
+    for head, text in zip(pieces[::2], pieces[1::2], strict=True):
+        for one in re.finditer(rf"({any_name})((?: \([^)]*\))?(?: \[[^\]]*\])?)(?=,|$| and )", head):
+            shape = one[2].strip()
+            found[one[1]] = " ".join(each for each in (shape, text.strip().rstrip(".")) if each)
+    return found, f"Raises {raised}" if raised else ""
 
 
 def _field_table(value: type, meanings: dict[str, str]) -> str:
@@ -172,7 +180,7 @@ def _member(owner: str, value: type, name: str) -> str:
     functions = [
         getattr(each, "fget", None) or getattr(each, "func", None) or getattr(each, "__func__", each) for each in found
     ]
-    text = _markdown(next((each.__doc__ for each in functions if each.__doc__), None))
+    text = _markdown(next((each.__doc__ for each in functions if each.__doc__), None), _parameters(functions[0]))
     kind = str(inspect.signature(functions[0]).return_annotation)
     if isinstance(found[0], (property, cached_property)):
         return f"**`{name}: {kind}`**\n\n{text}"
@@ -198,10 +206,21 @@ def _docstring(value: Any) -> str:
     return inspect.cleandoc(value.__doc__ or "")
 
 
-def _markdown(docstring: str | None) -> str:
-    """A docstring as Markdown: indented blocks become code."""
-    blocks = inspect.cleandoc(docstring or "").split("\n\n")
-    return "\n\n".join(_code(textwrap.dedent(each)) if each.startswith("    ") else each for each in blocks)
+def _parameters(function: Any) -> list[str]:
+    return list(inspect.signature(function).parameters)
+
+
+def _markdown(docstring: str | None, parameters: Iterable[str] = ()) -> str:
+    """A docstring as Markdown: indented blocks become code, and descriptions of parameters a list."""
+    shown = []
+    for block in inspect.cleandoc(docstring or "").split("\n\n"):
+        if block.startswith("    "):
+            shown.append(_code(textwrap.dedent(block)))
+            continue
+        found, rest = _labeled(block, parameters)
+        shown += ["\n".join(f"- `{name}`: {text}." for name, text in found.items())] if found else []
+        shown += [rest] if rest else []
+    return "\n\n".join(shown)
 
 
 def _code(text: str) -> str:
