@@ -22,7 +22,7 @@ from vm_train.data.pictures import find_pictures
 from vm_train.evaluation.evaluation import Evaluation, Rules
 from vm_train.evaluation.workers import Job, evaluate
 from vm_train.evaluation.worst_errors import WorstError
-from vm_train.evaluation.worst_pictures import drawn
+from vm_train.evaluation.worst_pictures import draw_error
 from vm_train.learning.configuration import ClassTable
 from vm_train.scores.object_scores import ObjectScores
 
@@ -103,7 +103,7 @@ def sheet(result: Evaluation, count: int = 20) -> tuple[np.ndarray, list[str]]:
     missed, false = result.worst.missed[: count // 2], result.worst.false[: count // 2]
     cells, words = [], []
     for number, each in enumerate((*missed, *false), 1):
-        cells.append(_numbered(drawn(each), number))
+        cells.append(_numbered(draw_error(each), number))
         words.append(_said(each, missed=number <= len(missed)))
     width = max(cell.shape[1] for cell in cells)
     cells = [cv2.copyMakeBorder(cell, 2, 2, 2, width - cell.shape[1] + 2, cv2.BORDER_CONSTANT) for cell in cells]

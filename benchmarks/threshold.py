@@ -27,7 +27,7 @@ from vm_export.grid import VISUAL
 from vm_train.data.pictures import read_picture
 from vm_train.evaluation.answers import Exact, load_subject, scene_of
 from vm_train.evaluation.object_truth import read_scene, true_objects
-from vm_train.evaluation.picture_selection import pictures_of
+from vm_train.evaluation.picture_selection import select_pictures
 from vm_train.graphs.labeled_graph import color, seen_points
 from vm_train.learning.configuration import ClassTable
 from vm_train.scores.object_scores import ObjectScores
@@ -49,7 +49,7 @@ def answered(subject: Exact, data: Path, numbers: Path, part: str) -> Iterator[A
     """The pictures of a part of a training."""
     table = tomllib.loads((NETWORKS / "ball-5x4.toml").read_text())["classes"]
     classes = ClassTable.from_table(table).mask_classes()
-    for files in pictures_of([data], numbers, part):
+    for files in select_pictures([data], numbers, part):
         picture = read_picture(files, classes)
         scene = read_scene(files.image.with_name(f"scene{files.number}.json"))
         assert scene is not None

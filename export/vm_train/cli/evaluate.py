@@ -53,19 +53,21 @@ def _evaluate(options: argparse.Namespace) -> int:
     from vm_workstation.plots import new_figure
 
     from ..evaluation.evaluation import Rules
-    from ..evaluation.files import points_on_object, write_evaluation
-    from ..evaluation.picture_selection import classes_of, pictures_of, usual_colors
-    from ..evaluation.report import lines
+    from ..evaluation.files import write_evaluation
+    from ..evaluation.mask_colors import classes_with_colors, default_colors
+    from ..evaluation.picture_selection import select_pictures
+    from ..evaluation.points_on_ball_plot import median_camera_figure
+    from ..evaluation.summary import lines
     from ..evaluation.workers import Job, evaluate
 
     settings = _settings(options)
-    pictures = pictures_of(options.data, options.list, options.part)
+    pictures = select_pictures(options.data, options.list, options.part)
     rules = Rules(options.radius_of, options.min_radius, options.strict)
     if options.output.exists() and not options.output.is_dir():
         raise InputError(f"can't write to {options.output}: it is no folder")
     new_figure(1.0, 1.0)  # better no plots now than after an hour
     subject = _subject(options, settings)
-    classes = classes_of(subject.manifest, usual_colors(options.model, options.list), options.color)
+    classes = classes_with_colors(subject.manifest, default_colors(options.model, options.list), options.color)
     job = Job(options.model, settings, options.as_robot, classes, rules)
     bar = ProgressBar(len(pictures), "vm-evaluate")
     try:
@@ -78,7 +80,7 @@ def _evaluate(options: argparse.Namespace) -> int:
         raise InputError("no picture could be evaluated")
     about = _about(options, settings, subject, job.classes.colors)
     about["notes"] = _notes(options, settings, subject, result)
-    figure, about["camera"] = points_on_object(result.poses, job.classes, subject.manifest, subject.grid)
+    figure, about["camera"] = median_camera_figure(result.poses, job.classes, subject.manifest, subject.grid)
     scores = write_evaluation(options.output, result, about, settings.threshold, figure)
     print(lines(scores))
     for note in about["notes"]:
@@ -162,13 +164,14 @@ def _points(options: argparse.Namespace) -> int:
     from vm_embedded.geometry.sphere import Sphere
     from vm_workstation.plots import check_figure_path, save_figure
 
-    from ..evaluation.points_on_ball import DISTANCES, PAPER_CAMERA, Camera, points_over_distance
+    from ..evaluation.points_on_ball import PAPER_CAMERA, PosedCamera
     from ..evaluation.points_on_ball_plot import points_figure
+    from ..evaluation.points_over_distance import DISTANCES, points_over_distance
 
     check_figure_path(options.output)
     check_writable(options.output)
     pose = Orientation.from_roll_pitch(options.height, pitch=math.radians(options.pitch))
-    camera = Camera(pose, PAPER_CAMERA.lens, PAPER_CAMERA.size)
+    camera = PosedCamera(pose, PAPER_CAMERA.lens, PAPER_CAMERA.size)
     ball = Sphere(options.radius)
     curves = points_over_distance(camera, ball, options.intersections, DISTANCES[::2], options.equal_at, options.early)
     title = (

@@ -1,6 +1,6 @@
-"""How well a network does on pictures: scores of points and of objects, the worst, and what could not be read.
+"""The result of an evaluation: scores of points and objects, the worst errors, and the pictures that can't be used.
 
-Evaluations of parts of the pictures add up.
+Results for parts of the pictures add up to the result for all of them.
 """
 
 from __future__ import annotations
@@ -23,13 +23,16 @@ from .object_truth import SceneTruth, read_scene, true_objects
 from .worst_errors import WorstErrors, worst_errors_of
 
 RADII = ("all", "scene")
-"""Which radius mesh and fit have. all: the network's. scene: that of each picture's own balls, as vm-synth knows it."""
+"""Radius of mesh and fit. all: the network's. scene: that of each picture's balls, from the sceneX.json of vm-synth."""
 
 
 @dataclass(frozen=True)
 class Rules:
-    """How pictures are evaluated. radius_of: one of RADII. min_radius: of objects that are to be found [px]. strict:
-    a picture that can't be used ends it."""
+    """How to evaluate pictures.
+
+    radius_of: one of RADII. min_radius: smaller true objects are ignored [px]. strict: stop at the first picture that
+    can't be used.
+    """
 
     radius_of: str = "all"
     min_radius: float = 2.0
@@ -38,7 +41,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class CameraPose:
-    """Where the camera of a picture was: height [m] and pitch [rad]."""
+    """The camera of a picture: height [m] and pitch [rad]."""
 
     files: PictureFiles
     height: float
@@ -47,10 +50,10 @@ class CameraPose:
 
 @dataclass(eq=False)
 class Evaluation:
-    """What came of some pictures.
+    """The result for some pictures.
 
-    objects: scores by class of the kind object. poses: of all pictures that were evaluated. radii: of the balls [m], of
-    each picture that has a sceneX.json. faults: pictures that were not evaluated, by path, and why.
+    objects: scores for each class of the kind object. poses: of the evaluated pictures. radii: of the balls [m], one
+    for each picture with a sceneX.json. faults: the reason for each picture that was not evaluated, by path.
     """
 
     points: PointScores
@@ -61,15 +64,15 @@ class Evaluation:
     worst: WorstErrors = field(default_factory=WorstErrors)
 
     @classmethod
-    def of_nothing(cls, subject: Subject, rules: Rules) -> Evaluation:
-        """What comes of no pictures. A network of another grid than the runtime's finds no objects."""
+    def empty(cls, subject: Subject, rules: Rules) -> Evaluation:
+        """The result for no pictures. It has scores of objects only for a Visual Mesh: the fit works on its rings."""
         classes = subject.manifest.classes
         objects = [each.name for each in classes if each.kind == "object" and subject.grid.kind == "visual"]
         scores = {name: ObjectScores(min_radius=rules.min_radius) for name in objects}
         return cls(PointScores([each.name for each in classes]), scores)
 
     def __add__(self, other: Evaluation) -> Evaluation:
-        """What came of the pictures of both. Raises InputError if they are of other classes or rules."""
+        """The result for the pictures of both. Raises InputError if their classes or rules differ."""
         return Evaluation(
             self.points + other.points,
             {name: scores + other.objects[name] for name, scores in self.objects.items()},
@@ -82,7 +85,7 @@ class Evaluation:
     def count(
         self, files: PictureFiles, picture: Picture, scene: SceneTruth | None, answer: Answer, manifest: Manifest
     ) -> None:
-        """Count what a network answered on a picture. Raises ModelError for answers that are no probabilities."""
+        """Add a network's answer on a picture. Raises ModelError for probabilities outside 0 to 1."""
         x, y = np.rint(answer.pixels).astype(np.intp).T
         self.points.add(answer.probabilities, picture.labels[y, x], answer.distances)
         for name, truths in true_objects(picture, scene, manifest).items():
@@ -97,21 +100,21 @@ class Evaluation:
         self.poses.append(CameraPose(files, orientation.height, orientation.pitch))
 
 
-def evaluated(subject: Subject, pictures: Sequence[PictureFiles], classes: Classes, rules: Rules) -> Evaluation:
-    """What comes of these pictures; those that can't be used are named in `faults`.
+def evaluate_pictures(subject: Subject, pictures: Sequence[PictureFiles], classes: Classes, rules: Rules) -> Evaluation:
+    """The result for these pictures; `faults` names those that can't be used.
 
-    Raises InputError for a mask with a color of no class, with `strict` for every picture that can't be used, and
-    ModelError for answers that are no probabilities.
+    Raises InputError for a mask color that belongs to no class, and with `strict` for any picture that can't be used.
+    Raises ModelError for probabilities outside 0 to 1.
     """
-    result = Evaluation.of_nothing(subject, rules)
+    result = Evaluation.empty(subject, rules)
     for files in pictures:
         try:
             picture, scene = _read(files, classes, rules)
             answer = subject.answer(picture, scene.ball_radius if scene and rules.radius_of == "scene" else None)
         except (InputError, GeometryError) as error:
             if isinstance(error, PictureFault) and error.kind == "color":
-                # Such colors are in many masks, and to leave these out would make another set of it.
-                raise InputError(f"{files.mask}: {error}; --color CLASS=R,G,B gives a color to a class") from error
+                # Many masks may have this color. To skip them all would change what the scores measure.
+                raise InputError(f"{files.mask}: {error}; assign it to a class with --color CLASS=R,G,B") from error
             if rules.strict:
                 raise InputError(f"{files.image}: {error}") from error
             result.faults[str(files.image)] = str(error)
@@ -124,5 +127,5 @@ def _read(files: PictureFiles, classes: Classes, rules: Rules) -> tuple[Picture,
     picture = read_picture(files, classes)
     scene = read_scene(files.image.with_name(f"scene{files.number}.json"))
     if scene is None and rules.radius_of == "scene":
-        raise InputError(f"scene{files.number}.json: is missing, and would tell the radius of the balls")
+        raise InputError(f"scene{files.number}.json: is missing, but --radius-of scene needs its ball radius")
     return picture, scene

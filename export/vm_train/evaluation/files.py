@@ -1,32 +1,25 @@
-"""The folder that vm-evaluate writes: scores.json, CSV files, plots, and report.html; the same run, the same files."""
+"""The output folder of vm-evaluate: scores.json, CSV files, plots and report.html. Equal runs give equal files."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import cv2
-import numpy as np
 
-from vm_embedded.errors import GeometryError, InputError
+from vm_embedded.errors import InputError
 from vm_embedded.files import atomic_write
-from vm_embedded.geometry.sphere import Sphere
-from vm_embedded.network.manifest import Manifest
-from vm_export.grid import Grid
 from vm_workstation.plots import save_figure
 
-from ..data.classes import Classes
-from ..data.pictures import read_picture
-from .evaluation import CameraPose, Evaluation
-from .plots import plots
-from .points_on_ball import Camera, points_over_distance
-from .points_on_ball_plot import points_figure
+from .evaluation import Evaluation
+from .object_plots import distance_errors, object_curves, objects_over_distance
+from .point_plots import confusion, point_curves, points_over_distance
 from .report import page
 from .tables import as_csv, as_json
 from .worst_errors import WorstError
-from .worst_pictures import drawn
+from .worst_pictures import draw_error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,26 +29,28 @@ _PLOTS = (
     *("points_curves", "points_over_distance", "confusion", "points_on_object"),
     *("objects_curves", "objects_over_distance", "distance_error"),
 )
-_DISTANCES = np.linspace(0.0, 10.0, 51)  # [m]
-_QUALITY = 85  # of small pictures
+_QUALITY = 85  # of the small JPEG pictures
 
 
 def write_evaluation(
-    out: Path, evaluation: Evaluation, about: dict[str, Any], threshold: float, figure: Figure | None
+    out: Path, evaluation: Evaluation, about: dict[str, Any], threshold: float, points_on_object: Figure | None
 ) -> dict[str, Any]:
-    """Write all files to a folder, which is made if it is not there, and return what scores.json holds.
+    """Write all files to a folder, which is created if missing, and return the content of scores.json.
 
-    about: what was evaluated, on what and how. threshold: probability from which a point counts. figure: that of points
-    on an object. What an earlier evaluation left there and this one does not have is removed. Raises InputError.
+    about: model, data, rules, settings and notes. threshold: probability from which a point counts. points_on_object:
+    a figure to add to the plots. Removes files of an earlier evaluation that this one does not have. Raises InputError
+    if a file can't be written.
     """
     try:
         (out / "plots").mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"can't make folder {out}: {error.strerror or error}") from error
+        raise InputError(f"can't create folder {out}: {error.strerror or error}") from error
     scores = {"about": about, **as_json(evaluation, threshold)}
     texts = {f"{name}.csv": text for name, text in as_csv(evaluation, threshold).items()}
     texts["scores.json"] = json.dumps(scores, indent=1, allow_nan=False) + "\n"
-    figures = plots(evaluation, threshold) | ({} if figure is None else {"points_on_object": figure})
+    figures = _figures(evaluation, threshold)
+    if points_on_object is not None:
+        figures["points_on_object"] = points_on_object
     for name, each in figures.items():
         for suffix in (".png", ".svg"):
             save_figure(each, out / "plots" / f"{name}{suffix}")
@@ -72,44 +67,30 @@ def write_evaluation(
     return scores
 
 
-def points_on_object(
-    poses: Sequence[CameraPose], classes: Classes, manifest: Manifest, grid: Grid
-) -> tuple[Figure | None, str]:
-    """The paper's figure for a network's ball and the data's median camera, and which one that is.
-
-    That camera is the one of the picture nearest to the medians of height and pitch; there is one picture or more. If
-    it shows no such ball, there is no figure, but why.
-    """
-    if manifest.shape != "sphere":
-        return None, f"The figure is of balls, and the network's objects are of shape {manifest.shape}."
-    radius = manifest.object_radius
-    values = np.array([(each.height, each.pitch) for each in poses])
-    spread = np.maximum(values.std(axis=0), 1e-9)
-    nearest = np.linalg.norm((values - np.median(values, axis=0)) / spread, axis=1).argmin()
-    pose = poses[int(nearest)]
-    picture = read_picture(pose.files, classes)
-    orientation = picture.lens.orientation
-    assert orientation is not None
-    camera = Camera(orientation, picture.lens.lens, (picture.image.shape[1], picture.image.shape[0]))
-    name = (
-        f"Camera of {pose.files.image.name}, nearest to the median of all: {pose.height:.2f} m high, "
-        f"{np.degrees(pose.pitch):.0f} degrees down; a ball of radius {radius:g} m."
-    )
-    try:
-        curves = points_over_distance(camera, Sphere(radius), (3, 4, 5), _DISTANCES, grid.equal_at or None)
-    except (InputError, GeometryError) as error:
-        return None, f"{name} {error}"
-    return points_figure(curves), name
+def _figures(evaluation: Evaluation, threshold: float) -> dict[str, Figure]:
+    """All plots by name. Raises InputError without matplotlib."""
+    points, objects = evaluation.points, evaluation.objects
+    figures = {
+        "points_curves": point_curves(points),
+        "points_over_distance": points_over_distance(points, threshold),
+        "confusion": confusion(points),
+    }
+    if objects:
+        figures["objects_curves"] = object_curves(objects)
+        figures["objects_over_distance"] = objects_over_distance(objects)
+        figures["distance_error"] = distance_errors(objects)
+    return figures
 
 
 def _strips(evaluation: Evaluation) -> Mapping[str, list[tuple[bytes, str]]]:
-    odd = evaluation.worst
+    """The worst errors by heading: small JPEG pictures with their captions."""
+    worst = evaluation.worst
     return {
-        "Objects that were missed, the largest": [
-            (_jpeg(each), f"{_name(each)}: {each.class_name} of {each.rank:.1f} px") for each in odd.missed
+        "Missed objects, the largest first": [
+            (_jpeg(each), f"{_name(each)}: {each.class_name} of {each.rank:.1f} px") for each in worst.missed
         ],
-        "What was taken for an object, the most confident": [
-            (_jpeg(each), f"{_name(each)}: {each.class_name} {each.rank:.2f}") for each in odd.false
+        "False objects, the most confident first": [
+            (_jpeg(each), f"{_name(each)}: {each.class_name} {each.rank:.2f}") for each in worst.false
         ],
     }
 
@@ -119,4 +100,4 @@ def _name(error: WorstError) -> str:
 
 
 def _jpeg(error: WorstError) -> bytes:
-    return cv2.imencode(".jpg", drawn(error), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+    return cv2.imencode(".jpg", draw_error(error), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()

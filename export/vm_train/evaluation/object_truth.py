@@ -1,4 +1,4 @@
-"""The objects that a picture truly shows: from the sceneX.json that vm-synth writes, else from the mask."""
+"""The true objects of a picture: from the sceneX.json of vm-synth, or else from the mask."""
 
 from __future__ import annotations
 
@@ -21,12 +21,15 @@ from ..data.pictures import Picture
 from ..scores.overlaps import TrueObject, coverage
 
 BALL = "ball"
-"""The class whose object a sceneX.json describes."""
+"""The class of the object in a sceneX.json."""
 
 
 @dataclass(frozen=True, eq=False)
 class SceneBall:
-    """A ball around center (3,) [m], in the frame of the picture's orientation. visible: share of its outline."""
+    """The ball of a scene.
+
+    center (3,) [m]: in the frame of the picture's orientation. radius [m]. visible: share of its outline.
+    """
 
     center: Floats
     radius: float
@@ -35,14 +38,14 @@ class SceneBall:
 
 @dataclass(frozen=True, eq=False)
 class SceneTruth:
-    """What vm-synth knows of a picture: the radius that balls have in it [m], and its ball, if there is one."""
+    """The truth of vm-synth about a picture: the radius of its balls [m], and its ball, if it has one."""
 
     ball_radius: float
     ball: SceneBall | None
 
 
 def read_scene(path: Path) -> SceneTruth | None:
-    """The truth in a sceneX.json; None if there is no such file. Raises InputError naming file and fault."""
+    """The truth in a sceneX.json; None if the file is missing. Raises InputError naming file and fault."""
     if not path.is_file():
         return None
     try:
@@ -53,13 +56,13 @@ def read_scene(path: Path) -> SceneTruth | None:
             found = SceneBall(np.array(ball["center"], dtype=np.float64), float(ball["radius"]), float(ball["visible"]))
         truth = SceneTruth(float(table["ball_radius"]), found)
     except (OSError, KeyError, TypeError, ValueError, RecursionError) as error:
-        raise InputError(f"{path.name}: is no description of a scene by vm-synth: {error!r}") from error
-    if not _makes_sense(truth):
-        raise InputError(f"{path.name}: its ball has no center, radius or visible share that a ball can have")
+        raise InputError(f"{path.name}: is not a scene file of vm-synth: {error!r}") from error
+    if not _is_valid(truth):
+        raise InputError(f"{path.name}: center, radius or visible share of its ball is out of range")
     return truth
 
 
-def _makes_sense(truth: SceneTruth) -> bool:
+def _is_valid(truth: SceneTruth) -> bool:
     ball = truth.ball
     if ball is None:
         return 0.0 < truth.ball_radius < math.inf
@@ -71,8 +74,9 @@ def _makes_sense(truth: SceneTruth) -> bool:
 def true_objects(picture: Picture, scene: SceneTruth | None, manifest: Manifest) -> dict[str, list[TrueObject]]:
     """The true objects of each class of the kind object.
 
-    Of class ball it is what the scene says, with its whole outline, if there is a scene. Of all others each connected
-    piece of the mask is an object of the manifest's size, which stands where the mean ray through it meets the plane.
+    With a scene, the class ball has the scene's ball with its whole outline, or no object. Otherwise each connected
+    piece of the mask is an object of the manifest's size; it stands where the mean ray through the piece meets the
+    plane.
     """
     shape = manifest.object_shape
     found: dict[str, list[TrueObject]] = {}
@@ -110,7 +114,7 @@ def _of_mask(picture: Picture, shown: Mask, shape: Shape) -> list[TrueObject]:
 
 
 def _place(picture: Picture, mask: Mask, shape: Shape) -> Floats:
-    """Where the object of that shape is (3,) [m] whose pixels are set in the mask (h, w); NaN above the horizon."""
+    """Position (3,) [m] of an object of that shape, from its pixels in a mask (h, w); NaN above the horizon."""
     orientation = picture.lens.orientation
     assert orientation is not None
     height, width = mask.shape

@@ -1,4 +1,4 @@
-"""An evaluation as one page of HTML that needs no other file and no network, and as lines for a terminal."""
+"""The report of an evaluation: one HTML page that needs no other file and no network."""
 
 from __future__ import annotations
 
@@ -7,24 +7,30 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
-from vm_workstation.text_tables import aligned
-
-Scores = Mapping[str, Any]
-"""What goes to scores.json: that of evaluation_tables.as_json, and about: model, data, settings and notes."""
+from .summary import (
+    Scores,
+    as_meters,
+    as_number,
+    as_percent,
+    object_table,
+    point_table,
+    subject,
+    tables_by_overlap,
+)
 
 CAPTIONS = {
-    "objects_curves": "Objects: precision, and false ones in a picture, over recall. The curves end where the "
-    "detector's settings end: what it rejects has no confidence.",
-    "objects_over_distance": "Objects by distance, at the detector's settings. Bins with fewer than 10 true objects "
-    "are left out.",
-    "distance_error": "Distance on the plane of objects that were found rightly at the lower IoU. Bins with "
-    "fewer than 10 of them are left out.",
-    "points_curves": "Points of each class against all others.",
+    "objects_curves": "Objects: precision and false objects per picture, over recall. The curves end at the detector's "
+    "settings, because the objects that it rejects have no confidence.",
+    "objects_over_distance": "Objects by distance, at the detector's settings. The plots leave out bins with fewer "
+    "than 10 true objects.",
+    "distance_error": "Distance errors on the plane, of the objects found at the lower IoU. The plots leave out bins "
+    "with fewer than 10 of them.",
+    "points_curves": "Points of each class against all other points.",
     "points_over_distance": "Points by distance, at the threshold.",
-    "confusion": "Which class the points of a class were taken for, by the highest probability.",
+    "confusion": "The most probable class of the points of each true class.",
     "points_on_object": "Points on an object over its distance, as in the paper's figure ball_distance_graph. ",
 }
-"""Plots in the order of the page, and what stands under them."""
+"""Captions of the plots, in the order of the page."""
 
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #222; max-width: 1120px; margin: 2em auto; padding: 0 1em }
@@ -42,107 +48,61 @@ figure { margin: 1.2em 0 } figure img { max-width: 100% } figcaption { color: #5
 .true { color: #1f9a33 } .found { color: #c22bc2 }
 """
 
+_KEY = '<p>Outlines: <b class="true">true</b>, <b class="found">found</b>.</p>'
+
 
 def page(scores: Scores, plots: Mapping[str, bytes], strips: Mapping[str, Sequence[tuple[bytes, str]]]) -> str:
-    """The page. plots: SVG by name, as in CAPTIONS. strips: for a heading JPEG pictures with what stands under each."""
+    """The HTML text. plots: SVG by name, as in CAPTIONS. strips: by heading, JPEG pictures with their captions."""
     about = scores["about"]
     parts = [
         f"<h1>{escape(about['model']['file'])}</h1>",
-        f"<p>{escape(_subject(scores))}</p>",
+        f"<p>{escape(subject(scores))}</p>",
         *(f'<p class="note">{escape(each)}</p>' for each in about["notes"]),
         _cards(scores),
     ]
     for name, by_overlap in scores["objects"].items():
-        parts.append(f"<h2>Objects of class {escape(name)}</h2>{_table(*_object_table(by_overlap))}")
+        parts.append(f"<h2>Objects of class {escape(name)}</h2>{_table(*object_table(by_overlap))}")
         parts.append(f"<p>{escape(_ignored(by_overlap))}</p>")
     parts += [_plot(name, plots, about) for name in ("objects_curves", "objects_over_distance", "distance_error")]
     for heading, pictures in strips.items():
         if pictures:
             parts.append(f"<h2>{escape(heading)}</h2>{_KEY}{_strip(pictures)}")
-    parts.append(f"<h2>Points</h2>{_table(*_point_table(scores['points']))}")
+    parts.append(f"<h2>Points</h2>{_table(*point_table(scores['points']))}")
     parts += [_plot(name, plots, about) for name in ("points_curves", "points_over_distance", "confusion")]
     if "points_on_object" in plots:
-        parts.append("<h2>What the meshes see of an object</h2>" + _plot("points_on_object", plots, about))
-    parts.append("<h2>How this was made</h2>" + _facts(scores))
+        parts.append("<h2>Mesh points on an object</h2>" + _plot("points_on_object", plots, about))
+    parts.append("<h2>Model, data and settings</h2>" + _facts(scores))
     title = escape(f"vm-evaluate: {about['model']['file']}")
     head = f'<meta charset="utf-8"><title>{title}</title><style>{_STYLE}</style>'
     return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(parts) + "\n</body></html>\n"
 
 
-def lines(scores: Scores) -> str:
-    """The summary for a terminal."""
-    rows = [_subject(scores)]
-    for name, by_overlap in scores["objects"].items():
-        heading, body = _object_table(by_overlap)
-        rows += ["", f"objects of class {name}", *aligned([heading, *body])]
-    heading, body = _point_table(scores["points"])
-    return "\n".join([*rows, "", "points", *aligned([heading, *body])])
-
-
-_KEY = '<p>Outlines: <b class="true">true</b>, <b class="found">found</b>.</p>'
-
-
-def _subject(scores: Scores) -> str:
-    count, skipped = scores["pictures"], len(scores["skipped"])
-    folders = ", ".join(scores["about"]["data"]["folders"])
-    return f"{count} picture{'s' * (count != 1)} of {folders}" + (f", {skipped} skipped" if skipped else "")
-
-
 def _ignored(by_overlap: Scores) -> str:
     return (
-        f"{by_overlap['ignored']} objects are ignored, neither missed nor false if found: those that show less than "
-        f"{100.0 * by_overlap['min_visible']:g} % of themselves or are smaller than {by_overlap['min_radius']:g} px "
-        "in radius."
+        f"{by_overlap['ignored']} objects are ignored: less than {100.0 * by_overlap['min_visible']:g} % of them is "
+        f"visible, or their radius is below {by_overlap['min_radius']:g} px. An ignored object counts neither as "
+        "missed nor, if it is found, as false."
     )
 
 
 def _cards(scores: Scores) -> str:
     cards = []
     for name, by_overlap in scores["objects"].items():
-        overlaps = {key: table["all"] for key, table in by_overlap.items() if key.startswith("iou_")}
-        for key, each in overlaps.items():
-            cards.append((_number(each["average_precision"]), f"{name}: AP at IoU {key.removeprefix('iou_')}"))
+        overlaps = {overlap: table["all"] for overlap, table in tables_by_overlap(by_overlap).items()}
+        for overlap, each in overlaps.items():
+            cards.append((as_number(each["average_precision"]), f"{name}: AP at IoU {overlap}"))
         first = next(iter(overlaps.values()))
         errors = first["errors"]
         cards += [
-            (_percent(first["recall"]), f"{name}: recall"),
-            (_number(first["false_per_picture"], 2), f"{name}: false in a picture"),
-            (_meters(errors["distance_median"]), f"{name}: distance error, median"),
-            (_meters(errors["distance_p90"]), f"{name}: distance error, 90 %"),
+            (as_percent(first["recall"]), f"{name}: recall"),
+            (as_number(first["false_per_picture"], 2), f"{name}: false per picture"),
+            (as_meters(errors["distance_median"]), f"{name}: distance error, median"),
+            (as_meters(errors["distance_p90"]), f"{name}: distance error, 90 %"),
         ]
     for name, bins in scores["points"].items():
-        cards.append((_number(bins["all"]["average_precision"]), f"points of {name}: AP"))
-    shown = (f'<div class="card"><b>{value}</b><span>{escape(what)}</span></div>' for value, what in cards)
+        cards.append((as_number(bins["all"]["average_precision"]), f"points of {name}: AP"))
+    shown = (f'<div class="card"><b>{value}</b><span>{escape(label)}</span></div>' for value, label in cards)
     return f'<div class="cards">{"".join(shown)}</div>'
-
-
-def _object_table(by_overlap: Scores) -> tuple[Sequence[str], list[Sequence[str]]]:
-    """A row for each distance at which there is something, with recall and AP at every overlap."""
-    overlaps = {key.removeprefix("iou_"): table for key, table in by_overlap.items() if key.startswith("iou_")}
-    first = next(iter(overlaps.values()))
-    heading = ["distance [m]", "true"]
-    heading += [f"{what}@{overlap}" for what in ("recall", "precision", "AP") for overlap in overlaps]
-    heading += ["false/picture", "error median", "error 90 %"]
-    rows: list[Sequence[str]] = []
-    for where, each in first.items():
-        if not each["truths"] and not each["false"]:
-            continue
-        at = [table[where] for table in overlaps.values()]
-        row = [where, str(each["truths"])]
-        row += [_percent(table[what]) for what in ("recall", "precision") for table in at]
-        row += [_number(table["average_precision"]) for table in at]
-        errors = each["errors"]
-        row += [_number(each["false_per_picture"]), _meters(errors["distance_median"]), _meters(errors["distance_p90"])]
-        rows.append(row)
-    return heading, rows
-
-
-def _point_table(points: Scores) -> tuple[Sequence[str], list[Sequence[str]]]:
-    names = ("precision", "recall", "f1", "mcc", "informedness", "markedness", "average_precision", "roc_auc")
-    rows: list[Sequence[str]] = []
-    for name, bins in points.items():
-        rows.append([name, str(bins["all"]["points"]), *(_number(bins["all"][each]) for each in names)])
-    return ["class", "points", "precision", "recall", "F1", "MCC", "informed.", "marked.", "AP", "ROC area"], rows
 
 
 def _facts(scores: Scores) -> str:
@@ -152,11 +112,11 @@ def _facts(scores: Scores) -> str:
         facts |= {f"{section}: {key.replace('_', ' ')}": value for key, value in about[section].items()}
     facts["pictures with sceneX.json"] = scores["pictures_with_scenes"]
     facts |= {f"skipped {path}": fault for path, fault in scores["skipped"].items()}
-    rows = (f"<tr><td>{escape(key)}</td><td>{escape(_said(value))}</td></tr>" for key, value in facts.items())
+    rows = (f"<tr><td>{escape(key)}</td><td>{escape(_as_text(value))}</td></tr>" for key, value in facts.items())
     return f'<table class="facts">{"".join(rows)}</table>'
 
 
-def _said(value: object) -> str:
+def _as_text(value: object) -> str:
     if isinstance(value, list):
         return ", ".join(map(str, value))
     if isinstance(value, bool):
@@ -185,15 +145,3 @@ def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     head = "".join(f"<th>{escape(each)}</th>" for each in heading)
     body = "".join("<tr>" + "".join(f"<td>{escape(each)}</td>" for each in row) + "</tr>" for row in rows)
     return f"<table><tr>{head}</tr>{body}</table>"
-
-
-def _number(value: float | None, digits: int = 3) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
-
-
-def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{100.0 * value:.1f} %"
-
-
-def _meters(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f} m"

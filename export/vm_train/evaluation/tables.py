@@ -1,4 +1,4 @@
-"""An evaluation as numbers: one table for JSON, and rows for CSV."""
+"""The scores of an evaluation for other programs: as JSON and as CSV."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from .evaluation import Evaluation
 
 
 def as_json(evaluation: Evaluation, threshold: float) -> dict[str, Any]:
-    """All scores, over all distances and in each bin, None where there is none. threshold: probability from which a
-    point counts."""
+    """All scores, over all distances and in each bin; None for a score without a value.
+
+    threshold: probability from which a point counts.
+    """
     points = evaluation.points
     bins = named_bins(points.distance_edges)
     return {
@@ -39,7 +41,7 @@ def as_json(evaluation: Evaluation, threshold: float) -> dict[str, Any]:
 
 
 def as_csv(evaluation: Evaluation, threshold: float) -> dict[str, str]:
-    """The same as the text of CSV files by name, and the curves; empty where there is no value."""
+    """The same scores and the curves as CSV texts, by file name. A score without a value is empty."""
     found = {
         "points": _text(_point_rows(evaluation, threshold)),
         "point_curves": _text(_point_curves(evaluation)),
@@ -96,7 +98,7 @@ def _short(value: float) -> str:
 
 
 def _text(rows: Iterable[dict[str, object]]) -> str:
-    """Rows as CSV, with a heading."""
+    """Rows as CSV text, with a heading."""
     every = list(rows)
     text = io.StringIO()
     writer = csv.DictWriter(text, list(every[0]) if every else [], lineterminator="\n")

@@ -1,4 +1,4 @@
-"""Evaluation with several processes, each on one core; how many there are does not change what comes of it."""
+"""Evaluation in several processes, one core each. Their number does not change the result."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from vm_workstation.worker_process import begin, shielded
 from ..data.classes import Classes
 from ..data.picture_files import PictureFiles
 from .answers import Subject, load_subject
-from .evaluation import Evaluation, Rules, evaluated
+from .evaluation import Evaluation, Rules, evaluate_pictures
 
 _CHUNK = 32
-"""Pictures that a worker evaluates at once: adding up costs about as much as one of them."""
+"""Pictures that a worker evaluates at a time. Adding up two results costs about as much as one picture."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What every worker knows. model: a .pt or .onnx file."""
+    """What each worker process needs. model: a .pt or .onnx file."""
 
     model: Path
     settings: Settings
@@ -34,20 +34,21 @@ class Job:
     rules: Rules
 
     def subject(self) -> Subject:
-        """What is evaluated. Raises InputError or ModelError."""
+        """The network to evaluate. Raises InputError or ModelError."""
         return load_subject(self.model, self.settings, self.as_robot)
 
 
 def evaluate(
     job: Job, subject: Subject, pictures: Sequence[PictureFiles], workers: int, report: Callable[[], None]
 ) -> Evaluation:
-    """What comes of all pictures, with so many processes, 1 for none but this one; report each that is done.
+    """The result for all pictures, from so many processes; 1 uses only this process.
 
-    Raises what `evaluated` does, and VisualMeshError if a worker was killed.
+    report: is called after each picture. Raises the errors of `evaluate_pictures`, and VisualMeshError if a worker was
+    killed.
     """
     size = min(_CHUNK, max(-(-len(pictures) // workers), 1))
     chunks = [pictures[start : start + size] for start in range(0, len(pictures), size)]
-    result = Evaluation.of_nothing(subject, job.rules)
+    result = Evaluation.empty(subject, job.rules)
     for part, chunk in zip(_parts(job, subject, chunks, workers), chunks, strict=True):
         result += part
         for _ in chunk:
@@ -58,7 +59,7 @@ def evaluate(
 def _parts(job: Job, subject: Subject, chunks: Sequence[Sequence[PictureFiles]], workers: int) -> Iterator[Evaluation]:
     if workers == 1 or len(chunks) < 2:
         for chunk in chunks:
-            yield evaluated(subject, chunk, job.classes, job.rules)
+            yield evaluate_pictures(subject, chunk, job.classes, job.rules)
         return
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
@@ -74,7 +75,7 @@ def _parts(job: Job, subject: Subject, chunks: Sequence[Sequence[PictureFiles]],
 
 
 _worker: tuple[Job, Subject] | None = None
-"""What a worker process keeps between pictures."""
+"""The state of a worker process."""
 
 
 def _start(job: Job) -> None:
@@ -86,4 +87,4 @@ def _start(job: Job) -> None:
 def _evaluate_chunk(pictures: Sequence[PictureFiles]) -> Evaluation:
     assert _worker is not None
     job, subject = _worker
-    return evaluated(subject, pictures, job.classes, job.rules)
+    return evaluate_pictures(subject, pictures, job.classes, job.rules)

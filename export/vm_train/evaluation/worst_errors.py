@@ -1,4 +1,4 @@
-"""The worst of what a network does: pictures with missed objects, and with false ones."""
+"""The worst errors of a network: the largest missed objects, and the most confident false ones."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from ..scores.object_scores import Mistakes
 from ..scores.overlaps import TrueObject
 
 MOST = 12
-"""How many pictures of each kind are kept."""
+"""Errors of each kind to keep."""
 
 
 @dataclass(frozen=True, eq=False)
 class WorstError:
-    """A picture with an object that was missed, or with one that is none.
+    """A picture with a missed or a false object.
 
-    rank: radius [px] of the largest that was missed, or confidence of the most confident that is false. center (2,),
-    radius [px]: of that one. true, found: outlines (m, 2) [px] of all objects of the class.
+    rank: radius of the largest missed object [px], or confidence of the most confident false one. center (2,) and
+    radius [px]: of this object. true, found: outlines (m, 2) [px] of all objects of the class.
     """
 
     files: PictureFiles
@@ -38,13 +38,13 @@ class WorstError:
 
 @dataclass(frozen=True)
 class WorstErrors:
-    """Pictures with missed and with false objects, worst first."""
+    """Pictures with missed objects and pictures with false objects, the worst first."""
 
     missed: tuple[WorstError, ...] = ()
     false: tuple[WorstError, ...] = ()
 
     def __add__(self, other: WorstErrors) -> WorstErrors:
-        """The worst of both."""
+        """The worst errors of both."""
         return WorstErrors(_worst(self.missed + other.missed), _worst(self.false + other.false))
 
 
@@ -55,7 +55,7 @@ def worst_errors_of(
     found: Sequence[Detection],
     mistakes: Mistakes[Detection],
 ) -> WorstErrors:
-    """What is odd in a picture, from its true and found objects of a class."""
+    """The largest missed and the most confident false object of a picture. truths, found: all objects of the class."""
     if not mistakes.missed and not mistakes.false:
         return WorstErrors()
     true_outlines = tuple(outline for each in truths for outline in _outlines(each.mask))
@@ -65,8 +65,9 @@ def worst_errors_of(
         largest = max(mistakes.missed, key=lambda each: each.radius)
         rows, columns = np.nonzero(largest.mask)
         center = np.array([columns.mean(), rows.mean()]) if len(rows) else np.zeros(2)
-        shown = float(np.sqrt(largest.mask.sum(dtype=np.float64) / np.pi))  # of an endless outline little may show
-        missed.append(WorstError(files, class_name, shown, center, shown, true_outlines, found_outlines))
+        # Of the part inside the picture: the whole outline may be endless.
+        radius = float(np.sqrt(largest.mask.sum(dtype=np.float64) / np.pi))
+        missed.append(WorstError(files, class_name, radius, center, radius, true_outlines, found_outlines))
     if mistakes.false:
         worst = mistakes.false[0]
         rank, center = worst.confidence, worst.center
@@ -74,11 +75,11 @@ def worst_errors_of(
     return WorstErrors(tuple(missed), tuple(false))
 
 
-def _worst(all_of_them: Sequence[WorstError]) -> tuple[WorstError, ...]:
-    return tuple(sorted(all_of_them, key=lambda each: (-each.rank, str(each.files.image)))[:MOST])
+def _worst(errors: Sequence[WorstError]) -> tuple[WorstError, ...]:
+    return tuple(sorted(errors, key=lambda each: (-each.rank, str(each.files.image)))[:MOST])
 
 
 def _outlines(mask: Mask | Singles) -> list[Floats]:
-    """Outlines (m, 2) [px] of what is set in a mask (h, w)."""
+    """Outlines (m, 2) [px] of the set pixels of a mask (h, w)."""
     found, _ = cv2.findContours((mask >= 0.5).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return [each.reshape(-1, 2).astype(np.float64) for each in found]

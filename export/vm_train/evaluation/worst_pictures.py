@@ -1,4 +1,4 @@
-"""Small pictures of oddities: the whole picture, and beside it the place that it is about, enlarged."""
+"""Small pictures of the worst errors: the whole picture, and beside it the missed or false object, enlarged."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ TRUE, FOUND = (120, 255, 60), (255, 60, 255)
 """BGR colors of true and found outlines."""
 
 _HEIGHT = 200  # of the small picture [px]
-_AROUND = 4.0  # radii that are shown around the place
-_LEAST = 24.0  # px around the place, so that it stays to be recognized
-_ROUND = 4  # bits behind the point, as OpenCV takes corners
+_AROUND = 4.0  # radii to show around the object
+_LEAST = 24.0  # px to show around the object at least, so that people recognize it
+_ROUND = 4  # fractional bits of corners in OpenCV
 
 
-def drawn(error: WorstError) -> Image:
-    """The picture (200, w, 3) with all outlines. Raises PictureFault if it can't be read any more."""
+def draw_error(error: WorstError) -> Image:
+    """The picture (200, w, 3) with all outlines. Raises PictureFault if the image can no longer be read."""
     data = np.frombuffer(error.files.read("image"), dtype=np.uint8)
     image = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION))
     height, width = image.shape[:2]
@@ -31,7 +31,7 @@ def drawn(error: WorstError) -> Image:
     whole = np.array([[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5]])
     reach = min(max(_AROUND * error.radius, _LEAST), min(height, width) / 2.0)
     zoom = _HEIGHT / (2.0 * reach)
-    # What is shown enlarged is part of the picture, also where the place is at its border or beyond.
+    # The enlarged part stays inside the picture, even if the object is at the border or beyond.
     x, y = np.clip(error.center, reach - 0.5, (width - reach - 0.5, height - reach - 0.5)).tolist()
     near = np.array([[zoom, 0.0, _HEIGHT / 2.0 - 0.5 - zoom * x], [0.0, zoom, _HEIGHT / 2.0 - 0.5 - zoom * y]])
     small = cv2.resize(image, (round(width * scale), _HEIGHT), interpolation=cv2.INTER_AREA)
@@ -48,6 +48,6 @@ def _with_outlines(picture: npt.NDArray[Any], view: Floats, error: WorstError) -
 
 
 def _corners(outlines: Sequence[Floats], view: Floats) -> list[npt.NDArray[np.int32]]:
-    """Outlines as OpenCV takes them, without those that go beyond what it can draw."""
+    """Outlines in the form that OpenCV draws, without those that are too large for it."""
     placed = [each @ view[:, :2].T + view[:, 2] for each in outlines if len(each)]
     return [np.rint(each * 2**_ROUND).astype(np.int32) for each in placed if np.abs(each).max(initial=0.0) < 1e5]

@@ -10,19 +10,14 @@ import time
 from pathlib import Path
 
 import cv2
-import numpy as np
 import pytest
 
 from vm_export.checkpoint import Checkpoint
 from vm_export.grid import Grid
 from vm_train.cli.evaluate import main
-from vm_train.data.pictures import find_pictures
-from vm_train.evaluation.worst_errors import WorstError
-from vm_train.evaluation.worst_pictures import FOUND, TRUE, drawn
 
 from ...drawn_scenes import CHECKPOINT, IMAGES, MODEL
 from ..drawn import draw_set
-from ..scores.test_overlaps import circle
 
 COMMAND = Path(sys.executable).parent / "vm-evaluate"
 
@@ -224,13 +219,3 @@ def test_an_interrupt_ends_it_with_130_and_writes_nothing(data, tmp_path):
     assert "stopped" in said
     assert "Traceback" not in said
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("center", [(80.0, 64.0), (2.0, 125.0), (-30.0, 900.0)])
-def test_small_pictures_show_outlines_and_the_place(data, center):
-    files = find_pictures(data)[0]
-    at = circle(*center, 9.0)
-    made = drawn(WorstError(files, "ball", 1.0, at.mean(axis=0), 9.0, (at,), (at + 3.0, at * 1e30)))
-    assert made.shape == (200, 250 + 3 + 200, 3)
-    nearest = min(np.abs(made.astype(int) - color).sum(axis=2).min() for color in (FOUND, TRUE))
-    assert bool(nearest < 60) == (0.0 < center[0] < 160.0)

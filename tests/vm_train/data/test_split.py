@@ -49,16 +49,16 @@ def test_another_seed_gives_another_split():
 
 @pytest.mark.parametrize(("validation", "test"), [(-0.1, 0.0), (0.5, 0.5), (1.0, 0.0), (float("nan"), 0.0)])
 def test_shares_that_leave_nothing_are_refused(validation, test):
-    with pytest.raises(InputError, match="below 1 in all"):
+    with pytest.raises(InputError, match="add up to less than 1"):
         split_by_seed(NUMBERS, validation, test, 0)
 
 
 def test_empty_parts_are_named():
-    with pytest.raises(InputError, match="validation gets none of 1000 pictures: change its share"):
+    with pytest.raises(InputError, match="validation gets none of the 1000 pictures: change its share"):
         split_by_seed(NUMBERS, 0.0, 0.1, 0)
-    with pytest.raises(InputError, match="training gets none of 0 pictures"):
+    with pytest.raises(InputError, match="training gets none of the 0 pictures"):
         split_by_seed((), 0.1, 0.1, 0)
-    with pytest.raises(InputError, match="validation gets none of 1000 pictures: name its pictures in a list"):
+    with pytest.raises(InputError, match="validation gets none of the 1000 pictures: list its pictures in a file"):
         split_by_lists(NUMBERS, None, None, None)
 
 

@@ -17,9 +17,9 @@ from vm_export.grid import Grid
 from vm_export.onnx_graph import export
 from vm_train.data.pictures import Picture, find_pictures, read_picture
 from vm_train.evaluation.answers import Exact, load_subject
-from vm_train.evaluation.evaluation import Evaluation, Rules, evaluated
+from vm_train.evaluation.evaluation import Evaluation, Rules, evaluate_pictures
+from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
 from vm_train.evaluation.object_truth import SceneBall, SceneTruth
-from vm_train.evaluation.picture_selection import classes_of, pictures_of, usual_colors
 from vm_train.evaluation.tables import as_csv, as_json
 from vm_train.evaluation.workers import Job, evaluate
 
@@ -27,14 +27,15 @@ from ...drawn_scenes import CHECKPOINT, FOLDER, IMAGES, MODEL, TRUTH
 from ..drawn import RADIUS, draw_set
 
 MANIFEST = read_model(MODEL).manifest
-USUAL = usual_colors(Path("model.onnx"), None)
-CLASSES = classes_of(MANIFEST, USUAL, [])
+
+
+USUAL = default_colors(Path("model.onnx"), None)
+
+
+CLASSES = classes_with_colors(MANIFEST, USUAL, [])
+
+
 SETTINGS = Settings()
-
-
-@pytest.fixture(scope="module")
-def drawn(tmp_path_factory):
-    return draw_set(tmp_path_factory.mktemp("drawn"), 10, seed=1)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +80,7 @@ def test_checkpoints_and_model_files_answer_alike_in_every_layout(models, files)
 
 def test_scores_of_checkpoints_and_model_files_agree(models, files):
     rules = Rules(radius_of="scene")
-    scores = [as_json(evaluated(subject, files, CLASSES, rules), 0.5) for subject in models.values()]
+    scores = [as_json(evaluate_pictures(subject, files, CLASSES, rules), 0.5) for subject in models.values()]
     for each in scores[1:]:
         assert each["pictures"] == 10
         assert each["objects"] == scores[0]["objects"]
@@ -89,7 +90,7 @@ def test_scores_of_checkpoints_and_model_files_agree(models, files):
 
 
 def test_the_drawn_balls_are_found_where_they_are(models):
-    result = Evaluation.of_nothing(models["runs"], Rules())
+    result = Evaluation.empty(models["runs"], Rules())
     files = find_pictures(FOLDER)
     for each, (picture, scene) in zip(files, drawn_pictures(), strict=True):
         result.count(each, picture, scene, models["runs"].answer(picture), MANIFEST)
@@ -121,7 +122,7 @@ KNOWING = Exact(MANIFEST, Grid(), "", SETTINGS, by_color)
 
 
 def test_a_network_that_sees_colors_is_nearly_perfect_on_drawn_balls(files):
-    result = evaluated(KNOWING, files, CLASSES, Rules(radius_of="scene"))
+    result = evaluate_pictures(KNOWING, files, CLASSES, Rules(radius_of="scene"))
     assert result.points.ranking("ball").at(0.5).recall > 0.8
     ranking = result.objects["ball"].ranking(0.5)
     assert ranking.truths >= 6
@@ -133,7 +134,7 @@ def test_a_hexagonal_network_has_scores_of_points_only(files):
     checkpoint = Checkpoint.load(CHECKPOINT)
     network = load_subject(CHECKPOINT, SETTINGS).network
     subject = Exact(checkpoint.manifest, Grid("hexagonal"), "", SETTINGS, network)
-    result = evaluated(subject, files[:2], CLASSES, Rules())
+    result = evaluate_pictures(subject, files[:2], CLASSES, Rules())
     assert result.objects == {}
     assert result.points.confusion().sum() > 100
     assert "objects" not in as_csv(result, 0.5)
@@ -154,7 +155,7 @@ def test_parts_add_up_in_any_number_of_processes(files):
 
 def test_the_largest_missed_and_the_most_confident_false_come_first(files):
     blind = replace(KNOWING, network=lambda mesh, colors: np.tile(np.float32([0, 0, 1, 0]), (len(mesh), 1)))
-    result = evaluated(blind, files, CLASSES, Rules())
+    result = evaluate_pictures(blind, files, CLASSES, Rules())
     ranks = [each.rank for each in result.worst.missed]
     assert len(ranks) == result.objects["ball"].ranking(0.5).truths
     assert ranks == sorted(ranks, reverse=True)
@@ -168,11 +169,11 @@ def test_pictures_that_can_t_be_used_are_named(tmp_path):
     (folder / "image0002.jpg").write_bytes((folder / "image0002.jpg").read_bytes()[:500])
     (folder / "lens0003.yaml").write_text("projection: RECTILINEAR\n")
     (folder / "scene0004.json").write_text("{}")
-    result = evaluated(KNOWING, find_pictures(folder), CLASSES, Rules())
+    result = evaluate_pictures(KNOWING, find_pictures(folder), CLASSES, Rules())
     assert [path[-8:-4] for path in result.faults] == ["0001", "0002", "0003", "0004"]
     assert len(result.poses) == 2
     with pytest.raises(InputError, match="mask0001"):
-        evaluated(KNOWING, find_pictures(folder), CLASSES, Rules(strict=True))
+        evaluate_pictures(KNOWING, find_pictures(folder), CLASSES, Rules(strict=True))
 
 
 def test_a_camera_below_the_ball_is_named(tmp_path):
@@ -180,7 +181,7 @@ def test_a_camera_below_the_ball_is_named(tmp_path):
     lens = (folder / "lens0000.yaml").read_text().splitlines()
     row = lens[-2].rsplit(",", 1)[0] + ", 0.05]"
     (folder / "lens0000.yaml").write_text("\n".join([*lens[:-2], row, lens[-1]]) + "\n")
-    result = evaluated(KNOWING, find_pictures(folder), CLASSES, Rules())
+    result = evaluate_pictures(KNOWING, find_pictures(folder), CLASSES, Rules())
     assert "diameter" in next(iter(result.faults.values()))
 
 
@@ -190,15 +191,15 @@ def test_colors_of_no_class_end_it(tmp_path):
     mask[:5, :5] = (255, 0, 0, 255)
     cv2.imwrite(str(folder / "mask0001.png"), mask)
     with pytest.raises(InputError, match=r"mask0001.*\[0, 0, 255\]"):
-        evaluated(KNOWING, find_pictures(folder), CLASSES, Rules())
-    known = classes_of(MANIFEST, USUAL, [("environment", (0, 0, 255))])
-    assert len(evaluated(KNOWING, find_pictures(folder), known, Rules()).poses) == 2
+        evaluate_pictures(KNOWING, find_pictures(folder), CLASSES, Rules())
+    known = classes_with_colors(MANIFEST, USUAL, [("environment", (0, 0, 255))])
+    assert len(evaluate_pictures(KNOWING, find_pictures(folder), known, Rules()).poses) == 2
 
 
 def test_answers_that_are_no_probabilities_end_it(files):
     broken = replace(KNOWING, network=lambda mesh, colors: np.full((len(mesh), 4), np.nan, dtype=np.float32))
     with pytest.raises(ModelError, match="0 to 1"):
-        evaluated(broken, files, CLASSES, Rules())
+        evaluate_pictures(broken, files, CLASSES, Rules())
 
 
 def test_the_radius_of_a_scene_makes_mesh_and_fit(files, tmp_path):
@@ -208,41 +209,6 @@ def test_the_radius_of_a_scene_makes_mesh_and_fit(files, tmp_path):
     assert many > 1.4 * few  # a smaller ball needs a finer mesh: (0.095 / 0.07)^2
     folder = draw_set(tmp_path / "set", 2)
     (folder / "scene0000.json").unlink()
-    result = evaluated(subject, find_pictures(folder), CLASSES, Rules(radius_of="scene"))
+    result = evaluate_pictures(subject, find_pictures(folder), CLASSES, Rules(radius_of="scene"))
     assert "scene0000.json" in next(iter(result.faults.values()))
     assert result.radii == [RADIUS]
-
-
-def test_lists_choose_pictures(drawn, tmp_path):
-    chosen = tmp_path / "list.txt"
-    chosen.write_text("# some\n0003\nimage0001.jpg  # by its name\n\n")
-    assert [each.number for each in pictures_of([drawn], chosen, None)] == ["0001", "0003"]
-    run = tmp_path / "pictures.json"
-    run.write_text(json.dumps({"training": ["0000"], "validation": ["0002"], "test": ["0005", "0006"]}))
-    assert [each.number for each in pictures_of([drawn], run, None)] == ["0005", "0006"]
-    assert [each.number for each in pictures_of([drawn], run, "validation")] == ["0002"]
-    assert len(pictures_of([drawn, drawn], None, None)) == 20
-    for without in (chosen, None):
-        with pytest.raises(InputError, match="give it with --list"):
-            pictures_of([drawn], without, "test")
-
-
-@pytest.mark.parametrize(("text", "part"), [("0099\n", "did you mean '0009'"), ("# none\n", "names no picture")])
-def test_lists_of_what_is_not_there_are_refused(drawn, tmp_path, text, part):
-    chosen = tmp_path / "list.txt"
-    chosen.write_text(text)
-    with pytest.raises(InputError, match=part):
-        pictures_of([drawn], chosen, None)
-    with pytest.raises(InputError, match=r"missing\.txt"):
-        pictures_of([drawn], tmp_path / "missing.txt", None)
-
-
-def test_classes_without_colors_are_asked_for():
-    manifest = replace(MANIFEST, classes=(*MANIFEST.classes[:3], replace(MANIFEST.classes[3], name="grass")))
-    with pytest.raises(InputError, match=r"--color grass=R,G,B"):
-        classes_of(manifest, USUAL, [])
-    assert classes_of(manifest, USUAL, [("grass", (1, 2, 3))]).colors["grass"] == ((1, 2, 3),)
-    with pytest.raises(InputError, match="did you mean 'ball'"):
-        classes_of(MANIFEST, USUAL, [("bal", (1, 2, 3))])
-    with pytest.raises(InputError, match="share the color"):
-        classes_of(MANIFEST, USUAL, [("environment", (255, 0, 0))])

@@ -12,15 +12,15 @@ import pytest
 from vm_embedded.errors import InputError
 from vm_embedded.network.model_file import read_model
 from vm_train.data.pictures import find_pictures, read_picture
+from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
 from vm_train.evaluation.object_truth import SceneBall, SceneTruth, read_scene, true_objects
-from vm_train.evaluation.picture_selection import classes_of, usual_colors
 
 from ...drawn_scenes import MODEL
 from ..drawn import RADIUS, draw_set
 
 MANIFEST = read_model(MODEL).manifest
-USUAL = usual_colors(Path("model.onnx"), None)
-CLASSES = classes_of(MANIFEST, USUAL, [])
+USUAL = default_colors(Path("model.onnx"), None)
+CLASSES = classes_with_colors(MANIFEST, USUAL, [])
 
 
 @pytest.fixture(scope="module")

@@ -14,14 +14,14 @@ from vm_train.evaluation.points_on_ball import (
     BEARINGS,
     PAPER_BALL,
     PAPER_CAMERA,
-    Camera,
     EarlySphere,
+    PosedCamera,
     centers,
     points_on_ball,
-    points_over_distance,
     rings_across,
 )
 from vm_train.evaluation.points_on_ball_plot import points_figure
+from vm_train.evaluation.points_over_distance import points_over_distance
 from vm_workstation.plots import new_figure, save_figure
 
 from ...vm_embedded.strategies import reals
@@ -30,7 +30,7 @@ heights, radii, intersections = reals(0.4, 1.8), reals(0.05, 0.15), st.integers(
 FULL = math.pi / 4.0
 """Of k x k points, the part that a round object covers."""
 
-SMALL = Camera(
+SMALL = PosedCamera(
     Orientation.from_roll_pitch(0.9, pitch=math.radians(45.0)),
     Equisolid(focal_length=105.0, fov=2.6, size=(320, 256)),
     (320, 256),
@@ -108,21 +108,21 @@ def test_the_two_meshes_have_equally_many_points_on_a_ball_where_they_are_made_t
 
 
 def test_a_ball_that_the_picture_cuts_or_lacks_is_not_counted():
-    ahead = Camera(Orientation.from_roll_pitch(0.9), Equisolid(focal_length=200.0, fov=1.2), (320, 256))
+    ahead = PosedCamera(Orientation.from_roll_pitch(0.9), Equisolid(focal_length=200.0, fov=1.2), (320, 256))
     ours, _ = points_over_distance(ahead, PAPER_BALL, (3,), np.array([0.0, 0.3, 4.0]))
     assert np.isnan(ours.mean[:2]).all()
     assert np.isnan(ours.rings[:2]).all()
     assert ours.mean[2] > 5.0
-    with pytest.raises(InputError, match="no ball at"):
+    with pytest.raises(InputError, match="no complete ball at"):
         points_over_distance(ahead, PAPER_BALL, (3,), np.array([4.0]), equal_at=0.3)
 
 
 def test_a_camera_that_is_too_low_or_shows_no_mesh_is_refused():
-    low = Camera(Orientation.from_roll_pitch(0.1, pitch=0.5), SMALL.lens, SMALL.size)
+    low = PosedCamera(Orientation.from_roll_pitch(0.1, pitch=0.5), SMALL.lens, SMALL.size)
     with pytest.raises(GeometryError, match="diameter"):
         points_over_distance(low, PAPER_BALL, (3,), np.array([1.0]))
-    up = Camera(Orientation.from_roll_pitch(0.9, pitch=-1.5), Equisolid(focal_length=200.0, fov=1.2), SMALL.size)
-    with pytest.raises(InputError, match="shows nothing"):
+    up = PosedCamera(Orientation.from_roll_pitch(0.9, pitch=-1.5), Equisolid(focal_length=200.0, fov=1.2), SMALL.size)
+    with pytest.raises(InputError, match="sees no point"):
         points_over_distance(up, PAPER_BALL, (3,), np.array([1.0]))
 
 

@@ -1,0 +1,45 @@
+"""The colors of each class in the masks of an evaluation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from vm_embedded.config.sections import read_sections
+from vm_embedded.errors import InputError, unknown
+from vm_embedded.network.manifest import Manifest
+from vm_synth.dataset.files import COLORS
+
+from ..data.classes import Classes, Color
+from ..learning.configuration import TrainConfiguration
+
+
+def default_colors(model: Path, chosen: Path | None) -> Mapping[str, tuple[Color, ...]]:
+    """Colors of classes from the train.toml beside a checkpoint or its pictures.json, or else those of vm-synth.
+
+    chosen: the list of pictures, if any. Raises InputError if train.toml can't be read.
+    """
+    for folder in (each.parent for each in (chosen, model) if each is not None and each.suffix in (".json", ".pt")):
+        if (folder / "train.toml").exists():
+            return read_sections(TrainConfiguration, folder / "train.toml").classes.colors
+    return {name: (color,) for name, color in COLORS.items()}
+
+
+def classes_with_colors(
+    manifest: Manifest, defaults: Mapping[str, tuple[Color, ...]], more: Sequence[tuple[str, Color]]
+) -> Classes:
+    """The network's classes with their default colors in masks, and with more colors for some of them.
+
+    Raises InputError for a color of a class that the network does not have, and for a class without any color.
+    """
+    names = [each.name for each in manifest.classes]
+    found: dict[str, tuple[Color, ...]] = {name: defaults.get(name, ()) for name in names}
+    for name, color in more:
+        if name not in found:
+            raise InputError(unknown("class of --color", name, names))
+        if color not in found[name]:
+            found[name] += (color,)
+    for name, each in found.items():
+        if not each:
+            raise InputError(f"class {name!r} has no color in masks: give it one with --color {name}=R,G,B")
+    return Classes(found)
