@@ -21,7 +21,9 @@ import cv2
 import numpy as np
 
 from vm_embedded import Detector, Orientation, Settings
-from vm_embedded.cli.measuring import cold, machine, measure, rss_mib, sgemm_rate, walk
+from vm_embedded.cli.machine import describe_machine, rss_mib, sgemm_rate
+from vm_embedded.cli.measuring import measure, measure_cold
+from vm_embedded.cli.workload import walk
 from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.projection import project
 from vm_embedded.mesh.mesh import Mesh
@@ -234,7 +236,7 @@ def walks(models: Models, work: list[Frame], seconds: float) -> dict[str, Any]:
                 largest = max(largest, cache.nbytes / 2**20)
             rows.append({"height_m": height, "hit_rate": round(cache.hit_rate, 4), "cache_mib": round(largest, 1)})
         orientations = [each.orientation for each in work for _ in range(4)]
-        found[name] = {"walks": rows, "cold": cold(detector, frame.lens, frame.size, orientations)}
+        found[name] = {"walks": rows, "cold": measure_cold(detector, frame.lens, frame.size, orientations)}
     return found
 
 
@@ -278,7 +280,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         models = Models(Path(folder))
         rate = sgemm_rate()
-        found: dict[str, Any] = {"machine": machine() | {"cores": len(_ALL_CORES)}, "frames": what}
+        found: dict[str, Any] = {"machine": describe_machine() | {"cores": len(_ALL_CORES)}, "frames": what}
         found["sgemm_gflops"] = round(rate / 1e9, 1)
         found["operations_per_point"] = {name: shape.operations for name, (shape, _, _) in NETWORKS.items()}
         parts: dict[str, Callable[[], dict[str, Any]]] = {

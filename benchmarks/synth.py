@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from vm_embedded.cli.measuring import machine
+from vm_embedded.cli.machine import describe_machine
 
 RESULTS = Path(__file__).with_name("synth.json")
 PAGE = Path(__file__).parents[1] / "docs" / "synth.md"
@@ -39,7 +39,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200, help="pictures of 640 x 512; default 200")
     options = parser.parse_args()
     runs = {str(workers): rendered(options.hdri, options.count, workers) for workers in (1, 2)}
-    RESULTS.write_text(json.dumps({"machine": machine(), "runs": runs}, indent=1) + "\n")
+    RESULTS.write_text(json.dumps({"machine": describe_machine(), "runs": runs}, indent=1) + "\n")
     rows = [
         f"| {workers} | {run['pictures']} | {run['an_hour']} | {run['mib_a_worker']} |" for workers, run in runs.items()
     ]

@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 import torch
 
-from vm_embedded.cli.measuring import machine
+from vm_embedded.cli.machine import describe_machine
 from vm_embedded.config.sections import read_sections
 from vm_export.network import Network
 from vm_train.data.pictures import find_pictures
@@ -119,7 +119,9 @@ def main() -> None:
         alone = parts(options.data, numbers[:160], folder)
         os.sched_setaffinity(0, cores)
         together = whole(options.data, numbers, folder, workers=1)
-    RESULTS.write_text(json.dumps({"machine": machine(), "one core": alone, "two cores": together}, indent=1) + "\n")
+    RESULTS.write_text(
+        json.dumps({"machine": describe_machine(), "one core": alone, "two cores": together}, indent=1) + "\n"
+    )
     rows = [f"| {name} | {value:.0f} |" for name, value in alone.items() if name != "points"]
     rows += [f"| training, {name}, one core reads, one learns | {value:.0f} |" for name, value in together.items()]
     table = "| | pictures/s |\n| --- | ---: |\n" + "\n".join(rows) + "\n"

@@ -1,0 +1,62 @@
+"""The machine that figures are measured on: processor, libraries, arithmetic rate and memory."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from ..network.session import RUNTIME_VERSION
+
+_SGEMM = """
+import time
+import numpy
+a = numpy.random.default_rng(0).random((768, 768), dtype=numpy.float32)
+best = 1e9
+for _ in range(20):
+    started = time.perf_counter()
+    a @ a
+    best = min(best, time.perf_counter() - started)
+print(2 * 768**3 / best)
+"""
+
+
+def describe_machine() -> dict[str, Any]:
+    """Processor, number of usable cores, vector instructions, and versions of Python and the libraries."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    flags = next((line.split() for line in lines if line.startswith("flags")), [])
+    return {
+        "processor": names[0] if names else platform.processor(),
+        "cores": len(os.sched_getaffinity(0)),
+        "vectors": next((each for each in ("avx512f", "avx2", "avx", "sse4_2") if each in flags), "unknown"),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "opencv": cv2.__version__,
+        "onnxruntime": RUNTIME_VERSION,
+    }
+
+
+def sgemm_rate() -> float:
+    """Multiplications and additions per second [1/s] of numpy's single-precision matrix product on one core.
+
+    It runs in a separate process, because numpy fixes its number of threads when it is loaded.
+    """
+    one = dict.fromkeys(("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "BLIS_NUM_THREADS"), "1")
+    done = subprocess.run(
+        [sys.executable, "-c", _SGEMM], env={**os.environ, **one}, capture_output=True, text=True, check=True
+    )
+    return float(done.stdout)
+
+
+def rss_mib() -> float:
+    """Resident memory of this process [MiB]."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20

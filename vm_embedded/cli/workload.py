@@ -1,0 +1,110 @@
+"""The frame, lens and walk that vm-bench measures a detector on."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from ..arrays import Image
+from ..cameras.image_files import check_file_format, read_image
+from ..config.units import parse_angle, parse_length
+from ..detection.sampling import checked_image
+from ..errors import InputError
+from ..geometry.lens import Lens, Size
+from ..geometry.orientation import Orientation
+from ..geometry.radial_lenses import Rectilinear
+from ..live.configuration import Configuration
+
+_SIZE, _HEIGHT, _PITCH = (1280, 1024), 0.6, 0.4
+"""Image size [px], height [m] and pitch [rad] of the camera where the user gives none."""
+
+_FRAME_RATE, _STRIDE_RATE, _STEPS_PER_STRIDE = 30.0, 0.97, 2.02
+"""Frames and strides per second, and steps per stride. The odd values keep the walk from repeating itself."""
+
+
+@dataclass(frozen=True)
+class Workload:
+    """One image, seen through a lens from each orientation of a walk.
+
+    middle: the orientation around which the walk swings. swing: of pitch and roll [rad]. sway: of the height [m].
+    """
+
+    image: Image
+    lens: Lens
+    middle: Orientation
+    swing: float
+    sway: float
+    orientations: list[Orientation]
+
+    @property
+    def size(self) -> Size:
+        """Width and height of the image [px]."""
+        return self.image.shape[1], self.image.shape[0]
+
+
+def make_workload(options: argparse.Namespace, given: Configuration) -> Workload:
+    """The workload that the options of vm-bench describe. Raises InputError."""
+    swing, sway = parse_angle(options.swing), parse_length(options.sway)
+    if options.frames < 1:
+        raise InputError(f"--frames must be at least 1, not {options.frames}")
+    middle = (
+        given.orientation.orientation()
+        or (given.lens.orientation if given.lens else None)
+        or Orientation.from_roll_pitch(_HEIGHT, 0.0, _PITCH)
+    )
+    if abs(sway) >= middle.height:
+        raise InputError(f"--sway {sway:g} m moves a camera at {middle.height:g} m below the plane; give a smaller one")
+    image, lens = _image_and_lens(options, given.lens.lens if given.lens else None, given.detector.format)
+    return Workload(image, lens, middle, swing, sway, walk(middle, swing, sway, options.frames))
+
+
+def walk(middle: Orientation, swing: float, sway: float, frames: int) -> list[Orientation]:
+    """Orientations of the camera of a walking robot, 30 per second.
+
+    The roll swings by `swing` [rad] to both sides about once per second, and the pitch about twice. The height sways
+    by `sway` [m] about twice per second. The frequencies differ, so no two frames are the same.
+    """
+    phases = 2.0 * np.pi * _STRIDE_RATE / _FRAME_RATE * np.arange(frames)
+    return [
+        Orientation.from_roll_pitch(
+            middle.height + sway * math.sin(_STEPS_PER_STRIDE * phase),
+            middle.roll + swing * math.sin(phase),
+            middle.pitch + swing * math.cos(_STEPS_PER_STRIDE * phase),
+        )
+        for phase in phases.tolist()
+    ]
+
+
+def draw_empty_field(size: Size, format: str) -> Image:
+    """An image of a green field without objects: uint8 (height, width[, channels]) in a pixel format."""
+    random = np.random.default_rng(0)
+    field = np.full((size[1], size[0], 3), (60, 110, 50), dtype=np.uint8)
+    field = np.asarray(cv2.add(field, random.integers(0, 12, field.shape, dtype=np.uint8)), dtype=np.uint8)
+    if format in ("bgra", "rgba"):
+        return np.dstack([field, np.full(field.shape[:2], 255, dtype=np.uint8)])
+    return field if format in ("bgr", "rgb") else np.ascontiguousarray(field[:, :, 1])
+
+
+def _image_and_lens(options: argparse.Namespace, lens: Lens | None, format: str) -> tuple[Image, Lens]:
+    """The image to detect in, and its lens: the given one, or a rectilinear one with a wide view."""
+    if options.image is None:
+        size = _parse_size(options.size) if options.size else (lens.size if lens and lens.size else _SIZE)
+        return draw_empty_field(size, format), lens or Rectilinear(focal_length=0.5 * size[0], fov=2.0)
+    if options.size is not None:
+        raise InputError("--size is only for the drawn field; leave it out with --image")
+    check_file_format(format)
+    image = checked_image(read_image(options.image, raw=format != "bgr"), format)
+    return image, lens or Rectilinear(focal_length=0.5 * image.shape[1], fov=2.0)
+
+
+def _parse_size(text: str) -> Size:
+    parts = text.lower().split("x")
+    if len(parts) != 2 or not all(part.isascii() and part.isdecimal() and 2 <= int(part) <= 20000 for part in parts):
+        raise InputError(
+            f"{text!r} is not a size; write width and height, from 2 to 20000 pixels each, as in 1280x1024"
+        )
+    return int(parts[0]), int(parts[1])
