@@ -38,7 +38,7 @@ def bench_table(found: dict[str, Any]) -> str:
         "",
         f"cold bucket {bucket['p50']:.1f} (p99 {bucket['p99']:.1f}), with a new mesh "
         f"{mesh['p50']:.1f} (p99 {mesh['p99']:.1f}); memory of the process {found['rss_mib']:.0f} MiB",
-        "times in milliseconds; stages: median and share of the total time; x floor: time of the network divided by the "
-        "time of its operations at the sgemm rate",
+        "times in milliseconds; stages: median and share of the total time; x floor: time of the network divided by "
+        "the time of its operations at the sgemm rate",
     ]
     return "\n".join(lines)
