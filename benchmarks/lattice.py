@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from vm_embedded import Equisolid, Orientation, Settings
+from vm_embedded import Equisolid, Orientation
 from vm_embedded.detection.projection import project
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.manifest import Manifest, ObjectClass
@@ -66,7 +66,7 @@ def _call(depth, width, model, layout, lens, pose):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.onnx"
         export(made, path, layout)
-        session = Session(read_model(path), Settings())
+        session = Session(read_model(path))
     whole = facts.model.build(facts.mesh_shape, HEIGHT, 4.0, 10.0)
     mesh = project(whole, pose.level, lens, SIZE).visible.graph
     arranged = choose_layout(mesh, replace(facts, layout=layout))

@@ -79,8 +79,8 @@ def session_call(detector: Detector, mesh: Mesh) -> Callable[[], object]:
     points = layout.points()
     layout.colors(points)[:] = np.random.default_rng(0).random((len(layout.slots), 3), dtype=np.float32)
     feeds = layout.feeds(points, layout.slots < len(mesh))
-    session = detector.session._session
-    return lambda: session.run(["probabilities"], feeds)
+    model = detector.session.onnx
+    return lambda: model.run(feeds)
 
 
 def numpy_call(network: Network, mesh: Mesh) -> Callable[[], object]:
@@ -138,7 +138,7 @@ def whole_calls(models: Models, work: list[Frame], rounds: int) -> dict[str, Any
             }
             times = interleaved(calls, rounds)  # type: ignore[arg-type]
             row: dict[str, Any] = dict(times)
-            row |= {"frame": frame.name, "points": len(seen.pixels), "slots": len(seen.layout.slots)}
+            row |= {"frame": frame.name, "points": len(seen.pixels), "slots": len(seen.observation.layout)}
             row["whole_over_session"] = round(row["whole"]["p50"] / row["session"]["p50"], 2)
             row["p99_over_p50"] = round(row["whole"]["p99"] / row["whole"]["p50"], 2)
             found[f"{name} {sampling}"] = row

@@ -11,24 +11,19 @@ from __future__ import annotations
 import argparse
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
-import numpy as np
-
 from benchmarks.shipped import FRAMES_AN_HOUR, NETWORKS
-from vm_embedded.arrays import Singles
-from vm_embedded.detection.objects import Scene, find_objects
+from vm_embedded.detection.objects import locate
+from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import GeometryError
-from vm_embedded.network.manifest import Manifest
-from vm_export.grid import VISUAL
 from vm_train.data.pictures import read_picture
-from vm_train.evaluation.answers import Exact, load_subject, scene_of
+from vm_train.evaluation.answers import Exact, load_subject
 from vm_train.evaluation.object_truth import read_scene, true_objects
 from vm_train.evaluation.picture_selection import select_pictures
-from vm_train.graphs.labeled_graph import color, seen_points
 from vm_train.learning.configuration import ClassTable
 from vm_train.scores.object_scores import ObjectScores
 from vm_train.scores.overlaps import TrueObject
@@ -36,41 +31,28 @@ from vm_train.scores.overlaps import TrueObject
 THRESHOLDS, INSIDES, AROUNDS = (0.5, 0.6, 0.7, 0.8, 0.9), (0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95), (0.25, 0.4)
 
 
-@dataclass(frozen=True)
-class Answered:
-    """A picture: its true balls, where objects are sought, and what the network says of each point."""
-
-    truths: list[TrueObject]
-    scene: Scene
-    probabilities: Singles
-
-
-def answered(subject: Exact, data: Path, numbers: Path, part: str) -> Iterator[Answered]:
-    """The pictures of a part of a training."""
+def observed(subject: Exact, data: Path, numbers: Path, part: str) -> Iterator[tuple[list[TrueObject], Observation]]:
+    """For each picture of a part of a training its true balls, and its points with their probabilities."""
     table = tomllib.loads((NETWORKS / "ball-5x4.toml").read_text())["classes"]
     classes = ClassTable.from_table(table).mask_classes()
     for files in select_pictures([data], numbers, part):
         picture = read_picture(files, classes)
         scene = read_scene(files.image.with_name(f"scene{files.number}.json"))
         assert scene is not None
-        manifest: Manifest = replace(subject.manifest, radius=scene.ball_radius, object_radius=scene.ball_radius)
-        height, width = picture.labels.shape
+        manifest = replace(subject.manifest, radius=scene.ball_radius, object_radius=scene.ball_radius)
         try:
-            shown = seen_points(picture.lens, (width, height), manifest)
+            observation = subject.observe(picture, scene.ball_radius)
         except GeometryError:
             continue
-        colors = np.empty((len(shown), 3), dtype=np.float32)
-        color(picture, shown, manifest, VISUAL, "exact", colors)
-        answers = subject.network(shown.graph, colors) if len(shown) else np.zeros((0, 2), dtype=np.float32)
-        yield Answered(true_objects(picture, scene, manifest)["ball"], scene_of(picture, shown, manifest), answers)
+        yield true_objects(picture, scene, manifest)["ball"], observation
 
 
-def scored(pictures: list[Answered], subject: Exact, settings: Settings) -> ObjectScores:
+def scored(pictures: list[tuple[list[TrueObject], Observation]], settings: Settings) -> ObjectScores:
     """Scores of all pictures with some settings."""
     scores = ObjectScores(min_radius=2.0)
-    for each in pictures:
-        found, _ = find_objects(each.scene, subject.manifest.classes, each.probabilities, settings)
-        scores.add(each.truths, found)
+    for truths, observation in pictures:
+        found, _ = locate(observation, settings)
+        scores.add(truths, found)
     return scores
 
 
@@ -82,11 +64,11 @@ def main() -> None:
     options = parser.parse_args()
     subject = load_subject(options.run / "model.pt", Settings())
     assert isinstance(subject, Exact)
-    pictures = list(answered(subject, options.data, options.run / "pictures.json", options.part))
+    pictures = list(observed(subject, options.data, options.run / "pictures.json", options.part))
     rows = []
     for threshold, inside, around in product(THRESHOLDS, INSIDES, AROUNDS):
         settings = Settings(threshold=threshold, min_inside=inside, max_around=around)
-        outcome = scored(pictures, subject, settings).ranking(0.5).at()
+        outcome = scored(pictures, settings).ranking(0.5).at()
         rows.append((outcome.f1, threshold, inside, around, outcome))
     print(f"{len(pictures)} pictures\nthreshold min_inside max_around    F1 recall precision false/picture  an hour")
     best = sorted(rows, key=lambda row: -row[0])[:20]

@@ -31,7 +31,6 @@ sys.path.insert(0, str(TOP))
 from vm_embedded import __version__  # noqa: E402
 from vm_embedded.cameras.camera import CameraSettings  # noqa: E402
 from vm_embedded.config.toml_writer import to_commented_toml  # noqa: E402
-from vm_embedded.detection.settings import Settings  # noqa: E402
 from vm_embedded.errors import InputError, VisualMeshError  # noqa: E402
 from vm_embedded.files import atomic_write  # noqa: E402
 from vm_embedded.live.configuration import Configuration, read_configuration  # noqa: E402
@@ -177,7 +176,7 @@ def configured(configuration: Path | None, model: str | None) -> dict[str, bytes
 def _model(model: str) -> bytes:
     """The bytes of a network that passes its self-test. Raises VisualMeshError."""
     read = read_model(model_path(model))
-    Session(read, Settings())
+    Session(read)
     return read.content
 
 

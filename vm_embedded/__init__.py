@@ -2,7 +2,7 @@
 
 from .detection.detections import ClassPoints, Detection, Detections
 from .detection.detector import Detector
-from .detection.multi_view import Sighting, View, detect_views
+from .detection.multi_view import CameraView, Sighting, detect_views
 from .detection.settings import Settings
 from .errors import GeometryError, InputError, ModelError, VisualMeshError
 from .geometry.calibrated_lenses import BrownLens, FisheyeLens
@@ -19,6 +19,7 @@ from .mesh.models import build_mesh
 __all__ = [
     "GROUND",
     "BrownLens",
+    "CameraView",
     "Circle",
     "ClassPoints",
     "Cylinder",
@@ -39,7 +40,6 @@ __all__ = [
     "Settings",
     "Sighting",
     "Sphere",
-    "View",
     "VisualMeshError",
     "build_mesh",
     "detect_views",

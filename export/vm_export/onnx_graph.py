@@ -11,12 +11,12 @@ import torch
 
 import vm_embedded
 from vm_embedded.arrays import Indices, Singles
-from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import ModelError
 from vm_embedded.files import atomic_write
 from vm_embedded.mesh.grids import lattice_neighbors
-from vm_embedded.network.manifest import Manifest, SelfTest
+from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import ModelFile
+from vm_embedded.network.self_test import SelfTest
 from vm_embedded.network.session import Session
 
 from .checkpoint import Checkpoint
@@ -89,7 +89,7 @@ def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) 
 
 def largest_difference(content: bytes, network: Network | SecondLook, manifest: Manifest) -> float:
     """Largest difference of a probability between ONNX Runtime and torch, over several numbers of points."""
-    session = Session(ModelFile(Path("the new model"), content, replace(manifest, self_test=None), ""), Settings())
+    session = Session(ModelFile(Path("the new model"), content, replace(manifest, self_test=None), ""))
     worst = 0.0
     for seed, points in enumerate(_CHECKED_POINTS):
         test = _example(network, manifest, points, seed)

@@ -12,7 +12,6 @@ import yaml
 
 from tests.vm_export.test_export import checkpoint, manifest
 from tests.vm_export.test_reference_format import reference_file
-from vm_embedded.detection.settings import Settings as RuntimeSettings
 from vm_embedded.network.manifest import EDGES, ObjectClass
 from vm_embedded.network.model_file import read_model
 from vm_embedded.network.session import Session
@@ -59,7 +58,7 @@ def test_command_writes_the_fastest_layout_and_the_portable_one_beside_it(tmp_pa
     assert replace(both[0].manifest, layout="plain").as_json() == both[1].manifest.as_json()
     test = onnx_graph._example(made.network, made.manifest, 300, 1)
     for each in both:
-        answer = Session(each, RuntimeSettings()).answer(test)
+        answer = Session(each).answer(test)
         np.testing.assert_allclose(answer, test.probabilities[:-1], atol=1e-5)
         (line,) = [line for line in done.stdout.splitlines() if line.startswith(f"{each.path}:")]
         assert f"layout {each.manifest.layout}" in line
@@ -90,7 +89,7 @@ def test_command_writes_one_file_in_the_layout_that_it_is_told(layout, mesh, tmp
     assert names_in(tmp_path) == ["model.onnx", "model.pt"]
     read = read_model(tmp_path / "model.onnx")
     assert (read.manifest.layout, read.manifest.mesh) == (layout, mesh)
-    Session(read, RuntimeSettings())  # runs the self-test
+    Session(read)  # runs the self-test
     assert f"layout {layout}" in done.stdout
 
 

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.vm_export.test_export import manifest
-from vm_embedded.detection.settings import Settings as RuntimeSettings
 from vm_embedded.errors import InputError, ModelError
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import choose_layout
@@ -106,7 +105,7 @@ def test_onnx_runtime_gives_the_same_answers_on_real_meshes(
         expected = made(torch.from_numpy(colors), neighbors)[:-1].numpy()
 
     content = onnx_graph.build(made, facts)
-    session = Session(ModelFile("model", content, facts, ""), RuntimeSettings())
+    session = Session(ModelFile("model", content, facts, ""))
     layout = choose_layout(part, facts)
     given_points = layout.points()
     layout.colors(given_points)[:] = colors[layout.slots]
@@ -119,7 +118,7 @@ def test_a_picture_without_anything_worth_it_is_answered_by_the_first(tmp_path):
     onnx_graph.export(whole, tmp_path / "both.onnx")
     onnx_graph.export(Checkpoint(whole.network.first, manifest()), tmp_path / "first.onnx", "runs")
     example = read_model(tmp_path / "first.onnx").manifest.self_test
-    both, first = (Session(read_model(tmp_path / name), RuntimeSettings()) for name in ("both.onnx", "first.onnx"))
+    both, first = (Session(read_model(tmp_path / name)) for name in ("both.onnx", "first.onnx"))
     np.testing.assert_array_equal(both.answer(example), first.answer(example))
 
 

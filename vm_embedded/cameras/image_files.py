@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Image
-from ..detection.sampling import FORMATS
+from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
 from .decoding import decode
 

@@ -12,7 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..network.session import RUNTIME_VERSION
+from ..network.onnx_model import RUNTIME_VERSION
 
 _SGEMM = """
 import time

@@ -81,7 +81,7 @@ def measure(
         for number in turns if frame % 2 else reversed(turns):
             found = detectors[number].detect(image, orientation, lens)
             timings[number].append(found.timing_ms)
-            points[number].append(int(found.projected.on_screen.sum()))
+            points[number].append(len(found.observation))
         progress(frame)
     return [
         Run(

@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Image
 from ..cameras.image_files import check_file_format, read_image
 from ..config.units import parse_angle, parse_length
-from ..detection.sampling import checked_image
+from ..detection.pixel_formats import checked_image
 from ..errors import InputError
 from ..geometry.lens import Lens, Size
 from ..geometry.orientation import Orientation

@@ -1,4 +1,4 @@
-"""Connected parts of the mesh, and how wide they are."""
+"""Clusters of points that the mesh connects, and their graph diameter (paper, "Discussion and Conclusion")."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ _Edges = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 
 def clusters(graph: PointGraph, members: Members) -> list[Members]:
-    """The connected components of the points `members`, each in their order, largest first, then as they come.
+    """The connected components of the points `members`, largest first. Points keep their order.
 
-    Two points are connected if either is a neighbor of the other. Labels spread along all links at once,
-    the smaller one winning, and jump to the label of their label, so the rounds needed grow with the logarithm of a
-    component's width, and nothing loops over points.
+    Two points are connected if either is a neighbor of the other. In each round the smallest label spreads along all
+    links at once, then each point takes the label of its label. So the number of rounds grows with the logarithm of a
+    component's width, without a loop over points.
     """
     a, b = _edges(graph, members)
     label = np.arange(len(members))
@@ -36,10 +36,10 @@ def clusters(graph: PointGraph, members: Members) -> list[Members]:
 
 
 def graph_diameter(graph: PointGraph, members: Members, limit: int) -> int:
-    """Steps between the two members farthest apart, going through members only.
+    """Steps between the two members farthest apart, on ways through members only; at most limit + 1.
 
-    Found by two breadth-first sweeps, the second from the end of the first: exact for chains, at most a step or two
-    short for round clusters. Counting stops at limit + 1.
+    Two breadth-first sweeps, the second from the end of the first: exact for chains, at most a step or two short for
+    round clusters.
     """
     edges = _edges(graph, members)
     far = int(np.argmax(_steps(edges, len(members), 0, limit)))
@@ -49,7 +49,7 @@ def graph_diameter(graph: PointGraph, members: Members, limit: int) -> int:
 def wider_than(graph: PointGraph, members: Members, middle: int, limit: int) -> bool:
     """Whether the graph diameter of `members` is above `limit`.
 
-    Nearly always one sweep from the member in the `middle` tells: no two are farther apart than twice its reach.
+    One sweep from the member in the `middle` usually decides: no two members are farther apart than twice its reach.
     """
     reach = int(_steps(_edges(graph, members), len(members), middle, limit).max())
     return 2 * reach > limit and graph_diameter(graph, members, limit) > limit
@@ -67,7 +67,7 @@ def _edges(graph: PointGraph, members: Members) -> _Edges:
 
 
 def _steps(edges: _Edges, count: int, start: int, limit: int) -> npt.NDArray[np.intp]:
-    """Steps (count,) from `start`, at most limit + 1; -1 where there is no way within them."""
+    """Steps (count,) from `start`; -1 for members more than limit + 1 steps away."""
     a, b = edges
     steps = np.full(count, -1)
     steps[start] = 0

@@ -1,32 +1,30 @@
-"""What a frame was found to show."""
+"""Results of a frame: the objects and the points behind them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats, Indices, Singles
-from ..network.layout import Layout
+from ..arrays import Floats, Singles
 from ..network.manifest import Manifest
-from .projection import Projection
+from .observation import Observation
 
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """One object on the observation plane, or, with a `reason`, a cluster that was rejected as one.
+    """One object on the observation plane, or, with a `reason`, a rejected candidate.
 
-    The plane's frame stands below the camera, z up, with the heading that the frame's orientation had.
+    Its frame has the origin on the plane below the camera, z up, and the heading of the frame's orientation.
 
     class_name: name of its class. confidence: mean probability inside its outline. center (2,), radius [px]: of the
-    disk that covers as many pixels as its outline. outline (m, 2) [px]: what the lens sees of it. bearing (3,): unit
-    vector from the camera to its center. position (3,): its center [m]. distance: from the camera to its center [m],
-    where its bearing meets the plane. angular_radius [rad]: of the size that fits the points best. distance_by_angle
-    [m]: what follows from that size alone. distances_agree: whether the two differ by less than the mesh can resolve.
-    points: mesh points inside its outline. reason: why it was rejected, or None.
+    disk with the centroid and the area of its outline. outline (m, 2) [px]: the part that the lens sees. bearing (3,):
+    unit vector from the camera to its center. position (3,): its center [m]. distance: from the camera to its center
+    [m], where its bearing meets the plane. angular_radius [rad]: of the size that fits the points best.
+    distance_by_angle [m]: follows from that size alone. distances_agree: whether the two distances differ by less than
+    the mesh can resolve. points: number of mesh points inside its outline. reason: why it was rejected, or None.
     """
 
     class_name: str
@@ -44,7 +42,7 @@ class Detection:
     reason: str | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers for JSON: pixels to 0.1, metres to 0.001."""
+        """Plain numbers for JSON: pixels to 0.1, meters to 0.001."""
         data: dict[str, Any] = {
             "class": self.class_name,
             "confidence": round(self.confidence, 3),
@@ -65,7 +63,7 @@ class Detection:
 
 @dataclass(frozen=True, eq=False)
 class ClassPoints:
-    """The m points of a class that is no object: bearings (m, 3), pixels (m, 2), probabilities (m,)."""
+    """The m points of a class: bearings (m, 3) in the observation plane's frame, pixels (m, 2), probabilities (m,)."""
 
     class_name: str
     bearings: Floats
@@ -80,19 +78,13 @@ class ClassPoints:
 class Detections:
     """The objects of a frame, most confident first, and the n mesh points on screen behind them.
 
-    rejected: clusters that were no objects, with reasons, if they were asked for. manifest: of the network that
-    looked. layout, projected, answers (m, C): what it took and gave. heading (3, 3): from the mesh's frame to the
-    frame's own observation plane. threshold: above which a point counts for a class. timing_ms: milliseconds of each
-    stage.
+    rejected: candidates that are not objects, with reasons, if asked for. observation: the points. threshold: a point
+    counts for a class above this probability. timing_ms: milliseconds of each stage.
     """
 
     objects: tuple[Detection, ...]
     rejected: tuple[Detection, ...]
-    manifest: Manifest
-    layout: Layout
-    projected: Projection[Layout]
-    answers: Singles
-    heading: Floats
+    observation: Observation
     threshold: float
     timing_ms: dict[str, float] = field(default_factory=dict)
 
@@ -105,29 +97,28 @@ class Detections:
     def __getitem__(self, index: int) -> Detection:
         return self.objects[index]
 
-    @cached_property
-    def _shown(self) -> Indices:
-        """Slots (n,) of the points on screen, in the order of the mesh."""
-        places = self.layout.places
-        return places[self.projected.on_screen[places]]
+    @property
+    def manifest(self) -> Manifest:
+        """What the model file says about the network."""
+        return self.observation.manifest
 
-    @cached_property
+    @property
     def pixels(self) -> Floats:
         """Pixels (n, 2) of the points."""
-        return self.projected.pixels[self._shown]
+        return self.observation.pixels
 
-    @cached_property
+    @property
     def rays(self) -> Floats:
         """Unit vectors (n, 3) to the points, in the frame's own observation plane."""
-        return np.asarray(self.layout.rays[self._shown] @ self.heading.T)
+        return self.observation.rays
 
-    @cached_property
+    @property
     def probabilities(self) -> Singles:
         """Probabilities (n, C) of the points, in the order of the manifest's classes."""
-        return self.answers[self._shown]
+        return self.observation.probabilities
 
     def points_of(self, class_name: str) -> ClassPoints:
-        """The points of a class, whose probability is above the threshold. Raises InputError for an unknown class."""
+        """The points of a class with a probability above the threshold. Raises InputError for an unknown class."""
         column = self.probabilities[:, self.manifest.column(class_name)]
         chosen = np.flatnonzero(column > self.threshold)
         return ClassPoints(class_name, self.rays[chosen], self.pixels[chosen], column[chosen])

@@ -1,4 +1,4 @@
-"""One detector, several cameras and several planes: what they see of the same world, put together."""
+"""One detector, several cameras and several planes: detections of the same object become one sighting."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from .detector import Detector
 
 
 @dataclass(frozen=True, eq=False)
-class View:
-    """A camera's picture: uint8 in the detector's pixel format, its lens, and where the camera was."""
+class CameraView:
+    """A camera's picture, uint8 in the detector's pixel format, its lens, and the pose of the camera in the world."""
 
     image: Image
     lens: Lens
@@ -29,8 +29,8 @@ class View:
 class Sighting:
     """An object in the world frame.
 
-    camera, plane: names of the view and the plane of its clearest detection. position (3,): its center [m]. direction
-    (3,): unit vector from that camera. also: the others of the same object, clearest first.
+    camera, plane: names of the camera and the plane of its most confident detection. position (3,): its center [m].
+    direction (3,): unit vector from that camera. also: further detections of the same object, most confident first.
     """
 
     camera: str
@@ -42,17 +42,18 @@ class Sighting:
 
 
 def detect_views(
-    detector: Detector, views: Mapping[str, View], planes: Sequence[Plane] = (GROUND,)
+    detector: Detector, views: Mapping[str, CameraView], planes: Sequence[Plane] = (GROUND,)
 ) -> tuple[Sighting, ...]:
-    """What cameras, by their names, show on planes; the clearest first.
+    """Objects that cameras, by their names, show on planes; the most confident first.
 
-    All use the detector's network and share its meshes. Two detections of one class are one object if they lie on the
-    same plane less than a diameter apart and are of different cameras, or if one camera sees them on different planes
-    less than their angular radius apart: then only one of the planes can be right. The nearest are put together first,
-    and no object has two detections of one camera on one plane. Where planes disagree, that with the most confidence in
-    sum counts. A camera that is not before a plane, or too near it for the mesh, sees nothing on it.
+    All cameras share the detector's network and meshes. Two detections of one class are one object in two cases:
+    - cameras differ, the plane is the same, and they lie less than a diameter apart;
+    - the camera is the same, planes differ, and they lie less than their angular radius apart.
+    In the second case only one of the planes can be right: the one with the largest sum of confidences. The nearest
+    detections are joined first, and an object has at most one detection of each camera on each plane. A camera behind
+    a plane, or too near it for the mesh, sees nothing on it.
 
-    Raises InputError for no planes, planes of one name, or a picture that does not fit.
+    Raises InputError for no planes, planes with equal names, or a picture that does not fit.
     """
     names = [each.name for each in planes]
     if not planes or len(set(names)) != len(names):
@@ -63,26 +64,33 @@ def detect_views(
     for camera, view in views.items():
         for plane in planes:
             found += _sightings(detector, camera, view, plane)
+    joined = [_join(group) for group in _groups(found, 2.0 * detector.shape.radius)]
+    return tuple(sorted(joined, key=lambda each: -each.detection.confidence))
+
+
+def _groups(found: Sequence[Sighting], diameter: float) -> list[list[Sighting]]:
+    """The sightings, grouped by object: the nearest pairs are joined first."""
     pairs = []
     for i, one in enumerate(found):
         for j, other in enumerate(found[:i]):
-            apart = _apart(one, other, 2.0 * detector.shape.radius)
+            apart = _apart(one, other, diameter)
             if apart < 1.0:
                 pairs.append((apart, i, j))
-    group_of = [[each] for each in range(len(found))]
+    group_of = list(range(len(found)))
+    members = {each: [each] for each in group_of}
     for _, i, j in sorted(pairs):
-        one_group, other_group = group_of[i], group_of[j]
-        seen = [(found[each].camera, found[each].plane) for each in one_group + other_group]
-        if one_group is not other_group and len(set(seen)) == len(seen):
-            one_group += other_group
-            for each in other_group:
-                group_of[each] = one_group
-    groups = {id(each): each for each in group_of}.values()
-    together = [_together([found[each] for each in group]) for group in groups]
-    return tuple(sorted(together, key=lambda each: -each.detection.confidence))
+        kept, merged = group_of[i], group_of[j]
+        if kept == merged:
+            continue
+        seen = [(found[each].camera, found[each].plane) for each in members[kept] + members[merged]]
+        if len(set(seen)) == len(seen):
+            for each in members[merged]:
+                group_of[each] = kept
+            members[kept] += members.pop(merged)
+    return [[found[each] for each in group] for group in sorted(members.values(), key=min)]
 
 
-def _sightings(detector: Detector, camera: str, view: View, plane: Plane) -> Iterator[Sighting]:
+def _sightings(detector: Detector, camera: str, view: CameraView, plane: Plane) -> Iterator[Sighting]:
     try:
         orientation = plane.seen_from(view.pose)
         detector.cache.mesh_height(orientation.height)
@@ -95,7 +103,7 @@ def _sightings(detector: Detector, camera: str, view: View, plane: Plane) -> Ite
 
 
 def _apart(one: Sighting, other: Sighting, diameter: float) -> float:
-    """How far apart two sightings are, 1 being too far for one object."""
+    """Distance of two sightings as a share of the one from which they are two objects; infinite if they always are."""
     if one.detection.class_name != other.detection.class_name:
         return math.inf
     if one.camera != other.camera and one.plane == other.plane:
@@ -106,8 +114,8 @@ def _apart(one: Sighting, other: Sighting, diameter: float) -> float:
     return math.inf
 
 
-def _together(group: Sequence[Sighting]) -> Sighting:
-    """One sighting of several of the same object: the clearest on the plane that most speaks for, and the others."""
+def _join(group: Sequence[Sighting]) -> Sighting:
+    """One sighting of several of the same object: on the plane with the largest sum of confidences, the surest one."""
     sums: dict[str, float] = {}
     for each in group:
         sums[each.plane] = sums.get(each.plane, 0.0) + each.detection.confidence

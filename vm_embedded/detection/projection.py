@@ -1,4 +1,4 @@
-"""From the mesh to the picture: which points are on screen, and where."""
+"""From the mesh to the picture: the pixels of the points, and whether they are on screen."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ G = TypeVar("G", bound=PointGraph, covariant=True)
 
 @dataclass(frozen=True, eq=False)
 class Projection(Generic[G]):
-    """The n points of a graph, their pixels (n, 2), and which of them are on_screen (n,).
+    """The n points of a graph, their pixels (n, 2), and a mask of those that are on_screen (n,).
 
-    Pixels of points that are not are without meaning.
+    Pixels of points off screen have no meaning.
     """
 
     graph: G
@@ -37,14 +37,14 @@ class Projection(Generic[G]):
         return Projection(self.graph.part(kept), self.pixels[kept], self.on_screen[kept])
 
     def only(self, chosen: Mask) -> Projection[G]:
-        """The same graph, of which at most the chosen points (n,) are on screen."""
+        """The same graph, with only those of the chosen points (n,) on screen that are on screen here."""
         return Projection(self.graph, self.pixels, self.on_screen & chosen)
 
 
 def along(rays: Floats, direction: Floats) -> Floats:
     """Cosines (n,) between rays (n, 3) and a unit vector (3,).
 
-    Not a matrix product, because numpy's would start threads on every core for that.
+    A matrix product would make numpy start threads on every core.
     """
     x, y, z = direction.tolist()
     cosines: Floats = rays[:, 0] * x
@@ -56,7 +56,7 @@ def along(rays: Floats, direction: Floats) -> Floats:
 def to_camera(rays: Floats, rotation: Floats) -> Floats:
     """Rays (n, 3) in the camera frame, R^T ray, column by column in memory.
 
-    Written out instead of as a matrix product, so that a ray's digits don't depend on how many others there are.
+    The digits of a matrix product would depend on the number of rays; those of this sum don't.
     """
     camera = np.empty((3, len(rays)))
     term = np.empty(len(rays))
@@ -70,10 +70,10 @@ def to_camera(rays: Floats, rotation: Floats) -> Floats:
 
 
 def project(graph: AnyGraph, rotation: Floats, lens: Lens, size: Size) -> Projection[AnyGraph]:
-    """A graph in the picture.
+    """Project a graph's points into the picture.
 
-    rotation (3, 3) maps camera to mesh coordinates. On screen means: seen by the lens, and with all four pixels
-    around the point in the picture, 0 <= x and x + 1 < width, the same for y.
+    rotation (3, 3): camera to mesh frame. size: width and height [px]. A point is on screen if the lens sees it and all
+    four pixels around it are in the picture: 0 <= x and x + 1 < width, and the same for y.
     """
     camera = to_camera(graph.rays, rotation)
     pixels = lens.project(camera, size)
@@ -81,15 +81,15 @@ def project(graph: AnyGraph, rotation: Floats, lens: Lens, size: Size) -> Projec
 
 
 def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack: float) -> Mask:
-    """Which points are on screen for at least one camera turned by up to `slack` [rad] from `rotation`.
+    """The points (n,) that are on screen for a camera turned by up to `slack` [rad] from `rotation`.
 
-    Never too few: a point that a turn brings on screen lies within slack of the part of the view that the picture
-    covers, and no pixel in it moves faster than `_pixels_per_radian`. Points outside of that part are judged by where
-    they would enter it.
+    It never leaves one out. A point that a turn brings on screen lies within the slack of the view that the picture
+    covers, and no pixel in that view moves faster than `_pixels_per_radian`. A point outside of the view is moved to
+    its edge first.
     """
     reach = _view_angle(lens, size)
     ahead = along(mesh.rays, rotation[:, 0])
-    # A rotation that is not quite one may shorten rays by up to 5e-4; the lens compares their x as it is.
+    # Rounding errors of a rotation may shorten rays by up to 5e-4, and the lens compares their x without normalizing.
     near = np.flatnonzero(ahead > np.cos(min(reach + slack, np.pi)) - 1e-3)
     camera = to_camera(mesh.rays[near], rotation)
     cosine = np.maximum(camera[:, 0], np.cos(reach))

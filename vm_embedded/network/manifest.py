@@ -1,4 +1,4 @@
-"""What a model file says about itself: one schema, written by the exporter and read by the runtime.
+"""The description in a model file: one schema, written by the exporter and read by the runtime.
 
 It travels as JSON in the .onnx file's metadata under the key `visual_mesh`.
 """
@@ -8,37 +8,40 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any
+from functools import cached_property
 
-import numpy as np
-
-from ..arrays import Indices, Singles
-from ..detection.color_normalization import COLORINGS
 from ..errors import GeometryError, InputError, ModelError, unknown
 from ..geometry.make_shape import SHAPES, make_shape
 from ..geometry.shape import Shape
 from ..mesh.mesh import MeshModel
 from ..mesh.models import MESH_MODELS
 from ..mesh.walls import wall_counts
+from .self_test import SelfTest
 
 METADATA_KEY = "visual_mesh"
 FORMAT_VERSION = 5
 
 KINDS = ("object", "upright", "area", "background")
-"""What a class is. object: has the mesh's shape and is located. upright, area: points with bearings. background."""
+"""Kinds of classes. object: has the mesh's shape; the runtime locates it. upright, area: the runtime reports its points
+with bearings. background: everything else."""
 
 EDGES = ("hard", "same")
-"""Where a missing neighbor leads. hard: to the off-screen point, whose input is -1. same: to the point itself."""
+"""Replacement of a missing neighbor. hard: the off-screen point, whose input is -1. same: the point itself."""
 
 LAYOUTS = ("plain", "runs", "lattice")
-"""How the network takes its points. plain: as rows. runs: as columns, ring by ring. lattice: as a picture; see
-layout.py."""
+"""Order of the points in the network's input; see layout.py. plain: rows. runs: columns, ring by ring. lattice: a
+picture."""
 
 POINT_SAMPLINGS = ("bilinear", "footprint")
-"""What color a point has. bilinear: of its place, between four pixels. footprint: of its surroundings; footprint.py."""
+"""Color of a point. bilinear: at its pixel, from the four around it. footprint: the mean of the area that it stands
+for; see detection/footprint.py."""
+
+POINT_COLORS = ("absolute", "relative")
+"""Colors that the network takes. absolute: from 0 to 1. relative: normalized with the mean and the deviation of the
+picture's points; see detection/color_normalization.py."""
 
 _LARGEST = 1e9
-"""Beyond every radius, distance and number of rings."""
+"""Limit of every radius, distance and number of rings."""
 
 
 @dataclass(frozen=True)
@@ -50,70 +53,23 @@ class ObjectClass:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
-            raise ModelError(f"name of a class must be text, not {self.name!r}")
+            raise ModelError(f"name of a class must be a string, not {self.name!r}")
         if self.kind not in KINDS:
             raise ModelError(unknown(f"kind of class {self.name!r}", self.kind, KINDS))
 
 
-@dataclass(frozen=True, eq=False)
-class SelfTest:
-    """A small graph and its answer: points (n + 1, 3), neighbors (n + 1, N), probabilities (n + 1, C).
-
-    cells (n, 2): of points on a lattice their columns and rows, as in Mesh, else None.
-    """
-
-    points: Singles
-    neighbors: Indices
-    probabilities: Singles
-    cells: Indices | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Nested lists, with as many digits as the check needs."""
-        return {
-            "points": np.round(self.points.astype(float), 4).tolist(),
-            "neighbors": self.neighbors.tolist(),
-            "probabilities": np.round(self.probabilities.astype(float), 6).tolist(),
-            "cells": None if self.cells is None else self.cells.tolist(),
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> SelfTest:
-        """Inverse of `as_dict`. Raises ModelError."""
-        try:
-            test = cls(
-                np.array(data["points"], dtype=np.float32),
-                np.array(data["neighbors"], dtype=np.int32),
-                np.array(data["probabilities"], dtype=np.float32),
-                None if data["cells"] is None else np.array(data["cells"], dtype=np.int32).reshape(-1, 2),
-            )
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise ModelError(f"self-test in the model file can't be read: {error}") from error
-        rows = len(test.points) if test.points.ndim == 2 else 0
-        if rows < 1 or test.points.shape != (rows, 3) or test.neighbors.ndim != 2 or test.probabilities.ndim != 2:
-            raise ModelError("self-test in the model file has arrays of the wrong shape")
-        if len(test.neighbors) != rows or len(test.probabilities) != rows:
-            raise ModelError("self-test in the model file has arrays of different lengths")
-        if test.neighbors.size and not 0 <= test.neighbors.min() <= test.neighbors.max() < rows:
-            raise ModelError("self-test in the model file has neighbors that are no points")
-        if test.cells is not None:
-            most = abs(test.cells).max(initial=0)
-            if len(test.cells) != rows - 1 or most > 1000 or len(np.unique(test.cells, axis=0)) != rows - 1:
-                raise ModelError("self-test in the model file has cells that are no places of its points")
-        return test
-
-
 @dataclass(frozen=True, kw_only=True)
 class Manifest:
-    """What the runtime must know to build the mesh and read the answers of a network.
+    """Everything that the runtime must know to build the mesh and to read the network's answers.
 
-    shape: one of SHAPES. radius: the object's radius that the mesh is made for [m]. object_radius: that of the real
-    object [m]. object_height: of a cylinder [m], else 0. any_radius: whether the network knows objects of any radius,
-    so that the mesh is made for the real one's, whatever it is. intersections: rings across an object of `radius`.
-    mesh: one of MESH_MODELS. max_distance of the mesh [m]. edge: one of EDGES. classes: in the order of the network's
-    outputs. layout: one of LAYOUTS; runs and lattice need edge hard. operations: multiplications and additions for each
-    point. channels, scale: a point's input is its color in this order, times scale. sampling: one of POINT_SAMPLINGS.
-    colors: one of COLORINGS. provenance: who made it from what. Raises ModelError for values that this runtime does not
-    know.
+    shape: of the object, one of SHAPES. radius: of the object that the mesh is made for [m]. object_radius: of the real
+    object [m]. object_height: of a cylinder [m], else 0. any_radius: the network was trained on objects of many radii,
+    so the mesh is made for the real one's. intersections: rings across an object of `radius`, the paper's k. mesh: one
+    of MESH_MODELS. max_distance: of the mesh [m]. edge: one of EDGES. classes: in the order of the network's outputs.
+    layout: one of LAYOUTS; runs and lattice need edge hard. operations: multiplications and additions for each point.
+    channels, scale: a point's input is its color in this order of channels, times scale. sampling: one of
+    POINT_SAMPLINGS. colors: one of POINT_COLORS. provenance: origin of the file, for people. Raises ModelError for
+    unknown values.
     """
 
     shape: str
@@ -143,15 +99,17 @@ class Manifest:
             "layout": LAYOUTS,
             "channels": ("rgb",),
             "sampling": POINT_SAMPLINGS,
-            "colors": COLORINGS,
+            "colors": POINT_COLORS,
         }
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
                 raise ModelError(unknown(f"{name} in the model's manifest", getattr(self, name), allowed))
         if self.layout != "plain" and self.edge != "hard":
-            raise ModelError(f"layout {self.layout} needs edge hard; for edge {self.edge} there is layout plain")
+            raise ModelError(f"layout {self.layout} needs edge hard; edge {self.edge} needs layout plain")
         if self.layout == "lattice" and MESH_MODELS[self.mesh].steps is None:
-            raise ModelError(f"layout lattice is for grids, whose neighbors are fixed steps away; {self.mesh} is none")
+            raise ModelError(
+                f"layout lattice needs a grid, whose neighbors are fixed steps away; mesh {self.mesh} is not a grid"
+            )
         for name in ("radius", "object_radius", "intersections", "max_distance", "scale"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= _LARGEST:
@@ -165,33 +123,34 @@ class Manifest:
             raise ModelError(f"scale in the model's manifest must be 1/255, not {self.scale!r}")
         names = [each.name for each in self.classes]
         if not names or len(set(names)) != len(names):
-            raise ModelError(f"classes in the model's manifest must be one or more different names, not {names}")
+            raise ModelError(f"classes in the model's manifest must be one or more, with different names, not {names}")
 
     def _check_shape(self) -> None:
         tall = self.object_height
         if isinstance(tall, bool) or not isinstance(tall, int | float) or not 0 <= tall <= _LARGEST:
             raise ModelError(f"object_height in the model's manifest must be a number of at least 0, not {tall!r}")
         if (self.shape == "cylinder") != (tall > 0):
-            raise ModelError(f"a cylinder has an object_height and no other shape has, but {self.shape} has {tall:g} m")
+            raise ModelError(
+                f"object_height must be above 0 for a cylinder and 0 for other shapes; {self.shape} has {tall:g} m"
+            )
         if self.mesh != "wall6":
             return
         if self.shape != "cylinder":
-            raise ModelError(f"mesh wall6 is for shape cylinder, not {self.shape}")
+            raise ModelError(f"mesh wall6 needs shape cylinder, not {self.shape}")
         if self.sampling != "bilinear":
-            raise ModelError(f"mesh wall6 has no footprints: its sampling is bilinear, not {self.sampling}")
+            raise ModelError(f"mesh wall6 needs sampling bilinear, not {self.sampling}")
         for each in self.classes:
             if each.kind == "object":
                 raise ModelError(
-                    f"mesh wall6 does not locate objects, so class {each.name!r} can't be of kind object, but "
-                    "upright or area"
+                    f"mesh wall6 does not locate objects: the kind of class {each.name!r} must be upright or area"
                 )
         try:
             wall_counts(self.mesh_shape, self.intersections, self.max_distance)
         except GeometryError as error:
-            raise ModelError(f"the model's manifest has no mesh: {error}") from error
+            raise ModelError(f"the model's manifest describes a mesh that can't be built: {error}") from error
 
     def used_for(self, object_radius: float | None, max_distance: float | None) -> Manifest:
-        """The manifest for real objects of a radius [m] and a mesh that reaches so far [m]; None for what it says."""
+        """The manifest for another radius of the real object [m] and reach of the mesh [m]; None keeps its own."""
         radius = self.object_radius if object_radius is None else object_radius
         return replace(
             self,
@@ -214,21 +173,25 @@ class Manifest:
 
     @property
     def model(self) -> MeshModel:
-        """How points are placed and linked."""
+        """The mesh model, which places and links the points."""
         return MESH_MODELS[self.mesh]
 
-    @property
+    @cached_property
     def mesh_shape(self) -> Shape:
         """The shape that the mesh is made for."""
         return make_shape(self.shape, self.radius, self.object_height)
 
-    @property
+    @cached_property
     def object_shape(self) -> Shape:
         """The shape of the real object."""
         return make_shape(self.shape, self.object_radius, self.object_height)
 
+    def rings(self, mesh_height: float, height: float) -> float:
+        """Rings that cross the real object seen from a camera height [m], in a mesh made for `mesh_height` [m]."""
+        return self.model.rings(self.mesh_shape, mesh_height, self.intersections, self.object_shape, height)
+
     def as_json(self) -> str:
-        """The manifest as it stands in the model file."""
+        """The manifest as the model file holds it."""
         data = asdict(self) | {"format_version": FORMAT_VERSION}
         data["self_test"] = self.self_test.as_dict() if self.self_test else None
         return json.dumps(data, sort_keys=True)
@@ -241,12 +204,12 @@ class Manifest:
         except (ValueError, RecursionError) as error:
             raise ModelError(f"the model's manifest is not JSON: {error}") from error
         if not isinstance(data, dict):
-            raise ModelError("the model's manifest is not a table")
+            raise ModelError("the model's manifest is not a JSON object")
         version = data.pop("format_version", None)
         if version != FORMAT_VERSION:
             raise ModelError(
-                f"the model's manifest has format version {version!r}, this release reads {FORMAT_VERSION}: "
-                "make the file again with the tools of this release"
+                f"the model's manifest has format version {version!r}, this release reads version {FORMAT_VERSION}: "
+                "export the model again with this release"
             )
         known = [each.name for each in fields(cls)]
         for key in data:

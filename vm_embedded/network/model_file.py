@@ -1,7 +1,7 @@
-"""Reading a model file without trusting it: its manifest, and whether it points outside of itself.
+"""Reads a model file without trusting it: finds its manifest, and refuses references to other files.
 
-ONNX Runtime would follow a tensor's path to another file, so that is looked for in the bytes before it gets them. An
-.onnx file is one Protocol Buffers message; the walk below knows the wire format and the few fields that matter here.
+ONNX Runtime would follow a tensor's path to another file, so this module looks for such paths first. An .onnx file is
+one Protocol Buffers message; the walk below knows the wire format and the few fields that matter here.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 from ..errors import ModelError
 from .manifest import METADATA_KEY, Manifest
 
-# Which fields of a message lead to further messages, by the numbers of onnx.proto: where tensors can hide.
+# Fields of a message that hold further messages, by the numbers of onnx.proto: every place that can hold a tensor.
 _INNER: dict[str, dict[int, str]] = {
     "Model": {7: "Graph", 20: "Training", 25: "Function"},
     "Training": {1: "Graph", 2: "Graph"},
@@ -43,8 +43,8 @@ class ModelFile:
 def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
     """Read and check a model file.
 
-    Raises ModelError if it is missing, larger than `max_mib` [MiB], no ONNX file, refers to external data, or has no
-    manifest of this format.
+    Raises ModelError if it is missing, larger than `max_mib` [MiB], not an ONNX file, refers to external data, or lacks
+    a manifest of this format.
     """
     path = Path(path)
     try:
@@ -65,7 +65,7 @@ def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
 
 
 def _metadata(content: bytes) -> dict[str, str]:
-    """The metadata of an ONNX file. Raises ModelError if it is none or refers to external data."""
+    """The metadata of an ONNX file. Raises ModelError for other files and for references to external data."""
     metadata: dict[str, str] = {}
     graphs = 0
     for number, value in _fields(memoryview(content)):
@@ -95,7 +95,7 @@ def _fields(data: memoryview) -> Iterator[tuple[int, int | memoryview]]:
     position = 0
     while position < len(data):
         tag, position = _varint(data, position)
-        if tag >> 32:  # other readers would cut it down to another field's number
+        if tag >> 32:  # other readers would truncate it to another field's number
             raise ModelError("not an ONNX file")
         number, wire = tag >> 3, tag & 7
         if wire == 0:

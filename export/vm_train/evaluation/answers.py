@@ -1,50 +1,47 @@
-"""A network's answers on pictures: those of a checkpoint and of a model file alike, or what a robot would get.
+"""A network's answers on pictures, from a checkpoint, a model file, or a detector as it runs on a robot.
 
-Checkpoints and model files are asked at the same points, those of the mesh at a picture's own pose, which are also
-those of the training. A robot shares meshes between poses that are near each other, so its points differ.
+A checkpoint and a model file classify the same points as the training: those of the mesh at the picture's own pose. A
+robot shares meshes between similar poses, so its points differ.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from vm_embedded.arrays import Floats, Singles
+from vm_embedded.arrays import Floats, Mask, Singles
 from vm_embedded.detection.detections import Detection
 from vm_embedded.detection.detector import Detector
-from vm_embedded.detection.objects import Scene, find_objects
+from vm_embedded.detection.objects import locate
+from vm_embedded.detection.observation import Network, Observation, classify
+from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.detection.projection import Projection
 from vm_embedded.detection.settings import Settings
+from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.orientation import Orientation, rotation_z
-from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.layout import Layout
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import read_model
-from vm_embedded.network.plain_layout import PlainLayout
 from vm_embedded.network.session import Session
 from vm_export.grid import VISUAL, Grid
 
 from ..data.pictures import Picture
-from ..graphs.labeled_graph import OFF_SCREEN, color, plane_distances, seen_points
+from ..graphs.labeled_graph import levels_for, plane_distances, seen_points
 
 if TYPE_CHECKING:
     from vm_export.checkpoint import Checkpoint
 
-Network = Callable[[Mesh, Singles], Singles]
-"""Probabilities (n, C) of a mesh's points from their colors (n, 3)."""
-
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a network says of a picture: pixels (n, 2), distances (n,) on the plane [m] and probabilities (n, C) of its
-    points, and the objects that it found, most confident first."""
+    """The answer to a picture: pixels (n, 2), distances (n,) on the plane [m] and probabilities (n, C) of its points,
+    and the objects found, most confident first."""
 
     pixels: Floats
     distances: Floats
@@ -53,7 +50,7 @@ class Answer:
 
 
 class Subject(Protocol):
-    """What is evaluated. sha256: of the file that it was read from."""
+    """A network to evaluate. sha256: of its file."""
 
     @property
     def manifest(self) -> Manifest: ...
@@ -63,7 +60,7 @@ class Subject(Protocol):
     def sha256(self) -> str: ...
 
     def answer(self, picture: Picture, radius: float | None = None) -> Answer:
-        """What it says of a picture. radius [m]: of the objects that mesh and fit are for, if not the manifest's.
+        """Its answer to a picture. radius [m]: of the objects, for mesh and fit, if not the manifest's.
 
         Raises GeometryError if the camera is too low for a mesh, and InputError for a lens that does not fit.
         """
@@ -71,7 +68,7 @@ class Subject(Protocol):
 
 @dataclass(eq=False)
 class Exact:
-    """A network at the points of a picture's own mesh."""
+    """A network at the points of each picture's own mesh."""
 
     manifest: Manifest
     grid: Grid
@@ -80,22 +77,24 @@ class Exact:
     network: Network
 
     def answer(self, picture: Picture, radius: float | None = None) -> Answer:
+        observation = self.observe(picture, radius)
+        found: tuple[Detection, ...] = ()
+        if self.grid.kind == VISUAL.kind:
+            found, _ = locate(observation, self.settings)
+        return _answer(observation, found)
+
+    def observe(self, picture: Picture, radius: float | None = None) -> Observation:
+        """The points of a picture with their probabilities; see `Subject.answer`."""
         manifest = self.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         if radius is not None:
             manifest = replace(manifest, radius=radius, object_radius=radius)
         height, width = picture.labels.shape
-        orientation = _orientation(picture)
         shown = seen_points(picture.lens, (width, height), manifest, self.grid)
-        colors = np.empty((len(shown), 3), dtype=np.float32)
-        color(picture, shown, manifest, self.grid, self.settings.sampling, colors)
-        probabilities = np.zeros((0, len(manifest.classes)), dtype=np.float32)
-        if len(shown):
-            probabilities = self.network(shown.graph, colors)
-        found: tuple[Detection, ...] = ()
-        if self.grid.kind == VISUAL.kind:
-            scene = scene_of(picture, shown, manifest)
-            found, _ = find_objects(scene, manifest.classes, probabilities, self.settings)
-        return Answer(shown.pixels, plane_distances(shown.graph.rays, orientation.height), probabilities, found)
+        layout = choose_layout(shown.graph, manifest)
+        pixels = np.append(shown.pixels, np.full((1, 2), np.nan), axis=0)[layout.slots]
+        projected = Projection(layout, pixels, layout.slots < len(shown))
+        view = _view(picture, layout, manifest, self.grid)
+        return classify(picture.image, view, projected, manifest, self.network, self.settings, Stopwatch())
 
 
 @dataclass(eq=False)
@@ -112,83 +111,76 @@ class Robot:
 
     def answer(self, picture: Picture, radius: float | None = None) -> Answer:
         assert radius is None  # a robot's network is for balls of one size
-        orientation = _orientation(picture)
-        seen = self.detector.detect(picture.image, orientation, picture.lens.lens)
-        return Answer(seen.pixels, plane_distances(seen.rays, orientation.height), seen.probabilities, seen.objects)
+        seen = self.detector.detect(picture.image, _orientation(picture), picture.lens.lens)
+        return _answer(seen.observation, seen.objects)
+
+
+def _answer(observation: Observation, found: tuple[Detection, ...]) -> Answer:
+    distances = plane_distances(observation.rays, observation.view.height)
+    return Answer(observation.pixels, distances, observation.probabilities, found)
+
+
+def _view(picture: Picture, layout: Layout, manifest: Manifest, grid: Grid) -> PreparedView:
+    """The view of a picture with a mesh for its own height."""
+    height, width = picture.labels.shape
+    orientation = _orientation(picture)
+    return PreparedView(
+        layout=layout,
+        levels=levels_for(picture, layout.rays, manifest, grid),
+        shape=manifest.object_shape,
+        rings=manifest.rings(orientation.height, orientation.height),
+        height=orientation.height,
+        rotation=orientation.level,
+        heading=rotation_z(orientation.yaw),
+        lens=picture.lens.lens.for_image((width, height)),
+        size=(width, height),
+    )
 
 
 def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subject:
     """Read a checkpoint (.pt) or a model file (.onnx).
 
-    Raises InputError or ModelError for a file that is neither, or for a checkpoint that is to run as on a robot.
+    as_robot: run it as a robot does; only model files can. Raises InputError or ModelError for other files.
     """
     kind = path.suffix.lower()
     if kind == ".onnx":
         model = read_model(path)
         if as_robot:
             return Robot(Detector(model, settings), model.sha256)
-        return Exact(model.manifest, VISUAL, model.sha256, settings, _of_session(Session(model, settings)))
+        session = Session(model, settings.threads, settings.spinning)
+        return Exact(model.manifest, VISUAL, model.sha256, settings, session)
     if kind != ".pt":
-        raise InputError(f"{path}: a model is a checkpoint (.pt) or a model file (.onnx)")
+        raise InputError(f"{path}: a model must be a checkpoint (.pt) or a model file (.onnx), not {path.suffix!r}")
     if as_robot:
-        raise InputError(f"{path}: a robot has no checkpoints; write a model file with vm-export first")
-    from vm_export.checkpoint import Checkpoint  # torch takes a second to load, and model files do without it
+        raise InputError(f"{path}: a robot runs model files, not checkpoints; export it with vm-export first")
+    from vm_export.checkpoint import Checkpoint  # torch takes a second to load, and model files don't need it
 
     checkpoint = Checkpoint.load(path)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    return Exact(checkpoint.manifest, checkpoint.grid, digest, settings, _of_checkpoint(checkpoint))
+    manifest = replace(checkpoint.manifest, layout="plain")
+    return Exact(manifest, checkpoint.grid, digest, settings, TorchNetwork(checkpoint))
 
 
-def _of_session(session: Session) -> Network:
-    def run(mesh: Mesh, colors: Singles) -> Singles:
-        layout = choose_layout(mesh, session.model.manifest)
-        return session.run(layout, _colored(layout, colors), layout.slots < len(mesh))[layout.places]
+class TorchNetwork:
+    """A checkpoint's network on one thread of torch."""
 
-    return run
+    def __init__(self, checkpoint: Checkpoint) -> None:
+        import torch
 
+        torch.set_num_threads(1)
+        self._network = checkpoint.network
 
-def _of_checkpoint(checkpoint: Checkpoint) -> Network:
-    import torch
+    def run(self, layout: Layout, points: Singles, on_screen: Mask) -> Singles:
+        """Probabilities (m, C) of the slots of a plain layout, from its colored `points`."""
+        import torch
 
-    torch.set_num_threads(1)
-
-    def run(mesh: Mesh, colors: Singles) -> Singles:
-        layout = PlainLayout(mesh, checkpoint.manifest.edge)
-        feeds = layout.feeds(_colored(layout, colors), np.ones(len(mesh), dtype=bool))
+        feeds = layout.feeds(points, on_screen)
         with torch.inference_mode():
-            output = checkpoint.network(torch.from_numpy(feeds["points"]), torch.from_numpy(feeds["neighbors"]))
-        return np.asarray(output[:-1].numpy())
-
-    return run
-
-
-def _colored(layout: Layout, colors: Singles) -> Singles:
-    """A layout's points with the colors (n, 3) of its mesh."""
-    points = layout.points()
-    layout.colors(points)[:] = np.append(colors, np.full((1, 3), OFF_SCREEN, dtype=np.float32), axis=0)[layout.slots]
-    return points
+            output = self._network(torch.from_numpy(feeds["points"]), torch.from_numpy(feeds["neighbors"]))
+        return layout.answers(output.numpy())
 
 
 def _orientation(picture: Picture) -> Orientation:
     orientation = picture.lens.orientation
-    assert orientation is not None  # read_picture has seen to it
+    assert orientation is not None  # read_picture refuses pictures without
     return orientation
-
-
-def scene_of(picture: Picture, shown: Projection[Mesh], manifest: Manifest) -> Scene:
-    """Where objects are sought among the points of a picture's own mesh."""
-    height, width = picture.labels.shape
-    orientation = _orientation(picture)
-    shape = manifest.object_shape
-    above = orientation.height
-    return Scene(
-        shape=shape,
-        height=above,
-        rotation=orientation.level,
-        heading=rotation_z(orientation.yaw),
-        lens=picture.lens.lens.for_image((width, height)),
-        size=(width, height),
-        projected=shown,
-        order=np.arange(len(shown), dtype=np.int32),
-        rings=manifest.model.rings(manifest.mesh_shape, above, manifest.intersections, shape, above),
-    )

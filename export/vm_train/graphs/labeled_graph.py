@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Indices, Singles
-from vm_embedded.detection.color_normalization import make_relative
-from vm_embedded.detection.footprint import alike, levels_of
+from vm_embedded.detection.color_normalization import normalize_colors
+from vm_embedded.detection.footprint import Levels, footprint_levels, uniform_levels
 from vm_embedded.detection.projection import Projection, along, project
 from vm_embedded.detection.sampling import sample
 from vm_embedded.geometry.lens import Lens, Size
@@ -119,29 +119,25 @@ def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> Label
     height, width = picture.labels.shape
     shown = seen_points(picture.lens, (width, height), manifest, grid)
     points = np.full((len(shown) + 1, 3), OFF_SCREEN, dtype=np.float32)
-    color(picture, shown, manifest, grid, "exact", points[:-1])
+    levels = levels_for(picture, shown.graph.rays, manifest, grid)
+    sample(picture.image, shown.pixels, "bgr", "exact", points[:-1], levels)
+    normalize_colors(points[:-1], manifest.colors)
     x, y = np.rint(shown.pixels).astype(np.intp).T
     assert picture.lens.orientation is not None
     distances = plane_distances(shown.graph.rays, picture.lens.orientation.height)
     return LabeledGraph(points, shown.graph.neighbors, picture.labels[y, x], distances, shown.pixels)
 
 
-def color(
-    picture: Picture, shown: Projection[Mesh], manifest: Manifest, grid: Grid, sampling: str, out: Singles
-) -> None:
-    """Write the colors of a picture's points (n, 3) as a network with this manifest takes them."""
-    levels = None
-    if manifest.sampling == "footprint":
-        height, width = picture.labels.shape
-        if grid.kind == "visual":
-            assert picture.lens.orientation is not None
-            above, scale = picture.lens.orientation.height, picture.lens.lens.for_image((width, height)).scale
-            levels = levels_of(shown.graph.rays, manifest.mesh_shape, above, manifest.intersections, scale)
-        else:
-            levels = alike(len(shown), math.sqrt(height * width / max(len(shown), 1)))
-    sample(picture.image, shown.pixels, "bgr", sampling, out, levels)
-    if manifest.colors == "relative":
-        make_relative(out)
+def levels_for(picture: Picture, rays: Floats, manifest: Manifest, grid: Grid) -> Levels | None:
+    """The points with rays (n, 3) that each halved picture colors, or None if the network samples single pixels."""
+    height, width = picture.labels.shape
+    if grid.kind == VISUAL.kind:
+        assert picture.lens.orientation is not None
+        lens = picture.lens.lens.for_image((width, height))
+        return footprint_levels(manifest, rays, picture.lens.orientation.height, lens)
+    if manifest.sampling == "bilinear":
+        return None
+    return uniform_levels(len(rays), math.sqrt(height * width / max(len(rays), 1)))
 
 
 def plane_distances(rays: Floats, height: float) -> Floats:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from torch.utils.data import DataLoader, Dataset
 
-from vm_embedded.detection.color_normalization import make_relative
+from vm_embedded.detection.color_normalization import normalize_colors
 from vm_embedded.errors import GeometryError, InputError, VisualMeshError
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
@@ -69,8 +69,7 @@ class GraphRecipe:
         """A window of a view with other colors, or what the first network passes on of it."""
         objects = [at for at, each in enumerate(self.manifest.classes) if each.kind == "object"]
         colors = perturb_colors(graph.points[:-1], self.augmentation, random)
-        if self.manifest.colors == "relative":
-            make_relative(colors)
+        normalize_colors(colors, self.manifest.colors)
         told = replace(graph, points=np.concatenate([colors, graph.points[-1:]]))
         seen = random_window(told, self.window, objects, random)
         if self.mirrored and random.random() < self.mirrored:  # where it is off, nothing more is drawn

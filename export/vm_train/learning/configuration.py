@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from vm_embedded.config.entries import check_entries, number, one_of, share
-from vm_embedded.detection.color_normalization import COLORINGS
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
-from vm_embedded.network.manifest import KINDS, POINT_SAMPLINGS, Manifest, ObjectClass
+from vm_embedded.network.manifest import KINDS, POINT_COLORS, POINT_SAMPLINGS, Manifest, ObjectClass
 from vm_export.grid import GRIDS, Grid
 from vm_export.network_shape import ACTIVATIONS, NetworkShape
 from vm_synth.dataset.files import COLORS
@@ -124,7 +123,7 @@ class MeshSettings:
         "as it stands for",
     )
     colors: str = one_of(
-        COLORINGS,
+        POINT_COLORS,
         "absolute",
         "colors that the network takes: absolute, or relative to the mean and the deviation of all points of a picture",
     )

@@ -13,6 +13,7 @@ from vm_embedded import read_lens_file
 from vm_embedded.live.configuration import read_configuration
 from vm_embedded.network.model_file import read_model
 
+STAGES = ("mesh", "project", "sample", "infer", "cluster")
 COMMAND = Path(sys.executable).with_name("vm-bench")
 
 

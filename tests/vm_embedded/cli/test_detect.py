@@ -184,7 +184,7 @@ def test_raw_frames_are_read_in_their_format(tmp_path, lens):
     (line,) = lines(detect(tmp_path / "raw.png", *pose, "--format", "bayer_rggb", "--save-overlay", tmp_path))
     assert line["points"] > 0
     one_complaint(detect(tmp_path / "raw.png", *pose, "--format", "rgba", code=1), "rgba", "bayer_rggb")
-    one_complaint(detect(IMAGES[0], "--format", "grey", code=1), "grey image must be of shape")
+    one_complaint(detect(IMAGES[0], "--format", "gray", code=1), "gray image must have the shape")
 
 
 def one_complaint(done, *parts):

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from vm_embedded import Orientation
 from vm_embedded.cli.workload import draw_empty_field, walk
-from vm_embedded.detection.sampling import FORMATS, checked_image
+from vm_embedded.detection.pixel_formats import FORMATS, checked_image
 
 
 @given(st.floats(0.0, 0.3), st.floats(0.0, 0.1))

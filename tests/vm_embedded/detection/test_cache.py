@@ -39,7 +39,7 @@ def assert_same_as_without(cache, orientation, lens, size):
     slots, places = view.layout.slots, view.layout.places
     prepared = project(view.layout, view.rotation, lens, size)
     shown = places[prepared.on_screen[places]]
-    whole = project(built(cache, view.mesh_height), view.rotation, lens, size).visible
+    whole = project(built(cache, cache.mesh_height(orientation.height)), view.rotation, lens, size).visible
     np.testing.assert_array_equal(view.layout.rays[shown], whole.graph.rays)
     np.testing.assert_array_equal(prepared.pixels[shown], whole.pixels)
     rank = np.full(len(view.layout) + 1, len(shown))
@@ -146,7 +146,7 @@ def test_heights_share_few_meshes(tolerance, seed):
 def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(layout, orientation):
     cache = MeshCache(manifest(layout=layout), Settings(height_tolerance=0.0))
     view = cache.view(orientation, LENS, SIZE)
-    assert view.mesh_height == orientation.height
+    assert cache.mesh_height(orientation.height) == orientation.height
     np.testing.assert_array_equal(view.rotation, orientation.rotation)
     np.testing.assert_array_equal(view.heading, np.eye(3))
     assert_same_as_without(cache, orientation, LENS, SIZE)
@@ -197,7 +197,7 @@ def test_a_hit_gives_the_same_layout(layout):
 def test_nbytes_is_what_is_held(layout):
     cache = MeshCache(manifest(layout=layout), Settings())
     first = cache.view(Orientation.from_roll_pitch(0.8, pitch=0.4), LENS, SIZE)
-    whole = built(cache, first.mesh_height)
+    whole = built(cache, cache.mesh_height(0.8))
     assert cache.nbytes == whole.nbytes + first.layout.nbytes
     second = cache.view(Orientation.from_roll_pitch(0.8, pitch=1.2), LENS, SIZE)
     assert cache.nbytes == whole.nbytes + first.layout.nbytes + second.layout.nbytes

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.detection.color_normalization import make_relative
+from vm_embedded.detection.color_normalization import normalize_colors
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.lens_files import read_lens_file
@@ -28,15 +28,15 @@ def colors_of(seed, count=200):
 def test_light_and_haze_make_no_difference(seed, gain, haze):
     colors = colors_of(seed)
     other = np.float32(gain) * colors + np.float32(haze)
-    make_relative(colors)
-    make_relative(other)
+    normalize_colors(colors, "relative")
+    normalize_colors(other, "relative")
     np.testing.assert_allclose(other, colors, atol=1e-3)
 
 
 @given(seeds)
 def test_they_have_no_mean_and_a_deviation_of_one(seed):
     colors = colors_of(seed)
-    make_relative(colors)
+    normalize_colors(colors, "relative")
     np.testing.assert_allclose(colors.mean(axis=0), 0.0, atol=1e-5)
     np.testing.assert_allclose(colors.std(axis=0), 1.0, atol=1e-4)
 
@@ -50,21 +50,28 @@ def test_only_what_counts_decides_and_its_order_does_not(seed, random):
     random.shuffle(order)
     shuffled = mixed[order]
     alone = colors[:120].copy()
-    make_relative(alone)
-    make_relative(mixed, counted)
-    make_relative(shuffled, counted[order])
+    normalize_colors(alone, "relative")
+    normalize_colors(mixed, "relative", counted)
+    normalize_colors(shuffled, "relative", counted[order])
     np.testing.assert_array_equal(mixed[:120], alone)
     np.testing.assert_array_equal(shuffled, mixed[order])
 
 
 def test_a_picture_of_nothing_keeps_its_noise_small():
     for colors in (np.full((50, 3), 0.3, dtype=np.float32), np.empty((0, 3), dtype=np.float32)):
-        make_relative(colors)
+        normalize_colors(colors, "relative")
         assert np.abs(colors).max(initial=0.0) < 1e-5
     nothing = colors_of(3)
     before = nothing.copy()
-    make_relative(nothing, np.zeros(200, dtype=bool))
+    normalize_colors(nothing, "relative", np.zeros(200, dtype=bool))
     np.testing.assert_array_equal(nothing, before)
+
+
+def test_absolute_colors_stay():
+    colors = colors_of(4)
+    before = colors.copy()
+    normalize_colors(colors, "absolute")
+    np.testing.assert_array_equal(colors, before)
 
 
 @pytest.mark.parametrize("gain", [1.0, 0.5])
@@ -72,7 +79,7 @@ def test_a_robot_gives_its_network_what_a_training_does(gain):
     """All points of a picture at its own pose, in a picture half as bright too."""
     from vm_export.grid import VISUAL
     from vm_train.data.pictures import Picture
-    from vm_train.evaluation.answers import Exact, _of_session
+    from vm_train.evaluation.answers import Exact
 
     model = read_model(DRAWN / "ball.onnx")
     model = replace(model, manifest=replace(model.manifest, colors="relative", self_test=None))
@@ -83,7 +90,7 @@ def test_a_robot_gives_its_network_what_a_training_does(gain):
     detector = Detector(model, Settings(height_tolerance=0.0))
     robot = detector.detect(image, lens.orientation, lens.lens)
     labels = np.zeros(image.shape[:2], dtype=np.int8)
-    training = Exact(model.manifest, VISUAL, "", Settings(), _of_session(detector.session))
+    training = Exact(model.manifest, VISUAL, "", Settings(), detector.session)
     answer = training.answer(Picture(image, labels, lens))
     assert len(answer.pixels) == len(robot.pixels) > 500
     ours, theirs = (

@@ -55,7 +55,9 @@ def without_bucket(detector, image, orientation, lens):
 
     def whole(orientation, lens, size):
         view = prepared(orientation, lens, size)
-        return replace(view, layout=choose_layout(fresh.cache._build(view.mesh_height), fresh.manifest))
+        return replace(
+            view, layout=choose_layout(fresh.cache._build(fresh.cache.mesh_height(orientation.height)), fresh.manifest)
+        )
 
     fresh.cache.view = whole
     return fresh.detect(image, orientation, lens)

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.detection.footprint import alike, levels_of
-from vm_embedded.detection.sampling import SAMPLINGS, checked_image, sample
+from vm_embedded.detection.footprint import levels_of, uniform_levels
+from vm_embedded.detection.pixel_formats import checked_image
+from vm_embedded.detection.sampling import SAMPLINGS, sample
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import build_mesh
 
@@ -36,9 +37,9 @@ def test_gaps_have_a_level_too():
 
 
 def test_points_that_are_alike_have_one_level():
-    levels = alike(5, 9.0)
+    levels = uniform_levels(5, 9.0)
     assert [len(each) for each in levels] == [0, 0, 0, 5]
-    assert [len(each) for each in alike(5, 0.3)] == [5]
+    assert [len(each) for each in uniform_levels(5, 0.3)] == [5]
 
 
 def colored(image, pixels, levels, sampling="exact", format="bgr"):
@@ -67,9 +68,9 @@ def test_a_fine_pattern_becomes_gray(pixels, level):
     assert colored(image, pixels, levels) == pytest.approx(0.5, abs=0.01)
 
 
-@pytest.mark.parametrize("format", ["grey", "bayer_rggb", "bgra"])
+@pytest.mark.parametrize("format", ["gray", "bayer_rggb", "bgra"])
 def test_every_format_has_levels(format):
-    shape = {"grey": (64, 64), "bayer_rggb": (64, 64), "bgra": (64, 64, 4)}[format]
+    shape = {"gray": (64, 64), "bayer_rggb": (64, 64), "bgra": (64, 64, 4)}[format]
     image = np.full(shape, 100, dtype=np.uint8)
     pixels = np.array([[20.0, 30.0], [40.0, 50.0]])
     found = colored(image, pixels, (np.array([0]), np.empty(0, np.intp), np.array([1])), format=format)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vm_embedded import GROUND, Detector, InputError, Plane, Pose, Sighting, View, detect_views, read_lens_file
+from vm_embedded import GROUND, CameraView, Detector, InputError, Plane, Pose, Sighting, detect_views, read_lens_file
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection import multi_view as views
 from vm_embedded.geometry.orientation import rotation_z
@@ -29,7 +29,7 @@ def view(index, turn=None, shift=(0.0, 0.0, 0.0)):
     """A drawn frame, in a world that was turned and shifted."""
     image, lens, orientation = frame(index)
     turn = np.eye(3) if turn is None else turn
-    return View(image, lens, Pose(turn @ orientation.rotation, turn @ (0.0, 0.0, orientation.height) + shift))
+    return CameraView(image, lens, Pose(turn @ orientation.rotation, turn @ (0.0, 0.0, orientation.height) + shift))
 
 
 @pytest.mark.parametrize("index", range(6))

@@ -8,7 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vm_embedded.detection.objects import Scene, find_objects
+from tests.manifests import ball_manifest
+from vm_embedded.detection.objects import locate
+from vm_embedded.detection.observation import Observation
+from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.detection.projection import Projection, project, to_camera
 from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.circle import Circle
@@ -16,22 +19,33 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import build_mesh
-from vm_embedded.network.manifest import ObjectClass
+from vm_embedded.network.layout import PlainLayout
 
 SIZE = (1280, 1024)
 K = 5.0
-BALL = (ObjectClass("ball", "object"),)
+BALLS = ball_manifest(radius=0.08, object_radius=0.08, intersections=K)
 
 
 def scene_at(height=0.9, pitch=0.6, shape=None, mesh_shape=None, lens=None):
+    """An observation of a field, whose points have no probabilities yet."""
     shape = shape or Sphere(0.08)
     mesh_shape = mesh_shape or shape
     lens = lens or Equisolid(focal_length=500.0, fov=2.6)
     orientation = Orientation.from_roll_pitch(height, 0.05, pitch)
-    projected = project(build_mesh(mesh_shape, height, K, 8.0), orientation.level, lens, SIZE)
+    layout = PlainLayout(build_mesh(mesh_shape, height, K, 8.0), "hard")
     rings = K * float(shape.spacing(height) / mesh_shape.spacing(height))
-    order = np.arange(len(projected), dtype=np.int32)
-    return Scene(shape, height, orientation.level, np.eye(3), lens, SIZE, projected, order, rings)
+    view = PreparedView(layout, None, shape, rings, height, orientation.level, np.eye(3), lens, SIZE)
+    projected = project(layout, orientation.level, lens, SIZE)
+    return Observation(view, BALLS, projected, np.zeros((len(layout), 1), dtype=np.float32))
+
+
+def reordered(scene, order):
+    """The same observation of the points `order`, in that order; those at the same place sum in the same order."""
+    mesh = build_mesh(scene.view.shape, scene.view.height, K, 8.0)
+    layout = PlainLayout(mesh.part(order), "hard")
+    layout.slots = order.astype(np.int32)
+    projected = Projection(layout, scene.projected.pixels[order], scene.projected.on_screen[order])
+    return replace(scene, view=replace(scene.view, layout=layout), projected=projected)
 
 
 def ideal(scene, *spots, radius=None):
@@ -39,12 +53,12 @@ def ideal(scene, *spots, radius=None):
 
     What is off screen has any answer, and none at all.
     """
-    shape = type(scene.shape)(radius) if radius else scene.shape
+    shape = type(scene.view.shape)(radius) if radius else scene.view.shape
     rays = scene.projected.graph.rays
     inside = np.zeros(len(rays), dtype=bool)
     for spot in spots:
-        center = np.array([[*spot, shape.center_height - scene.height]])
-        inside |= shape.offset(rays, center, scene.height)[0] < 1.0
+        center = np.array([[*spot, shape.center_height - scene.view.height]])
+        inside |= shape.offset(rays, center, scene.view.height)[0] < 1.0
     seen = np.where(inside, 0.97, 0.02)
     nonsense = np.resize([0.97, np.nan, 0.99, 0.0], len(rays))
     return np.where(scene.projected.on_screen, seen, nonsense).astype(np.float32)
@@ -56,7 +70,7 @@ def lowest_of(scene):
 
 
 def objects_in(scene, probability, **settings):
-    return find_objects(scene, BALL, probability[:, None], Settings(**settings), explain=True)
+    return locate(replace(scene, slot_probabilities=probability[:, None]), Settings(**settings), explain=True)
 
 
 @given(distance=st.floats(0.6, 6.0), heading=st.floats(-0.4, 0.4), height=st.floats(0.5, 1.3))
@@ -66,14 +80,14 @@ def test_a_ball_is_found_where_it_is(distance, heading, height):
     found, rejected = objects_in(scene, ideal(scene, spot))
     assert len(found) == 1, [each.reason for each in rejected]
     ball = found[0]
-    away = float(np.hypot(distance, height - scene.shape.radius))
+    away = float(np.hypot(distance, height - scene.view.shape.radius))
     assert ball.distance == pytest.approx(away, rel=0.05)
-    center = np.array([[*spot, scene.shape.radius - height]])
-    assert scene.shape.offset(ball.bearing[None], center, height)[0, 0] < 0.35
+    center = np.array([[*spot, scene.view.shape.radius - height]])
+    assert scene.view.shape.offset(ball.bearing[None], center, height)[0, 0] < 0.35
     np.testing.assert_allclose(ball.position, ball.bearing * ball.distance + [0, 0, height], atol=1e-9)
-    assert ball.position[2] == pytest.approx(scene.shape.radius)
+    assert ball.position[2] == pytest.approx(scene.view.shape.radius)
     assert ball.distances_agree
-    assert np.sin(ball.angular_radius) == pytest.approx(scene.shape.radius / away, rel=2.0 / K)
+    assert np.sin(ball.angular_radius) == pytest.approx(scene.view.shape.radius / away, rel=2.0 / K)
     assert ball.confidence > 0.8
 
 
@@ -98,8 +112,8 @@ def test_pixels_are_those_of_the_outline():
     scene = scene_at(0.9, pitch=0.5, lens=Rectilinear(focal_length=700.0, fov=2.0))
     found, _ = objects_in(scene, ideal(scene, (1.6, 0.2)))
     ball = found[0]
-    center = to_camera(ball.bearing[None], scene.rotation)
-    assert np.linalg.norm(scene.lens.project(center, SIZE)[0] - ball.center) < 2.0
+    center = to_camera(ball.bearing[None], scene.view.rotation)
+    assert np.linalg.norm(scene.view.lens.project(center, SIZE)[0] - ball.center) < 2.0
     reach = np.linalg.norm(ball.outline - ball.center, axis=1)
     assert reach.min() <= ball.radius <= reach.max()
 
@@ -107,10 +121,10 @@ def test_pixels_are_those_of_the_outline():
 def test_an_object_that_the_border_cuts_keeps_its_center():
     scene = scene_at(0.9, pitch=0.5)
     border = scene.projected.graph.rays[lowest_of(scene)]
-    spot = scene.shape.center_along(border[None], scene.height)[0, :2]
+    spot = scene.view.shape.center_along(border[None], scene.view.height)[0, :2]
     found, _ = objects_in(scene, ideal(scene, spot))
     assert len(found) == 1
-    assert np.linalg.norm(found[0].position[:2] - spot) < 0.5 * scene.shape.radius
+    assert np.linalg.norm(found[0].position[:2] - spot) < 0.5 * scene.view.shape.radius
 
 
 def test_two_objects_are_two():
@@ -164,13 +178,14 @@ def test_noise_never_breaks_the_search(seed, share):
 
 def test_reasons_are_only_collected_when_asked_for():
     scene = scene_at()
-    _, rejected = find_objects(scene, BALL, ideal(scene, (1.3, 0.0), radius=0.3)[:, None], Settings())
+    observation = replace(scene, slot_probabilities=ideal(scene, (1.3, 0.0), radius=0.3)[:, None])
+    _, rejected = locate(observation, Settings())
     assert rejected == ()
 
 
 def test_a_larger_object_radius_is_an_object_of_more_rings():
     scene = scene_at(shape=Sphere(0.12), mesh_shape=Sphere(0.08))
-    assert scene.rings > K * 1.4
+    assert scene.view.rings > K * 1.4
     found, _ = objects_in(scene, ideal(scene, (1.5, 0.1)))
     assert len(found) == 1
     assert found[0].position[2] == pytest.approx(0.12)
@@ -185,11 +200,8 @@ def test_how_the_mesh_lies_in_memory_changes_no_digit(seed, noise):
     probability = ideal(scene, *spots)
     probability = np.where(random.random(len(probability)) < noise, random.random(len(probability)), probability)
     order = random.permutation(len(probability))
-    seen = scene.projected
-    moved = Projection(seen.graph.part(order), seen.pixels[order], seen.on_screen[order])
-    shuffled = replace(scene, projected=moved, order=order.astype(np.int32))
     plain = objects_in(scene, probability)
-    other = objects_in(shuffled, probability[order])
+    other = objects_in(reordered(scene, order), probability[order])
     for before, after in zip(plain, other, strict=True):
         assert [each.as_dict() for each in before] == [each.as_dict() for each in after]
 
@@ -200,11 +212,10 @@ def test_what_is_off_screen_changes_nothing(seed):
     """Neither its probabilities nor whether the mesh has it at all."""
     random = np.random.default_rng(seed)
     scene = scene_at(0.9, pitch=random.uniform(0.3, 1.2))
-    spot = scene.shape.center_along(scene.projected.graph.rays[[lowest_of(scene)]], scene.height)[0, :2]
+    spot = scene.view.shape.center_along(scene.projected.graph.rays[[lowest_of(scene)]], scene.view.height)[0, :2]
     probability = ideal(scene, spot, (1.2, 0.3))
     shown = np.flatnonzero(scene.projected.on_screen)
-    visible = replace(scene, projected=scene.projected.visible, order=np.arange(len(shown), dtype=np.int32))
-    with_it, without_it = objects_in(scene, probability), objects_in(visible, probability[shown])
+    with_it, without_it = objects_in(scene, probability), objects_in(reordered(scene, shown), probability[shown])
     assert len(with_it[0]) == 2
     for one, other in zip(with_it, without_it, strict=True):
         assert [each.as_dict() for each in one] == [each.as_dict() for each in other]

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.detection.sampling import FORMATS, SAMPLINGS, checked_image, sample
+from vm_embedded.detection.pixel_formats import FORMATS, checked_image
+from vm_embedded.detection.sampling import SAMPLINGS, sample
 from vm_embedded.errors import InputError
 
 from ..strategies import seeds
@@ -64,7 +65,7 @@ def test_exact_sampling_of_grey_is_bilinear_and_the_same_in_all_colors(shape, se
     random = np.random.default_rng(seed)
     image = noise(random, *shape, 1)
     pixels = pixels_in(random, 20, *shape)
-    values = sampled(image, pixels, "grey", "exact")
+    values = sampled(image, pixels, "gray", "exact")
     np.testing.assert_allclose(values, np.repeat(bilinear(image, pixels) / 255.0, 3, axis=1), atol=1e-5)
 
 
@@ -79,7 +80,7 @@ def test_whole_pixels_are_read_as_they_are(sampling, shape, seed):
     np.testing.assert_allclose(sampled(image, pixels, "rgb", sampling), expected, atol=1e-7)
 
 
-@given(shapes, st.sampled_from(["rgb", "grey"]), st.integers(0, 600), seeds)
+@given(shapes, st.sampled_from(["rgb", "gray"]), st.integers(0, 600), seeds)
 def test_fast_sampling_is_off_by_a_grey_level_and_a_32nd_pixel_at_most(shape, format, count, seed):
     random = np.random.default_rng(seed)
     image = noise(random, *shape, 3 if format == "rgb" else 1)
@@ -126,7 +127,7 @@ def test_a_grey_scene_looks_grey_in_every_format(sampling, shape, seed):
     pixels = pixels_in(random, 20, *shape)
     expected = sampled(np.repeat(grey, 3, axis=2), pixels, "rgb", sampling)
     for image in (grey, grey[:, :, 0]):
-        np.testing.assert_array_equal(sampled(image, pixels, "grey", sampling), expected)
+        np.testing.assert_array_equal(sampled(image, pixels, "gray", sampling), expected)
 
 
 def mosaic(rgb, format):
@@ -263,9 +264,9 @@ def test_what_is_no_array_is_refused_by_type(image):
         ("rgb", (8, 8, 4)),
         ("rgba", (8, 8, 3)),
         ("bgra", (8, 8)),
-        ("grey", (8, 8, 3)),
-        ("grey", (8, 8, 2)),
-        ("grey", (8,)),
+        ("gray", (8, 8, 3)),
+        ("gray", (8, 8, 2)),
+        ("gray", (8,)),
         ("bayer_rggb", (8, 8, 3)),
         ("rgb", (2, 8, 8, 3)),
         ("rgb", ()),
@@ -292,4 +293,4 @@ def test_an_unknown_format_names_the_nearest():
 def test_checking_copies_nothing():
     image = np.zeros((8, 9, 3), dtype=np.uint8)
     assert checked_image(image, "rgb") is image
-    assert np.shares_memory(checked_image(image[:, :, :1], "grey"), image)
+    assert np.shares_memory(checked_image(image[:, :, :1], "gray"), image)

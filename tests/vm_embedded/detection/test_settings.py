@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.config.entries import checked
-from vm_embedded.detection.sampling import FORMATS, SAMPLINGS
+from vm_embedded.detection.pixel_formats import FORMATS
+from vm_embedded.detection.sampling import SAMPLINGS
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
 
@@ -100,7 +101,7 @@ def test_every_choice_is_accepted(name, value):
 
 @pytest.mark.parametrize(
     ("name", "wrong", "near"),
-    [("format", "gray", "grey"), ("format", "bayer_rgbg", "bayer_rggb"), ("sampling", "fats", "fast")],
+    [("format", "grey", "gray"), ("format", "bayer_rgbg", "bayer_rggb"), ("sampling", "fats", "fast")],
 )
 def test_an_unknown_choice_names_the_nearest(name, wrong, near):
     with pytest.raises(InputError, match=rf"{name} '{wrong}'.*'{near}'"):

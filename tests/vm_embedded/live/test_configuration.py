@@ -149,7 +149,7 @@ WRONG = {
     "step out of range": ("[detector]\npitch_step = 0\n", "pitch_step .*from 0.001 to 1 rad, not 0"),
     "number for a word": ("[detector]\nsampling = 1\n", "sampling 1 .*exact, fast"),
     "word for a switch": ("[detector]\nspinning = 'yes'\n", "spinning must be true or false, not 'yes'"),
-    "unknown format": ("[detector]\nformat = 'gray'\n", "format 'gray'.*'grey'"),
+    "unknown format": ("[detector]\nformat = 'grey'\n", "format 'grey'.*'gray'"),
     "not TOML": ("model = ball.onnx\n", "line 1"),
     "not TOML further down": ("model = 'a'\n\n[detector\n", "line 3"),
     "key twice": ("model = 'a'\nmodel = 'b'\n", "line 2"),

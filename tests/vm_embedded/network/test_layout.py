@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from tests.manifests import ball_manifest
 from vm_embedded.detection.projection import project
-from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
@@ -143,7 +142,7 @@ def answers(session, mesh, colors, on_screen):
 
 def session_of(network, model, layout, **changes):
     manifest = manifest_of(model, layout, network.shape.classes, **changes)
-    return Session(ModelFile(Path(f"{layout}.onnx"), build(network, manifest), manifest, ""), Settings())
+    return Session(ModelFile(Path(f"{layout}.onnx"), build(network, manifest), manifest, ""))
 
 
 def logits_of(probabilities, head):

@@ -13,7 +13,8 @@ from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import MESH_MODELS
-from vm_embedded.network.manifest import EDGES, FORMAT_VERSION, KINDS, LAYOUTS, Manifest, ObjectClass, SelfTest
+from vm_embedded.network.manifest import EDGES, FORMAT_VERSION, KINDS, LAYOUTS, Manifest, ObjectClass
+from vm_embedded.network.self_test import SelfTest
 
 from ..strategies import attempt, reals, seeds
 
@@ -132,7 +133,7 @@ def test_an_unknown_entry_names_itself_and_the_nearest_known_one():
 
 @pytest.mark.parametrize("version", [0, 1, FORMAT_VERSION + 1, "1", None, 1.5, ..., [1]], ids=str)
 def test_another_version_is_refused_with_both_and_what_to_do(version):
-    with pytest.raises(ModelError, match=rf"version .*reads {FORMAT_VERSION}.*make the file again"):
+    with pytest.raises(ModelError, match=rf"version .*reads {FORMAT_VERSION}.*export the model again"):
         Manifest.from_json(changed(format_version=version))
 
 
@@ -144,7 +145,7 @@ def test_what_is_not_json_is_refused(text):
 
 @pytest.mark.parametrize("text", ["1", "null", "[]", '"ball"', "true"])
 def test_json_that_is_no_table_is_refused(text):
-    with pytest.raises(ModelError, match="not a table"):
+    with pytest.raises(ModelError, match="not a JSON object"):
         Manifest.from_json(text)
 
 

@@ -140,7 +140,7 @@ def test_a_model_without_a_manifest_is_refused(write):
     [
         ("", "not JSON"),
         ("{}", "version"),
-        ("[]", "not a table"),
+        ("[]", "not a JSON object"),
         (MANIFEST.as_json().replace("ring6", "ring5"), "ring5"),
     ],
 )

@@ -111,14 +111,26 @@ def test_a_robot_finds_the_same_balls_with_its_shared_meshes(models):
         assert np.isfinite(answer.distances).all()
 
 
-def by_color(mesh, colors):
-    """Probabilities (n, 4) of a network that knows how pictures are drawn: orange balls, green fields, white lines."""
-    red, green, blue = colors.T
-    answers = np.select([red > 1.4 * blue, green > 1.4 * red, red + green + blue > 1.6], [0, 2, 1], 3)
-    return np.eye(4, dtype=np.float32)[answers]
+class ByColor:
+    """A network that knows how pictures are drawn: orange balls, green fields, white lines."""
+
+    def run(self, layout, points, on_screen):
+        red, green, blue = layout.colors(points).T
+        answers = np.select([red > 1.4 * blue, green > 1.4 * red, red + green + blue > 1.6], [0, 2, 1], 3)
+        return np.eye(4, dtype=np.float32)[answers]
 
 
-KNOWING = Exact(MANIFEST, Grid(), "", SETTINGS, by_color)
+class Always:
+    """A network that gives every point the same answer."""
+
+    def __init__(self, answer):
+        self.answer = np.float32(answer)
+
+    def run(self, layout, points, on_screen):
+        return np.tile(self.answer, (len(layout), 1))
+
+
+KNOWING = Exact(MANIFEST, Grid(), "", SETTINGS, ByColor())
 
 
 def test_a_network_that_sees_colors_is_nearly_perfect_on_drawn_balls(files):
@@ -154,7 +166,7 @@ def test_parts_add_up_in_any_number_of_processes(files):
 
 
 def test_the_largest_missed_and_the_most_confident_false_come_first(files):
-    blind = replace(KNOWING, network=lambda mesh, colors: np.tile(np.float32([0, 0, 1, 0]), (len(mesh), 1)))
+    blind = replace(KNOWING, network=Always([0, 0, 1, 0]))
     result = evaluate_pictures(blind, files, CLASSES, Rules())
     ranks = [each.rank for each in result.worst.missed]
     assert len(ranks) == result.objects["ball"].ranking(0.5).truths
@@ -197,7 +209,7 @@ def test_colors_of_no_class_end_it(tmp_path):
 
 
 def test_answers_that_are_no_probabilities_end_it(files):
-    broken = replace(KNOWING, network=lambda mesh, colors: np.full((len(mesh), 4), np.nan, dtype=np.float32))
+    broken = replace(KNOWING, network=Always(np.full(4, np.nan)))
     with pytest.raises(ModelError, match="0 to 1"):
         evaluate_pictures(broken, files, CLASSES, Rules())
 

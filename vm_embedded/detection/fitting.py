@@ -1,0 +1,55 @@
+"""Where an object fits a candidate best: the paper's best fitting subgraph."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Floats
+from ..geometry.shape import tangents
+from .candidates import Candidate
+from .prepared_view import PreparedView
+
+_GRID = np.stack(np.meshgrid(np.linspace(-1.0, 1.0, 5), np.linspace(-1.0, 1.0, 5)), axis=2).reshape(-1, 2)
+"""Places of one round of the search for a center, in units of the round's reach."""
+
+_REACHES = (1.0, 0.3, 0.1)
+"""Reach of each round, in object radii; upwards and downwards in half heights of an object taller than wide."""
+
+_SCALES = np.geomspace(0.6, 1.8, 15)
+"""Apparent sizes to try, as shares of the expected one."""
+
+
+def fit(view: PreparedView, candidate: Candidate) -> Candidate:
+    """The candidate with the center [m] of the object whose subgraph fits best.
+
+    If points were independent, the likeliest object would have the largest sum of log-odds inside its outline: the best
+    of a grid of places, then of finer grids around it. The outline is half a ring spacing soft, so the sum has no
+    plateaus between points. Points off screen add nothing, so an object that the border cuts gets its true center.
+    """
+    center = candidate.center
+    rays = np.ascontiguousarray(view.layout.rays[candidate.near])
+    for reach in _REACHES:
+        distance = float(np.linalg.norm(center))
+        axis = center / distance
+        across, up = view.shape.radius, max(view.shape.radius, view.shape.center_height)
+        tried = axis + reach / distance * ((_GRID * (across, up)) @ tangents(axis))
+        centers = view.shape.center_along(tried, view.height)
+        inside = _share_inside(view.shape.offset(rays, centers, view.height), view)
+        center = centers[int(np.argmax(inside @ candidate.log_odds))]
+    return replace(candidate, center=center)
+
+
+def best_scale(view: PreparedView, candidate: Candidate, offset: Floats) -> float:
+    """The apparent size that fits best at the candidate's bearing, as a share of the one that the plane predicts.
+
+    offset (p,): of the candidate's points from its center, as `Shape.offset` gives it.
+    """
+    sums = _share_inside(offset / _SCALES[:, None], view) @ candidate.log_odds
+    return float(_SCALES[int(np.argmax(sums))])
+
+
+def _share_inside(offset: Floats, view: PreparedView) -> Floats:
+    """1 for points inside the outline, 0 outside; it falls over half a ring spacing around it."""
+    return np.clip(0.5 + (1.0 - offset) / (0.5 * view.spacing), 0.0, 1.0)

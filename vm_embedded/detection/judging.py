@@ -1,0 +1,62 @@
+"""Whether a fitted candidate is an object: it must be filled, the band around it empty, and no other object there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .candidates import Candidate
+from .prepared_view import PreparedView
+from .settings import Settings
+
+_FARTHEST = 1e5
+"""Distance of objects on the horizon, in camera heights."""
+
+
+def judge(view: PreparedView, candidate: Candidate, accepted: Sequence[Candidate], settings: Settings) -> Candidate:
+    """The candidate, with a reason if its points don't show an object at its center or an accepted one is there."""
+    reason = _misfit(view, candidate, settings) or _repeats(view, candidate, accepted)
+    return replace(candidate, reason=reason)
+
+
+def _misfit(view: PreparedView, candidate: Candidate, settings: Settings) -> str | None:
+    """Why the points do not look like an object at the center, or None.
+
+    Points within a ring spacing of the outline say little: their pixels show both sides, and a ring that grazes the
+    object shows some of it. So the inside ends a quarter of a spacing before the outline. The band around begins three
+    quarters beyond it and is 1.5 spacings wide.
+
+    Less than one object from the nadir the mesh is singular, and up to twice as many points see an object (the paper's
+    second limitation, section "Discussion and Conclusion"). It may seem to cover twice its area there, so the band is
+    farther out by sqrt(2).
+    """
+    center, p = candidate.center, candidate.probabilities
+    if center[2] >= 0.0 or np.linalg.norm(center) > _FARTHEST * view.height:
+        return "on the horizon or above it"
+    offset = view.shape.offset(view.layout.rays[candidate.near], center[None], view.height)[0]
+    whole = math.pi / 4.0 * view.rings**2
+    visible = int((offset < 1.0).sum())
+    if visible < settings.min_visible * whole:
+        return f"{visible} of its points on screen, where a whole object has about {whole:.0f}"
+    inside = p[offset < 1.0 - 0.25 * view.spacing]
+    if len(inside) == 0 or inside.mean() < settings.min_inside:
+        share = inside.mean() if len(inside) else 0.0
+        return f"mean probability inside its outline is {share:.2f}, below {settings.min_inside:g}"
+    inclination = math.atan2(math.hypot(center[0], center[1]), -center[2])
+    apparent = offset / (math.sqrt(2.0) if view.shape.n(inclination, view.height) < 1.0 else 1.0)
+    around = p[(apparent > 1.0 + 0.75 * view.spacing) & (apparent < 1.0 + 2.25 * view.spacing)]
+    if len(around) and around.mean() > settings.max_around:
+        return f"mean probability around its outline is {around.mean():.2f}, above {settings.max_around:g}"
+    return None
+
+
+def _repeats(view: PreparedView, candidate: Candidate, accepted: Sequence[Candidate]) -> str | None:
+    """Why the candidate is an object that was accepted before, whose outline its center is in, or None."""
+    ray = (candidate.center / np.linalg.norm(candidate.center))[None]
+    for other in accepted:
+        if view.shape.offset(ray, other.center[None], view.height)[0, 0] < 1.0:
+            return f"the same object as the one at {np.linalg.norm(other.center):.2f} m"
+    return None

@@ -1,0 +1,106 @@
+"""From a frame to points with probabilities: project, sample, infer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from ..arrays import Floats, Image, Indices, Mask, Singles
+from ..network.layout import Layout
+from ..network.manifest import Manifest
+from .color_normalization import normalize_colors
+from .prepared_view import PreparedView
+from .projection import Projection, project
+from .sampling import sample
+from .settings import Settings
+from .stopwatch import Stopwatch
+
+
+class Network(Protocol):
+    """Anything that gives points their probabilities: a Session, or a network in torch."""
+
+    def run(self, layout: Layout, points: Singles, on_screen: Mask) -> Singles:
+        """Probabilities (m, C) of a layout's slots, from its colored `points` and the slots (m,) on screen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """A frame's n points on screen with their probabilities, before objects are located among them.
+
+    view: what the frame was projected with. manifest: of the network. projected: the slots of the layout, m in all.
+    slot_probabilities (m, C): the network's output; it has no meaning off screen. timing_ms: milliseconds by stage.
+    """
+
+    view: PreparedView
+    manifest: Manifest
+    projected: Projection[Layout]
+    slot_probabilities: Singles
+    timing_ms: Mapping[str, float] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self._shown)
+
+    @property
+    def layout(self) -> Layout:
+        """The network's order of the points."""
+        return self.view.layout
+
+    @cached_property
+    def _shown(self) -> Indices:
+        """Slots (n,) of the points on screen, in the order of the mesh."""
+        places = self.layout.places
+        return places[self.projected.on_screen[places]]
+
+    @cached_property
+    def pixels(self) -> Floats:
+        """Pixels (n, 2) of the points."""
+        return self.projected.pixels[self._shown]
+
+    @cached_property
+    def rays(self) -> Floats:
+        """Unit vectors (n, 3) to the points, in the frame's own observation plane."""
+        return np.asarray(self.layout.rays[self._shown] @ self.view.heading.T)
+
+    @cached_property
+    def probabilities(self) -> Singles:
+        """Probabilities (n, C) of the points, in the order of the manifest's classes."""
+        return self.slot_probabilities[self._shown]
+
+
+def observe(
+    image: Image, view: PreparedView, manifest: Manifest, network: Network, settings: Settings, watch: Stopwatch
+) -> Observation:
+    """Project the view's points into the image and classify them.
+
+    image: as `checked_image` returns it. watch: gets the stages project, sample and infer. Raises ModelError if the
+    network does not run.
+    """
+    projected = project(view.layout, view.rotation, view.lens, view.size)
+    watch.lap("project")
+    return classify(image, view, projected, manifest, network, settings, watch)
+
+
+def classify(
+    image: Image,
+    view: PreparedView,
+    projected: Projection[Layout],
+    manifest: Manifest,
+    network: Network,
+    settings: Settings,
+    watch: Stopwatch,
+) -> Observation:
+    """Sample the image at projected points, and let the network classify them. See `observe`."""
+    layout = view.layout
+    shown = projected.only(layout.original)
+    points = layout.points()
+    colors = layout.colors(points)
+    sample(image, projected.pixels, settings.format, settings.sampling, colors, view.levels)
+    normalize_colors(colors, manifest.colors, shown.on_screen)
+    watch.lap("sample")
+    probabilities = network.run(layout, points, projected.on_screen)
+    watch.lap("infer")
+    return Observation(view, manifest, shown, probabilities, watch.stages)

@@ -1,0 +1,44 @@
+"""All that geometry says about a frame before its pixels are read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..arrays import Floats
+from ..geometry.lens import Lens, Size
+from ..geometry.shape import Shape
+from ..network.layout import Layout
+from .footprint import Levels
+from .projection import to_camera
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedView:
+    """The mesh points that can be on screen, the camera that sees them, and the object that is sought among them.
+
+    layout: the points in the network's order. levels: the picture of the pyramid that each point is sampled from, or
+    None without footprints. shape: of the real object. rings: number of mesh rings that cross it. height: of the
+    camera over the observation plane [m]. rotation (3, 3): camera to mesh frame, in which objects are sought.
+    heading (3, 3): mesh frame to the frame's observation plane, a turn around the vertical. lens, size [px]: of the
+    frame.
+    """
+
+    layout: Layout
+    levels: Levels | None
+    shape: Shape
+    rings: float
+    height: float
+    rotation: Floats
+    heading: Floats
+    lens: Lens
+    size: Size
+
+    @property
+    def spacing(self) -> float:
+        """Distance between two rings, in the units of `Shape.offset`: the object's outline is at 1."""
+        return 2.0 / self.rings
+
+    def pixels(self, rays: Floats) -> Floats:
+        """Pixels (m, 2) of those of the rays (n, 3), in the mesh frame, that the lens sees, on screen or not."""
+        camera = to_camera(rays, self.rotation)
+        return self.lens.project(camera[self.lens.sees(camera)], self.size)
