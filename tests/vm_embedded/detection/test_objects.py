@@ -19,7 +19,7 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import build_mesh
-from vm_embedded.network.layout import PlainLayout
+from vm_embedded.network.plain_layout import PlainLayout
 
 SIZE = (1280, 1024)
 K = 5.0
