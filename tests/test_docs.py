@@ -1,5 +1,7 @@
 """The documentation says what the programs do, is complete, and its links lead somewhere."""
 
+import ast
+import importlib
 import json
 import re
 import shlex
@@ -126,6 +128,25 @@ def test_commands_are_what_the_programs_take(page, docs_script, capsys):
             parser.parse_args(words[1:] if command in parsers else words)
         except SystemExit:
             pytest.fail(f"{name_of(page)}: {line}\n{capsys.readouterr().err}")
+
+
+@every_page
+def test_imports_of_python_examples_resolve(page):
+    for block in re.findall(r"^```python\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL):
+        if page.name == "api.md" and re.match(r"class |\w+\(|GROUND", block):
+            continue  # signatures
+        for node in ast.walk(ast.parse(block)):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("vm_"):
+                module = importlib.import_module(node.module)
+                missing = [each.name for each in node.names if not hasattr(module, each.name)]
+                assert not missing, f"{name_of(page)} imports {missing} from {node.module}"
+
+
+@every_page
+def test_paths_of_the_repository_exist(page):
+    text = page.read_text()
+    for path in re.findall(r"`((?:vm_embedded|export|tests|benchmarks|docs|deploy)/[\w./-]+)`", text):
+        assert (TOP / path).exists(), f"{name_of(page)} names {path}"
 
 
 def shell_lines(page: Path) -> list[str]:
