@@ -90,7 +90,7 @@ def test_show_draws_on_a_picture(tmp_path, capsys):
         (("range", "--lens", LENS, "--size", "640*512"), "640x512"),
         (("compare", "--lens", LENS), "--size"),
         (("compare", "--network", "ball-6x4"), "ball"),
-        (("show", "--intersections", "1e300", "-o", "mesh.png"), "too large"),
+        (("show", "--intersections", "1e300", "-o", "mesh.png"), "at most 8,000,000 are allowed"),
         (("show", "--reach", "nan", "-o", "mesh.png"), "--reach"),
         (("show", "--object", "-1", "-o", "mesh.png"), "distances"),
         (("range", "--lens", LENS, "--intersections", "nan"), "--intersections"),

@@ -1,4 +1,4 @@
-"""Lens files: the reference's lens*.yaml, OpenCV's and ROS's calibrations, and TOML."""
+"""Reads and writes lens files: the reference's lens*.yaml, calibrations of OpenCV and ROS, and TOML."""
 
 from __future__ import annotations
 
@@ -18,30 +18,31 @@ from .lens import Lens
 from .orientation import Orientation
 from .radial_lenses import RadialLens, projection_named
 
-_LARGEST = 2**20  # bytes; a lens file has a thousand
+_LARGEST = 2**20
+"""Largest size of a lens file [bytes]; a usual one has about a thousand."""
 
 _LENS_KEYS = ("projection", "focal_length", "center", "distortion", "fov", "size")
 
 _REFERENCE_NAMES = {"centre": "center", "k": "distortion"}
-"""What the reference calls the same things."""
+"""The reference's names of keys, and ours."""
 
 _BROWN, _FISHEYE = ("plumb_bob", "rational_polynomial"), ("equidistant", "fisheye")
 
 
 @dataclass(frozen=True)
 class LensFile:
-    """A lens, and the orientation of the camera where the file has one."""
+    """A lens, and the camera's orientation if the file has one."""
 
     lens: Lens
     orientation: Orientation | None
 
 
 def read_lens_file(path: str | Path) -> LensFile:
-    """Read a lens file by its suffix, .toml or else YAML. Raises InputError naming file and fault."""
+    """Reads a lens file: TOML if its name ends in .toml, else YAML. Raises InputError with the file and the reason."""
     path = Path(path)
     try:
         if path.stat().st_size > _LARGEST:
-            raise InputError(f"{path}: too large for a lens file")
+            raise InputError(f"{path} is too large for a lens file; at most {_LARGEST} bytes are allowed")
         text = path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:  # ValueError: not text, or a path with a zero byte
         raise InputError(f"can't read lens file {path}: {getattr(error, 'strerror', None) or error}") from error
@@ -51,7 +52,7 @@ def read_lens_file(path: str | Path) -> LensFile:
             return LensFile(lens_from_table(table.get("lens", table)), None)
         table = read_yaml(text)
         if not isinstance(table, dict):
-            raise InputError("not a table of values")
+            raise InputError("expected a table of keys and values")
         if "projection" in table:
             table = {_REFERENCE_NAMES.get(key, key): value for key, value in table.items()}
             hoc = table.pop("Hoc", None)
@@ -65,7 +66,11 @@ def read_lens_file(path: str | Path) -> LensFile:
 
 
 def lens_text(lens: Lens, orientation: Orientation) -> str:
-    """A lens and an orientation as a lens file, to the last digit: the reference's, or a calibration with Hoc."""
+    """The text of a lens file with this lens and orientation; reading it gives exactly the same numbers.
+
+    Radial lenses use the reference's format, calibrated ones a calibration with an additional Hoc. Raises InputError
+    for other lenses.
+    """
     hoc = np.eye(4)
     hoc[:3, :3] = orientation.rotation
     hoc[2, 3] = orientation.height
@@ -90,7 +95,7 @@ def lens_text(lens: Lens, orientation: Orientation) -> str:
         if lens.size is not None:
             lines += [f"image_width: {lens.size[0]}", f"image_height: {lens.size[1]}"]
     else:
-        raise InputError(f"a lens of type {type(lens).__name__} has no file format")
+        raise InputError(f"lens of type {type(lens).__name__} has no file format; use a radial or a calibrated lens")
     lines += ["Hoc:", *(f"  - {_listed(row)}" for row in hoc.tolist())]
     return "\n".join(lines) + "\n"
 
@@ -100,9 +105,10 @@ def _listed(numbers: Sequence[float]) -> str:
 
 
 def lens_from_table(table: Mapping[str, Any]) -> RadialLens:
-    """A lens from projection, focal_length [px], fov [rad] and, where they matter, center, distortion and size [px].
+    """A lens from the keys projection, focal_length [px] and fov [rad], and optionally center, distortion and size
+    [px].
 
-    Raises InputError naming an unknown or missing key.
+    Raises InputError for an unknown or missing key and for a wrong value.
     """
     if not isinstance(table, Mapping):
         raise InputError(f"lens must be a table, not {str(table)[:60]}")
@@ -111,7 +117,7 @@ def lens_from_table(table: Mapping[str, Any]) -> RadialLens:
             raise InputError(unknown("lens key", key, _LENS_KEYS))
     missing = [key for key in ("projection", "focal_length", "fov") if key not in table]
     if missing:
-        raise InputError(f"lens lacks {', '.join(missing)}")
+        raise InputError(f"lens needs {', '.join(missing)}")
     size = _numbers(table["size"], "size", 2) if "size" in table else None
     return projection_named(table["projection"])(
         focal_length=_number(table["focal_length"], "focal_length"),
@@ -123,10 +129,10 @@ def lens_from_table(table: Mapping[str, Any]) -> RadialLens:
 
 
 def lens_from_calibration(table: Mapping[str, Any]) -> Lens:
-    """A lens from a calibration as ROS (camera_info) and OpenCV (camera_matrix, ...) write it. Raises InputError."""
+    """A lens from a calibration as ROS (camera_info) or OpenCV (camera_matrix, ...) writes it. Raises InputError."""
     matrix = _first(table, "camera_matrix", "K", "k", "cameraMatrix")
     if matrix is None:
-        raise InputError("neither a lens (no projection) nor a calibration (no camera_matrix)")
+        raise InputError("found neither `projection`, as in a lens, nor `camera_matrix`, as in a calibration")
     k = _numbers(_data(matrix), "camera_matrix", 9)
     coefficients = _numbers(
         _data(_first(table, "distortion_coefficients", "D", "d", "distCoeffs", "dist_coeffs") or []), "distortion"
@@ -142,24 +148,24 @@ def lens_from_calibration(table: Mapping[str, Any]) -> Lens:
         else (int(_number(width, "width")), int(_number(height, "height"))),
     }
     if abs(k[1]) > 1e-6 * k[0]:
-        raise InputError(f"camera_matrix has a skew of {k[1]:g}; only calibrations without are supported")
+        raise InputError(f"camera_matrix has a skew of {k[1]:g}, but only calibrations without skew are supported")
     if model.lower() in _FISHEYE:
         return FisheyeLens(fov=2.0 * math.pi, coefficients=tuple(coefficients), **common)  # type: ignore[arg-type]
     if model.lower() in _BROWN:
         while len(coefficients) > 8 and coefficients[-1] == 0.0:
-            coefficients.pop()  # OpenCV writes its 12 and 14 coefficient models out even where the rest is zero
-        # As wide as a picture taken through one plane gets: 160 degrees.
+            coefficients.pop()  # OpenCV writes 12 or 14 coefficients even if the last ones are zero
+        # Calibrations have no field of view. 160 degrees is as wide as a rectilinear picture gets.
         return BrownLens(fov=math.radians(160.0), coefficients=tuple(coefficients), **common)  # type: ignore[arg-type]
     raise InputError(unknown("distortion_model", model, (*_BROWN, *_FISHEYE)))
 
 
 def _first(table: Mapping[str, Any], *keys: str) -> Any:
-    """The value of the first key that is there, or None."""
+    """The value of the first of these keys that the table has, or None."""
     return next((table[key] for key in keys if key in table), None)
 
 
 def _data(value: Any) -> Any:
-    """The numbers of a matrix written as rows, cols, data; anything else as it is."""
+    """The numbers of a matrix given as a table of rows, cols and data; any other value unchanged."""
     return value.get("data", value) if isinstance(value, Mapping) else value
 
 
@@ -174,7 +180,7 @@ def _number(value: Any, name: str) -> float:
 
 
 def _numbers(value: Any, name: str, count: int | None = None) -> list[float]:
-    """A flat list of numbers from a list, or a list of lists."""
+    """A flat list of `count` numbers from a list, or from a list of lists."""
     try:
         numbers = np.asarray(value, dtype=np.float64).ravel()
     except (TypeError, ValueError, OverflowError) as error:

@@ -1,8 +1,8 @@
-"""Where the camera is over the observation plane: height, roll and pitch, with the yaw taken out.
+"""The camera's pose over the observation plane: height, roll, pitch and yaw.
 
-Frames: camera x along the optical axis, y left, z up. Observation plane z up, the plane is z = 0. `H_oc` ("o from
-c") maps camera coordinates to plane coordinates. OpenCV's and ROS's optical frame (x right, y down, z forward) is
-converted here and nowhere else.
+Frames: the camera's x points along the optical axis, y left and z up. The observation plane is z = 0 of its frame,
+with z up. `H_oc` ("o from c") maps camera coordinates to plane coordinates. Only this module converts from the optical
+frame of OpenCV and ROS (x right, y down, z forward).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def rotation_z(angle: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """Height of the camera over the plane [m] and rotation (3, 3) from camera to observation plane.
+    """Height of the camera over the plane [m] and rotation (3, 3) from camera to observation-plane frame.
 
     Raises GeometryError if the height is not a finite number above 0 or the matrix is not a rotation.
     """
@@ -43,16 +43,21 @@ class Orientation:
         if not math.isfinite(self.height) or self.height <= 0:
             raise GeometryError(f"camera height must be a number above 0 m, not {self.height}")
         if rotation.shape != (3, 3) or not np.isfinite(rotation).all():
-            raise GeometryError("camera rotation must be 3 x 3 finite numbers (NaN or infinity in the orientation?)")
+            raise GeometryError("camera rotation must be 3 x 3 finite numbers; check it for NaN and infinity")
         error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
         if error > 1e-3 or np.linalg.det(rotation) < 0:
-            mirrored = "; it mirrors" if np.linalg.det(rotation) < 0 else ""
-            raise GeometryError(f"camera rotation is no rotation: R R^T is off the identity by {error:.2g}{mirrored}")
+            mirrored = ", and R mirrors" if np.linalg.det(rotation) < 0 else ""
+            raise GeometryError(
+                f"camera rotation R must be a rotation, but R R^T differs from the identity by {error:.2g}{mirrored}"
+            )
         object.__setattr__(self, "rotation", frozen(rotation))
 
     @classmethod
     def from_hoc(cls, hoc: npt.ArrayLike) -> Orientation:
-        """From the 4 x 4 transform H_oc; only its rotation and the height in row 2, column 3 [m] matter."""
+        """From the 4 x 4 transform H_oc, of which only the rotation and the height [m] in row 2, column 3 are used.
+
+        Raises GeometryError if it is not 4 x 4 numbers.
+        """
         try:
             matrix = np.asarray(hoc, dtype=np.float64)
         except (TypeError, ValueError) as error:
@@ -63,17 +68,18 @@ class Orientation:
 
     @classmethod
     def from_roll_pitch(cls, height: float, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Orientation:
-        """From angles [rad], R = Rz(yaw) Ry(pitch) Rx(roll): pitch > 0 looks down, roll > 0 leans to the right."""
+        """From angles [rad], R = Rz(yaw) Ry(pitch) Rx(roll). pitch > 0 looks down, roll > 0 tilts to the right."""
         cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
         tilt = np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])
         return cls(height, rotation_z(yaw) @ tilt)
 
     @classmethod
     def from_quaternion(cls, height: float, quaternion: Sequence[float], optical: bool = False) -> Orientation:
-        """From a quaternion (w, x, y, z) of the rotation camera to plane.
+        """From a quaternion (w, x, y, z) of the rotation from camera to plane.
 
-        `optical` says that the quaternion turns an OpenCV/ROS optical frame instead of the camera frame.
-        Raises GeometryError if its norm is further than 1e-3 from 1.
+        optical: the quaternion rotates from the optical frame of OpenCV and ROS instead of the camera frame.
+
+        Raises GeometryError if its length differs from 1 by more than 1e-3.
         """
         q = np.asarray(quaternion, dtype=np.float64)
         if q.shape != (4,) or not np.isfinite(q).all() or abs(float(q @ q) - 1.0) > 2e-3:
@@ -90,7 +96,7 @@ class Orientation:
 
     @cached_property
     def yaw(self) -> float:
-        """Heading of the optical axis [rad]; of the picture's upward direction when the camera looks straight down."""
+        """Heading of the optical axis [rad], or of the picture's upward direction if the camera looks straight down."""
         r = self.rotation
         if math.hypot(r[0, 0], r[1, 0]) > 1e-9:
             return math.atan2(r[1, 0], r[0, 0])
@@ -98,7 +104,7 @@ class Orientation:
 
     @cached_property
     def level(self) -> Floats:
-        """The rotation (3, 3) without its yaw, Ry(pitch) Rx(roll)."""
+        """The rotation (3, 3) without its yaw: Ry(pitch) Rx(roll)."""
         return frozen(rotation_z(-self.yaw) @ self.rotation)
 
     @property
@@ -108,5 +114,5 @@ class Orientation:
 
     @property
     def roll(self) -> float:
-        """Lean to the right [rad]."""
+        """Tilt to the right [rad]."""
         return math.atan2(-self.level[1, 2], self.level[1, 1])

@@ -1,6 +1,6 @@
-"""The paper's own recursions, equation by equation.
+"""The paper's recursions as it prints them. Only tests use this module.
 
-The meshes are built from the closed forms in `shapes.py`; these are what those forms are held against.
+Meshes are built from closed forms of these equations (`circle.py`, `sphere.py`). The tests compare the two.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ def circle_phi1(phi: float, radius: float, height: float) -> float:
 
 
 def circle_dtheta(phi: float, radius: float, height: float) -> float:
-    """Angular width [rad] of a circle around the vertical; the paper's eqn:circle_dtheta.
+    """Angular width [rad] of a circle or a sphere around the vertical; the paper's eqn:circle_dtheta.
 
-    Raises GeometryError where the circle covers the point below the camera.
+    Raises GeometryError where the object covers the point below the camera.
     """
     sine = radius / (height * math.tan(phi)) if phi > 0 else math.inf
     if sine > 1.0:
-        raise GeometryError(f"no width at phi = {phi:g} rad: an object of radius {radius:g} m covers the nadir there")
+        raise GeometryError(f"an object of radius {radius:g} m covers the nadir at phi = {phi:g} rad and has no width")
     return 2.0 * math.asin(sine)
 
 
@@ -37,17 +37,18 @@ def sphere_phi_1(phi: float, radius: float, height: float) -> float:
 
 
 def repeat(step: Step, times: int, phi: float, radius: float, height: float) -> float:
-    """f^times(phi, radius): `times` objects further out."""
+    """Inclination [rad] after `times` steps, `times` objects further out; the paper's f^times(phi, radius)."""
     for _ in range(times):
         phi = step(phi, radius, height)
     return phi
 
 
 def sample_radius(intersections: Fraction, radius: float, height: float, step: Step = sphere_phi_1) -> float:
-    """Radius [m] of the small objects of which `intersections` = p/q lie across one of radius `radius` [m].
+    """Radius [m] of the smaller objects of which `intersections` = p/q fit across one object of radius `radius` [m].
 
-    q large objects reach as far as p small ones, f^q(0, r0) = f^p(0, r1), solved for r1 by bisection. (The paper
-    prints f^pq on the right, which would be p small ones for each large one, whatever q.)
+    The paper's section "Object Dependent Sample Density", fig:multi_sphere_intersections: q large objects reach as far
+    as p small ones, f^q(0, r0) = f^p(0, r1), solved for r1 by bisection. The paper prints f^(pq) on the right side;
+    that would mean p small objects across a large one, whatever q is.
 
     Raises GeometryError if `intersections` is not above 0.
     """
@@ -55,7 +56,7 @@ def sample_radius(intersections: Fraction, radius: float, height: float, step: S
         raise GeometryError(f"intersections must be above 0, not {intersections}")
     p, q = intersections.numerator, intersections.denominator
     target = repeat(step, q, 0.0, radius, height)
-    # A small object never needs to be larger than q large ones side by side; above h / 2 a sphere has no next phi.
+    # r1 is at most the size of q large objects side by side. Above h / 2 a sphere has no next phi.
     low, high = 0.0, q * radius if step is circle_phi1 else min(q * radius, height / 2.0)
     while high - low > 1e-15 * high:
         middle = 0.5 * (low + high)

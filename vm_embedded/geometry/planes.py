@@ -1,7 +1,7 @@
-"""Observation planes anywhere: a table, a shelf, a wall, a ceiling, or a spotlight on a point; not only the ground.
+"""Observation planes anywhere: the ground, a table, a shelf, a wall, a ceiling, or a plane through any point.
 
-World frame: any fixed frame of the robot or the room. A plane's own frame has z along its normal; the frame that
-detections are in stands at the foot of the camera's perpendicular on the plane.
+World frame: any fixed frame of the robot or the room. A plane's frame has z along its normal. Its origin, for the
+positions of detections, is the camera's foot point: the point of the plane closest to the camera.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from .orientation import Orientation
 
 
 def _numbers(values: object) -> Floats:
-    """An array of what should be numbers. Raises GeometryError."""
+    """An array of these numbers. Raises GeometryError if they are something else."""
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise GeometryError(f"{values!r} is not what should be numbers: {error}") from error
+        raise GeometryError(f"expected numbers, not {values!r}: {error}") from error
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Where a camera is: rotation (3, 3) from camera to world frame, and position (3,) [m] in the world frame.
+    """A camera's rotation (3, 3) from camera to world frame, and its position (3,) [m] in the world frame.
 
-    Raises GeometryError if the matrix is no rotation or a number is not finite.
+    Raises GeometryError if the matrix is not a rotation or a number is not finite.
     """
 
     rotation: Floats
@@ -40,8 +40,8 @@ class Pose:
     def __post_init__(self) -> None:
         position = _numbers(self.position)
         if position.shape != (3,) or not np.isfinite(position).all():
-            raise GeometryError(f"a camera's position must be three finite numbers [m], not {self.position}")
-        # An orientation's own checks of a rotation; its height does not matter here.
+            raise GeometryError(f"camera position must be three finite numbers [m], not {self.position}")
+        # Orientation checks the rotation; the height does not matter here.
         object.__setattr__(self, "rotation", Orientation(1.0, self.rotation).rotation)
         object.__setattr__(self, "position", frozen(position))
 
@@ -50,16 +50,18 @@ class Pose:
         """From the 4 x 4 transform H_wc ("world from camera"). Raises GeometryError."""
         matrix = _numbers(hwc)
         if matrix.shape != (4, 4) or not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), atol=1e-6):
-            raise GeometryError("Hwc must be 4 x 4 numbers with 0, 0, 0, 1 as last row (is it transposed?)")
+            raise GeometryError("Hwc must be 4 x 4 numbers with last row 0, 0, 0, 1; check whether it is transposed")
         return cls(matrix[:3, :3], matrix[:3, 3])
 
 
 @dataclass(frozen=True)
 class Plane:
-    """All points p [m] of the world with normal . p = offset; objects lie on the side that the normal points to.
+    """All points p [m] of the world with normal . p = offset. Objects lie on the side that the normal points to.
 
-    name: what sightings on it are called after. The normal is brought to length 1, and the offset with it. Raises
-    GeometryError for a normal without direction.
+    name: of the plane, which sightings on it carry. The normal and the offset are scaled so that the normal has length
+    1.
+
+    Raises GeometryError for a normal of length 0 and for numbers that are not finite.
     """
 
     name: str
@@ -70,14 +72,14 @@ class Plane:
         normal, offset = _numbers(self.normal), float(_numbers(self.offset).reshape(-1)[0])
         length = float(np.linalg.norm(normal)) if normal.shape == (3,) else math.nan
         if not (math.isfinite(length) and length > 1e-9 and math.isfinite(offset)):
-            raise GeometryError(f"plane {self.name!r} needs a direction and an offset [m], not {self.normal}, {offset}")
+            raise GeometryError(f"plane {self.name!r} needs a normal and an offset [m], not {self.normal}, {offset}")
         x, y, z = (normal / length).tolist()
         object.__setattr__(self, "normal", (x, y, z))
         object.__setattr__(self, "offset", offset / length)
 
     @classmethod
     def through(cls, name: str, point: Sequence[float], normal: Sequence[float]) -> Plane:
-        """The plane through a point [m] of the world. Raises GeometryError."""
+        """The plane through a point [m] of the world, with this normal. Raises GeometryError."""
         place, direction = _numbers(point), _numbers(normal)
         if place.shape != (3,) or direction.shape != (3,):
             raise GeometryError(
@@ -88,9 +90,12 @@ class Plane:
 
     @classmethod
     def spotlight(cls, name: str, target: Sequence[float], camera: Sequence[float]) -> Plane:
-        """The plane through `target` that faces a camera at `camera` [m]: the mesh's middle lies on the target, and
-        objects are as dense in points there as the mesh makes them below a camera. Raises GeometryError if both are one
-        point."""
+        """The plane through the point `target` that faces a camera at the point `camera` [m].
+
+        The camera looks straight down on such a plane, and the middle of the mesh is on the target.
+
+        Raises GeometryError if both are the same point.
+        """
         here, there = _numbers(camera), _numbers(target)
         if here.shape != (3,) or there.shape != (3,):
             raise GeometryError(f"spotlight {name!r} needs three numbers for target and camera, not {target}, {camera}")
@@ -99,9 +104,9 @@ class Plane:
 
     @cached_property
     def axes(self) -> Floats:
-        """World to plane frame (3, 3): its rows are two directions in the plane, and the normal.
+        """Rotation (3, 3) from world to plane frame: its rows are two directions in the plane, and the normal.
 
-        The first is the world's x as far as the plane allows, or its z where the plane is upright across x.
+        The first direction is the world's x axis projected onto the plane, or its z axis if the normal is close to x.
         """
         normal = np.array(self.normal)
         along = np.eye(3)[0 if abs(self.normal[0]) < 0.99 else 2]
@@ -110,17 +115,17 @@ class Plane:
         return frozen(np.stack([first, np.cross(normal, first), normal]))
 
     def seen_from(self, pose: Pose) -> Orientation:
-        """The orientation of a camera over this plane. Raises GeometryError if the camera is not before the plane."""
+        """The orientation of a camera over this plane. Raises GeometryError if the camera is on or behind the plane."""
         height = float(np.dot(self.normal, pose.position)) - self.offset
         if height <= 0.0:
-            raise GeometryError(f"the camera is {-height:g} m behind plane {self.name!r}; is its normal the wrong way?")
+            raise GeometryError(f"camera is {-height:g} m behind plane {self.name!r}; check the plane's normal")
         return Orientation(height, self.axes @ pose.rotation)
 
     def to_world(self, points: Floats, pose: Pose) -> Floats:
-        """Points (n, 3) [m] of detections on this plane, seen from a pose, in the world frame."""
+        """Positions (n, 3) [m] of detections on this plane, seen from a pose, in the world frame."""
         foot = pose.position - (np.dot(self.normal, pose.position) - self.offset) * np.array(self.normal)
         return np.asarray(points @ self.axes + foot)
 
 
 GROUND = Plane("ground")
-"""The world's z = 0."""
+"""The plane z = 0 of the world frame."""

@@ -1,9 +1,11 @@
-"""Rings with a hexagonal cap around the point below the camera: as dense there as elsewhere, and six neighbors.
+"""Model cap6: rings, with hexagons of points around the nadir that are as dense there as elsewhere.
 
-Around the nadir the rings' number of points is a makeshift, and neighbors in rings of such different sizes meet at any
-angle. Here ring i has 6 i points, as the i-th hexagon of a hexagonal lattice. In the plane where an object n
-objects out lies at the radius n, the lattice's middle is a true one; outwards its hexagons are rolled into circles,
-until they are the mesh's rings.
+The paper calls the point below the camera a singularity of its mesh (section "Discussion and Conclusion"). The rings
+around it have a makeshift number of points, and links between rings of very different sizes meet at any angle.
+
+Here ring i has 6 i points there, like the i-th hexagon of a hexagonal lattice. In a plane that shows an object n
+objects out at the radius n, a hexagonal lattice has the same density everywhere, also at its middle. From the middle
+outwards the hexagons turn gradually into circles, and continue as the rings of the paper's mesh.
 """
 
 from __future__ import annotations
@@ -14,18 +16,18 @@ import numpy as np
 
 from ..arrays import Floats, Indices, frozen
 from ..geometry.shape import Shape
-from .mesh import Mesh, MeshModel, polar
-from .rings import Rings, inclinations, places, ring_counts, ring_neighbors
+from .mesh import Mesh, MeshModel, rays_from_polar
+from .rings import Rings, inclinations, ring_counts, ring_neighbors, ring_places
 
 _CORNER = math.sqrt(2.0 * math.pi / (3.0 * math.sqrt(3.0)))
-"""Distance of a hexagon's corners, over the radius of the circle that has its area."""
+"""Distance of a hexagon's corners from its center, relative to the radius of a circle with the same area."""
 
 
 class Cap(MeshModel):
-    """ring6 with a hexagonal cap, and ring6's neighbors: between hexagons they are those of the lattice.
+    """ring6 with a hexagonal cap, linked by the rule of ring6. Between hexagons this gives the links of the lattice.
 
-    The six corners of a hexagon have three neighbors outwards and one inwards in a lattice; here they have two and two
-    like all other points, so that left and right are always within the ring.
+    The only exceptions are the six corners of a hexagon. In a lattice a corner has three neighbors outwards and one
+    inwards; here it has two and two, like all other points. So left and right always stay in the ring.
     """
 
     neighbors = 6
@@ -35,25 +37,28 @@ class Cap(MeshModel):
         phi = inclinations(shape, height, intersections, max_distance)
         counts = ring_counts(shape, height, intersections, len(phi))
         rings = np.arange(len(counts), dtype=np.int32)
-        # Hexagons are used as long as they have at most half a point less across an object than rings would.
+        # The cap ends where hexagons would have over half a point less across an object than the rings.
         enough = 6 * rings >= (1.0 - 0.5 / max(intersections, 1.0)) * counts
         hexagons = int(np.argmin(np.append(enough | (rings <= intersections), False))) - 1
         counts[1 : hexagons + 1] = 6 * rings[1 : hexagons + 1]
 
-        start, j = places(counts)
-        radius, angle = np.repeat(rings / intersections, counts), 2.0 * np.pi * j / np.repeat(counts, counts)
+        start, place = ring_places(counts)
+        radius, angle = np.repeat(rings / intersections, counts), 2.0 * np.pi * place / np.repeat(counts, counts)
         inner = start[hexagons + 1]
-        radius[:inner], angle[:inner] = _rolled(np.repeat(rings, counts)[:inner], j[:inner], hexagons, intersections)
-        rays = polar(shape.phi(radius, height), angle)
-        return Mesh(frozen(rays), frozen(ring_neighbors(counts, start, j, self.neighbors, nudge=1e-6)))
+        radius[:inner], angle[:inner] = _cap(np.repeat(rings, counts)[:inner], place[:inner], hexagons, intersections)
+        rays = rays_from_polar(shape.phi(radius, height), angle)
+        return Mesh(frozen(rays), frozen(ring_neighbors(counts, start, place, self.neighbors, nudge=1e-6)))
 
 
-def _rolled(ring: Indices, j: Indices, hexagons: int, intersections: float) -> tuple[Floats, Floats]:
-    """Radius (n,) in objects and angle (n,) [rad] of the cap's points, j (n,) their place in their ring (n,)."""
+def _cap(ring: Indices, place: Indices, hexagons: int, intersections: float) -> tuple[Floats, Floats]:
+    """Radius (n,) [objects] and angle (n,) [rad] of the cap's points, from their ring (n,) and their place in it (n,).
+
+    Points of the innermost hexagon lie on a hexagon, those of the last one on a circle, and all others in between.
+    """
     sides = np.maximum(ring, 1)
-    side, along = j // sides, (j % sides) / sides
+    side, along = place // sides, (place % sides) / sides
     corners = np.exp(1j * np.pi / 3.0 * np.arange(7))
     hexagon = _CORNER * ((1.0 - along) * corners[side] + along * corners[side + 1])
     circle = np.exp(1j * np.pi / 3.0 * (side + along))
-    place = ring / intersections * (hexagon + ring / max(hexagons, 1) * (circle - hexagon))
-    return np.abs(place), np.angle(place)
+    point = ring / intersections * (hexagon + ring / max(hexagons, 1) * (circle - hexagon))
+    return np.abs(point), np.angle(point)

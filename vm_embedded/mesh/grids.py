@@ -1,15 +1,17 @@
-"""Meshes on a lattice: every neighbor is a fixed step away, and there is no ring to close.
+"""Meshes on a lattice: every neighbor is a fixed step away, and there are no rings to close. They are the reference's.
 
-A lattice counts objects along two axes of the plane, u and v, in steps of 1 / k. With c the height of the object's
-center and g = h - c, a point of the plane at the height c has the coordinates
-XY: x = g tan(phi(u)), y = g tan(phi(v));
-XM: x = g tan(phi(u)), y = h' tan(phi(v, h' + c)) with h' = sqrt(g^2 + x^2): the slice through the camera that holds y;
-NM: both at once, x = h'' tan(phi(u, h'' + c)) with h'' = sqrt(g^2 + y^2), and y as in XM.
+A lattice counts objects along two axes of the plane, u and v, in steps of 1 / k. Let c be the height of the object's
+center and g = h - c. In the plane at the height c a point has the coordinates
+
+- XY: x = g tan(phi(u)) and y = g tan(phi(v));
+- XM: x as in XY, and y = h' tan(phi(v, h' + c)) with h' = sqrt(g^2 + x^2), the camera's distance in the slice at x;
+- NM: y as in XM, and x = h'' tan(phi(u, h'' + c)) with h'' = sqrt(g^2 + y^2). These two equations are solved together.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import cv2
 import numpy as np
@@ -30,20 +32,21 @@ _RUNS = {
     8: ((0, SELF, 4), (1, 2, 3), (7, 6, 5)),
 }
 _ROW = math.sqrt(0.75)
-"""Distance of the rows of a six-neighbor lattice, in steps."""
+"""Distance between the rows of a six-neighbor lattice [steps]."""
 
-_TURNS, _HALVINGS = 30, 60
-"""How often an NM point's coordinates are computed from each other in turns, about ten are needed; where that does not
-settle, as for thin cylinders, how often the interval of one is halved."""
+_TURNS, _HALVINGS, _SETTLED = 30, 60, 1e-12
+"""For NM's equations: the most iterations of `_solve_in_turns`, the iterations of `_solve_by_halving` for points that
+do not settle (as with thin cylinders), and the relative change at which a point has settled."""
 
 KINDS = ("xy", "xm", "nm")
 
 
 class Grid(MeshModel):
-    """A lattice of one of KINDS, row by row, as far as it hangs together with the point below the camera.
+    """A lattice of one of KINDS, row by row: all points that links connect to the point below the camera.
 
-    Neighbors, as columns and rows: `steps`. A six-neighbor lattice has axial coordinates: u = (n + m / 2) / k and
-    v = sqrt(3) / 2 m / k.
+    A point has the column n and the row m, and its neighbors are `steps` away. With four or eight neighbors u = n / k
+    and v = m / k. With six neighbors every other row is half a step off: u = (n + m / 2) / k and v = sqrt(3) / 2 m /
+    k.
     """
 
     steps: tuple[tuple[int, int], ...]
@@ -62,7 +65,7 @@ class Grid(MeshModel):
         shown = np.isfinite(x[np.abs(m), np.abs(half)])
         m, half = m[shown], half[shown]
         n = (half - m) // 2 if self.neighbors == 6 else half // 2
-        linked = _together(n, m, self.neighbors)
+        linked = _connected_to_nadir(n, m, self.neighbors)
         m, n, half = m[linked], n[linked], half[linked]
 
         rays = np.empty((len(n), 3), order="F")
@@ -74,9 +77,9 @@ class Grid(MeshModel):
         return Mesh(frozen(rays), frozen(lattice_neighbors(cells, self.steps)), frozen(cells))
 
     def _quarter(self, shape: Shape, height: float, intersections: float, max_distance: float) -> tuple[Floats, Floats]:
-        """x and y [m] of the quarter of the lattice that both are positive in, and all others are mirror images of.
+        """x and y [m] in the quarter of the lattice with x >= 0 and y >= 0; the other quarters are its mirror images.
 
-        (rows, half columns); NaN where no point is. Raises GeometryError for more places than memory has.
+        Both are (rows, half columns), and NaN where the lattice has no point. Raises GeometryError for too many points.
         """
         six = self.neighbors == 6
         row = _ROW if six else 1.0
@@ -85,53 +88,85 @@ class Grid(MeshModel):
         check_size(across * along)
         halves, rows = (math.floor(each) + 2 for each in border.max(axis=0) * (2.0, 1.0 / row))
         m, half = (axis.reshape(-1) for axis in np.mgrid[:rows, :halves].astype(np.int32))
-        places = np.stack([0.5 * half, row * m], axis=1)
-        tried = np.flatnonzero(((half - m if six else half) % 2 == 0) & _within(places, border))
-        u, v = (places[tried] / intersections).T
-        x, y = _position(self.kind, u, v, shape, height)
+        steps = np.stack([0.5 * half, row * m], axis=1)
+        tried = np.flatnonzero(((half - m if six else half) % 2 == 0) & _within(steps, border))
+        u, v = (steps[tried] / intersections).T
+        x, y = _positions(self.kind, u, v, shape, height)
         x[np.hypot(x, y) > max_distance] = np.nan
         found = np.full((2, rows * halves), np.nan)
         found[:, tried] = x, y
         return found[0].reshape(rows, halves), found[1].reshape(rows, halves)
 
 
-def _position(kind: str, u: Floats, v: Floats, shape: Shape, height: float) -> tuple[Floats, Floats]:
-    """Coordinates x and y (n,) [m] at the height of the object's center, u and v (n,) >= 0 objects out."""
+Coordinate = Callable[[Floats, Floats | float], Floats]
+"""(n objects out, distance of the slice [m]) -> coordinate [m]; see `_coordinate`."""
+
+
+def _coordinate(shape: Shape, height: float) -> Coordinate:
+    """A function that gives the coordinate (n,) [m] n objects out, in the slice at a distance (n,) [m].
+
+    A slice is a plane through the camera that is parallel to the coordinate's axis. Its distance from the camera's foot
+    point is measured at the height of the object's center. In a slice at the distance d the camera's height over that
+    plane, g, becomes sqrt(g^2 + d^2).
+    """
     c = shape.center_height
     g = height - c
 
-    def across(n: Floats, other: Floats | float) -> Floats:
-        """Coordinate n objects out, in the slice through the camera that is `other` [m] away."""
-        slant = np.hypot(g, other)
+    def coordinate(n: Floats, distance: Floats | float) -> Floats:
+        slant = np.hypot(g, distance)
         return np.asarray(slant * np.tan(shape.phi(n, slant + c)))
 
-    x = across(u, 0.0)
+    return coordinate
+
+
+def _positions(kind: str, u: Floats, v: Floats, shape: Shape, height: float) -> tuple[Floats, Floats]:
+    """Coordinates x and y (n,) [m] at the height of the object's center, u and v (n,) >= 0 objects out."""
+    coordinate = _coordinate(shape, height)
+    x = coordinate(u, 0.0)
     if kind == "xy":
-        return x, across(v, 0.0)
-    y = across(v, x)
+        return x, coordinate(v, 0.0)
+    y = coordinate(v, x)
     if kind == "xm":
         return x, y
-    # A slice's coordinate hardly depends on the slice where it is far out itself, so turns settle nearly everywhere.
-    left = np.arange(len(u))
-    for _ in range(_TURNS):
-        new_x = across(u[left], y[left])
-        new_y = across(v[left], new_x)
-        off = np.maximum(np.abs(new_x - x[left]), np.abs(new_y - y[left])) > 1e-12 * (g + new_x + new_y)
-        x[left], y[left] = new_x, new_y
-        left = left[off]
-    # A coordinate shrinks as its slice moves away, so x lies between 0 and that of the slice below the camera.
-    low, high = np.zeros(len(left)), across(u[left], 0.0)
-    for _ in range(_HALVINGS if len(left) else 0):
-        middle = 0.5 * (low + high)
-        beyond = across(u[left], across(v[left], middle)) < middle
-        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-    x[left] = 0.5 * (low + high)
-    y[left] = across(v[left], x[left])
+    unsettled = _solve_in_turns(coordinate, u, v, x, y, height - shape.center_height)
+    x[unsettled], y[unsettled] = _solve_by_halving(coordinate, u[unsettled], v[unsettled])
     return x, y
 
 
+def _solve_in_turns(
+    coordinate: Coordinate, u: Floats, v: Floats, x: Floats, y: Floats, g: float
+) -> npt.NDArray[np.intp]:
+    """Solves the equations of NM for x and y (n,) in place: computes each from the other until both settle.
+
+    A coordinate far out hardly depends on its slice, so nearly all points settle in about ten turns. Returns the
+    indices of the points that still move by more than _SETTLED (g + x + y) after _TURNS turns.
+    """
+    moving = np.arange(len(u))
+    for _ in range(_TURNS):
+        new_x = coordinate(u[moving], y[moving])
+        new_y = coordinate(v[moving], new_x)
+        change = np.maximum(np.abs(new_x - x[moving]), np.abs(new_y - y[moving]))
+        x[moving], y[moving] = new_x, new_y
+        moving = moving[change > _SETTLED * (g + new_x + new_y)]
+    return moving
+
+
+def _solve_by_halving(coordinate: Coordinate, u: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """x and y (n,) of NM, by halving the interval that holds x. Slow, but it always settles.
+
+    A coordinate shrinks as its slice moves away. So x is between 0 and its value in the slice below the camera.
+    """
+    low, high = np.zeros(len(u)), coordinate(u, 0.0)
+    for _ in range(_HALVINGS if len(u) else 0):
+        middle = 0.5 * (low + high)
+        too_large = coordinate(u, coordinate(v, middle)) < middle
+        low, high = np.where(too_large, low, middle), np.where(too_large, middle, high)
+    x = 0.5 * (low + high)
+    return x, coordinate(v, x)
+
+
 def _border(kind: str, shape: Shape, height: float, max_distance: float) -> Floats:
-    """Points (m, 2) of a quarter circle of that radius [m] around the camera's foot, as u and v."""
+    """u and v (m, 2) of points on the border of the quarter: a quarter circle with the radius `max_distance` [m]."""
     c = shape.center_height
     angle = np.linspace(0.0, np.pi / 2.0, 721)
     x, y = max_distance * np.cos(angle), max_distance * np.sin(angle)
@@ -145,22 +180,29 @@ def _border(kind: str, shape: Shape, height: float, max_distance: float) -> Floa
     return np.stack([u, v], axis=1)
 
 
-def _within(places: Floats, border: Floats) -> Mask:
-    """Which places (n, 2) lie within a border (m, 2) from the first axis to the second, or up to two steps beyond."""
+def _within(points: Floats, border: Floats) -> Mask:
+    """Which points (n, 2) of a quarter lie within its border (m, 2) or up to two steps beyond it; in steps.
+
+    The border runs from the first axis to the second. It is drawn as a polygon, and each point looks up its pixel.
+    """
     width, height = (math.ceil(each) + 3 for each in border.max(axis=0))
     outline = np.concatenate([[[0.0, 0.0]], border, [[0.0, border[-1, 1]]]])
     inside = np.zeros((height, width), dtype=np.uint8)
     cv2.fillPoly(inside, [np.rint(outline).astype(np.int32)], 1)
     inside = cv2.dilate(inside, np.ones((5, 5), dtype=np.uint8))
-    nearest = np.minimum(np.rint(places).astype(np.intp), (width - 1, height - 1))
+    nearest = np.minimum(np.rint(points).astype(np.intp), (width - 1, height - 1))
     return np.asarray(inside[nearest[:, 1], nearest[:, 0]] > 0)
 
 
-def _together(n: Indices, m: Indices, neighbors: int) -> Mask:
-    """Which of the cells in columns n and rows m hang together with the cell (0, 0), by links to so many neighbors."""
+def _connected_to_nadir(n: Indices, m: Indices, neighbors: int) -> Mask:
+    """Which cells in columns n (c,) and rows m (c,) are connected to the cell (0, 0) by links to 4, 6 or 8 neighbors.
+
+    The cells become pixels, and OpenCV finds their connected components.
+    """
     row = m - m.min()
     if neighbors == 6:
-        # In half columns neighbors in other rows touch at corners; those in a row touch what is put between them.
+        # Pixels are half columns: neighbors in other rows touch at corners. Neighbors in a row are two pixels apart, so
+        # the pixel between them is set, too.
         column = 2 * n + m
         column = column - column.min()
         present = np.zeros((row.max() + 1, column.max() + 3), dtype=np.uint8)
@@ -176,7 +218,7 @@ def _together(n: Indices, m: Indices, neighbors: int) -> Mask:
 
 
 def lattice_neighbors(cells: Indices, steps: tuple[tuple[int, int], ...]) -> Indices:
-    """Neighbors (n + 1, N) of cells (n, 2) at fixed steps (N, 2)."""
+    """Neighbors (n + 1, N) of cells (n, 2) at fixed steps (N, 2), each as (columns, rows)."""
     missing = len(cells)
     width, height = cells.max(axis=0) + 3
     flat = (cells[:, 1] + 1) * width + cells[:, 0] + 1

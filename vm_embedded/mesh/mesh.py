@@ -1,4 +1,8 @@
-"""The Visual Mesh: a graph of rays that puts the same number of points on an object at every distance."""
+"""The Visual Mesh: a graph of rays that puts the same number of points on an object at every distance.
+
+This file has the mesh itself, `Mesh`, and the base class of all ways to build one, `MeshModel`. The models by name are
+in `models.py`.
+"""
 
 from __future__ import annotations
 
@@ -15,37 +19,36 @@ from ..errors import GeometryError
 from ..geometry.shape import Shape
 
 SELF = -1
-"""The point itself, where others are named by their position among its neighbors."""
+"""Stands for the point itself in `Runs`, where a neighbor is named by its position among the point's neighbors."""
 
 Runs = tuple[tuple[int, ...], ...]
-"""Neighbors that follow each other in memory, in groups of at most three; together all of a point's neighbors."""
-
+"""Groups of one to three neighbors that follow each other in memory. Each neighbor, and SELF, is in one group."""
 
 MOST_POINTS = 8_000_000
-"""Of a mesh: more than OpenCV samples at once, and more than a camera has pixels."""
+"""Largest number of points in a mesh: more than the pixels of a camera, and more than OpenCV samples at once."""
 
 
 class PointGraph(Protocol):
-    """n points that are linked."""
+    """n points with their rays and links: a mesh, or a mesh laid out for a network (network.layout.Layout)."""
 
     @property
     def rays(self) -> Floats:
-        """Unit vectors (n, 3) in the observation-plane frame, from the camera."""
+        """Unit vectors (n, 3) from the camera, in the observation-plane frame."""
 
     def __len__(self) -> int: ...
 
     def links(self, members: npt.NDArray[np.integer]) -> Indices:
-        """Neighbors (m, N) of some points (m,); n is the off-screen point."""
+        """Neighbors (m, N) of the points `members` (m,); n is the off-screen point."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """n points and their neighbors, or any part of such a mesh.
+    """n points and their neighbors: a whole mesh or a part of one.
 
-    rays: (n, 3) unit vectors in the observation-plane frame, from the camera, column by column in memory.
-    neighbors: (n + 1, N) positions in the mesh. Row n is the one off-screen point, which stands for every missing
-        neighbor and is linked to itself.
-    cells: (n, 2) column and row of each point in a lattice where all neighbors are fixed steps away, or None.
+    rays: (n, 3) unit vectors from the camera, in the observation-plane frame, column by column in memory.
+    neighbors: (n + 1, N) indices of points. Index n is the off-screen point, which takes the place of every missing
+        neighbor. It is linked to itself.
+    cells: (n, 2) column and row of each point, in a lattice where all neighbors are fixed steps away; else None.
     """
 
     rays: Floats
@@ -56,16 +59,16 @@ class Mesh:
         return len(self.rays)
 
     def links(self, members: npt.NDArray[np.integer]) -> Indices:
-        """Neighbors (m, N) of some points (m,)."""
+        """Neighbors (m, N) of the points `members` (m,)."""
         return np.take(self.neighbors, members, axis=0)
 
     @property
     def nbytes(self) -> int:
-        """Memory that it holds [bytes]."""
+        """Size in memory [bytes]."""
         return self.rays.nbytes + self.neighbors.nbytes + (0 if self.cells is None else self.cells.nbytes)
 
     def part(self, kept: npt.NDArray[np.intp]) -> Mesh:
-        """The mesh of the points `kept`, in that order; links to all others lead to the off-screen point."""
+        """The mesh of the points `kept` (m,), in that order. Links to other points lead to the off-screen point."""
         position = np.full(len(self) + 1, len(kept), dtype=np.int32)
         position[kept] = np.arange(len(kept), dtype=np.int32)
         rows = np.append(kept, len(self))
@@ -79,8 +82,8 @@ class Mesh:
 class MeshModel(ABC):
     """A way to place points and to link them.
 
-    neighbors: N of each point; their order fixes the meaning of a network's weights. runs: those that follow each other
-    in memory. steps: columns and rows to each neighbor, in a model whose points lie on a lattice, else None.
+    neighbors: the number N of neighbors of a point. A network's weights depend on their order. runs: the neighbors that
+    follow each other in memory. steps: (columns, rows) to each neighbor if the points lie on a lattice, else None.
     """
 
     neighbors: int
@@ -88,10 +91,12 @@ class MeshModel(ABC):
     steps: tuple[tuple[int, int], ...] | None = None
 
     def build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
-        """The mesh for objects of a shape, seen from a height [m], out to `max_distance` [m].
+        """The mesh for objects of this shape, seen from a height [m], out to `max_distance` [m].
 
-        `intersections` k is the number of points in a row across an object. Raises GeometryError for a shape, height,
-        intersections or distance that have no mesh.
+        intersections: the paper's k, the number of rings that cross an object and of points in a row across it.
+
+        Raises GeometryError for a shape, a height, a number of intersections or a distance that this model cannot
+        build.
         """
         if not (math.isfinite(intersections) and intersections > 0):
             raise GeometryError(f"intersections must be above 0, not {intersections}")
@@ -103,10 +108,11 @@ class MeshModel(ABC):
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh: ...
 
     def mesh_height(self, shape: Shape, height: float, intersections: float, tolerance: float) -> float:
-        """Height [m] of the mesh that serves a camera height [m], such that no row is off by more than `tolerance`.
+        """The height [m] to build the mesh for, so that it also serves other camera heights close to `height` [m].
 
-        The number of rings across an object is proportional to the shape's spacing, so heights whose spacings form a
-        geometric series with ratio (1 + t / k)^2 leave no height farther than t rings from its mesh.
+        tolerance: how far [rings] the number of rings across an object may be from k; 0 gives `height` itself. This
+        number is proportional to the shape's spacing. So mesh heights whose spacings form a geometric series with the
+        ratio (1 + tolerance / k)^2 are close enough for every camera height.
         """
         spacing = float(shape.spacing(height))
         if tolerance == 0.0:
@@ -115,20 +121,23 @@ class MeshModel(ABC):
         return shape.height_of(math.exp(step * round(math.log(spacing) / step)))
 
     def rings(self, made_for: Shape, mesh_height: float, intersections: float, seen: Shape, height: float) -> float:
-        """Rings that cross the object `seen` from a height [m], of a mesh that was made for others."""
+        """Number of rings that cross the object `seen` from a height [m].
+
+        The rings belong to a mesh built for the shape `made_for`, `mesh_height` [m] and k = `intersections`.
+        """
         return intersections * float(seen.spacing(height) / made_for.spacing(mesh_height))
 
 
 def check_size(points: float) -> None:
-    """Raise GeometryError for more points than a mesh may have, before they take memory."""
+    """Raises GeometryError for a mesh with too many points, before any memory is allocated."""
     if not points <= MOST_POINTS:
         raise GeometryError(
-            f"a mesh of {points:.3g} points is too large, {MOST_POINTS:g} are allowed: take fewer intersections, a "
-            "shorter maximum distance or a larger object"
+            f"the mesh would have {points:.3g} points, and at most {MOST_POINTS:,} are allowed; choose fewer "
+            "intersections, a shorter maximum distance or a larger object"
         )
 
 
-def polar(inclination: Floats, angle: Floats) -> Floats:
+def rays_from_polar(inclination: Floats, angle: Floats) -> Floats:
     """Rays (n, 3) at an inclination (n,) [rad] from straight below and an angle (n,) [rad] around the vertical."""
     rays = np.empty((len(angle), 3), order="F")
     sine = np.sin(inclination)

@@ -1,4 +1,4 @@
-"""All mesh models by their names."""
+"""The mesh models by their names in model files and configurations."""
 
 from __future__ import annotations
 
@@ -16,16 +16,21 @@ MESH_MODELS: dict[str, MeshModel] = {
     "cap6": Cap(),
     "wall6": Walls(),
 }
-"""The reference's twelve; cap6, rings that are as dense below the camera as elsewhere; wall6, for tall cylinders."""
+"""The reference's twelve models, cap6 (as dense below the camera as elsewhere) and wall6 (for tall cylinders)."""
 
 
 def mesh_model(name: str) -> MeshModel:
-    """The model of a name. Raises InputError for an unknown one."""
+    """The mesh model of this name. Raises InputError for an unknown name."""
     if name not in MESH_MODELS:
         raise InputError(unknown("mesh model", name, MESH_MODELS))
     return MESH_MODELS[name]
 
 
 def build_mesh(shape: Shape, height: float, intersections: float, max_distance: float, model: str = "ring6") -> Mesh:
-    """The mesh of a model by its name; see MeshModel.build. Raises InputError for an unknown model, GeometryError."""
+    """The mesh for objects of this shape, seen from a height [m], out to `max_distance` [m].
+
+    intersections: the paper's k, the number of points in a row across an object. model: one of MESH_MODELS.
+
+    Raises InputError for an unknown model, and GeometryError for arguments that the model cannot build a mesh from.
+    """
     return mesh_model(model).build(shape, height, intersections, max_distance)

@@ -1,14 +1,25 @@
-"""Meshes of concentric rings around the point below the camera, with 4, 6 or 8 neighbors: the paper's."""
+"""The paper's mesh: concentric rings around the point below the camera, with 4, 6 or 8 neighbors for each point.
+
+The paper's section "Graph Structure of the Mesh" and its fig:mesh_projection describe model ring6.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Floats, Indices, frozen
 from ..geometry.shape import Shape
-from .mesh import SELF, Mesh, MeshModel, check_size, polar
+from .mesh import SELF, Mesh, MeshModel, check_size, rays_from_polar
+
+_NEIGHBORS = {
+    4: ("left", "top", "right", "bottom"),
+    6: ("left", "top left", "top right", "right", "bottom right", "bottom left"),
+    8: ("left", "top left", "top", "top right", "right", "bottom right", "bottom", "bottom left"),
+}
+"""Neighbors in their order. Left and right are in the same ring, top is in the next ring outwards, bottom inwards."""
 
 _RUNS = {
     4: ((0, SELF, 2), (1,), (3,)),
@@ -16,16 +27,14 @@ _RUNS = {
     8: ((0, SELF, 4), (1, 3), (2,), (7, 5), (6,)),
 }
 
-# Float noise must not change the size of a ring; no real count comes this close to a whole number from above.
+# Float noise must not change the number of points in a ring. No exact value is this close above a whole number.
 _CEIL_EPSILON = 1e-9
 
 
 class Rings(MeshModel):
-    """Ring i lies at phi(i / k) and has ceil(2 pi k / theta) points. Ring 0 is the nadir.
+    """Ring i is at phi(i / k) and has ceil(2 pi k / theta(i / k)) points. Ring 0 is the nadir, a single point.
 
-    Neighbors of ring4: left, top, right, bottom; ring6: left, top-left, top-right, right, bottom-right, bottom-left;
-    ring8: left, top-left, top, top-right, right, bottom-right, bottom, bottom-left, where top is the next ring
-    outwards.
+    The order of the neighbors is that of the reference: left, then around the point by way of the top.
     """
 
     def __init__(self, neighbors: int) -> None:
@@ -35,81 +44,99 @@ class Rings(MeshModel):
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         phi = inclinations(shape, height, intersections, max_distance)
         counts = ring_counts(shape, height, intersections, len(phi))
-        start, j = places(counts)
-        rays = polar(np.repeat(phi, counts), 2.0 * np.pi * j / np.repeat(counts, counts))
-        return Mesh(frozen(rays), frozen(ring_neighbors(counts, start, j, self.neighbors)))
+        start, place = ring_places(counts)
+        rays = rays_from_polar(np.repeat(phi, counts), 2.0 * np.pi * place / np.repeat(counts, counts))
+        return Mesh(frozen(rays), frozen(ring_neighbors(counts, start, place, self.neighbors)))
 
 
 def inclinations(shape: Shape, height: float, intersections: float, max_distance: float) -> Floats:
-    """phi (rings,) [rad] of each ring, the nadir first. Raises GeometryError for a height without a mesh."""
+    """The paper's phi_n (rings,) [rad] of all rings, the nadir first, with k = `intersections` rings across an object.
+
+    The last ring is the last one closer than `max_distance` [m]. Raises GeometryError for a height that is too low for
+    the shape, and for too many rings.
+    """
     shape.spacing(height)
     last = float(shape.n(math.atan(max_distance / height), height)) * intersections
     check_size(last)
-    # One ring more than the closed form gives, since its last digit may fall short; the rule itself decides.
+    # The last digit of `last` may be too small, so take one more ring; the comparison below decides.
     phi = shape.phi(np.arange(1, math.floor(last) + 2) / intersections, height)
     return np.append(0.0, phi[height * np.tan(phi) < max_distance])
 
 
 def ring_counts(shape: Shape, height: float, intersections: float, rings: int) -> Indices:
-    """How many points each of so many rings has (rings,)."""
+    """Number of points in each ring (rings,). Points are the paper's Delta theta / k apart, or slightly less."""
     theta = shape.theta(np.arange(1, rings) / intersections, height)
     counts = np.ceil(2.0 * np.pi * intersections / theta - _CEIL_EPSILON)
     check_size(float(counts.sum()))
     return np.append(np.int32(1), counts.astype(np.int32))
 
 
-def places(counts: Indices) -> tuple[Indices, Indices]:
-    """Where rings of `counts` points (rings,) begin (rings + 1,), and each point's place in its ring (n,)."""
+def ring_places(counts: Indices) -> tuple[Indices, Indices]:
+    """The first point of each ring (rings + 1,), then the number n of points, and each point's place in its ring (n,).
+
+    counts: (rings,) number of points in each ring.
+    """
     start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     return start, np.arange(start[-1], dtype=np.int32) - np.repeat(start[:-1], counts)
 
 
-def ring_neighbors(counts: Indices, start: Indices, j: Indices, width: int, nudge: float = 0.0) -> Indices:
-    """Neighbors (n + 1, width) in rings of `counts` points (rings,), which begin at `start` (rings + 1,).
+class _Ring(NamedTuple):
+    """One ring for each point of the mesh: its first point (n,) and its number of points (n,)."""
 
-    j (n,) is each point's place in its ring. nudge: of places that are compared between rings, so that float noise does
-    not decide where one ring's size is a multiple of another's.
+    first: Indices
+    size: Indices
+
+    def at(self, place: Indices) -> Indices:
+        """The points at these places (n,) in the rings. The place after a ring's last point is its first point."""
+        return np.where(place == self.size, self.first, self.first + place)
+
+
+def ring_neighbors(counts: Indices, start: Indices, place: Indices, width: int, nudge: float = 0.0) -> Indices:
+    """Neighbors (n + 1, width) of points in rings (paper: section "Graph Structure of the Mesh").
+
+    counts: (rings,) number of points in each ring. start, place: from `ring_places`. width: 4, 6 or 8 neighbors.
+    nudge: added to all places before they are compared between rings. With it, float noise does not decide where the
+    size of one ring is a multiple of the next one's.
+
+    A point is linked to the two adjacent points of its ring, and to the points of the next rings at the same fraction
+    of the circle: the nearest two of them, the nearest one, or all three. The nadir's neighbors are spread evenly over
+    ring 1.
     """
     missing = int(start[-1])
+    inner, own, outer = _beside(counts, start)
+    # The reference rounds this fraction in floating point, and whole numbers would round differently.
+    fraction = (place + nudge) / own.size
+    outwards, inwards = fraction * outer.size, fraction * inner.size
+    outwards_floor, inwards_floor = outwards.astype(np.int32), inwards.astype(np.int32)
 
-    def of_rings(values: Indices) -> Indices:
-        """A value of each ring, for each of its points."""
-        return np.repeat(values, counts)
-
-    def around(first: Indices, size: Indices, index: Indices) -> Indices:
-        """Points at a place in a ring; the place after its last is its first."""
-        return np.where(index == size, first, first + index)
-
-    padded_counts, padded_start = np.pad(counts, 1, constant_values=1), np.pad(start, (1, 0))
-    inner, own, outer = (
-        (of_rings(padded_start[at : at + len(counts)]), of_rings(padded_counts[at : at + len(counts)]))
-        for at in range(3)
-    )
-    fraction = (j + nudge) / own[1]  # and not whole numbers, because that is what the reference rounds
-    out_position, in_position = fraction * outer[1], fraction * inner[1]
-    out_floor, in_floor = out_position.astype(np.int32), in_position.astype(np.int32)
-
+    find = {
+        "left": lambda: own.at(np.where(place == 0, own.size, place) - 1),
+        "right": lambda: own.at(place + 1),
+        "top left": lambda: outer.at(outwards_floor),
+        "top right": lambda: outer.at(outwards_floor + 1),
+        "bottom left": lambda: inner.at(inwards_floor),
+        "bottom right": lambda: inner.at(inwards_floor + 1),
+        # Halves are rounded up, as C's round does for positive numbers.
+        "top": lambda: outer.at(np.floor(outwards + 0.5).astype(np.int32)),
+        "bottom": lambda: inner.at(np.floor(inwards + 0.5).astype(np.int32)),
+    }
     neighbors = np.empty((missing + 1, width), dtype=np.int32)
-    left = around(*own, np.where(j == 0, own[1], j) - 1)
-    right = around(*own, j + 1)
-    if width in (4, 8):  # halves are rounded upwards, as C's round does for these positive numbers
-        top = around(*outer, np.floor(out_position + 0.5).astype(np.int32))
-        bottom = around(*inner, np.floor(in_position + 0.5).astype(np.int32))
-    if width in (6, 8):
-        top_left, top_right = around(*outer, out_floor), around(*outer, out_floor + 1)
-        bottom_left, bottom_right = around(*inner, in_floor), around(*inner, in_floor + 1)
-    columns: list[Indices]
-    if width == 4:
-        columns, outwards = [left, top, right, bottom], [1]
-    elif width == 6:
-        columns, outwards = [left, top_left, top_right, right, bottom_right, bottom_left], [1, 2]
-    else:
-        columns = [left, top_left, top, top_right, right, bottom_right, bottom, bottom_left]
-        outwards = [1, 2, 3]
-    for column, points in enumerate(columns):
-        neighbors[:missing, column] = points
-    neighbors[start[-2] : missing, outwards] = missing
-    # The nadir's neighbors are spread evenly over ring 1.
+    for column, name in enumerate(_NEIGHBORS[width]):
+        neighbors[:missing, column] = find[name]()
     neighbors[0] = 1 + (np.arange(width) * counts[1]) // width if len(counts) > 1 else missing
     neighbors[missing] = missing
     return neighbors
+
+
+def _beside(counts: Indices, start: Indices) -> tuple[_Ring, _Ring, _Ring]:
+    """For each point, the next ring inwards, its own ring and the next ring outwards.
+
+    Beyond the last ring is a ring with only the off-screen point. The nadir's inner ring is never used.
+    """
+    counts_around, start_around = np.pad(counts, 1, constant_values=1), np.pad(start, (1, 0))
+
+    def rings(step: int) -> _Ring:
+        shifted = slice(step, step + len(counts))
+        return _Ring(np.repeat(start_around[shifted], counts), np.repeat(counts_around[shifted], counts))
+
+    return rings(0), rings(1), rings(2)

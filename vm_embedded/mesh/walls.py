@@ -1,10 +1,12 @@
-"""A mesh for upright cylinders of any height: as many points on a goal post as high as the camera, near and far.
+"""Model wall6: a mesh for upright cylinders of any height. A goal post higher than the camera has k points across, too.
 
-Rings need the end of an object's shadow on the plane, and what reaches the camera's height has none: all rings would
-fall on the horizon. So an object is sampled where it stands, on its own surface. Walls around the camera, at distances
-that form a geometric series, carry k rows of points from the plane to the object's top, and k points across the object
-in each row. A direction may lie on several walls. On the wall at its own distance an object covers all rows from the
-first to the last, and on the others it has the wrong width or ends in the wrong row.
+Rings need the far end of an object's shadow on the plane. The shadow of an object as high as the camera has no end, and
+all rings would fall on the horizon. The paper names this limit in its section "Discussion and Conclusion".
+
+So this model samples an object on its own surface. Cylindrical walls stand around the camera, at distances in a
+geometric series. Each wall carries k rows of points from the plane to the object's top, and each row has k points
+across an object. A direction may lie on several walls. On the wall at its own distance an object covers all rows, from
+the first to the last. On other walls it has the wrong width or ends in the wrong row.
 """
 
 from __future__ import annotations
@@ -18,16 +20,16 @@ from ..errors import GeometryError
 from ..geometry.cylinder import Cylinder
 from ..geometry.shape import Shape
 from .grids import Grid
-from .mesh import Mesh, MeshModel, check_size, polar
+from .mesh import Mesh, MeshModel, check_size, rays_from_polar
 
 NEAREST = 0.3
-"""Distance [m] at which the first wall begins to serve."""
+"""Distance of the nearest objects that the first wall is for [m]."""
 
 
 class Walls(MeshModel):
-    """Walls around the camera, the nearest first, each from its lowest row to its highest.
+    """Walls around the camera, the nearest first; in each wall row by row, the lowest row first.
 
-    Neighbors as those of a six-neighbor lattice: left, top-left, top-right, right, bottom-right, bottom-left.
+    The six neighbors have the order of a lattice's: `Grid.steps`. Walls are not linked to each other.
     """
 
     neighbors = 6
@@ -38,12 +40,12 @@ class Walls(MeshModel):
         rows = round(intersections)
         distances = wall_distances(shape, intersections, max_distance)
         counts = wall_counts(shape, intersections, max_distance)
-        up = (np.arange(rows) + 0.5) / rows * tall - height  # over the camera [m]
+        up = (np.arange(rows) + 0.5) / rows * tall - height  # height of the rows above the camera [m]
 
         pieces, links, first = [], [], 0
         for distance, count in zip(distances.tolist(), counts.tolist(), strict=True):
             row, place = (axis.reshape(-1) for axis in np.mgrid[:rows, :count].astype(np.int32))
-            pieces.append(polar(np.arctan2(distance, -up[row]), 2.0 * np.pi * (place + 0.5 * row) / count))
+            pieces.append(rays_from_polar(np.arctan2(distance, -up[row]), 2.0 * np.pi * (place + 0.5 * row) / count))
             links.append((row, place, count, first))
             first += rows * count
         neighbors = np.full((first + 1, self.neighbors), first, dtype=np.int32)
@@ -55,39 +57,45 @@ class Walls(MeshModel):
         return Mesh(frozen(np.asfortranarray(np.concatenate(pieces))), frozen(neighbors))
 
     def mesh_height(self, shape: Shape, height: float, intersections: float, tolerance: float) -> float:
-        """Rows are object_height / k apart, and move by as much as the camera."""
+        """The mesh height [m] from an arithmetic series: rows are object_height / k apart and move with the camera."""
         step = 2.0 * tolerance * _checked(shape, height).object_height / intersections
         return height if step == 0.0 else max(round(height / step) * step, 0.5 * step)
 
     def rings(self, made_for: Shape, mesh_height: float, intersections: float, seen: Shape, height: float) -> float:
-        """Always k: objects are sampled where they stand."""
+        """Always k, because an object is sampled where it stands."""
         return intersections
 
 
 def _checked(shape: Shape, height: float) -> Cylinder:
-    """The shape as the cylinder that it is. Raises GeometryError for other shapes, and for what is no camera height."""
+    """The shape, if it is a cylinder. Raises GeometryError for other shapes and for a height [m] of 0 or less."""
     if not isinstance(shape, Cylinder):
-        raise GeometryError(f"walls are for cylinders, not for a {type(shape).__name__.lower()}")
+        raise GeometryError(
+            f"mesh model wall6 is for cylinders, not for a {type(shape).__name__.lower()}; use ring6 or cap6"
+        )
     if not (math.isfinite(height) and height > 0):
         raise GeometryError(f"camera height must be above 0 m, not {height} m")
     return shape
 
 
 def wall_distances(shape: Shape, intersections: float, max_distance: float) -> Floats:
-    """Distances (m,) of walls [m], from the nearest to the farthest.
+    """Distances (m,) of the walls [m], the nearest first.
 
-    An object at d fills the angle 2 a(d) = 2 asin(r / d), and k a(d) / a(w) points of the wall at w. So a wall serves
-    angles from 1 - 1 / k to 1 + 1 / k of its own, and the next one begins where it ends. A row is rounded up to whole
-    points, which makes objects wider by up to a(d) / pi points; the upper end leaves room for that.
+    An object at the distance d fills the angle 2 a(d) = 2 asin(r / d), and k a(d) / a(w) points of the wall at w. So a
+    wall serves objects with a(d) from 1 - 1 / k to 1 + 1 / k times a(w), and the next wall begins where it ends.
+    Rounding a row up to whole points makes objects wider by up to a(d) / pi points. The upper end is lower by that
+    much.
 
-    Raises GeometryError for fewer than 2 intersections, an object too thick for the first wall, or if all is nearer.
+    Raises GeometryError for fewer than 2 intersections, and for a radius or a maximum distance that leaves no room for
+    a wall at NEAREST.
     """
     if intersections < 2.0:
-        raise GeometryError(f"walls need at least 2 intersections, not {intersections:g}")
+        raise GeometryError(f"mesh model wall6 needs at least 2 intersections, not {intersections:g}")
     if max_distance <= NEAREST:
-        raise GeometryError(f"walls begin at {NEAREST:g} m; a maximum distance of {max_distance:g} m leaves none")
+        raise GeometryError(
+            f"walls begin at {NEAREST:g} m, so the maximum distance must be above that, not {max_distance:g} m"
+        )
     if shape.radius >= NEAREST:
-        raise GeometryError(f"walls begin at {NEAREST:g} m, so a cylinder of {shape.radius:g} m radius has no room")
+        raise GeometryError(f"walls begin at {NEAREST:g} m, so the radius must be below that, not {shape.radius:g} m")
     widest, narrowest = (math.asin(shape.radius / each) for each in (NEAREST, max_distance))
     low, high = 1.0 - 1.0 / intersections, 1.0 + (1.0 - widest / math.pi) / intersections
     with np.errstate(divide="ignore", over="ignore"):
@@ -98,7 +106,7 @@ def wall_distances(shape: Shape, intersections: float, max_distance: float) -> F
 
 
 def wall_counts(shape: Shape, intersections: float, max_distance: float) -> Indices:
-    """How many points a row of each wall has (m,). Raises GeometryError as wall_distances does."""
+    """Points in a row of each wall (m,). Raises GeometryError like `wall_distances`, and for too many points."""
     theta = 2.0 * np.arcsin(shape.radius / wall_distances(shape, intersections, max_distance))
     counts = np.ceil(2.0 * np.pi * intersections / theta - 1e-9)
     check_size(float(counts.sum()) * intersections)

@@ -1,4 +1,4 @@
-"""Points as a picture: the cells of a lattice, which a network looks at with ordinary convolutions and no look-ups."""
+"""Layout lattice: the points as pixels of a picture, for networks of ordinary convolutions without look-ups."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from ..mesh.mesh import Mesh
 from .layout import OFF_SCREEN, Feeds, Layout
 
 BELOW = 3
-"""Rows of gaps before the first point: the second place of the second row has nothing but gaps around it, and so is
-what the off-screen point is in every layer (vm_export/lattice_graph.py)."""
+"""Rows of gaps before the first point. The second slot of the second row has only gaps around it, so in every layer it
+has the value of the off-screen point (vm_export/lattice_graph.py)."""
 
 
 class LatticeLayout(Layout):
-    """The box around all cells, row by row, with gaps around it. Its neighbors need no indices, they lie beside it."""
+    """The box around all cells of a lattice, row by row, with gaps around it.
+
+    steps: columns and rows from a point to each of its neighbors. They replace the neighbor indices.
+    """
 
     def __init__(self, mesh: Mesh, steps: tuple[tuple[int, int], ...]) -> None:
         assert mesh.cells is not None

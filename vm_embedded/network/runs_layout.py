@@ -1,4 +1,32 @@
-"""Points as columns, such that neighbors which follow each other in a mesh follow each other in memory."""
+"""Layout runs: points in an order in which a point's neighbors lie beside each other in memory.
+
+The words that this file uses:
+
+- A *slot* is one of the m places in the network's input `points` (3, m). It holds a point, a copy of a point, or
+  nothing. An empty slot is a *gap* and has the off-screen point's value in every layer.
+- A *run* is a sequence of slots in which each point is followed by its right neighbor. A gap follows the last one.
+- A *group* is up to three neighbors of a point that should follow each other in a run (MeshModel.runs). The groups of
+  ring6 are left, the point itself and right; top left and top right; bottom left and bottom right.
+- The *middle* of a group is the second slot of a group of three, and the first slot of a shorter group.
+- A *column* is a position in a layer's table (vm_export/runs_graph.py). The table holds, for each group and each slot,
+  a sum over the window of three slots around it. So a point looks up one value for each group, not for each neighbor.
+
+An example. Points 0 1 2 are a part of a ring, points 3 4 5 6 the whole next ring. The groups are left, self and right,
+and two upper neighbors: 3 4 above point 0, 4 5 above point 1, 6 3 above point 2. The m = 23 slots are:
+
+    slot   0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22
+    point  - - - 0 1 2 - 3 4 5 6  -  -  5  6  3  6  3  4  6  3  -  -
+
+Slots 3 to 5 and 7 to 10 are runs; - is a gap. The ring closes between 6 and 3, and the runs tear three groups apart
+there: the upper neighbors 6 3 of point 2, and 5 6 3 and 6 3 4 around points 6 and 3. Copies of these groups follow.
+
+Point 1 is in slot 4. Its first group, 0 1 2, has its middle in slot 4, and its second group, 4 5, in slot 8. Each group
+takes m - 1 = 22 columns of the table, and the sum around slot s is in column s + 1 of its group. So the columns of
+point 1 are 4 + 1 = 5 and 22 + 8 + 1 = 31.
+
+Copies and gaps look up the same sums as their originals and the off-screen point. So they have the right values in all
+layers, without masks or special cases.
+"""
 
 from __future__ import annotations
 
@@ -10,34 +38,25 @@ from ..mesh.mesh import SELF, Mesh, Runs
 from .layout import OFF_SCREEN, Feeds, Layout
 
 GAP = 1
-"""The middle one of three gaps that come first: all around it is off screen, so it is what the off-screen point is."""
+"""The middle one of the three gaps that come first. All slots around it are gaps, as around the off-screen point."""
 
+_GAPS_BEFORE = 3
 _GAPS_BEHIND = 2
-"""The last two slots are in no window's middle: the windows end with the network's third copy of the points, which
-lacks three (vm_export/runs_graph.py)."""
+"""The table has no windows around the last two slots. The network makes the windows from three copies of the points,
+and the third copy lacks its last three slots (vm_export/runs_graph.py)."""
+
+_Positions = npt.NDArray[np.int64]
 
 
 class RunsLayout(Layout):
-    """Points as columns, such that neighbors which follow each other in a ring follow each other in memory.
+    """The slots of a mesh in layout runs, and the columns in which each slot finds the sums of its groups.
 
-    The neighbors of a point form groups (MeshModel.runs) of up to three that follow each other. So a group's part of a
-    convolution is one of width 3 along memory, and a point needs one look-up for each group, not for each neighbor.
-
-    The slots are the points, each followed by its right neighbor or, where that is off screen, by a gap, which stands
-    for the off-screen point. Behind them come copies of the groups that are torn apart there, where a ring closes and
-    around the nadir. Each slot, copies and gaps too, looks up what its point would, so all copies of a point keep its
-    value through all layers.
-
-    An example, with - for gaps: points 4 5 6 of a ring and 7 8 9 10 of the next one lie as - - - 4 5 6 - 7 8 9 10 -,
-    and if point 6 has 10 and 7 as its upper pair, a copy of the two follows.
-
-    columns: (G, m), where slot s finds its group g in a layer's table (G (m - 1),). The sum around slot s stands in
-    column s + 1 of its group, because that is how the network gets a window of width 3 without moving data.
+    columns: (G, m) positions in a layer's table of G (m - 1) sums.
     """
 
     def __init__(self, mesh: Mesh, groups: Runs) -> None:
         self._groups = groups
-        slots, places, middles = _runs(mesh.neighbors, self._groups)
+        slots, places, middles = _arranged(mesh.neighbors, self._groups)
         count = len(slots)
         self.slots = frozen(slots.astype(np.int32))
         self.places = frozen(places.astype(np.int32))
@@ -45,15 +64,15 @@ class RunsLayout(Layout):
         original[places] = True
         self.original = frozen(original)
         self.rays = frozen(np.take(np.append(mesh.rays.T, np.full((3, 1), np.nan), axis=1), slots, axis=1)).T
-        self._starts = 1 + (count - 1) * np.arange(len(middles), dtype=np.int32)[:, None]
-        self.columns = frozen(middles.astype(np.int32) + self._starts)
+        self._first_columns = 1 + (count - 1) * np.arange(len(middles), dtype=np.int32)[:, None]
+        self.columns = frozen(middles.astype(np.int32) + self._first_columns)
 
     def links(self, members: npt.NDArray[np.integer]) -> Indices:
         places = np.append(self.places, np.int32(len(self)))
         found = np.empty((len(members), sum(map(len, self._groups)) - 1), dtype=np.int32)
-        for group, columns, start in zip(self._groups, self.columns, self._starts, strict=True):
-            middle = columns[members] - start
-            for offset, neighbor in enumerate(group, start=-(len(group) // 3)):
+        for group, columns, first in zip(self._groups, self.columns, self._first_columns, strict=True):
+            middle = columns[members] - first
+            for offset, neighbor in zip(_offsets(group), group, strict=True):
                 if neighbor != SELF:
                     found[:, neighbor] = places[self.slots[middle + offset]]
         return found
@@ -72,39 +91,38 @@ class RunsLayout(Layout):
         off_screen = ~on_screen
         np.copyto(points, OFF_SCREEN, where=off_screen)
         columns = self.columns.astype(np.int64)
-        np.copyto(columns, GAP + self._starts, where=off_screen)
+        np.copyto(columns, GAP + self._first_columns, where=off_screen)
         return {"points": points, "columns": columns}
 
     def answers(self, output: Singles) -> Singles:
         return output.T
 
 
-_Positions = npt.NDArray[np.int64]
+def _offsets(group: tuple[int, ...]) -> range:
+    """Slots of a group's members relative to its middle: -1, 0, 1 for three members, 0, 1 for two, 0 for one."""
+    first = -(len(group) // 3)
+    return range(first, first + len(group))
 
 
-def _runs(neighbors: Indices, groups: Runs) -> tuple[_Positions, _Positions, _Positions]:
-    """The point of each slot (m,), n for gaps; the slot of each point (n,); and for each group of the slots' points,
-    the slot in its middle (G, m)."""
+def _arranged(neighbors: Indices, groups: Runs) -> tuple[_Positions, _Positions, _Positions]:
+    """Arranges a mesh's points in slots, from their neighbors (n + 1, N).
+
+    Returns the point in each slot (m,), n in gaps; the slot of each point (n,); and for each group and slot the slot in
+    the group's middle (G, m).
+    """
     n = len(neighbors) - 1
-    # One gap more at the end: a group of three may begin with the last point.
-    slots = np.append(_in_runs(neighbors[:n, groups[0][0]], neighbors[:n, groups[0][-1]]), n)
-    slot = np.full(n + 1, GAP)
-    shown = np.flatnonzero(slots < n)
-    slot[slots[shown]] = shown
+    # The second gap at the end is for a group of three that begins with the last point.
+    runs = np.append(_in_runs(neighbors[:n, groups[0][0]], neighbors[:n, groups[0][-1]]), n)
+    slot = np.full(n + 1, GAP)  # of each point, and of the off-screen point
+    filled = np.flatnonzero(runs < n)
+    slot[runs[filled]] = filled
 
-    points = np.arange(n)
-    parts, middles, count = [slots], [], len(slots)
+    parts, middles, count = [runs], [], len(runs)
     for group in groups:
-        wanted = np.stack([points if each == SELF else neighbors[:n, each] for each in group])
-        center = len(group) // 3  # of three the second is the middle of the window, of two and of one the first
-        middle = np.full(n + 1, GAP)  # where any of them is on screen, the others should lie beside it
-        for offset, targets in enumerate(wanted, start=-center):
-            np.copyto(middle[:n], slot[targets] - offset, where=targets < n)
-        torn = np.zeros(n, dtype=bool)
-        for offset, targets in enumerate(wanted, start=-center):
-            torn |= slots[middle[:n] + offset] != targets
-        copies, which = np.unique(wanted[:, torn], axis=1, return_inverse=True)
-        middle[:n][torn] = count + len(group) * which.reshape(-1) + center
+        members = np.stack([np.arange(n) if each == SELF else neighbors[:n, each] for each in group])
+        middle, torn = _found_in_runs(members, _offsets(group), runs, slot)
+        copies, copy = np.unique(members[:, torn], axis=1, return_inverse=True)
+        middle[:n][torn] = count + len(group) * copy.reshape(-1) - _offsets(group)[0]
         parts.append(copies.T.reshape(-1))
         count += copies.size
         middles.append(middle)
@@ -112,38 +130,65 @@ def _runs(neighbors: Indices, groups: Runs) -> tuple[_Positions, _Positions, _Po
     return slots, slot[:n], np.stack([middle[slots] for middle in middles])
 
 
-def _in_runs(left: Indices, right: Indices) -> _Positions:
-    """Points of slots, n in gaps: three gaps, then the n points, each followed by its right neighbor or by a gap.
+def _found_in_runs(
+    members: Indices, offsets: range, runs: _Positions, slot: _Positions
+) -> tuple[_Positions, npt.NDArray[np.bool_]]:
+    """Where the group of each point lies in the runs, and whether the runs tear it apart.
 
-    Points in a row are joined at once; the loop is over the pieces, two for a ring that the view cuts in two.
+    members: (group size, n) points of each point's group, n off screen. slot: (n + 1,) of each point. Returns the slots
+    of the groups' middles (n + 1,), GAP where no member is on screen, and a mask (n,) of the groups that are torn.
+    """
+    n = members.shape[1]
+    middle = np.full(n + 1, GAP)
+    for offset, points in zip(offsets, members, strict=True):  # any member on screen gives the middle of a whole group
+        np.copyto(middle[:n], slot[points] - offset, where=points < n)
+    torn = np.zeros(n, dtype=bool)
+    for offset, points in zip(offsets, members, strict=True):
+        torn |= runs[middle[:n] + offset] != points
+    return middle, torn
+
+
+def _in_runs(left: Indices, right: Indices) -> _Positions:
+    """The points in runs (n in gaps), from their left and right neighbors (n,): three gaps, then runs with a gap each.
+
+    A *piece* is a sequence of points i, i + 1, ... that are also neighbors. numpy finds all pieces at once, and a loop
+    joins only pieces to runs. A ring that the view cuts in two has two pieces.
     """
     n = len(left)
     points = np.arange(n)
     starts = np.flatnonzero(np.append(True, (right[:-1] != points[1:]) | (left[1:] != points[:-1]))[:n])
     ends = np.append(starts[1:], n)[: len(starts)] - 1
-    piece = np.full(n + 1, -1)
+    piece = np.full(n + 1, -1)  # that begins with a point, or -1
     piece[starts] = np.arange(len(starts))
-    follower = piece[right[ends]]  # the piece that begins with the right neighbor of a piece's end
-    follower[left[starts[follower]] != ends] = -1
-    leads = np.ones(len(starts), dtype=bool)
-    leads[follower[follower >= 0]] = False
+    follower = piece[right[ends]]
+    follower[left[starts[follower]] != ends] = -1  # right of a piece's end, but not linked back to it
 
-    order: list[int] = []
-    gaps_after: list[int] = []
-    waiting = np.ones(len(starts), dtype=bool)
-    for first in (*np.flatnonzero(leads).tolist(), *np.flatnonzero(~leads).tolist()):  # the latter close in a circle
-        each = first
-        while each >= 0 and waiting[each]:
-            waiting[each] = False
-            order.append(each)
-            gaps_after.append(0)
-            each = int(follower[each])
-        if gaps_after:
-            gaps_after[-1] = 1
-    ordered = starts[np.array(order, dtype=np.intp)]
-    lengths = (ends - starts + 1)[np.array(order, dtype=np.intp)]
-    place = 3 + np.cumsum(np.append(0, lengths + np.array(gaps_after, dtype=np.intp)))
-    slots = np.full(place[-1], n)
+    order, ends_run = _chained(follower)
+    lengths = (ends - starts + 1)[order]
+    slot = _GAPS_BEFORE + np.cumsum(np.append(0, lengths + ends_run))  # where each piece begins
+    slots = np.full(slot[-1], n)
     within = points - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    slots[np.repeat(place[:-1], lengths) + within] = np.repeat(ordered, lengths) + within
+    slots[np.repeat(slot[:-1], lengths) + within] = np.repeat(starts[order], lengths) + within
     return slots
+
+
+def _chained(follower: _Positions) -> tuple[npt.NDArray[np.intp], Mask]:
+    """All pieces in an order in which each piece comes right before its follower, and which of them end a run.
+
+    follower: (pieces,) the piece that continues a piece, or -1.
+    """
+    leads = np.ones(len(follower), dtype=bool)
+    leads[follower[follower >= 0]] = False
+    order: list[int] = []
+    ends_run: list[bool] = []
+    waiting = np.ones(len(follower), dtype=bool)
+    # First the pieces that follow no other; the rest are closed rings, which may begin with any piece.
+    for first in (*np.flatnonzero(leads).tolist(), *np.flatnonzero(~leads).tolist()):
+        piece = first
+        while piece >= 0 and waiting[piece]:
+            waiting[piece] = False
+            order.append(piece)
+            ends_run.append(False)
+            piece = int(follower[piece])
+        ends_run[-1] = True
+    return np.array(order, dtype=np.intp), np.array(ends_run, dtype=bool)

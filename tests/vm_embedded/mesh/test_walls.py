@@ -212,10 +212,10 @@ def test_walls_are_for_cylinders(shape):
     ("post", "height", "k", "max_distance", "complaint"),
     [
         (GOAL_POST, 1.0, 1.9, FAR, "at least 2 intersections, not 1.9"),
-        (GOAL_POST, 1.0, 4.0, 0.3, "maximum distance of 0.3 m"),
+        (GOAL_POST, 1.0, 4.0, 0.3, r"maximum distance must be above that, not 0\.3 m"),
         (GOAL_POST, 1.0, 4.0, 0.1, "begin at 0.3 m"),
-        (Cylinder(0.3, 1.8), 1.0, 4.0, FAR, "0.3 m radius has no room"),
-        (Cylinder(1.0, 1.8), 1.0, 4.0, FAR, "1 m radius has no room"),
+        (Cylinder(0.3, 1.8), 1.0, 4.0, FAR, r"radius must be below that, not 0\.3 m"),
+        (Cylinder(1.0, 1.8), 1.0, 4.0, FAR, "radius must be below that, not 1 m"),
         (GOAL_POST, 0.0, 4.0, FAR, "height"),
         (GOAL_POST, -1.0, 4.0, FAR, "height"),
         (GOAL_POST, math.nan, 4.0, FAR, "height"),

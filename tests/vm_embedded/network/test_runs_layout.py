@@ -11,12 +11,25 @@ from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.geometry.sphere import Sphere
-from vm_embedded.mesh.mesh import SELF
+from vm_embedded.mesh.mesh import SELF, Mesh
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
+from vm_embedded.network import runs_layout
 from vm_embedded.network.runs_layout import RunsLayout
 
 from ..strategies import SIZE, reals, seeds
 from .test_layout import MODELS, manifest_of, models, random_meshes, ring_meshes
+
+
+def test_the_example_in_the_docstring():
+    """Points 0 1 2 of a ring, below the closed ring of 3 4 5 6; neighbors are left, right and two above."""
+    off = 7
+    left, right = [off, 0, 1, 6, 3, 4, 5], [1, 2, off, 4, 5, 6, 3]
+    above = [[3, 4], [4, 5], [6, 3], *[[off, off]] * 4]
+    neighbors = np.vstack([np.column_stack([left, right, above]), np.full(4, off)]).astype(np.int32)
+    layout = RunsLayout(Mesh(np.zeros((7, 3)), neighbors), ((0, SELF, 1), (2, 3)))
+    points = next(each.split() for each in runs_layout.__doc__.splitlines() if each.startswith("    point"))[1:]
+    assert layout.slots.tolist() == [off if each == "-" else int(each) for each in points]
+    assert layout.columns[:, 4].tolist() == [5, 31]
 
 
 def assert_laws_of_runs(mesh, model):
