@@ -119,7 +119,9 @@ def _arranged(neighbors: Indices, groups: Runs) -> tuple[_Positions, _Positions,
 
     parts, middles, count = [runs], [], len(runs)
     for group in groups:
-        members = np.stack([np.arange(n) if each == SELF else neighbors[:n, each] for each in group])
+        members: npt.NDArray[np.integer] = np.stack(
+            [np.arange(n) if each == SELF else neighbors[:n, each] for each in group]
+        )
         middle, torn = _found_in_runs(members, _offsets(group), runs, slot)
         copies, copy = np.unique(members[:, torn], axis=1, return_inverse=True)
         middle[:n][torn] = count + len(group) * copy.reshape(-1) - _offsets(group)[0]
@@ -131,8 +133,8 @@ def _arranged(neighbors: Indices, groups: Runs) -> tuple[_Positions, _Positions,
 
 
 def _found_in_runs(
-    members: Indices, offsets: range, runs: _Positions, slot: _Positions
-) -> tuple[_Positions, npt.NDArray[np.bool_]]:
+    members: npt.NDArray[np.integer], offsets: range, runs: _Positions, slot: _Positions
+) -> tuple[_Positions, Mask]:
     """Where the group of each point lies in the runs, and whether the runs tear it apart.
 
     members: (group size, n) points of each point's group, n off screen. slot: (n + 1,) of each point. Returns the slots
