@@ -20,9 +20,9 @@ from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_embedded.network.model_file import read_model
 from vm_embedded.network.session import Session
 from vm_export.checkpoint import Checkpoint
+from vm_export.export import export
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape
-from vm_export.onnx_graph import export
 
 from .timing import interleaved
 

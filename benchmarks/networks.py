@@ -9,9 +9,9 @@ from vm_embedded.arrays import Indices, Singles
 from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_embedded.network.model_file import ModelFile, read_model
 from vm_export.checkpoint import Checkpoint
+from vm_export.export import export
 from vm_export.network import Network
 from vm_export.network_shape import Layer, NetworkShape
-from vm_export.onnx_graph import export
 
 REFERENCE = NetworkShape(
     (

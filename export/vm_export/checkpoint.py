@@ -1,4 +1,4 @@
-"""Checkpoints: a network's description, its manifest and its weights in one .pt file of plain values."""
+"""Checkpoints: a network and its manifest in one .pt file of plain values and tensors."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FORMAT = "vm-embedded checkpoint 3"
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """A trained network and what its model file will say about it. The manifest has no self-test yet."""
+    """A trained network and the manifest of its model file, which has no self-test yet. Raises ModelError."""
 
     network: Network | SecondLook
     manifest: Manifest
@@ -33,13 +33,17 @@ class Checkpoint:
     def __post_init__(self) -> None:
         shape, manifest = self.network.shape, self.manifest
         if shape.classes != len(manifest.classes):
-            raise ModelError(f"the network has {shape.classes} outputs, the manifest {len(manifest.classes)} classes")
+            raise ModelError(
+                f"the network has {shape.classes} outputs, but the manifest names {len(manifest.classes)} classes"
+            )
         if shape.neighbors != manifest.neighbors:
-            raise ModelError(f"the network has {shape.neighbors} neighbors, mesh {manifest.mesh} {manifest.neighbors}")
+            raise ModelError(
+                f"the network is for {shape.neighbors} neighbors, but mesh {manifest.mesh} has {manifest.neighbors}"
+            )
 
     @property
-    def last(self) -> Network:
-        """The network itself, or of a second look the second one."""
+    def last_network(self) -> Network:
+        """The network that answers last: the second one of a second look, else the only one."""
         return self.network.second if isinstance(self.network, SecondLook) else self.network
 
     def save(self, path: str | Path) -> None:
@@ -54,22 +58,22 @@ class Checkpoint:
         }
         if isinstance(self.network, SecondLook):
             content["first"] = {"network": self.network.first.shape.as_dict(), "gate": asdict(self.network.gate)}
-        file = io.BytesIO()  # on a full disk torch would fail in its own way
+        file = io.BytesIO()  # torch reports a full disk in its own way
         torch.save(content, file)
         with atomic_write(Path(path)) as part:
             part.write_bytes(file.getbuffer())
 
     @classmethod
     def load(cls, path: str | Path) -> Checkpoint:
-        """Read a checkpoint; nothing in it is executed. Raises InputError or ModelError."""
+        """Read a checkpoint without executing anything in it. Raises InputError or ModelError."""
         try:
             content = torch.load(path, map_location="cpu", weights_only=True)
         except OSError as error:
             raise InputError(f"can't read {path}: {error.strerror or error}") from error
         except (pickle.UnpicklingError, RuntimeError, EOFError, ValueError, KeyError) as error:
-            raise InputError(f"{path} is no checkpoint: {one_line(error)}") from error
+            raise InputError(f"{path} is not a checkpoint: {one_line(error)}") from error
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
-            raise InputError(f"{path} is no checkpoint of this format ({_FORMAT!r})")
+            raise InputError(f"{path} is not a checkpoint of format {_FORMAT!r}; train the network again")
         last = Network(NetworkShape.from_dict(content["network"]))
         network: Network | SecondLook = last
         if content["first"] is not None:
@@ -78,5 +82,5 @@ class Checkpoint:
         try:
             network.load_state_dict(content["state"])
         except (RuntimeError, KeyError) as error:
-            raise InputError(f"{path}: weights do not fit the network: {one_line(error)}") from error
+            raise InputError(f"{path}: the weights do not fit the network: {one_line(error)}") from error
         return cls(network.eval(), Manifest.from_json(json.dumps(content["manifest"])), Grid(**content["grid"]))

@@ -1,4 +1,4 @@
-"""vm-export: from a trained network to one self-describing ONNX file."""
+"""vm-export: from a trained network to a self-describing ONNX file."""
 
 from __future__ import annotations
 
@@ -19,33 +19,39 @@ EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command line of vm-export."""
+    """The argument parser of vm-export."""
     parser = argparse.ArgumentParser(
         prog="vm-export",
-        description="Write a network as one ONNX file that describes itself, checked against torch.",
-        epilog="Exit status: 0 written, 1 not written (the reason is on standard error), 2 wrong usage.",
+        description="Write a network as a self-describing ONNX file, and check its answers against torch.",
+        epilog="Exit status: 0 written, 1 not written (standard error says why), 2 wrong usage.",
     )
-    parser.add_argument("model", type=Path, help="a checkpoint (.pt) or a network of the reference (.yaml)")
+    parser.add_argument("model", type=Path, help="checkpoint (.pt), or network of the reference implementation (.yaml)")
     parser.add_argument(
-        "-o", "--output", type=Path, help="file to write; default: the model's name with .onnx or .yaml"
+        "-o", "--output", type=Path, help="file to write; default: the name of the model with .onnx or .yaml"
     )
     parser.add_argument(
         "--layout",
         choices=LAYOUTS,
-        help="write one file, in this layout; default: the fastest one, and beside it the portable NAME.plain.onnx "
-        "(not of a network with a second look, which has only runs)",
+        help="write one file, in this layout; default: the fastest layout, and NAME.plain.onnx for other ONNX runtimes "
+        "(a network with a second look has only layout runs)",
     )
-    parser.add_argument("--to-yaml", action="store_true", help="write the reference's format instead")
-    facts = parser.add_argument_group("what the file does not say, or says wrongly")
-    facts.add_argument("--intersections", type=float, metavar="K", help="rings that cross an object")
-    facts.add_argument("--radius", type=float, metavar="M", help="radius that the mesh is made for [m]")
+    parser.add_argument(
+        "--to-yaml", action="store_true", help="write the format of the reference implementation instead"
+    )
+    facts = parser.add_argument_group("entries that the file lacks, or that you want to replace")
+    facts.add_argument("--intersections", type=float, metavar="K", help="rings of the mesh across an object")
+    facts.add_argument("--radius", type=float, metavar="M", help="radius of the object that the mesh is built for [m]")
     facts.add_argument("--object-radius", type=float, metavar="M", help="radius of the real object [m]")
-    facts.add_argument("--max-distance", type=float, metavar="M", help="how far out the mesh reaches [m]")
-    facts.add_argument("--edge", choices=EDGES, help="where a missing neighbor leads: the off-screen point, or itself")
+    facts.add_argument("--max-distance", type=float, metavar="M", help="reach of the mesh [m]")
+    facts.add_argument(
+        "--edge",
+        choices=EDGES,
+        help="neighbor that replaces a missing one: the off-screen point (hard), or the point itself (same)",
+    )
     facts.add_argument(
         "--classes",
         metavar="NAME[:KIND],...",
-        help="classes in the order of the outputs; kind: object, upright, area or background",
+        help="classes in the order of the outputs; KIND is object, upright, area or background",
     )
     return parser
 
@@ -64,21 +70,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    # Imported here, so that a robot without torch still gets help texts and one clear line.
-    from .onnx_graph import export, fastest_layout
+    # Imported here: without torch, --help still works and the error is one clear line.
+    from .export import export, fastest_layout
     from .reference import write_reference
 
     output = options.output or options.model.with_suffix(".yaml" if options.to_yaml else ".onnx")
     portable = output.with_suffix(".plain" + output.suffix)
     for path in (output,) if options.to_yaml or options.layout else (output, portable):
         if path.resolve() == options.model.resolve():
-            raise InputError(f"{path} is the input and would be written over; give another file with --output")
+            raise InputError(f"{path} is the input and would be overwritten; give another file with --output")
     if options.to_yaml and options.layout:
-        raise InputError("--layout is for ONNX files, and --to-yaml writes none")
+        raise InputError("--layout is for ONNX files; leave it out with --to-yaml")
     checkpoint = _load(options.model, _overrides(options))
     if checkpoint.grid.kind != "visual":
         raise InputError(
-            f"{options.model} was trained on a {checkpoint.grid.kind} mesh, which the runtime does not have"
+            f"{options.model} was trained on a {checkpoint.grid.kind} grid; the runtime has only the Visual Mesh"
         )
     manifest = checkpoint.manifest
     classes = ", ".join(f"{each.name} ({each.kind})" for each in manifest.classes)
@@ -87,11 +93,11 @@ def _run(options: argparse.Namespace) -> int:
     print(f"  object radius {manifest.object_radius:g} m, edge {manifest.edge}, classes: {classes}")
     if options.to_yaml:
         write_reference(checkpoint, output)
-        print(f"{output}: written in the reference's format")
+        print(f"{output}: written in the format of the reference implementation")
         return EXIT_OK
     layout = options.layout or fastest_layout(checkpoint)
-    everywhere = options.layout is None and layout != "plain" and checkpoint.network is checkpoint.last
-    files = {portable: "plain"} if everywhere else {}
+    both = options.layout is None and layout != "plain" and checkpoint.network is checkpoint.last_network
+    files = {portable: "plain"} if both else {}
     files[output] = layout
     for path, layout in files.items():
         difference = export(checkpoint, path, layout)
@@ -133,8 +139,8 @@ def _load(path: Path, overrides: Overrides) -> Checkpoint:
     if path.suffix.lower() in (".yaml", ".yml"):
         return read_reference(path, overrides)
     if path.suffix.lower() == ".pt":
-        return overrides.applied(Checkpoint.load(path))
-    raise InputError(f"{path}: a model is a checkpoint (.pt) or a network of the reference (.yaml)")
+        return overrides.apply_to(Checkpoint.load(path))
+    raise InputError(f"{path} must be a checkpoint (.pt) or a network of the reference implementation (.yaml)")
 
 
 if __name__ == "__main__":

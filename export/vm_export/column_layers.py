@@ -1,8 +1,10 @@
-"""A network's layers on points as columns, written into an ONNX graph.
+"""The layers of a network on points as columns, for the graphs of layouts runs and lattice.
 
-- SELU and ELU are taken apart into cheap operators. With c = ln(alpha) and u = z + c, their value is up to a factor and
-  a constant max(u, c) + exp(min(u, c)); c goes into the layer's own bias, factor and constant into the next layer.
-- Two classes need one output: the difference of their logits.
+Two rewritings make them fast:
+
+- SELU and ELU become cheap operators. With c = ln(alpha) and u = z + c, their value is max(u, c) + exp(min(u, c)), up
+  to a factor and a constant. c goes into the bias of the layer, factor and constant into the weights of the next one.
+- Two classes with a softmax need one output: the difference of their logits.
 """
 
 from __future__ import annotations
@@ -15,24 +17,26 @@ import numpy as np
 
 from vm_embedded.arrays import Floats
 
-from .graph import Graph
 from .network import GraphConvolution, GraphLayer, Network, SeparableConvolution
+from .onnx_graph import OnnxGraph
 
 Convolve = Callable[[str, str, Floats], str]
-"""Sums (outputs, m) of a convolution without its bias, from a name for its nodes, the name of what it takes (inputs, m)
-and a kernel (outputs, N + 1, inputs), self first."""
+"""Writes the nodes of a convolution without its bias: from a name for the nodes, the name of its input (inputs, m) and
+a kernel (outputs, N + 1, inputs), the point itself first, to the name of its output (outputs, m)."""
 
 _FLAT = -30.0
-"""Below it an exponential is counted as e^-30: less than a float32 near 1 can show, and far above the denormal numbers,
-with which a processor counts many times slower."""
+"""The smallest exponent. e^-30 vanishes beside a float32 near 1, and it is far above the denormal numbers, with which
+a processor is many times slower."""
 
 _SELU_ALPHA, _SELU_SCALE = 1.6732632423543772, 1.0507009873554805
 
 
 @dataclass(frozen=True)
 class _Activation:
-    """What an activation leaves to its neighbors: its value is scale * (what its nodes give) + constant, if its input
-    has the bias added."""
+    """The parts of an activation that move into the weights of the layers around it.
+
+    If the layer before adds `bias`, the activation is `scale` times the value of its nodes plus `constant`.
+    """
 
     bias: float = 0.0
     scale: float = 1.0
@@ -52,36 +56,36 @@ _ACTIVATIONS = {
 }
 
 
-def column_layers(graph: Graph, network: Network, x: str, convolve: Convolve, name: str, output: str) -> str:
-    """Write all layers of a network; return `output`, its probabilities (C, m), from x (3, m).
+def write_layers(graph: OnnxGraph, network: Network, x: str, convolve: Convolve, prefix: str, output: str) -> str:
+    """Write all layers of a network; return `output`, the name of its probabilities (C, m), from x (3, m).
 
-    Nodes are called after `name`; `convolve` writes what looks at neighbors.
+    Names of nodes begin with `prefix`; `convolve` writes the convolutions, which look at neighbors.
     """
     before = _Activation()
     for index, (spec, layer) in enumerate(zip(network.shape.layers, network.typed_layers, strict=True)):
-        each = f"{name}layer{index}"
-        kernel, bias = _weights(layer)
+        name = f"{prefix}layer{index}"
         last = index == len(network.shape.layers) - 1
+        kernel, bias = _weights(layer)
         if last and spec.activation == "softmax" and spec.width == 2:
             kernel, bias = kernel[1:] - kernel[:1], bias[1:] - bias[:1]
         activation = _Activation() if last else _ACTIVATIONS[spec.activation]
         bias = bias + activation.bias + before.constant * kernel.sum(axis=(1, 2))
         kernel = before.scale * kernel
-        if kernel.shape[1] == 1:
-            sums = graph.node("MatMul", [graph.constant(f"{each}.kernel", kernel[:, 0]), x], f"{each}.sums")
+        if kernel.shape[1] == 1:  # a dense layer
+            sums = graph.node("MatMul", [graph.constant(f"{name}.kernel", kernel[:, 0]), x], f"{name}.sums")
         else:
-            sums = convolve(each, x, kernel)
-        z = graph.node("Add", [sums, graph.constant(f"{each}.bias", bias[:, None])], f"{each}.linear")
+            sums = convolve(name, x, kernel)
+        z = graph.node("Add", [sums, graph.constant(f"{name}.bias", bias[:, None])], f"{name}.linear")
         if last:
-            _head(graph, name, spec.activation, spec.width, z, output)
+            _write_head(graph, f"{prefix}head", spec.activation, spec.width, z, output)
         else:
-            x = _activation(graph, each, spec.activation, z)
+            x = _write_activation(graph, name, spec.activation, z)
         before = activation
     return output
 
 
 def _weights(layer: GraphLayer) -> tuple[Floats, Floats]:
-    """Kernel (outputs, N + 1 or 1, inputs), self first, and bias (outputs,) of a layer."""
+    """Kernel (outputs, N + 1 or 1, inputs), the point itself first, and bias (outputs,) of a layer."""
     weight = layer.linear.weight.detach().numpy().astype(np.float64)
     bias = layer.linear.bias.detach().numpy().astype(np.float64)
     if isinstance(layer, SeparableConvolution):
@@ -90,8 +94,8 @@ def _weights(layer: GraphLayer) -> tuple[Floats, Floats]:
     return weight.reshape(len(weight), places, -1), bias
 
 
-def _activation(graph: Graph, name: str, activation: str, z: str) -> str:
-    """Node of an activation; see `_Activation` for what it leaves out."""
+def _write_activation(graph: OnnxGraph, name: str, activation: str, z: str) -> str:
+    """Write the nodes of an activation, without the parts that `_Activation` moves into the weights."""
     if activation in ("relu", "tanh"):
         return graph.node(activation.capitalize(), [z], f"{name}.activation")
     corner = graph.constant(f"{activation}.corner", _ACTIVATIONS[activation].bias)
@@ -101,15 +105,14 @@ def _activation(graph: Graph, name: str, activation: str, z: str) -> str:
     return graph.node("Add", [straight, curved], f"{name}.activation")
 
 
-def _head(graph: Graph, name: str, activation: str, classes: int, logits: str, output: str) -> str:
-    """Probabilities (classes, m) from logits (classes, m), or (1, m) where two classes need only their difference."""
-    head = f"{name}head"
+def _write_head(graph: OnnxGraph, name: str, activation: str, classes: int, logits: str, output: str) -> str:
+    """Write the head: probabilities (C, m) from logits (C, m), or from the difference (1, m) of two classes."""
     if activation == "sigmoid":
         return graph.node("Sigmoid", [logits], output)
     if classes == 2:
-        other = graph.node("Neg", [logits], f"{head}.other")
-        return graph.node("Sigmoid", [graph.node("Concat", [other, logits], f"{head}.both", axis=0)], output)
-    largest = graph.node("ReduceMax", [logits], f"{head}.largest", axes=[0])
-    powers = graph.node("Exp", [graph.node("Sub", [logits, largest], f"{head}.shifted")], f"{head}.powers")
-    total = graph.node("ReduceSum", [powers, graph.constant("first", [0])], f"{head}.total")
+        other = graph.node("Neg", [logits], f"{name}.other")
+        return graph.node("Sigmoid", [graph.node("Concat", [other, logits], f"{name}.both", axis=0)], output)
+    largest = graph.node("ReduceMax", [logits], f"{name}.largest", axes=[0])
+    powers = graph.node("Exp", [graph.node("Sub", [logits, largest], f"{name}.shifted")], f"{name}.powers")
+    total = graph.node("ReduceSum", [powers, graph.constant("first", [0])], f"{name}.total")
     return graph.node("Div", [powers, total], output)

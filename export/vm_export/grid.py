@@ -1,4 +1,4 @@
-"""Which points of a picture a network was trained on."""
+"""The arrangement of points that a network was trained on."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ GRIDS = ("visual", "hexagonal")
 
 @dataclass(frozen=True)
 class Grid:
-    """Which points of a picture a network was trained on.
+    """The arrangement of points that a network was trained on.
 
-    kind: visual, the mesh of the manifest, or hexagonal, the paper's baseline: a regular mesh in the picture, which the
-    runtime does not have. equal_at: distance at which a hexagonal mesh has as many points on an object as the Visual
-    Mesh [m]; 0 for as many in the whole picture. Raises InputError.
+    kind: visual, the mesh of the manifest; or hexagonal, the paper's baseline, a regular grid of pixels, which the
+    runtime does not have. equal_at: the distance [m] at which both have the same number of points on an object; 0 for
+    the same number of points in the whole picture. Raises InputError.
     """
 
     kind: str = "visual"
@@ -26,7 +26,7 @@ class Grid:
         if self.kind not in GRIDS:
             raise InputError(unknown("grid", self.kind, GRIDS))
         if not 0.0 <= self.equal_at < math.inf:
-            raise InputError(f"equal_at must be a distance of at least 0 m, not {self.equal_at!r}")
+            raise InputError(f"equal_at must be a finite distance of at least 0 m, not {self.equal_at!r}")
 
 
 VISUAL = Grid()

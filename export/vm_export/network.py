@@ -12,9 +12,10 @@ _ACTIVATIONS: dict[str, type[nn.Module]] = {"selu": nn.SELU, "relu": nn.ReLU, "e
 
 
 class GraphConvolution(nn.Module):
-    """Gather [self, neighbors...] of all channels, neighbor-major, times a kernel ((N + 1) inputs, outputs), plus bias.
+    """The paper's graph convolution: a linear layer on the values of a point and of its N neighbors.
 
-    The paper's section on the network: a 3 x 3 convolution on a graph of six neighbors.
+    It gathers (N + 1) * inputs values, the point's own channels first, then those of each neighbor in turn. With six
+    neighbors this is the counterpart of a 3 x 3 convolution.
     """
 
     def __init__(self, inputs: int, outputs: int, neighbors: int) -> None:
@@ -28,7 +29,7 @@ class GraphConvolution(nn.Module):
 
 
 class SeparableConvolution(nn.Module):
-    """A graph convolution whose kernel is a weight for each neighbor and channel, then a mix of the channels."""
+    """A graph convolution in two steps: a weight for each neighbor and channel, then a linear mix of the channels."""
 
     def __init__(self, inputs: int, outputs: int, neighbors: int) -> None:
         super().__init__()
@@ -42,7 +43,7 @@ class SeparableConvolution(nn.Module):
 
 
 class Dense(nn.Module):
-    """A layer on each point alone."""
+    """A linear layer on each point by itself."""
 
     def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
@@ -57,9 +58,9 @@ GraphLayer = GraphConvolution | SeparableConvolution | Dense
 
 
 class Network(nn.Module):
-    """A Visual Mesh network: (points, neighbors) to probabilities, or to logits in training.
+    """A Visual Mesh network: from points and neighbors to probabilities, or to logits in training.
 
-    Row n of the points is the off-screen point: -1 in every channel, linked to itself, it goes through every layer.
+    Row n of the points is the off-screen point: -1 in every channel and linked to itself. It goes through every layer.
     """
 
     def __init__(self, shape: NetworkShape) -> None:
@@ -71,7 +72,7 @@ class Network(nn.Module):
         )
         self.activations = nn.ModuleList(_ACTIVATIONS[layer.activation]() for layer in shape.layers[:-1])
         for module in self.modules():
-            if isinstance(module, nn.Linear):  # what SELU needs to keep its variance (LeCun)
+            if isinstance(module, nn.Linear):  # LeCun's initialization, with which SELU keeps the variance
                 nn.init.normal_(module.weight, std=module.in_features**-0.5)
                 nn.init.zeros_(module.bias)
 
@@ -82,7 +83,7 @@ class Network(nn.Module):
 
     @property
     def typed_layers(self) -> list[GraphLayer]:
-        """The layers, as what they are."""
+        """The layers with their types."""
         return [layer for layer in self.layers if isinstance(layer, GraphLayer)]
 
     def logits(self, points: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:

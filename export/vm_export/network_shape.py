@@ -1,4 +1,4 @@
-"""The description of a network: its layers, in plain values. It needs no torch."""
+"""The shape of a network: its layers, as plain values. This module does not need torch."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ KINDS = ("convolution", "separable", "dense")
 
 @dataclass(frozen=True)
 class Layer:
-    """One layer: its kind (one of KINDS), its width, and its activation (of the last one: a head)."""
+    """One layer: its kind (one of KINDS), its width, and its activation (of ACTIVATIONS; the last layer: of HEADS)."""
 
     kind: str
     width: int
@@ -27,14 +27,14 @@ class Layer:
         if self.activation not in (*ACTIVATIONS, *HEADS):
             raise InputError(unknown("activation", self.activation, (*ACTIVATIONS, *HEADS)))
         if self.width < 1:
-            raise InputError(f"a layer's width must be at least 1, not {self.width}")
+            raise InputError(f"the width of a layer must be at least 1, not {self.width}")
 
 
 @dataclass(frozen=True)
 class NetworkShape:
-    """Layers of a network for points with three colors and `neighbors` neighbors each.
+    """The layers of a network for points with three color channels and `neighbors` neighbors each.
 
-    Raises InputError if the first layer is dense, or a head stands anywhere but at the end.
+    Raises InputError if the first layer is dense, or if a head is not the last layer.
     """
 
     layers: tuple[Layer, ...]
@@ -42,10 +42,10 @@ class NetworkShape:
 
     def __post_init__(self) -> None:
         if not self.layers or self.layers[0].kind == "dense":
-            raise InputError("a network begins with a convolution")
+            raise InputError("the first layer of a network must be a convolution or separable")
         heads = [layer.activation in HEADS for layer in self.layers]
         if not heads[-1] or any(heads[:-1]):
-            raise InputError(f"a network ends with one of {', '.join(HEADS)}, and has it nowhere else")
+            raise InputError(f"the last layer of a network, and no other, must have activation {' or '.join(HEADS)}")
 
     @classmethod
     def uniform(
@@ -58,7 +58,7 @@ class NetworkShape:
         kind: str = "convolution",
         neighbors: int = 6,
     ) -> NetworkShape:
-        """`depth` convolutions, all but the last one of `width`: the paper's networks."""
+        """`depth` convolutions, all but the last one of `width` channels: the networks of the paper."""
         inner = (Layer(kind, width, activation),) * (depth - 1)
         return cls((*inner, Layer(kind, classes, head)), neighbors)
 
@@ -69,7 +69,7 @@ class NetworkShape:
 
     @property
     def operations(self) -> int:
-        """Multiplications and additions for each point, activations not counted."""
+        """Multiplications and additions for each point, without activations."""
         total, inputs = 0, 3
         for layer in self.layers:
             places = 1 if layer.kind == "dense" else self.neighbors + 1
@@ -79,7 +79,7 @@ class NetworkShape:
         return total
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values for a checkpoint."""
+        """The shape as plain values for a checkpoint."""
         return asdict(self)
 
     @classmethod
@@ -88,4 +88,4 @@ class NetworkShape:
         try:
             return cls(tuple(Layer(**layer) for layer in data["layers"]), int(data["neighbors"]))
         except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"network description can't be read: {error}") from error
+            raise InputError(f"can't read the shape of a network: {error}") from error

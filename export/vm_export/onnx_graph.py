@@ -1,119 +1,64 @@
-"""From a torch network to self-describing ONNX files, checked against torch."""
+"""An ONNX graph that grows node by node, and the model file made from it."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
-import torch
+import numpy.typing as npt
+import onnx
+from onnx import TensorProto, helper, numpy_helper
 
-import vm_embedded
-from vm_embedded.arrays import Indices, Singles
-from vm_embedded.errors import ModelError
-from vm_embedded.files import atomic_write
-from vm_embedded.mesh.grids import lattice_neighbors
-from vm_embedded.network.manifest import Manifest
-from vm_embedded.network.model_file import ModelFile
-from vm_embedded.network.self_test import SelfTest
-from vm_embedded.network.session import Session
+_OPSETS = {"": 17, "ai.onnx.ml": 3}
+_IR_VERSION = 8
+"""ONNX Runtime reads this version since 1.12: a robot may have an older one than the workstation."""
 
-from .checkpoint import Checkpoint
-from .lattice_graph import lattice_graph
-from .network import Network
-from .plain_graph import plain_graph
-from .runs_graph import runs_graph
-from .second_look import SecondLook
+FLOAT, INT32, INT64, BOOL = TensorProto.FLOAT, TensorProto.INT32, TensorProto.INT64, TensorProto.BOOL
 
-LARGEST_DIFFERENCE = 1e-4
-"""Probability by which ONNX Runtime may differ from torch."""
-
-_WIDEST = {"convolution": 64, "separable": 32, "dense": 1024}
-"""Width of a layer of each kind up to which layout runs is chosen: where it was measured to be faster, for convolutions
-and separable ones (docs/performance.md); dense layers have no look-ups, so their width hardly matters."""
-
-_CHECKED_POINTS = (1, 2, 7, 64, 1000, 5000)
+Tensors = dict[str, tuple[int, list[int | str]]]
+"""Inputs or outputs of a model by name: element type and shape; a text in a shape names a free dimension."""
 
 
-def fastest_layout(checkpoint: Checkpoint) -> str:
-    """The fastest layout that a network can have, by its shape.
+class OnnxGraph:
+    """The nodes and constants written so far. Each node has one output, and the node is named after it."""
 
-    Runs save look-ups and cost multiplications: two in nine of a convolution's are by zero, and separable ones become
-    full ones. So the wider a layer, the less they gain. A second look there is only in runs.
-    """
-    if isinstance(checkpoint.network, SecondLook):
-        return "runs"
-    narrow = all(layer.width <= _WIDEST[layer.kind] for layer in checkpoint.network.shape.layers)
-    return "runs" if narrow and checkpoint.manifest.edge == "hard" else "plain"
+    def __init__(self) -> None:
+        self._nodes: list[onnx.NodeProto] = []
+        self._constants: dict[str, onnx.TensorProto] = {}
 
+    def constant(self, name: str, value: npt.ArrayLike) -> str:
+        """Add a constant, integers as int64 and other numbers as float32; return its name."""
+        array = np.asarray(value)
+        kind = np.int64 if np.issubdtype(array.dtype, np.integer) else np.float32
+        self._constants[name] = numpy_helper.from_array(np.ascontiguousarray(array, dtype=kind), name)
+        return name
 
-def build(network: Network | SecondLook, manifest: Manifest) -> bytes:
-    """The bytes of an ONNX model in the manifest's layout: stock operators, the neighbor indices an input.
+    def node(self, operator: str, inputs: list[str], output: str, domain: str = "", **attributes: Any) -> str:
+        """Add a node; return the name of its output."""
+        self._nodes.append(helper.make_node(operator, inputs, [output], name=output, domain=domain, **attributes))
+        return output
 
-    Raises ModelError for a second look in another layout than runs, and for a layout that the mesh can't have.
-    """
-    if manifest.layout == "runs":
-        return runs_graph(network, manifest)
-    if isinstance(network, SecondLook):
-        raise ModelError(f"a network with a second look is written in layout runs, not {manifest.layout}")
-    return lattice_graph(network, manifest) if manifest.layout == "lattice" else plain_graph(network, manifest)
+    def columns_of(self, table: str, columns: str, output: str) -> str:
+        """Add a look-up of columns (k,) in a table (rows, m); return the name of the result (rows, k).
 
+        ArrayFeatureExtractor is the fastest operator for that: one list of columns serves all rows.
+        """
+        return self.node("ArrayFeatureExtractor", [table, columns], output, domain="ai.onnx.ml")
 
-def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) -> float:
-    """Write the model file of a checkpoint, in the fastest layout if none is given; return the difference to torch.
-
-    The file is checked in ONNX Runtime before it is written. Raises ModelError if a probability differs by more than
-    LARGEST_DIFFERENCE, or for a layout that does not fit the manifest; InputError if the file can't be written.
-    """
-    layout = layout or fastest_layout(checkpoint)
-    network = checkpoint.network.eval()
-    provenance = {**checkpoint.manifest.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"}
-    manifest = replace(
-        checkpoint.manifest,
-        layout=layout,
-        operations=network.operations,
-        provenance=provenance,
-    )
-    manifest = replace(manifest, self_test=_example(network, manifest, points=12, seed=0))
-    content = build(network, manifest)
-    difference = largest_difference(content, network, manifest)
-    if not difference <= LARGEST_DIFFERENCE:
-        raise ModelError(
-            f"not written: ONNX Runtime and torch differ by {difference:.2g}, allowed are {LARGEST_DIFFERENCE:g}"
+    def model(self, inputs: Tensors, outputs: Tensors, metadata: dict[str, str], doc: str) -> bytes:
+        """The bytes of a model file with this graph. The same graph gives the same bytes."""
+        takes, gives = (
+            [helper.make_tensor_value_info(name, kind, shape) for name, (kind, shape) in each.items()]
+            for each in (inputs, outputs)
         )
-    with atomic_write(Path(path)) as part:
-        part.write_bytes(content)
-    return difference
-
-
-def largest_difference(content: bytes, network: Network | SecondLook, manifest: Manifest) -> float:
-    """Largest difference of a probability between ONNX Runtime and torch, over several numbers of points."""
-    session = Session(ModelFile(Path("the new model"), content, replace(manifest, self_test=None), ""))
-    worst = 0.0
-    for seed, points in enumerate(_CHECKED_POINTS):
-        test = _example(network, manifest, points, seed)
-        worst = max(worst, float(np.abs(session.answer(test) - test.probabilities[:-1]).max()))
-    return worst
-
-
-def _example(network: Network | SecondLook, manifest: Manifest, points: int, seed: int) -> SelfTest:
-    """Random colors on a random graph of `points` points, rounded as the manifest does, and torch's answer.
-
-    For layout lattice the graph is a random part of a square of it.
-    """
-    random = np.random.default_rng(seed)
-    colors: Singles = np.full((points + 1, 3), -1.0, dtype=np.float32)
-    colors[:-1] = np.round(random.random((points, 3)), 4)
-    neighbors: Indices = random.integers(0, points + 1, (points + 1, network.shape.neighbors)).astype(np.int32)
-    neighbors[-1] = points
-    cells: Indices | None = None
-    if manifest.layout == "lattice":
-        assert manifest.model.steps is not None  # the graph is written
-        side = math.ceil(math.sqrt(1.5 * points))
-        chosen = np.sort(random.choice(side * side, points, replace=False))
-        cells = np.stack([chosen % side, chosen // side], axis=1).astype(np.int32)
-        neighbors = lattice_neighbors(cells, manifest.model.steps)
-    with torch.inference_mode():
-        answer = network(torch.from_numpy(colors), torch.from_numpy(neighbors)).numpy()
-    return SelfTest(colors, neighbors, answer, cells)
+        domains = sorted({node.domain for node in self._nodes})
+        model = helper.make_model(
+            helper.make_graph(self._nodes, "visual_mesh", takes, gives, list(self._constants.values())),
+            opset_imports=[helper.make_opsetid(domain, _OPSETS[domain]) for domain in domains],
+            ir_version=_IR_VERSION,
+            producer_name="vm-export",
+            doc_string=doc,
+        )
+        helper.set_model_props(model, metadata)
+        onnx.checker.check_model(model, full_check=True)
+        return bytes(model.SerializeToString(deterministic=True))

@@ -1,8 +1,8 @@
-"""Networks of the reference implementation: its YAML files, read and written.
+"""Reads and writes networks in the format of the reference implementation, a YAML file.
 
-The file: `geometry: {shape, radius, intersections}`, `mesh`, optional `class_map`, and `network`, a list of
-convolutions, each a list of `{weights [in][out], biases, activation}` of which the first gathers and further ones are
-dense. Its networks read four channels; the fourth, alpha, has zero weights.
+The file has `geometry: {shape, radius, intersections}`, `mesh`, optionally `class_map`, and `network`, a list of groups
+of layers. A layer is `{weights [in][out], biases, activation}`. The first layer of a group is a graph convolution, and
+the others are dense. The networks read four channels; the fourth one, alpha, has zero weights.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from .network_shape import Layer, NetworkShape
 from .second_look import SecondLook
 
 DEFAULT_CLASSES = ("ball", "goal", "line", "field", "environment")
-"""The order of the authors' own networks, for files without a class_map and five outputs."""
+"""The classes of a file that has five outputs and no class_map: those of the authors' networks, in their order."""
 
 _MESHES = tuple(name for name in MESH_MODELS if name not in ("cap6", "wall6"))
-"""The reference's own."""
+"""The mesh models of the reference."""
 
 _MAX_DISTANCE = 20.0
-"""How far out [m] the reference's own configuration lets the mesh reach; its files don't say."""
+"""The max_distance [m] in the reference's configuration; its network files do not have it."""
 
-KIND_OF = {
+USUAL_KINDS = {
     "ball": "object",
     "goal": "upright",
     "robot": "upright",
@@ -46,12 +46,12 @@ KIND_OF = {
     "environment": "background",
     "unlabelled": "background",
 }
-"""What classes with the field's usual names are."""
+"""The kinds of classes with usual names."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Overrides:
-    """What a user knows better than a reference file; None leaves the file's own entry. Lengths in [m]."""
+    """Entries of a manifest that replace those of a file; None keeps the entry of the file. Lengths in [m]."""
 
     intersections: float | None = None
     radius: float | None = None
@@ -60,22 +60,22 @@ class Overrides:
     edge: str | None = None
     classes: tuple[ObjectClass, ...] | None = None
 
-    def applied(self, checkpoint: Checkpoint) -> Checkpoint:
-        """A checkpoint with these entries in its manifest."""
+    def apply_to(self, checkpoint: Checkpoint) -> Checkpoint:
+        """The checkpoint with these entries in its manifest. Raises ModelError for wrong ones."""
         given = {each.name: getattr(self, each.name) for each in fields(self)}
         changed = {name: value for name, value in given.items() if value is not None}
         return replace(checkpoint, manifest=replace(checkpoint.manifest, **changed))
 
 
 def named_class(name: str, kind: str | None = None) -> ObjectClass:
-    """A class by name; its kind is known for the field's usual names. Raises InputError for others without a kind."""
-    if kind is None and name not in KIND_OF:
-        raise InputError(f"say what class {name!r} is, e.g. {name}:area (object, upright, area or background)")
-    return ObjectClass(name, kind or KIND_OF[name])
+    """A class by name; without a kind the name must be one of USUAL_KINDS. Raises InputError."""
+    if kind is None and name not in USUAL_KINDS:
+        raise InputError(f"class {name!r} needs a kind: object, upright, area or background, as in {name}:area")
+    return ObjectClass(name, kind or USUAL_KINDS[name])
 
 
 def read_reference(path: str | Path, overrides: Overrides) -> Checkpoint:
-    """A network that the reference implementation exported. Raises InputError saying what is wrong in the file."""
+    """Read a network that the reference implementation exported. Raises InputError."""
     path = Path(path)
     try:
         text = path.read_bytes()
@@ -87,7 +87,7 @@ def read_reference(path: str | Path, overrides: Overrides) -> Checkpoint:
     try:
         return _checkpoint(data, overrides, {"made_from": path.name, "sha256": hashlib.sha256(text).hexdigest()})
     except (KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path} is not a network of the reference: {error!r}") from error
+        raise InputError(f"{path} is not a network of the reference implementation: {error!r}") from error
     except VisualMeshError as error:
         raise InputError(f"{path}: {error}") from error
 
@@ -100,7 +100,9 @@ def _checkpoint(data: Mapping[str, Any], overrides: Overrides, provenance: dict[
     radius = float(geometry["radius"]) if overrides.radius is None else overrides.radius
     intersections = float(geometry["intersections"])
     if intersections < 1.0 and overrides.intersections is None:
-        raise InputError(f"intersections {intersections:g} in the file can't be right; give --intersections")
+        raise InputError(
+            f"the file has {intersections:g} intersections, but at least 1 is needed; give --intersections"
+        )
     manifest = Manifest(
         shape=str(geometry["shape"]).lower(),
         radius=radius,
@@ -112,30 +114,28 @@ def _checkpoint(data: Mapping[str, Any], overrides: Overrides, provenance: dict[
         classes=overrides.classes or _classes(data.get("class_map"), network.shape.classes),
         provenance=provenance,
     )
-    return overrides.applied(Checkpoint(network.eval(), manifest))
+    return overrides.apply_to(Checkpoint(network.eval(), manifest))
 
 
 def _classes(class_map: object, outputs: int) -> tuple[ObjectClass, ...]:
-    """Classes of a file: its class_map, a list of names or a table of positions, else the authors' own order."""
+    """The classes of a file, from its class_map (a list of names or a table of positions) or DEFAULT_CLASSES."""
     if class_map is None:
         if outputs != len(DEFAULT_CLASSES):
-            raise InputError(f"the file names no classes and has {outputs} outputs; give --classes")
+            raise InputError(f"the file has {outputs} outputs but no names of classes; give --classes")
         return tuple(named_class(name) for name in DEFAULT_CLASSES)
     if isinstance(class_map, Mapping):
         named = {int(position): str(name) for name, position in class_map.items()}
         if sorted(named) != list(range(outputs)):
-            raise InputError(
-                f"class_map {dict(class_map)} does not number the {outputs} outputs from 0; give --classes"
-            )
+            raise InputError(f"class_map {dict(class_map)} must number the {outputs} outputs from 0; give --classes")
         return tuple(named_class(named[position]) for position in range(outputs))
     if isinstance(class_map, Sequence) and not isinstance(class_map, str):
         names = [str(each["name"] if isinstance(each, Mapping) else each) for each in class_map]
         return tuple(named_class(name) for name in names)
-    raise InputError(f"class_map {class_map!r} can't be read; give --classes")
+    raise InputError(f"class_map {class_map!r} must be a list of names or a table of positions; give --classes")
 
 
 def _network(convolutions: Sequence[Sequence[Mapping[str, Any]]], neighbors: int) -> Network:
-    """The network with its weights."""
+    """The network of a file, with its weights, for a mesh of `neighbors` neighbors."""
     layers: list[Layer] = []
     kernels: list[tuple[np.ndarray, np.ndarray]] = []
     for group in convolutions:
@@ -143,14 +143,14 @@ def _network(convolutions: Sequence[Sequence[Mapping[str, Any]]], neighbors: int
             kernel = np.array(entry["weights"], dtype=np.float64)
             bias = np.array(entry["biases"], dtype=np.float64)
             if kernel.ndim != 2 or bias.shape != kernel.shape[1:] or not np.isfinite(kernel).all():
-                raise InputError(f"layer {len(layers)}: weights and biases do not fit, or are not finite")
+                raise InputError(f"layer {len(layers)}: weights and biases do not fit each other, or are not finite")
             if not layers:
                 kernel = _without_alpha(kernel, neighbors)
             kind = "dense" if position else "convolution"
             inputs = layers[-1].width if layers else 3
             rows = inputs * (1 if position else neighbors + 1)
             if kernel.shape[0] != rows:
-                raise InputError(f"layer {len(layers)}: {kernel.shape[0]} rows of weights, should be {rows}")
+                raise InputError(f"layer {len(layers)} has {kernel.shape[0]} rows of weights, but needs {rows}")
             layers.append(Layer(kind, kernel.shape[1], str(entry["activation"]).lower()))
             kernels.append((kernel, bias))
     network = Network(NetworkShape(tuple(layers), neighbors))
@@ -163,32 +163,35 @@ def _network(convolutions: Sequence[Sequence[Mapping[str, Any]]], neighbors: int
 
 
 def _without_alpha(kernel: np.ndarray, neighbors: int) -> np.ndarray:
-    """The first layer's kernel for three channels. Raises InputError if it needs the fourth."""
+    """The kernel of the first layer for three channels. Raises InputError if it has weights for the fourth."""
     if kernel.shape[0] == 3 * (neighbors + 1):
         return kernel
     if kernel.shape[0] != 4 * (neighbors + 1):
-        raise InputError(f"layer 0: {kernel.shape[0]} rows of weights fit neither 3 nor 4 channels")
+        raise InputError(f"layer 0 has {kernel.shape[0]} rows of weights, which fit neither 3 nor 4 channels")
     channels = kernel.reshape(neighbors + 1, 4, -1)
     if np.abs(channels[:, 3]).max() > 1e-6:
-        raise InputError("layer 0: the fourth input channel has weights; only networks that read colors are supported")
+        raise InputError(
+            "layer 0 has weights for the fourth input channel; only networks for three channels are supported"
+        )
     return channels[:, :3].reshape(3 * (neighbors + 1), -1)
 
 
 def write_reference(checkpoint: Checkpoint, path: str | Path) -> None:
     """Write a checkpoint in the reference's format.
 
-    Separable convolutions are multiplied out, and the fourth channel gets its zero weights back. Raises InputError.
+    Separable convolutions become full ones, and the fourth channel gets zero weights. Raises InputError for a network
+    that the format can't describe, or if the file can't be written.
     """
     network, manifest = checkpoint.network, checkpoint.manifest
     if isinstance(network, SecondLook):
-        raise InputError("the reference's format is for one network; this one has a second look")
+        raise InputError("the format of the reference holds one network, but this one has a second look")
     if (manifest.sampling, manifest.colors) != ("bilinear", "absolute"):
         kind = f"{manifest.sampling} points and {manifest.colors} colors"
-        raise InputError(f"the reference's networks take bilinear points and absolute colors; this one takes {kind}")
+        raise InputError(f"networks of the reference take bilinear points and absolute colors; this one takes {kind}")
     if manifest.object_height or manifest.mesh not in _MESHES:
         raise InputError(
-            f"the reference's format has no cylinders and no meshes but its own; this network is for {manifest.mesh}, "
-            f"shape {manifest.shape}"
+            f"the format of the reference has no shape {manifest.shape} with mesh {manifest.mesh}; it has circles and "
+            f"spheres with one of the meshes {', '.join(_MESHES)}"
         )
     neighbors = network.shape.neighbors
     groups: list[list[dict[str, Any]]] = []
@@ -217,7 +220,7 @@ def write_reference(checkpoint: Checkpoint, path: str | Path) -> None:
 
 
 def _kernel(layer: nn.Module) -> tuple[np.ndarray, np.ndarray]:
-    """A layer's kernel (inputs, outputs) and bias (outputs,), of separable ones multiplied out."""
+    """Kernel (inputs, outputs) and bias (outputs,) of a layer; a separable convolution becomes a full one."""
     assert isinstance(layer, GraphConvolution | SeparableConvolution | Dense)
     kernel = layer.linear.weight.detach().double().numpy().T
     if isinstance(layer, SeparableConvolution):

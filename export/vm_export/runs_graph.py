@@ -1,11 +1,16 @@
-"""The fast graph: points as columns, in runs along their rings; see vm_embedded/network/layout.py for what it takes.
+"""The graph of layout runs, the fast one: points as columns that follow each other along their rings.
 
-A convolution over the graph is one convolution of width 3 along memory that gives a table of G sums for each point, one
-for each group of neighbors, and one look-up of G values for each point. ArrayFeatureExtractor is the fastest operator
-for that: one list of columns serves all channels.
+vm_embedded/network/runs_layout.py prepares its inputs. A column of the input is a slot: a point, a copy of a point, or
+a gap. The neighbors of a point come in groups that lie beside each other in memory, so a convolution over the graph is:
+
+1. one convolution of width 3 along memory, which gives a sum for each slot and each group of neighbors;
+2. one look-up for each group, which gives a point the sums of the slots in the middle of its groups;
+3. the sum over the groups.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -13,56 +18,63 @@ from vm_embedded.arrays import Floats
 from vm_embedded.mesh.mesh import SELF, Runs
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
-from .column_layers import column_layers
-from .graph import FLOAT, INT64, Graph
+from .column_layers import write_layers
 from .network import Network
-from .second_look import SecondLook
-from .second_look_graph import second_look
+from .onnx_graph import FLOAT, INT64, OnnxGraph
 
 
-def runs_graph(network: Network | SecondLook, manifest: Manifest) -> bytes:
-    """An ONNX model of the network.
+def runs_model(network: Network, manifest: Manifest) -> bytes:
+    """The bytes of an ONNX model in layout runs.
 
     Inputs: points (3, m) float32 and columns (G, m) int64, as RunsLayout gives them. Output: probabilities (C, m)
     float32.
     """
-    graph = Graph()
-    groups = manifest.model.runs
+    graph, groups = OnnxGraph(), manifest.model.runs
 
     def convolve(name: str, x: str, kernel: Floats) -> str:
-        return _along_runs(graph, name, x, kernel, groups)
+        return convolve_along_runs(graph, name, x, kernel, groups)
 
-    if isinstance(network, SecondLook):
-        answers = column_layers(graph, network.first, "points", convolve, "first.", "first.probabilities")
-        second_look(graph, network, answers, convolve, groups)
-    else:
-        column_layers(graph, network, "points", convolve, "", "probabilities")
+    write_layers(graph, network, "points", convolve, "", "probabilities")
+    return finished_runs_model(graph, network.shape.classes, manifest)
+
+
+def finished_runs_model(graph: OnnxGraph, classes: int, manifest: Manifest) -> bytes:
+    """The bytes of a model whose graph has the inputs and the output of layout runs."""
     return graph.model(
-        {"points": (FLOAT, [3, "slots"]), "columns": (INT64, [len(groups), "slots"])},
-        {"probabilities": (FLOAT, [network.shape.classes, "slots"])},
+        {"points": (FLOAT, [3, "slots"]), "columns": (INT64, [len(manifest.model.runs), "slots"])},
+        {"probabilities": (FLOAT, [classes, "slots"])},
         {METADATA_KEY: manifest.as_json()},
         "Visual Mesh network, laid out in runs. The slots and their columns are prepared by vm_embedded.",
     )
 
 
-def _along_runs(graph: Graph, name: str, x: str, kernel: Floats, groups: Runs) -> str:
-    """Sums (outputs, m) of a convolution over x (inputs, m)."""
+def convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, groups: Runs) -> str:
+    """Write a convolution over the graph; return the name of its sums (outputs, m), from x (inputs, m)."""
     outputs, _, inputs = kernel.shape
-    # In memory x, x and x without its last three columns, row after row. Cut into rows one shorter than x, each row
-    # begins one column earlier in x than the one before: at (j, j - 1, j - 2), which is a window around j - 1.
+    # All windows of three columns, without a copy of each. A row of `thrice` holds a channel of x twice, and a third
+    # time without its last three columns: 3 (m - 1) values. Cut into three rows of m - 1 values, each row begins one
+    # column earlier in x than the row before. Column j of these rows is x at j, j - 1 and j - 2: a window around j - 1.
     ends = [graph.constant(f"slice.{key}", [value]) for key, value in (("start", 0), ("end", -3), ("axis", 1))]
     most = graph.node("Slice", [x, *ends], f"{name}.most")
     thrice = graph.node("Concat", [x, x, most], f"{name}.thrice", axis=1)
     window = graph.node("Reshape", [thrice, graph.constant(f"{name}.window.shape", [3 * inputs, -1])], f"{name}.window")
 
     taps = np.zeros((outputs, len(groups), inputs, 3))
-    for number, group in enumerate(groups):
-        for place, neighbor in enumerate(group, start=-(len(group) // 3)):
-            taps[:, number, :, 1 - place] = kernel[:, 0 if neighbor == SELF else 1 + neighbor]
+    for place, group, shift in kernel_places(groups):
+        taps[:, group, :, 1 - shift] = kernel[:, place]
     weights = graph.constant(f"{name}.kernel", taps.reshape(outputs * len(groups), 3 * inputs))
     sums = graph.node("MatMul", [weights, window], f"{name}.sums")
+
+    # The sums of all groups as one table (outputs, G * (m - 1)): `columns` points to the middles of a point's groups.
     table = graph.node("Reshape", [sums, graph.constant(f"{name}.table.shape", [outputs, -1])], f"{name}.table")
-    found = graph.node("ArrayFeatureExtractor", [table, "columns"], f"{name}.found", domain="ai.onnx.ml")
+    found = graph.columns_of(table, "columns", f"{name}.found")
     shape = graph.constant(f"{name}.groups.shape", [outputs, len(groups), -1])
     grouped = graph.node("Reshape", [found, shape], f"{name}.groups")
     return graph.node("ReduceSum", [grouped, graph.constant("second", [1])], f"{name}.summed", keepdims=0)
+
+
+def kernel_places(groups: Runs) -> Iterator[tuple[int, int, int]]:
+    """Each place of a kernel (the point itself is 0), its group, and its distance from the middle of the group."""
+    for number, group in enumerate(groups):
+        for shift, neighbor in enumerate(group, start=-(len(group) // 3)):
+            yield (0 if neighbor == SELF else 1 + neighbor), number, shift

@@ -1,6 +1,14 @@
-"""A second look, written into an ONNX graph: which points are worth it, their own small mesh, and its answers put back.
+"""The graph of a network with a second look, in layout runs.
 
-The runtime knows nothing of it: inputs and output are those of any other network in layout runs.
+The graph has four parts:
+
+1. the first network answers for all slots;
+2. the gate selects slots, and adds the rings of neighbors around them;
+3. the selected points become a small mesh, in which all other points are the off-screen point;
+4. the second network answers for the small mesh, and its answers replace those of the first one.
+
+Inputs and output are those of every other network in layout runs, so the runtime does not know of the second look.
+The small mesh has few points and no runs: each place of a receptive field is looked up alone.
 """
 
 from __future__ import annotations
@@ -8,89 +16,102 @@ from __future__ import annotations
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.mesh.mesh import SELF, Runs
+from vm_embedded.mesh.mesh import Runs
+from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.runs_layout import GAP
 
-from .column_layers import Convolve, column_layers
-from .graph import FLOAT, INT64, Graph
+from .column_layers import Convolve, write_layers
+from .onnx_graph import FLOAT, INT64, OnnxGraph
+from .runs_graph import convolve_along_runs, finished_runs_model, kernel_places
 from .second_look import Gate, SecondLook
 
 
-def second_look(graph: Graph, network: SecondLook, answers: str, convolve: Convolve, groups: Runs) -> str:
-    """Write what comes after the first network's `answers` (C, m); return the probabilities (C, m).
+def second_look_model(network: SecondLook, manifest: Manifest) -> bytes:
+    """The bytes of an ONNX model in layout runs, with inputs and output as `runs_model` gives them."""
+    graph, groups = OnnxGraph(), manifest.model.runs
 
-    convolve: a convolution over all slots.
-    """
-    worth = _worth(graph, network.gate, answers, convolve, sum(map(len, groups)))
-    slots, places = _part(graph, worth, groups)
+    def convolve(name: str, x: str, kernel: Floats) -> str:
+        return convolve_along_runs(graph, name, x, kernel, groups)
 
-    def convolve_part(name: str, x: str, kernel: Floats) -> str:
-        outputs, places_each, inputs = kernel.shape
-        seen = graph.node("ArrayFeatureExtractor", [x, places], f"{name}.seen", domain="ai.onnx.ml")
-        shape = graph.constant(f"{name}.receptive.shape", [places_each * inputs, -1])
+    answers = write_layers(graph, network.first, "points", convolve, "first.", "first.probabilities")
+    selected = _write_gate(graph, network.gate, answers, convolve, sum(map(len, groups)))
+    slots = _write_slots(graph, selected)
+    positions = _write_positions(graph, selected, slots)
+    fields = _write_receptive_fields(graph, selected, slots, positions, groups)
+
+    def convolve_small_mesh(name: str, x: str, kernel: Floats) -> str:
+        outputs, places, inputs = kernel.shape
+        seen = graph.columns_of(x, fields, f"{name}.seen")  # (inputs, places * k)
+        shape = graph.constant(f"{name}.receptive.shape", [places * inputs, -1])
         receptive = graph.node("Reshape", [seen, shape], f"{name}.receptive")
         weights = graph.constant(f"{name}.kernel", kernel.transpose(0, 2, 1).reshape(outputs, -1))
         return graph.node("MatMul", [weights, receptive], f"{name}.sums")
 
-    points = graph.node("ArrayFeatureExtractor", ["points", slots], "look.points", domain="ai.onnx.ml")
-    again = column_layers(graph, network.second, points, convolve_part, "look.", "look.probabilities")
+    points = graph.columns_of("points", slots, "look.points")
+    again = write_layers(graph, network.second, points, convolve_small_mesh, "look.", "look.probabilities")
+    # ScatterElements needs the slot of each element, so all rows of classes get the same slots.
     where = graph.node("Expand", [slots, graph.node("Shape", [again], "look.shape")], "look.where")
-    return graph.node("ScatterElements", [answers, where, again], "probabilities", axis=1)
+    graph.node("ScatterElements", [answers, where, again], "probabilities", axis=1)
+    return finished_runs_model(graph, network.shape.classes, manifest)
 
 
-def _worth(graph: Graph, gate: Gate, answers: str, convolve: Convolve, places: int) -> str:
-    """1 in slots (1, m) that are worth a second look, 0 in all others."""
+def _write_gate(graph: OnnxGraph, gate: Gate, answers: str, convolve: Convolve, places: int) -> str:
+    """Write the gate; return the name of a mask (1, m) float32: 1 in the slots that get a second look, else 0.
+
+    answers: the first network's probabilities (C, m). convolve: a convolution over all slots, with `places` places.
+    """
     chosen = graph.node("Gather", [answers, graph.constant("gate.classes", list(gate.classes))], "gate.chosen", axis=0)
     largest = graph.node("ReduceMax", [chosen], "gate.largest", axes=[0], keepdims=1)
     above = graph.node("Greater", [largest, graph.constant("gate.above", gate.above)], "gate.passed")
-    # Of what is off screen every group is looked up around the gap that stands for it, of all else the first is not.
-    row = graph.node("Gather", ["columns", graph.constant("gate.row", [0])], "gate.columns", axis=0)
-    off_screen = graph.node("Equal", [row, graph.constant("gate.gap", GAP + 1)], "gate.off_screen")
-    shown = graph.node("Not", [off_screen], "gate.shown")
-    worth = graph.node("Cast", [graph.node("And", [above, shown], "gate.seeds")], "gate.ring0", to=FLOAT)
+    # A slot off screen looks up the gap in every group, a slot on screen never in the first one. A window around the
+    # gap is in column GAP + 1 of the table.
+    first_group = graph.node("Gather", ["columns", graph.constant("gate.row", [0])], "gate.columns", axis=0)
+    off_screen = graph.node("Equal", [first_group, graph.constant("gate.gap", GAP + 1)], "gate.off_screen")
+    on_screen = graph.node("Not", [off_screen], "gate.shown")
+    selected = graph.node("Cast", [graph.node("And", [above, on_screen], "gate.seeds")], "gate.ring0", to=FLOAT)
+    # A convolution whose weights are ones counts the selected slots in each receptive field: above 0 is one ring more.
     for ring in range(1, gate.rings + 1):
-        reached = convolve(f"gate.step{ring}", worth, np.ones((1, places, 1)))
-        worth = graph.node("Clip", [reached, "", graph.constant("gate.one", 1.0)], f"gate.ring{ring}")
-    return worth
+        count = convolve(f"gate.step{ring}", selected, np.ones((1, places, 1)))
+        selected = graph.node("Clip", [count, "", graph.constant("gate.one", 1.0)], f"gate.ring{ring}")
+    return selected
 
 
-def _part(graph: Graph, worth: str, groups: Runs) -> tuple[str, str]:
-    """The slots (k,) of the part's points, the off-screen point first, and the places (N + 1 times k,) in it where each
-    of them finds itself and its neighbors, those of the same kind together."""
-    one = graph.constant("look.one", [1])
-    found = graph.node("Gather", [graph.node("NonZero", [worth], "look.found"), one], "look.slots", axis=0)
+def _write_slots(graph: OnnxGraph, selected: str) -> str:
+    """Write the slots (k,) of the small mesh's points: first a gap, as its off-screen point, then the selected ones."""
+    column = graph.constant("look.one", [1])  # NonZero gives rows and columns of the mask; its columns are the slots
+    found = graph.node("Gather", [graph.node("NonZero", [selected], "look.found"), column], "look.slots", axis=0)
     flat = graph.node("Reshape", [found, graph.constant("look.flat", [-1])], "look.shown")
-    slots = graph.node("Concat", [graph.constant("look.gap", [GAP]), flat], "look.all", axis=0)
+    return graph.node("Concat", [graph.constant("look.gap", [GAP]), flat], "look.all", axis=0)
 
+
+def _write_positions(graph: OnnxGraph, selected: str, slots: str) -> str:
+    """Write the position (1, m) of each slot among the small mesh's points; 0, the off-screen point, for all others."""
     ends = graph.constant("look.zero", 0), graph.node("Size", [slots], "look.count"), graph.constant("look.step", 1)
-    numbers = graph.node("Range", [*ends], "look.numbers")
-    # The place of the off-screen point, 0, for every slot that is not in the part.
-    whole = graph.node("Cast", [worth], "look.worth", to=INT64)
-    nowhere = graph.node("Mul", [whole, graph.constant("look.none", 0)], "look.nowhere")
+    numbers = graph.node("Range", [*ends], "look.numbers")  # 0 to k - 1
+    whole = graph.node("Cast", [selected], "look.worth", to=INT64)
+    zeros = graph.node("Mul", [whole, graph.constant("look.none", 0)], "look.nowhere")
     row = graph.constant("look.row", [1, -1])
     rows = [graph.node("Reshape", [each, row], f"{each}.row") for each in (slots, numbers)]
-    position = graph.node("ScatterElements", [nowhere, *rows], "look.position", axis=1)
+    return graph.node("ScatterElements", [zeros, *rows], "look.position", axis=1)
 
-    # A slot's group stands in a table of groups times (slots - 1), from its second column on (RunsLayout.columns).
-    columns = graph.node("ArrayFeatureExtractor", ["columns", slots], "look.columns", domain="ai.onnx.ml")
-    all_slots = graph.node("Size", [worth], "look.size")
+
+def _write_receptive_fields(graph: OnnxGraph, selected: str, slots: str, positions: str, groups: Runs) -> str:
+    """Write where in the small mesh its points find themselves and their neighbors: positions (places * k,).
+
+    All points' positions for the first place of a kernel come first, then those for the second place, and so on.
+    """
+    # `columns` points to the middle slots of groups in a flattened table (groups, m - 1). The sum around slot s is in
+    # column s + 1 of it (runs_graph.py). To get the slots back, subtract the start of the group's row, and then 1.
+    columns = graph.columns_of("columns", slots, "look.columns")  # (groups, k)
+    all_slots = graph.node("Size", [selected], "look.size")
     width = graph.node("Sub", [all_slots, graph.constant("look.less", 1)], "look.width")
     starts = graph.node("Mul", [width, graph.constant("look.groups", np.arange(len(groups))[:, None])], "look.starts")
-    middles = graph.node("Sub", [columns, starts], "look.middles")
-    group_of, shift = _places(groups)
+    middles = graph.node("Sub", [columns, starts], "look.middles")  # each group's middle slot, plus 1
+
+    # Places of the kernel in order: (place, group, shift from the group's middle slot).
+    _, group_of, shift = np.array(sorted(kernel_places(groups))).T
     own = graph.node("Gather", [middles, graph.constant("look.group", group_of)], "look.own", axis=0)
     neighbors = graph.node("Add", [own, graph.constant("look.shift", shift[:, None] - 1)], "look.neighbors")
-    every = graph.node("Reshape", [neighbors, graph.constant("look.every.shape", [-1])], "look.every")
-    places = graph.node("ArrayFeatureExtractor", [position, every], "look.found.places", domain="ai.onnx.ml")
-    return slots, graph.node("Reshape", [places, graph.constant("look.places.shape", [-1])], "look.places")
-
-
-def _places(groups: Runs) -> tuple[np.ndarray, np.ndarray]:
-    """Of each place of a kernel, self first: its group, and how far it is from the group's middle."""
-    found = {
-        0 if neighbor == SELF else 1 + neighbor: (number, shift)
-        for number, group in enumerate(groups)
-        for shift, neighbor in enumerate(group, start=-(len(group) // 3))
-    }
-    ordered = np.array([found[place] for place in range(len(found))])
-    return ordered[:, 0], ordered[:, 1]
+    flat = graph.node("Reshape", [neighbors, graph.constant("look.every.shape", [-1])], "look.every")
+    found = graph.columns_of(positions, flat, "look.found.places")
+    return graph.node("Reshape", [found, graph.constant("look.places.shape", [-1])], "look.places")

@@ -17,7 +17,7 @@ from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.manifest import LAYOUTS
 from vm_embedded.network.model_file import read_model
-from vm_export import onnx_graph
+from vm_export import export
 from vm_export.checkpoint import Checkpoint
 from vm_export.neighborhood import Neighborhood
 from vm_export.network import GraphConvolution, Network
@@ -65,8 +65,8 @@ def test_every_network_gives_the_same_answers_in_onnx_runtime(layout, shape, see
     mesh = f"{'xygrid' if layout == 'lattice' else 'ring'}{shape.neighbors}"
     made = checkpoint(seed, shape, mesh)
     facts = replace(made.manifest, layout=layout)
-    content = onnx_graph.build(made.network, facts)
-    assert onnx_graph.largest_difference(content, made.network, facts) < 1e-4
+    content = export.onnx_model(made.network, facts)
+    assert export.largest_difference(content, made.network, facts) < 1e-4
 
 
 @pytest.mark.parametrize("activation", ["elu", "selu"])
@@ -78,8 +78,8 @@ def test_far_below_zero_no_layer_makes_numbers_that_slow_a_processor_down(layout
         for layer in network.typed_layers[:-1]:
             layer.linear.bias -= torch.linspace(0, 110, 8)
     facts = manifest(("class0", "class1"), mesh, layout=layout)
-    content = onnx_graph.build(network, facts)
-    assert onnx_graph.largest_difference(content, network, facts) < 1e-4
+    content = export.onnx_model(network, facts)
+    assert export.largest_difference(content, network, facts) < 1e-4
 
     model = onnx.load_from_string(content)
     made = [node.output[0] for node in model.graph.node if node.op_type in ("MatMul", "Exp", "Add")]
@@ -111,7 +111,7 @@ DOMAINS = {"plain": {""}, "runs": {"", "ai.onnx.ml"}, "lattice": {""}}
 @in_all_layouts
 def test_the_file_describes_itself_and_is_one_file_of_stock_operators(layout, tmp_path):
     made = checkpoint(mesh=MESHES[layout])
-    difference = onnx_graph.export(made, tmp_path / "model.onnx", layout)
+    difference = export.export(made, tmp_path / "model.onnx", layout)
     assert difference < 1e-4
     assert [path.name for path in tmp_path.iterdir()] == ["model.onnx"]
     graph = onnx.load(tmp_path / "model.onnx")
@@ -133,41 +133,41 @@ def test_the_fastest_layout_is_the_one_that_is_written(tmp_path):
         ("separable", 33, "plain"),
     ):
         network = Network(NetworkShape.uniform(3, width, 2, kind=kind))
-        assert onnx_graph.fastest_layout(Checkpoint(network, manifest(("class0", "class1")))) == layout
+        assert export.fastest_layout(Checkpoint(network, manifest(("class0", "class1")))) == layout
     for edge, layout in (("hard", "runs"), ("same", "plain")):
         made = Checkpoint(checkpoint().network, manifest(edge=edge))
-        onnx_graph.export(made, tmp_path / "model.onnx")
+        export.export(made, tmp_path / "model.onnx")
         assert read_model(tmp_path / "model.onnx").manifest.layout == layout
 
 
 def test_a_layout_that_there_is_not_is_refused(tmp_path):
     with pytest.raises(ModelError, match=r"layout .*'run'.*'runs'"):
-        onnx_graph.export(checkpoint(), tmp_path / "model.onnx", "run")
+        export.export(checkpoint(), tmp_path / "model.onnx", "run")
     with pytest.raises(ModelError, match="runs needs edge hard"):
-        onnx_graph.export(Checkpoint(checkpoint().network, manifest(edge="same")), tmp_path / "model.onnx", "runs")
+        export.export(Checkpoint(checkpoint().network, manifest(edge="same")), tmp_path / "model.onnx", "runs")
     assert not list(tmp_path.iterdir())
 
 
 @in_all_layouts
 def test_the_same_checkpoint_gives_the_same_bytes(layout, tmp_path):
     for name in ("a", "b"):
-        onnx_graph.export(checkpoint(3, mesh=MESHES[layout]), tmp_path / name, layout)
+        export.export(checkpoint(3, mesh=MESHES[layout]), tmp_path / name, layout)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
 @in_all_layouts
 def test_a_graph_that_differs_from_torch_is_not_written(layout, tmp_path, monkeypatch):
-    other = onnx_graph.build(checkpoint(5).network, manifest(("class0", "class1"), MESHES[layout], layout=layout))
-    monkeypatch.setattr(onnx_graph, "build", lambda network, manifest: other)
+    other = export.onnx_model(checkpoint(5).network, manifest(("class0", "class1"), MESHES[layout], layout=layout))
+    monkeypatch.setattr(export, "onnx_model", lambda network, manifest: other)
     (tmp_path / "model.onnx").write_text("the file of before")
     with pytest.raises(ModelError, match="differ by"):
-        onnx_graph.export(checkpoint(4, mesh=MESHES[layout]), tmp_path / "model.onnx", layout)
+        export.export(checkpoint(4, mesh=MESHES[layout]), tmp_path / "model.onnx", layout)
     assert (tmp_path / "model.onnx").read_text() == "the file of before"
 
 
 def test_the_number_of_points_is_dynamic():
     made = checkpoint()
-    session = onnxruntime.InferenceSession(onnx_graph.build(made.network, made.manifest))
+    session = onnxruntime.InferenceSession(export.onnx_model(made.network, made.manifest))
     for points in (0, 1, 17, 3000):
         colors = np.full((points + 1, 3), -1.0, dtype=np.float32)
         neighbors = np.full((points + 1, 6), points, dtype=np.int32)

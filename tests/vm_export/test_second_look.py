@@ -15,7 +15,7 @@ from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.model_file import ModelFile, read_model
 from vm_embedded.network.session import Session
-from vm_export import onnx_graph
+from vm_export import export
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape
@@ -45,9 +45,9 @@ def test_what_passes_the_gate_is_what_is_above_it_and_so_many_steps_around():
     answers[[0, 6], [1, 2]] = 0.4
     answers[10] = 1.0
     for rings, expected in ((0, [6]), (1, [5, 6, 7]), (3, [3, 4, 5, 6, 7, 8, 9]), (9, list(range(10)))):
-        assert Gate(0.3, rings, (2,)).passed(answers, chain(10)).nonzero()[:, 0].tolist() == expected
-    assert Gate(0.3, 1, (1, 2)).passed(answers, chain(10)).nonzero()[:, 0].tolist() == [0, 1, 5, 6, 7]
-    assert not Gate(0.4, 9, (2,)).passed(answers, chain(10)).any()
+        assert Gate(0.3, rings, (2,)).selected(answers, chain(10)).nonzero()[:, 0].tolist() == expected
+    assert Gate(0.3, 1, (1, 2)).selected(answers, chain(10)).nonzero()[:, 0].tolist() == [0, 1, 5, 6, 7]
+    assert not Gate(0.4, 9, (2,)).selected(answers, chain(10)).any()
 
 
 def test_the_first_answers_where_the_second_does_not_and_the_second_sees_its_part_alone():
@@ -58,7 +58,7 @@ def test_the_first_answers_where_the_second_does_not_and_the_second_sees_its_par
     first = whole.first(colors, chain(30))
     whole.gate = Gate(float(first.detach()[:-1, 0].topk(6).values.min()) - 1e-6, 1, (0,))
     answers = whole(colors, chain(30))
-    kept = whole.gate.passed(first, chain(30)).nonzero()[:, 0]
+    kept = whole.gate.selected(first, chain(30)).nonzero()[:, 0]
     assert 0 < len(kept) < 30
     others = np.setdiff1d(np.arange(31), kept)
     assert torch.equal(answers[others], first[others])
@@ -104,7 +104,7 @@ def test_onnx_runtime_gives_the_same_answers_on_real_meshes(
     with torch.inference_mode():
         expected = made(torch.from_numpy(colors), neighbors)[:-1].numpy()
 
-    content = onnx_graph.build(made, facts)
+    content = export.onnx_model(made, facts)
     session = Session(ModelFile("model", content, facts, ""))
     layout = choose_layout(part, facts)
     given_points = layout.points()
@@ -115,8 +115,8 @@ def test_onnx_runtime_gives_the_same_answers_on_real_meshes(
 
 def test_a_picture_without_anything_worth_it_is_answered_by_the_first(tmp_path):
     whole = Checkpoint(second_look(Gate(0.99, 3, (0,))), manifest())
-    onnx_graph.export(whole, tmp_path / "both.onnx")
-    onnx_graph.export(Checkpoint(whole.network.first, manifest()), tmp_path / "first.onnx", "runs")
+    export.export(whole, tmp_path / "both.onnx")
+    export.export(Checkpoint(whole.network.first, manifest()), tmp_path / "first.onnx", "runs")
     example = read_model(tmp_path / "first.onnx").manifest.self_test
     both, first = (Session(read_model(tmp_path / name)) for name in ("both.onnx", "first.onnx"))
     np.testing.assert_array_equal(both.answer(example), first.answer(example))
@@ -127,11 +127,11 @@ def test_a_checkpoint_keeps_both_networks_and_the_gate(tmp_path):
     made.save(tmp_path / "model.pt")
     read = Checkpoint.load(tmp_path / "model.pt")
     assert read.network.gate == made.network.gate
-    assert read.last is read.network.second
+    assert read.last_network is read.network.second
     there, here = made.network.state_dict(), read.network.state_dict()
     assert there.keys() == here.keys()
     assert all(torch.equal(there[name], here[name]) for name in there)
-    onnx_graph.export(read, tmp_path / "model.onnx")
+    export.export(read, tmp_path / "model.onnx")
     found = read_model(tmp_path / "model.onnx").manifest
     assert found.layout == "runs"
     assert found.operations == made.network.first.shape.operations
@@ -141,11 +141,13 @@ def test_what_does_not_fit_is_refused(tmp_path):
     for above, rings, classes in ((1.0, 2, (0,)), (-0.1, 2, (0,)), (0.5, -1, (0,)), (0.5, 2, ())):
         with pytest.raises(ModelError, match="a second look needs"):
             Gate(above, rings, classes)
-    with pytest.raises(ModelError, match="first network has 6 neighbors, the one for the second look 4"):
+    with pytest.raises(
+        ModelError, match="first network has 6 neighbors, the one for the second look 4; they must be equal"
+    ):
         SecondLook(network(2, 2), network(2, 2, neighbors=4), Gate(0.5, 1, (0,)))
     made = Checkpoint(second_look(Gate(0.2, 3, (0,))), manifest())
-    with pytest.raises(ModelError, match="written in layout runs, not plain"):
-        onnx_graph.export(made, tmp_path / "model.onnx", "plain")
+    with pytest.raises(ModelError, match="has only layout runs, not plain"):
+        export.export(made, tmp_path / "model.onnx", "plain")
     with pytest.raises(InputError, match="has a second look"):
         write_reference(made, tmp_path / "model.yaml")
     for facts in ({"sampling": "footprint"}, {"colors": "relative"}):

@@ -33,19 +33,19 @@ class FirstLook:
         above, rings: of the gate, which is for the classes that are objects.
         """
         found = FrozenNetwork.load(path, manifest, VISUAL)
-        if found.checkpoint.network is not found.checkpoint.last:
+        if found.checkpoint.network is not found.checkpoint.last_network:
             raise InputError(f"{path} can't look first: it has a second look itself")
         objects = tuple(at for at, each in enumerate(manifest.classes) if each.kind == "object")
         if not objects:
             raise InputError("a second look is for objects, and no class of [classes] is of that kind")
-        return cls(found.checkpoint.last, Gate(above, rings, objects), found.sha256)
+        return cls(found.checkpoint.last_network, Gate(above, rings, objects), found.sha256)
 
     @torch.no_grad()
     def part(self, graph: LabeledGraph) -> LabeledGraph:
         """The points of a picture that get a second look."""
         neighbors = torch.tensor(graph.neighbors)
-        passed = self.gate.passed(self.network(torch.from_numpy(graph.points), neighbors), neighbors)
-        return graph.part(np.flatnonzero(passed.numpy()))
+        selected = self.gate.selected(self.network(torch.from_numpy(graph.points), neighbors), neighbors)
+        return graph.part(np.flatnonzero(selected.numpy()))
 
     def then(self, network: Network) -> SecondLook:
         """Both networks as one."""

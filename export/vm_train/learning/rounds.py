@@ -134,7 +134,7 @@ def _prepared(job: TrainingRun, hardware: Hardware, progress: TrainingProgress) 
     torch.manual_seed(int(np.random.default_rng([recipe.seed, progress.round]).integers(2**31)))
     network = Network(job.configuration.network_shape)
     rule = recipe.selection_of(progress.round)
-    graders = [Checkpoint.load(job.round_path(each)).last for each in range(1, progress.round)]
+    graders = [Checkpoint.load(job.round_path(each)).last_network for each in range(1, progress.round)]
     total = recipe.epochs * steps_an_epoch(recipe.looks * job.epoch, recipe.batch)
     shares, weights = selection_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
     teacher = None if job.teacher is None else job.teacher.checkpoint.network

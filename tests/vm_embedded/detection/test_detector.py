@@ -21,7 +21,7 @@ from vm_embedded.network.model_file import read_model
 from vm_embedded.network.plain_layout import PlainLayout
 from vm_embedded.network.runs_layout import RunsLayout
 from vm_export.checkpoint import Checkpoint
-from vm_export.onnx_graph import export
+from vm_export.export import export
 
 RING_LAYOUTS = ("plain", "runs")
 """Layouts of a network for rings."""

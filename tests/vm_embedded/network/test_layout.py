@@ -24,9 +24,9 @@ from vm_embedded.network.model_file import ModelFile
 from vm_embedded.network.plain_layout import PlainLayout
 from vm_embedded.network.runs_layout import RunsLayout
 from vm_embedded.network.session import Session
+from vm_export.export import onnx_model
 from vm_export.network import Network
 from vm_export.network_shape import ACTIVATIONS, Layer, NetworkShape
-from vm_export.onnx_graph import build
 
 from ..strategies import SIZE, random_direction, reals, rotation, seeds
 
@@ -142,7 +142,7 @@ def answers(session, mesh, colors, on_screen):
 
 def session_of(network, model, layout, **changes):
     manifest = manifest_of(model, layout, network.shape.classes, **changes)
-    return Session(ModelFile(Path(f"{layout}.onnx"), build(network, manifest), manifest, ""))
+    return Session(ModelFile(Path(f"{layout}.onnx"), onnx_model(network, manifest), manifest, ""))
 
 
 def logits_of(probabilities, head):

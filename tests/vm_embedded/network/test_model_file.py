@@ -84,9 +84,9 @@ def test_other_metadata_does_not_matter(write):
 
 def test_a_model_of_the_exporter_is_read(write):
     torch = pytest.importorskip("torch")
+    from vm_export.export import onnx_model
     from vm_export.network import Network
     from vm_export.network_shape import NetworkShape
-    from vm_export.onnx_graph import build
 
     torch.manual_seed(0)
     network = Network(NetworkShape.uniform(depth=2, width=4, classes=2)).eval()
@@ -94,7 +94,7 @@ def test_a_model_of_the_exporter_is_read(write):
     manifest = Manifest.from_json(
         json.dumps(json.loads(MANIFEST.as_json()) | {"classes": [vars(each) for each in classes]})
     )
-    content = build(network, manifest)
+    content = onnx_model(network, manifest)
     assert read_model(write(content)).manifest == manifest
 
 

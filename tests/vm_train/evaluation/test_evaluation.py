@@ -13,8 +13,8 @@ from vm_embedded.errors import InputError, ModelError
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.network.model_file import read_model
 from vm_export.checkpoint import Checkpoint
+from vm_export.export import export
 from vm_export.grid import Grid
-from vm_export.onnx_graph import export
 from vm_train.data.pictures import Picture, find_pictures, read_picture
 from vm_train.evaluation.answers import Exact, load_subject
 from vm_train.evaluation.evaluation import Evaluation, Rules, evaluate_pictures

@@ -37,7 +37,7 @@ def change(path):
     """Give a checkpoint other weights."""
     checkpoint = Checkpoint.load(path)
     with torch.no_grad():
-        checkpoint.last.typed_layers[0].linear.bias += 1.0
+        checkpoint.last_network.typed_layers[0].linear.bias += 1.0
     checkpoint.save(path)
 
 

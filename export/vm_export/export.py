@@ -1,0 +1,123 @@
+"""From a checkpoint to a self-describing ONNX file, checked against torch."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+import vm_embedded
+from vm_embedded.arrays import Indices, Singles
+from vm_embedded.errors import ModelError
+from vm_embedded.files import atomic_write
+from vm_embedded.mesh.grids import lattice_neighbors
+from vm_embedded.network.manifest import Manifest
+from vm_embedded.network.model_file import ModelFile
+from vm_embedded.network.self_test import SelfTest
+from vm_embedded.network.session import Session
+
+from .checkpoint import Checkpoint
+from .lattice_graph import lattice_model
+from .network import Network
+from .plain_graph import plain_model
+from .runs_graph import runs_model
+from .second_look import SecondLook
+from .second_look_graph import second_look_model
+
+LARGEST_DIFFERENCE = 1e-4
+"""Largest difference of a probability that is allowed between ONNX Runtime and torch."""
+
+_WIDEST = {"convolution": 64, "separable": 32, "dense": 1024}
+"""The largest width of a layer, by kind, for which layout runs is faster. Convolutions and separable ones are measured
+(docs/performance.md); dense layers have no look-ups, so their width hardly matters."""
+
+_CHECKED_POINTS = (1, 2, 7, 64, 1000, 5000)
+
+
+def fastest_layout(checkpoint: Checkpoint) -> str:
+    """The fastest layout for a network of this shape: runs or plain.
+
+    Layout runs saves look-ups and costs multiplications: two in nine of a convolution are by zero, and a separable
+    convolution becomes a full one. So it gains less for wider layers. A second look has only layout runs.
+    """
+    if isinstance(checkpoint.network, SecondLook):
+        return "runs"
+    narrow = all(layer.width <= _WIDEST[layer.kind] for layer in checkpoint.network.shape.layers)
+    return "runs" if narrow and checkpoint.manifest.edge == "hard" else "plain"
+
+
+def onnx_model(network: Network | SecondLook, manifest: Manifest) -> bytes:
+    """The bytes of an ONNX model in the manifest's layout, of standard operators only.
+
+    Raises ModelError for a second look in another layout than runs, and for layout lattice with a mesh that has none.
+    """
+    if isinstance(network, SecondLook):
+        if manifest.layout != "runs":
+            raise ModelError(f"a network with a second look has only layout runs, not {manifest.layout}")
+        return second_look_model(network, manifest)
+    models = {"plain": plain_model, "runs": runs_model, "lattice": lattice_model}
+    return models[manifest.layout](network, manifest)
+
+
+def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) -> float:
+    """Write the model file of a checkpoint and return the largest difference to torch of a probability.
+
+    layout: one of LAYOUTS; default the fastest one. ONNX Runtime runs the model before it is written. Raises ModelError
+    if a probability differs by more than LARGEST_DIFFERENCE or the layout does not fit the manifest, and InputError if
+    the file can't be written.
+    """
+    layout = layout or fastest_layout(checkpoint)
+    network = checkpoint.network.eval()
+    provenance = {**checkpoint.manifest.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"}
+    manifest = replace(
+        checkpoint.manifest,
+        layout=layout,
+        operations=network.operations,
+        provenance=provenance,
+    )
+    manifest = replace(manifest, self_test=_example(network, manifest, points=12, seed=0))
+    content = onnx_model(network, manifest)
+    difference = largest_difference(content, network, manifest)
+    if not difference <= LARGEST_DIFFERENCE:
+        raise ModelError(
+            f"{path} is not written: probabilities of ONNX Runtime and torch differ by {difference:.2g}; at most "
+            f"{LARGEST_DIFFERENCE:g} is allowed"
+        )
+    with atomic_write(Path(path)) as part:
+        part.write_bytes(content)
+    return difference
+
+
+def largest_difference(content: bytes, network: Network | SecondLook, manifest: Manifest) -> float:
+    """The largest difference of a probability between ONNX Runtime and torch, for graphs of different sizes."""
+    session = Session(ModelFile(Path("the new model"), content, replace(manifest, self_test=None), ""))
+    worst = 0.0
+    for seed, points in enumerate(_CHECKED_POINTS):
+        test = _example(network, manifest, points, seed)
+        worst = max(worst, float(np.abs(session.answer(test) - test.probabilities[:-1]).max()))
+    return worst
+
+
+def _example(network: Network | SecondLook, manifest: Manifest, points: int, seed: int) -> SelfTest:
+    """A random graph of `points` points with random colors, rounded as in the manifest, and torch's probabilities.
+
+    For layout lattice the graph is a random part of a square grid.
+    """
+    random = np.random.default_rng(seed)
+    colors: Singles = np.full((points + 1, 3), -1.0, dtype=np.float32)
+    colors[:-1] = np.round(random.random((points, 3)), 4)
+    neighbors: Indices = random.integers(0, points + 1, (points + 1, network.shape.neighbors)).astype(np.int32)
+    neighbors[-1] = points
+    cells: Indices | None = None
+    if manifest.layout == "lattice":
+        assert manifest.model.steps is not None  # or there is no such model
+        side = math.ceil(math.sqrt(1.5 * points))
+        chosen = np.sort(random.choice(side * side, points, replace=False))
+        cells = np.stack([chosen % side, chosen // side], axis=1).astype(np.int32)
+        neighbors = lattice_neighbors(cells, manifest.model.steps)
+    with torch.inference_mode():
+        answer = network(torch.from_numpy(colors), torch.from_numpy(neighbors)).numpy()
+    return SelfTest(colors, neighbors, answer, cells)
