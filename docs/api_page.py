@@ -19,23 +19,26 @@ from typing import Any
 
 import vm_embedded
 from vm_embedded import arrays
+from vm_embedded.detection.observation import Observation
 from vm_embedded.geometry.calibrated_lenses import CalibratedLens
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.radial_lenses import RadialLens
 from vm_embedded.geometry.shape import Shape
 from vm_embedded.mesh.mesh import Mesh
 
-OTHERS: dict[str, type] = {each.__name__: each for each in (CalibratedLens, LensFile, Mesh, RadialLens, Shape)}
+OTHERS: dict[str, type] = {
+    each.__name__: each for each in (CalibratedLens, LensFile, Mesh, Observation, RadialLens, Shape)
+}
 """Types that public names return or share as their base."""
 
 GROUPS = {
-    "Detect": ("Detector", "Settings", "Detections", "Detection", "ClassPoints"),
+    "Detect": ("Detector", "Settings", "Detections", "Detection", "ClassPoints", "Observation"),
     "Camera pose": ("Orientation",),
     "Lenses": (
         *("read_lens_file", "LensFile", "Lens", "RadialLens", "Rectilinear", "Equisolid", "Equidistant"),
         *("CalibratedLens", "BrownLens", "FisheyeLens"),
     ),
-    "Several cameras and planes": ("detect_views", "View", "Sighting", "Plane", "GROUND", "Pose"),
+    "Several cameras and planes": ("detect_views", "CameraView", "Sighting", "Plane", "GROUND", "Pose"),
     "Meshes": ("build_mesh", "Mesh", "Shape", "Circle", "Sphere", "Cylinder"),
     "Errors": ("VisualMeshError", "GeometryError", "InputError", "ModelError"),
 }
