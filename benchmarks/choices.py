@@ -1,8 +1,7 @@
-"""What each choice brings: `make choices`, after `make networks` and `make test-data`.
+"""Measures the effect of each choice of a training: `make choices`, after `make networks` and `make test-data`.
 
-Small networks trained on the same pictures, each with one thing changed, some with several seeds, a training on each
-core. They are scored on pictures of maps that no training saw. What is there already is not done again. Writes
-benchmarks/choices.json, from which benchmarks/choices_report.py makes the tables and plots of docs/results.md.
+It trains small networks on the same pictures, each with one change, some with several seeds, one training per core, and
+scores them on pictures under maps that no training uses. It skips finished trainings. Writes benchmarks/choices.json, from which benchmarks/choices_report.py makes the tables and plots of docs/results.md.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ TRAINING, VALIDATION = 2000, 200
 """Pictures of each training."""
 
 TESTED = 200
-"""Held-out pictures that each is scored on, and on each half."""
+"""Held-out pictures to score each network on, in all and for each half."""
 
 Changes = dict[str, dict[str, Any]]
 
@@ -55,8 +54,8 @@ HEXAGONAL = {"grid": "hexagonal", "equal_at": 2.5}
 
 @dataclass(frozen=True)
 class Variant:
-    """A network that is compared: what is changed in its configuration, which pictures it learns from (`only` those of
-    a lens, or of heights), and how many seeds."""
+    """A network to compare: the changes to the base configuration, the pictures it learns from (`only` those of one
+    lens or height), and the number of seeds."""
 
     changes: Changes
     only: str = ""
@@ -103,12 +102,12 @@ LENSES, HEIGHTS = ("rectilinear", "fisheye"), ("low", "high")
 
 MIDDLE = 0.8  # [m] between low and high
 SPLIT_TRAINING = 800
-"""Pictures of trainings that learn from a half."""
+"""Training pictures of networks that learn from one half."""
 
 
 @cache
 def kinds_of(folder: Path) -> dict[str, set[str]]:
-    """Of each picture of a folder, by number, its lens and height, as LENSES and HEIGHTS name them."""
+    """For each picture number of a folder its lens and height, as LENSES and HEIGHTS name them."""
     found = {}
     for path in sorted(folder.glob("lens*.yaml")):
         file = read_lens_file(path)
@@ -119,14 +118,14 @@ def kinds_of(folder: Path) -> dict[str, set[str]]:
 
 
 def split_of(data: Path, only: str) -> Split:
-    """The pictures that a variant learns from and is chosen by."""
+    """The training and validation pictures of a variant."""
     numbers = [number for number, kinds in kinds_of(data).items() if not only or only in kinds]
     count = SPLIT_TRAINING if only else TRAINING
     return Split(tuple(numbers[VALIDATION : VALIDATION + count]), tuple(numbers[:VALIDATION]), ())
 
 
 def trained(task: tuple[str, int, Path, Path]) -> Path:
-    """Folder of a training, done or gone on with."""
+    """Folder of a finished training; it starts or resumes the training if needed."""
     name, seed, data, out = task
     import torch
 
@@ -150,12 +149,12 @@ def trained(task: tuple[str, int, Path, Path]) -> Path:
 
 
 def folder_of(out: Path, name: str, seed: int) -> Path:
-    """Where a training is."""
+    """Folder of a training."""
     return out / name.replace(" ", "-").replace(",", "").replace("=", "is") / f"seed{seed}"
 
 
 def scored(model: Path, data: Path, out: Path, numbers: list[str]) -> dict[str, Any]:
-    """What vm-evaluate says of a network on some pictures of a folder."""
+    """Scores that vm-evaluate gives a network on some pictures of a folder."""
     if not (out / "scores.json").exists():
         out.mkdir(parents=True, exist_ok=True)
         command = [sys.executable, "-m", "vm_train.cli.evaluate", str(model), str(data), "-o", str(out)]
@@ -171,7 +170,7 @@ _OBJECTS = ("truths", "hits", "false", "average_precision", "recall", "false_per
 
 
 def _kept(scores: dict[str, Any]) -> dict[str, Any]:
-    """Scores of the ball that are compared: of its points and objects, in all and in each bin."""
+    """Scores of the class ball to compare: of points and objects, in all and by distance."""
     found: dict[str, Any] = {
         "points": {name: {key: each[key] for key in _POINTS} for name, each in scores["points"]["ball"].items()}
     }
@@ -194,7 +193,7 @@ def _curve(path: Path) -> list[tuple[float, float]]:
 
 
 def tasks() -> Iterator[tuple[str, int]]:
-    """Every variant with every seed, those with the first seed first."""
+    """Every variant with every seed, ordered by seed."""
     for seed in range(1, 4):
         for name, variant in VARIANTS.items():
             if seed <= variant.seeds:
@@ -202,7 +201,7 @@ def tasks() -> Iterator[tuple[str, int]]:
 
 
 def evaluated(task: tuple[str, int, Path, Path]) -> dict[str, Any]:
-    """Scores of a trained variant, on test pictures of all kinds and of the halves that it is compared on."""
+    """Scores of a trained variant, on all test pictures and on the halves that it is compared on."""
     name, seed, held_out, out = task
     folder, kinds = folder_of(out, name, seed), kinds_of(held_out)
     found = {"all": scored(folder / "model.pt", held_out, folder / "scores", list(kinds)[:TESTED])}

@@ -40,13 +40,13 @@ BASE = {
     "classes": "ball and other",
     "augmentation": "all augmentation",
 }
-"""What the base is called in each group."""
+"""Name of the base network in each group."""
 
 COLORS = {"3": "#7570b3", "5": "#1b9e77", "9": "#d95f02"}
 
 
 def values(scores: dict[str, Any], *path: str, test: str = "all") -> np.ndarray:
-    """A score of all seeds; NaN where there is none."""
+    """A score of all seeds; NaN where it is missing."""
     found = []
     for each in scores.values():
         value: Any = each.get(test, {})
@@ -57,7 +57,7 @@ def values(scores: dict[str, Any], *path: str, test: str = "all") -> np.ndarray:
 
 
 def shown(found: np.ndarray, digits: int = 3) -> str:
-    """Mean, and lowest to highest if there are several seeds."""
+    """Mean, and the range if there are several seeds."""
     if np.isnan(found).all():
         return "-"
     mean = f"{np.nanmean(found):.{digits}f}"

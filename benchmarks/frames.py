@@ -1,4 +1,4 @@
-"""Frames to measure on: the 15 of the paper's dataset where they lie beside the checkout, else the demo's six."""
+"""Frames to measure on: the 15 of the paper's dataset where they lie beside the checkout, else six of the demo."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Frame:
 
 
 def frames() -> tuple[str, list[Frame]]:
-    """What the frames are, and the frames."""
+    """A description of the frames, and the frames."""
     shared = Path(os.environ.get("VM_SHARED", _TOP.parent / "shared")) / "reference" / "images"
     if "VM_SHARED" in os.environ and not shared.is_dir():
         raise SystemExit(f"VM_SHARED: there is no folder {shared}")
@@ -38,7 +38,7 @@ def frames() -> tuple[str, list[Frame]]:
 
 
 def demo_frames() -> list[Frame]:
-    """The demo's six frames."""
+    """Six frames of the demo."""
     return _read(_TOP / "tests" / "fixtures" / "demo")
 
 

@@ -1,4 +1,4 @@
-"""What `import vm_embedded` costs on top of numpy, cv2 and onnxruntime: median of fresh interpreters."""
+"""Time of `import vm_embedded` beyond numpy, cv2 and onnxruntime: median of fresh interpreters."""
 
 import statistics
 import subprocess

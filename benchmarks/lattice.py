@@ -1,4 +1,4 @@
-"""Grids without look-ups against rings: one call of the same network in each layout, interleaved on one core.
+"""Grids without neighbor indices against rings: one call of the same network in each layout, interleaved on one core.
 
 python -m benchmarks.lattice
 """
@@ -50,7 +50,7 @@ def main() -> None:
 
 
 def _call(depth, width, model, layout, lens, pose):
-    """A call of a network on what the camera sees of a mesh, and its points and places."""
+    """A call of a network on the visible part of a mesh, its number of points, and its number of slots."""
     facts = Manifest(
         shape="sphere",
         radius=0.095,

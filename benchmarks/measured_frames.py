@@ -2,9 +2,9 @@
 
     python -m benchmarks.measured_frames ../shared/real --object-radius 0.11 --sheet real.jpg
 
-A folder holds `images/imageX.jpg` with `images/lensX.yaml`, and `balls.json`: of each frame its ball, or a list of its
+A folder holds `images/imageX.jpg` with `images/lensX.yaml`, and `balls.json`: for each frame its ball, or a list of its
 balls, with center `cx`, `cy` and radius `r_px` [px], and distance `dist` from the camera [m]. A detection is right if
-its center lies on a ball that none before it had.
+its center lies on a ball that no detection before it took.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ CELL = 240  # [px]
 
 @dataclass
 class Score:
-    """Of some frames: balls found with their relative errors of distance, missed balls, and false ones."""
+    """Result on some frames: balls found with their relative errors of distance, missed balls, and false ones."""
 
     found: list[tuple[str, dict[str, float], Detection]] = field(default_factory=list)
     missed: list[tuple[str, dict[str, float]]] = field(default_factory=list)
     false: list[tuple[str, Detection]] = field(default_factory=list)
 
     def summary(self, near: float) -> dict[str, Any]:
-        """Numbers of all, and of the balls nearer than `near` [m]."""
+        """Counts of all balls, and of those nearer than `near` [m]."""
         close = sum(ball["dist"] < near for _, ball, _ in self.found)
         close_missed = sum(ball["dist"] < near for _, ball in self.missed)
         errors = [abs(detection.distance / ball["dist"] - 1.0) for _, ball, detection in self.found]
@@ -53,7 +53,7 @@ class Score:
 
 
 def score(folder: Path, detector: Detector) -> Score:
-    """Detect in every frame of a folder and compare."""
+    """Detect in every frame of a folder and compare with the truth."""
     truth = json.loads((folder / "balls.json").read_text())
     result = Score()
     for path in sorted((folder / "images").glob("image*.jpg")):
@@ -123,7 +123,7 @@ def main() -> None:
     parser.add_argument("--model", type=Path, default=model_path(DEFAULT))
     parser.add_argument("--object-radius", type=float)
     parser.add_argument("--threshold", type=float)
-    parser.add_argument("--near", type=float, default=6.0, help="distance of balls that are counted by themselves [m]")
+    parser.add_argument("--near", type=float, default=6.0, help="count balls nearer than this separately [m]")
     parser.add_argument("--sheet", type=Path, help="picture of misses and false balls to write")
     parser.add_argument("--json", type=Path, help="summary to write")
     options = parser.parse_args()

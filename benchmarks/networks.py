@@ -1,4 +1,4 @@
-"""The Visual Mesh networks that are measured, with random weights, and a loop of numpy calls for comparison."""
+"""Visual Mesh networks to measure, with random weights, and a loop of numpy calls for comparison."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NETWORKS = {
 
 
 def checkpoint(shape: NetworkShape, intersections: float, max_distance: float) -> Checkpoint:
-    """A network of random weights that finds nothing: its last class, the only object, is far below the threshold."""
+    """A network with random weights that finds nothing: its only object class stays far below the threshold."""
     torch.manual_seed(0)
     network = Network(shape).eval()
     with torch.no_grad():

@@ -1,7 +1,7 @@
-"""The detectors that a user would otherwise pick, from their published layer tables, with random weights.
+"""The detectors that users would choose instead, from their published layer tables, with random weights.
 
 Weights do not change how long a network takes. Batch normalization is folded into the convolutions, as it is for
-inference. Four classes, as a team would train, which is easier on them than the eighty or ninety of their papers.
+inference. They have four classes, like a team's own training; the eighty or ninety of their papers would be slower.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from torch import nn
 
 CLASSES = 4
 _KEPT, _SCORE, _OVERLAP = 100, 0.5, 0.45
-"""Boxes that go into the suppression, the least score, and the overlap from which two boxes are one object."""
+"""Non-maximum suppression: number of boxes, lowest score, and the overlap from which two boxes are one object."""
 
 
 def convolution(inputs: int, outputs: int, size: int, stride: int, activation: nn.Module, groups: int = 1) -> nn.Module:
@@ -102,7 +102,7 @@ class Squeeze(nn.Module):
 
 
 class Bottleneck(nn.Module):
-    """MobileNet v3's block: wider, depthwise, narrower; with a way around if nothing changes its size."""
+    """MobileNet v3's block: wider, depthwise, narrower; with a skip connection if the size stays."""
 
     def __init__(self, inputs: int, size: int, wide: int, outputs: int, squeeze: bool, hard: bool, stride: int) -> None:
         super().__init__()
@@ -166,7 +166,7 @@ class SsdLiteMobileNetV3(nn.Module):
 
 
 class Split(nn.Module):
-    """YOLO v8's block: half of the channels goes through bottlenecks, and all stages are joined."""
+    """YOLO v8's block: half of the channels pass bottlenecks, and the outputs of all stages are concatenated."""
 
     def __init__(self, inputs: int, outputs: int, count: int, around: bool) -> None:
         super().__init__()
@@ -298,7 +298,7 @@ PEERS = (
 
 
 class PeerDetector:
-    """A peer from frame to boxes on one thread: scaling and layout of the frame, network, choice and suppression."""
+    """A peer from frame to boxes on one thread: preparing the frame, network, selection and suppression of boxes."""
 
     def __init__(self, peer: Peer) -> None:
         torch.manual_seed(0)

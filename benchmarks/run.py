@@ -1,6 +1,6 @@
-"""All figures of docs/performance.md: `make bench`. One pinned core; calls that are compared take turns.
+"""All figures of docs/performance.md: `make bench`. On one pinned core; compared calls take turns.
 
-Writes benchmarks/results.json. With --quick fewer rounds, to see that it works.
+Writes benchmarks/results.json. --quick makes fewer rounds, for a check that it works.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Models:
 
 
 def mesh_on_screen(detector: Detector, frame: Frame) -> Mesh:
-    """The points of a frame, of a mesh at its own height."""
+    """The visible part of the mesh at a frame's own height."""
     manifest = detector.manifest
     mesh = manifest.model.build(
         manifest.mesh_shape, frame.orientation.height, manifest.intersections, manifest.max_distance
@@ -74,7 +74,7 @@ def mesh_on_screen(detector: Detector, frame: Frame) -> Mesh:
 
 
 def session_call(detector: Detector, mesh: Mesh) -> Callable[[], object]:
-    """The session alone on a mesh, its inputs ready."""
+    """A call of the network alone on a mesh, with prepared inputs."""
     layout = choose_layout(mesh, detector.manifest)
     points = layout.points()
     layout.colors(points)[:] = np.random.default_rng(0).random((len(layout.slots), 3), dtype=np.float32)
@@ -125,7 +125,7 @@ def median_frame(models: Models, work: list[Frame], name: str) -> Frame:
 
 
 def whole_calls(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
-    """From frame to detections, warm, against the session alone on the same inputs."""
+    """Whole calls with a warm cache, against the network alone on the same points."""
     found: dict[str, Any] = {}
     for name in NETWORKS:
         frame = median_frame(models, work, name)
@@ -146,8 +146,8 @@ def whole_calls(models: Models, work: list[Frame], rounds: int) -> dict[str, Any
 
 
 def shipped(rounds: int) -> dict[str, Any]:
-    """The networks of the package, with the mesh as far out as they come and to 10 m, all on one frame: that of the
-    demo with the median number of points."""
+    """The networks of the package, with their own reach and with 10 m, on the demo's frame with the median number of
+    points."""
     found: dict[str, Any] = {}
     usual = Detector.from_file(model_path(DEFAULT))
     points = {each.name: len(usual.detect(each.image, each.orientation, each.lens).pixels) for each in demo_frames()}
@@ -164,7 +164,7 @@ def shipped(rounds: int) -> dict[str, Any]:
 
 
 def peers(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
-    """Whole calls on the same frame, in turns: the Visual Mesh with five and nine layers, and the peers."""
+    """Whole calls in turns on the same frame: the Visual Mesh with five and nine layers, and its peers."""
     frame = median_frame(models, work, "5x4")
     calls: dict[str, Callable[[], object]] = {}
     kinds = [(name, sampling) for name in ("5x4", "9x4") for sampling in ("exact", "fast")]
@@ -188,7 +188,7 @@ def peers(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
 
 
 def growth(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
-    """How a whole call of five layers grows with intersections, distance, resolution and threads."""
+    """Whole calls of a five-layer network over intersections, distance, resolution and threads."""
     frame = median_frame(models, work, "5x4")
 
     def row(detector: Detector, frame: Frame, **what: float) -> dict[str, Any]:
@@ -219,7 +219,7 @@ def growth(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
 
 
 def walks(models: Models, work: list[Frame], seconds: float) -> dict[str, Any]:
-    """Robots that walk for a while: hits of the cache after the first swing, its memory, and what cold calls cost."""
+    """Walking robots: hit rate of the cache after the first swing, its memory, and the time of cold calls."""
     found: dict[str, Any] = {}
     for name in ("5x4", "13x16"):
         frame = median_frame(models, work, name)
@@ -241,7 +241,7 @@ def walks(models: Models, work: list[Frame], seconds: float) -> dict[str, Any]:
 
 
 def soak(models: Models, work: list[Frame], count: int) -> dict[str, Any]:
-    """RSS over many frames of changing shapes: five layers, orientations all over, small images to save time."""
+    """Resident memory over many frames with random orientations, for a five-layer network."""
     detector = models.detector("5x4", sampling="fast", cache_mib=16.0)
     random = np.random.default_rng(0)
     frame = median_frame(models, work, "5x4")
@@ -267,7 +267,7 @@ _ALL_CORES = os.sched_getaffinity(0)
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--only", metavar="PART", help="measure this part again, and keep the others of the output")
+    parser.add_argument("--only", metavar="PART", help="measure only this part; the output keeps the other parts")
     parser.add_argument("--output", type=Path, default=RESULTS)
     options = parser.parse_args()
     if not options.output.parent.is_dir():

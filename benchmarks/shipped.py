@@ -1,4 +1,4 @@
-"""How good the networks of the package are: `make score TEST=...`, with what `make test-data` rendered.
+"""Accuracy of the networks of the package: `make score TEST=...`, on the sets of `make test-data`.
 
 Writes benchmarks/shipped.json, from which benchmarks/shipped_report.py makes tables, plots and model cards, and the
 sheet of the worst errors.
@@ -35,15 +35,15 @@ RANGES = {"0.5 to 6 m": range(1, 12), "6 to 10 m": range(12, 20), "1 to 6 m": ra
 """Bins of half a meter."""
 
 SETS = ("field", "clutter")
-"""Test sets: a field with robots and people, and one that is full of what may be taken for a ball."""
+"""Test sets: a field with robots and people, and a field full of things that resemble a ball."""
 
 METERS = {f"{near} to {near + 1} m": range(2 * near, 2 * near + 2) for near in range(10)}
 CANDIDATES = Settings(threshold=0.2, min_inside=0.05, max_around=0.95)
-"""Reports whatever may be a ball, for curves over all confidences."""
+"""Settings that accept every candidate, for curves over all confidences."""
 
 
 def evaluation(model: Path, folder: Path, settings: Settings) -> Evaluation:
-    """What comes of a network on a folder of vm-synth, each picture with a mesh for its own ball."""
+    """Evaluation of a network on a folder of vm-synth; each picture gets a mesh for its own ball."""
     table = tomllib.loads((NETWORKS / "ball-5x4.toml").read_text())["classes"]
     job = Job(model, settings, False, ClassTable.from_table(table).mask_classes(), Rules("scene"))
     subject = job.subject()
@@ -66,7 +66,7 @@ def numbers(scores: ObjectScores, bins: range | None, overlap: float = 0.5) -> d
 
 
 def scores_of(model: Path, folder: Path) -> tuple[dict[str, Any], Evaluation]:
-    """All numbers of a network on a test set: as it is used, and over all confidences."""
+    """All figures of a network on a test set: with the default settings, and over all confidences."""
     used, ranked = (evaluation(model, folder, each) for each in (Settings(), CANDIDATES))
     ball, curve = used.objects["ball"], ranked.objects["ball"]
     found: dict[str, Any] = {
@@ -92,14 +92,14 @@ def _size(folder: Path) -> list[int]:
 
 
 def _curve(scores: ObjectScores) -> list[list[float]]:
-    """Confidence, precision and recall, at two hundred places or fewer."""
+    """Confidence, precision and recall, at two hundred points or fewer."""
     curve = scores.ranking(0.5).precision_recall
     chosen = np.unique(np.linspace(0, len(curve.recall) - 1, 200).astype(int)) if len(curve.recall) else []
     return [[round(float(each[at]), 4) for each in (curve.thresholds, curve.precision, curve.recall)] for at in chosen]
 
 
 def sheet(result: Evaluation, count: int = 20) -> tuple[np.ndarray, list[str]]:
-    """The worst errors of an evaluation, half of them missed and half of them false, and what they are."""
+    """The worst errors of an evaluation, half of them missed and half of them false, as pictures with a description."""
     missed, false = result.worst.missed[: count // 2], result.worst.false[: count // 2]
     cells, words = [], []
     for number, each in enumerate((*missed, *false), 1):
@@ -125,7 +125,7 @@ def _said(error: WorstError, missed: bool) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("test", type=Path, help="folder of test sets")
-    parser.add_argument("--network", choices=SHIPPED, help="score this one again, and keep what is known of the others")
+    parser.add_argument("--network", choices=SHIPPED, help="score only this network; the results keep the others")
     options = parser.parse_args()
     found: dict[str, Any] = {"networks": {}, "grid": {}}
     if options.network:

@@ -25,7 +25,7 @@ def number(value: float | None, digits: int = 2, unit: float = 1.0) -> str:
 
 
 def networks(found: dict[str, Any], each_set: str) -> str:
-    """All networks on a test set in one table: balls within some ranges, as used and over all confidences."""
+    """All networks on a test set in one table, with the default settings and over all confidences."""
     rows = []
     for name, sets in found["networks"].items():
         scores = sets[each_set]

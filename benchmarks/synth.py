@@ -1,4 +1,4 @@
-"""How fast vm-synth renders, and with how much memory: `make bench-synth HDRI=...`.
+"""Speed and memory of vm-synth: `make bench-synth HDRI=...`.
 
 Renders the same small set with one worker and with two, each in a fresh folder, and writes benchmarks/synth.json and
 the table of docs/synth.md.

@@ -1,10 +1,9 @@
-"""Test sets of maps that no training saw: `make test-data HDRI=folder-of-maps`.
+"""Renders test sets under maps that no training uses: `make test-data HDRI=folder-of-maps`.
 
-OUT/field: a ball among robots, goals, lines and people, at all distances alike, 1280 x 1024 px. OUT/clutter: the same
-with what the training pictures have besides: furniture, bags and boxes, domes, discs, balloons, balls of other sizes or
-out of air, and balls that are half hidden or in the air. OUT/grid: scenes as in field, with
-three lenses at two sizes and three heights, the same scenes at both sizes. OUT/demo: what lies in tests/fixtures/demo,
-images, lenses and scenes.
+OUT/field: a ball among robots, goals, lines and people, with uniform distances, 1280 x 1024 px. OUT/clutter: also the
+other things of the training pictures: furniture, bags and boxes, domes, discs, balloons, balls of other sizes, flat
+balls, and balls that are half hidden or in the air. OUT/grid: scenes like those of field with three lenses, two sizes
+and three heights; both sizes show the same scenes. OUT/demo: the images, lenses and scenes of tests/fixtures/demo.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ UNCLUTTERED = (
 
 
 def render(hdri: Path, out: Path, count: int, seed: int, *entries: str) -> None:
-    """A set of the maps that are held out."""
+    """A test set under the held-out maps."""
     command = [sys.executable, "-m", "vm_synth", str(out), "--held-out", "--hdri", str(hdri)]
     command += ["--count", str(count), "--seed", str(seed), "--config", str(SCENES)]
     for entry in entries:

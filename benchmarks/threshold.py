@@ -2,8 +2,8 @@
 
     python -m benchmarks.threshold build/networks/ball-best data/soccer
 
-Answers are computed once; each combination of settings then judges them. Prints recall, precision, F1 and false balls a
-picture, best F1 first, and those of the default settings last.
+Answers are computed once; each combination of settings then judges them. Prints recall, precision, F1 and false balls
+per picture, best F1 first, and the default settings last.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ THRESHOLDS, INSIDES, AROUNDS = (0.5, 0.6, 0.7, 0.8, 0.9), (0.5, 0.6, 0.7, 0.75, 
 
 
 def observed(subject: Exact, data: Path, numbers: Path, part: str) -> Iterator[tuple[list[TrueObject], Observation]]:
-    """For each picture of a part of a training its true balls, and its points with their probabilities."""
+    """True balls and classified points of each picture in one part of a training."""
     table = tomllib.loads((NETWORKS / "ball-5x4.toml").read_text())["classes"]
     classes = ClassTable.from_table(table).mask_classes()
     for files in select_pictures([data], numbers, part):

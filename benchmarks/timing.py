@@ -1,7 +1,7 @@
-"""Calls timed in turns, so that whatever else the machine does meets all of them.
+"""Times calls in turns, so disturbances of the machine affect all of them alike.
 
-Each turn makes a call several times in a row. The first one finds in the processor's caches what the call before it
-left there; the others are what a call costs that follows its like. Both are kept.
+Each turn makes a call several times in a row. The first one finds the processor's caches as another call left them; the
+others find them as the same call left them. Both are reported.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 def interleaved(
     calls: Mapping[str, Callable[[], object]], rounds: int, row: int = 2, warm: int = 2
 ) -> dict[str, dict[str, float]]:
-    """Of each call, made `row` times in a row in each turn: p50 and p99 of all but the first of a row, and p50 of the
-    first ones, `first` [ms]. The first `warm` turns don't count."""
+    """Times of each call, which is made `row` times in each turn [ms]: p50 and p99 of all but the first of a row, and
+    `first`, the p50 of the first ones. The first `warm` turns don't count."""
     times: dict[str, list[list[float]]] = {name: [] for name in calls}
     for number in range(rounds + warm):
         for name, call in calls.items():

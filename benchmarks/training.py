@@ -1,6 +1,6 @@
-"""How fast vm-train is, and what limits it: `make bench-train DATA=...`.
+"""Speed of vm-train and of its parts: `make bench-train DATA=...`.
 
-Each part is timed by itself on one pinned core; then whole trainings with one process that reads and one that learns.
+It times each part alone on one pinned core, then whole trainings with one reading and one learning process.
 Writes benchmarks/training.json and the table of docs/training.md.
 """
 
@@ -49,7 +49,7 @@ def configuration(depth: int, width: int) -> TrainConfiguration:
 
 
 def per_second(call: Callable[[int], object], count: int) -> float:
-    """Calls a second, by the median of all."""
+    """Calls per second, from the median time."""
     times = []
     for number in range(count):
         started = perf_counter()
@@ -59,7 +59,7 @@ def per_second(call: Callable[[int], object], count: int) -> float:
 
 
 def parts(data: Path, numbers: tuple[str, ...], folder: Path) -> dict[str, float]:
-    """Pictures a second on one core."""
+    """Pictures per second on one core."""
     made = configuration(5, 4)
     job = TrainingRun.begin(folder / "parts", data, made, Split(numbers, (), ()), folder / "unpacked")
     kept = job.graphs(numbers)
@@ -90,7 +90,7 @@ def parts(data: Path, numbers: tuple[str, ...], folder: Path) -> dict[str, float
 
 
 def whole(data: Path, numbers: tuple[str, ...], folder: Path, workers: int) -> dict[str, float]:
-    """Pictures a second of trainings whose pictures are unpacked already, start and validation included."""
+    """Pictures per second of trainings with decoded pictures on disk, start and validation included."""
     found = {}
     for name, (depth, width) in NETWORKS.items():
         split = Split(numbers[8:], numbers[:8], ())
@@ -107,7 +107,7 @@ def whole(data: Path, numbers: tuple[str, ...], folder: Path, workers: int) -> d
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path, help="folder of pictures, as vm-synth makes them")
-    parser.add_argument("--count", type=int, default=800, help="pictures of whole trainings; default 800")
+    parser.add_argument("--count", type=int, default=800, help="number of pictures of the trainings; default 800")
     options = parser.parse_args()
     numbers = tuple(each.number for each in find_pictures(options.data)[: options.count])
     cores = sorted(os.sched_getaffinity(0))
