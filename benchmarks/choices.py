@@ -1,7 +1,8 @@
 """Measures the effect of each choice of a training: `make choices`, after `make networks` and `make test-data`.
 
 It trains small networks on the same pictures, each with one change, some with several seeds, one training per core, and
-scores them on pictures under maps that no training uses. It skips finished trainings. Writes benchmarks/choices.json, from which benchmarks/choices_report.py makes the tables and plots of docs/results.md.
+scores them on pictures under maps that no training uses. It skips finished trainings. It writes
+benchmarks/choices.json, from which benchmarks/choices_report.py makes the tables and plots of docs/results.md.
 """
 
 from __future__ import annotations
