@@ -1,7 +1,7 @@
-"""make bundle: all that a robot without internet needs for a release, in one file.
+"""make bundle: pack everything that a robot without internet needs for a release into one file.
 
-The same inputs, target and commit give the same bytes, whoever packs, and where: versions and hashes of packages are
-those of deploy/robot.txt, times are the commit's, and the tools that pack are those of deploy/constraints.txt.
+The same inputs, target and commit give the same bytes on every machine: versions and hashes of packages come from
+deploy/robot.txt, times from the commit, and versions of the packing tools from deploy/constraints.txt.
 """
 
 from __future__ import annotations
@@ -44,21 +44,21 @@ LOCK = TOP / "deploy" / "robot.txt"
 SCRIPTS = TOP / "deploy" / "robot"
 OWN = ("vm_embedded", "export", "pyproject.toml", "README.md", "LICENSE")
 PACKED = (*OWN, "deploy")
-"""What of the checkout is in the project's wheel, and in the bundle."""
+"""Paths of the checkout in the project's wheel (OWN) and in the bundle."""
 
-USUAL = "linux_x86_64-cp311"
-USUAL_GLIBC = (2, 28)
-"""Of a target that names none: the C library of Debian 10, Ubuntu 20.04 and everything since."""
+DEFAULT_TARGET = "linux_x86_64-cp311"
+DEFAULT_GLIBC = (2, 28)
+"""glibc of targets that name none: that of Debian 10, Ubuntu 20.04 and later."""
 
 OLDEST_GLIBC = 5
-"""Minor version of the C library from which wheels have been named by it (PEP 600)."""
+"""First minor version of glibc in the names of wheels (PEP 600)."""
 
 MODEL, CONFIGURATION = "model.onnx", "vm.toml"
 
 
 @dataclass(frozen=True)
 class Target:
-    """A kind of robot: linux_x86_64-cp311, or with the C library's version manylinux_2_17_x86_64-cp311."""
+    """A kind of robot: linux_x86_64-cp311, or with a version of glibc manylinux_2_17_x86_64-cp311."""
 
     name: str
     glibc: tuple[int, int]
@@ -66,33 +66,33 @@ class Target:
     python: str
 
     @classmethod
-    def named(cls, name: str) -> Target:
-        """Raises InputError."""
+    def parse(cls, name: str) -> Target:
+        """The target with a name. Raises InputError."""
         found = re.fullmatch(r"(?:linux|manylinux_2_(\d+))_(x86_64|aarch64)-(cp3(?:1[1-9]|[2-9]\d))", name)
         if not found:
             raise InputError(
-                f"TARGET must be like {USUAL}, linux_aarch64-cp312 or manylinux_2_17_x86_64-cp311 (Python 3.11 or "
+                f"TARGET must be like {DEFAULT_TARGET}, linux_aarch64-cp312 or manylinux_2_17_x86_64-cp311 (Python 3.11 or "
                 f"newer), not {name!r}"
             )
-        glibc = (2, int(found[1])) if found[1] else USUAL_GLIBC
+        glibc = (2, int(found[1])) if found[1] else DEFAULT_GLIBC
         return cls(name, glibc, found[2], found[3])
 
     def platforms(self) -> list[str]:
-        """What pip calls wheels that run there, the newest C library first."""
+        """pip's names of the platforms whose wheels run there, newest glibc first."""
         numbered = [f"manylinux_2_{minor}_{self.machine}" for minor in range(self.glibc[1], OLDEST_GLIBC - 1, -1)]
         return [*numbered, f"manylinux2014_{self.machine}"] if self.glibc[1] >= 17 else numbered
 
 
 @dataclass(frozen=True)
 class Origin:
-    """The commit that is packed: its name, which ends in +changes if there are any, and its time [s]."""
+    """The commit to pack: its hash, with +changes for a modified checkout, and its time since 1970 [s]."""
 
     commit: str
     time: int
 
     @classmethod
     def of(cls, top: Path) -> Origin:
-        """Raises InputError outside of a git checkout."""
+        """The commit of a checkout. Raises InputError outside of a git checkout."""
         commit, time = _git(top, "log", "-1", "--format=%H %ct").split()
         return cls(commit + ("+changes" if _git(top, "status", "--porcelain", "--", *PACKED) else ""), int(time))
 
@@ -101,11 +101,11 @@ def _git(top: Path, *words: str) -> str:
     try:
         return subprocess.run(["git", "-C", top, *words], check=True, capture_output=True, text=True).stdout
     except (OSError, subprocess.CalledProcessError) as error:
-        raise InputError(f"{top} must be a git checkout: a bundle says which commit it is of") from error
+        raise InputError(f"{top} must be a git checkout, because a bundle names its commit") from error
 
 
 def wheelhouse(target: Target, folder: Path) -> list[Path]:
-    """The wheels of deploy/robot.txt for a target, downloaded unless they are there. Raises InputError."""
+    """The wheels of deploy/robot.txt for a target, downloaded if they are missing. Raises InputError."""
     made = folder / target.name
     stamp, lock = made / "lock", hashlib.sha256(LOCK.read_bytes()).hexdigest()
     if not stamp.exists() or stamp.read_text() != lock:
@@ -115,7 +115,7 @@ def wheelhouse(target: Target, folder: Path) -> list[Path]:
         part.mkdir(parents=True)
         platforms = [word for each in target.platforms() for word in ("--platform", each)]
         _pip(
-            f"there is no wheel for {target.name} of a package in {LOCK.relative_to(TOP)}, or no way to it",
+            f"a package of {LOCK.relative_to(TOP)} has no wheel for {target.name}, or can't be downloaded",
             *["download", "--no-deps", "--require-hashes", "--only-binary=:all:", "--dest", part, *platforms],
             *["--python-version", target.python[2] + "." + target.python[3:], "--implementation", "cp"],
             *["--abi", target.python, "--abi", "abi3", "--abi", "none", "--requirement", LOCK],
@@ -125,15 +125,15 @@ def wheelhouse(target: Target, folder: Path) -> list[Path]:
     return sorted(made.glob("*.whl"))
 
 
-def own_wheel(top: Path, origin: Origin, folder: Path) -> Path:
-    """The wheel of this project, from what is in the checkout and git does not ignore. Raises InputError."""
+def project_wheel(top: Path, origin: Origin, folder: Path) -> Path:
+    """Build the wheel of this project from the files of the checkout that git does not ignore. Raises InputError."""
     with tempfile.TemporaryDirectory() as name:
         source = Path(name)
         listed = _git(top, "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", *OWN)
         for each in filter(None, listed.split("\0")):
             copy = source / each
             copy.parent.mkdir(parents=True, exist_ok=True)
-            with contextlib.suppress(FileNotFoundError):  # removed, and not committed yet
+            with contextlib.suppress(FileNotFoundError):  # a removed file that is still in git's index
                 copy.write_bytes((top / each).read_bytes())
                 copy.chmod(0o644)
         words: list[str | Path] = ["wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, source]
@@ -144,14 +144,14 @@ def own_wheel(top: Path, origin: Origin, folder: Path) -> Path:
 
 def _pip(what: str, *words: str | Path, env: Mapping[str, str] | None = None) -> None:
     command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet", *words]
-    # Modes of files go into a wheel.
+    # The umask, because wheels contain file modes.
     ran = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **(env or {})}, umask=0o022)
     if ran.returncode:
         raise InputError(f"{what}:\n{ran.stderr.strip()}")
 
 
-def configured(configuration: Path | None, model: str | None) -> dict[str, bytes]:
-    """Files of the folder etc/: vm.toml, model and lens, which refer to each other. Raises VisualMeshError."""
+def configuration_files(configuration: Path | None, model: str | None) -> dict[str, bytes]:
+    """Content of the files in etc/ by name: vm.toml, and the model and lens it names. Raises VisualMeshError."""
     if configuration is None:
         shown = Configuration(
             model=MODEL,
@@ -163,42 +163,42 @@ def configured(configuration: Path | None, model: str | None) -> dict[str, bytes
     text = configuration.read_text(encoding="utf-8")
     table = tomllib.loads(text)
     files = {MODEL: _model(model or given.model)}
-    text = _renamed(text, "model", MODEL)
+    text = _with_entry(text, "model", MODEL)
     if isinstance(table.get("lens"), str):
         lens = configuration.parent / table["lens"]
         if lens.name in (CONFIGURATION, MODEL):
             raise InputError(f"the lens file {lens} can't be called {lens.name} in a bundle")
         files[lens.name] = lens.read_bytes()
-        text = _renamed(text, "lens", lens.name)
+        text = _with_entry(text, "lens", lens.name)
     return {CONFIGURATION: text.encode(), **files}
 
 
 def _model(model: str) -> bytes:
-    """The bytes of a network that passes its self-test. Raises VisualMeshError."""
+    """The bytes of a network, after its self-test. Raises VisualMeshError."""
     read = read_model(model_path(model))
     Session(read)
     return read.content
 
 
-def _renamed(text: str, key: str, value: str) -> str:
-    """vm.toml with another value of an entry that stands before all sections. Raises InputError."""
+def _with_entry(text: str, key: str, value: str) -> str:
+    """vm.toml with another value for an entry before all sections. Raises InputError."""
     table, line = tomllib.loads(text), f"{key} = {json.dumps(value)}"
     found = re.compile(rf"^{key}\s*=.*$", re.MULTILINE)
     text = found.sub(lambda _: line, text, count=1) if key in table else f"{line}\n{text}"
     if tomllib.loads(text) != table | {key: value}:
-        raise InputError(f"the configuration's {key} must be on a line of its own, as {line}")
+        raise InputError(f"the configuration's {key} must be on a separate line, like: {line}")
     return text
 
 
-def bundle(target: Target, configuration: Path | None, model: str | None, wheels: Path, dist: Path) -> Path:
-    """Write a bundle, and return its path. Raises VisualMeshError."""
+def write_bundle(target: Target, configuration: Path | None, model: str | None, wheels: Path, dist: Path) -> Path:
+    """Write a bundle and return its path. Raises VisualMeshError."""
     origin = Origin.of(TOP)
-    files = {f"etc/{name}": content for name, content in configured(configuration, model).items()}
+    files = {f"etc/{name}": content for name, content in configuration_files(configuration, model).items()}
     packages = wheelhouse(target, wheels)
     with tempfile.TemporaryDirectory() as folder:
-        packages = sorted([*packages, own_wheel(TOP, origin, Path(folder))], key=lambda each: each.name)
+        packages = sorted([*packages, project_wheel(TOP, origin, Path(folder))], key=lambda each: each.name)
         files |= {f"wheels/{each.name}": each.read_bytes() for each in packages}
-    files["requirements.txt"] = "".join(_required(files)).encode()
+    files["requirements.txt"] = "".join(_requirements(files)).encode()
     for each in sorted(SCRIPTS.iterdir()):
         files[each.name] = each.read_bytes()
     files["README.md"] = (TOP / "deploy" / "README.md").read_bytes()
@@ -208,12 +208,12 @@ def bundle(target: Target, configuration: Path | None, model: str | None, wheels
     path = dist / f"{NAME}-{__version__}-{target.name}.tar.gz"
     dist.mkdir(parents=True, exist_ok=True)
     with atomic_write(path) as part:
-        part.write_bytes(_packed(f"{NAME}-{release}-{target.name}", files, origin.time))
+        part.write_bytes(_pack(f"{NAME}-{release}-{target.name}", files, origin.time))
     return path
 
 
-def _required(files: dict[str, bytes]) -> Iterator[str]:
-    """Lines of requirements.txt: each wheel but pip's, with its hash."""
+def _requirements(files: dict[str, bytes]) -> Iterator[str]:
+    """Lines of requirements.txt: each wheel except pip's, with its hash."""
     for name, content in files.items():
         if name.startswith("wheels/") and not name.startswith("wheels/pip-"):
             project, version, *_ = Path(name).name.split("-")
@@ -233,14 +233,14 @@ def _manifest(target: Target, origin: Origin, release: str, files: dict[str, byt
         "machine": target.machine,
         "glibc": ".".join(map(str, target.glibc)),
         "python": target.python,
-        "disk_mib": round(1.15 * sum(sizes) / 2**20) + 16,  # and what Python compiles
+        "disk_mib": round(1.15 * sum(sizes) / 2**20) + 16,  # 15 % and 16 MiB for the files that Python compiles
         "model_sha256": hashlib.sha256(files[f"etc/{MODEL}"]).hexdigest(),
         "packages": {name.split("/")[1].split("-")[0]: name.split("-")[1] for name in sorted(wheels)},
     }
 
 
-def _packed(name: str, files: dict[str, bytes], time: int) -> bytes:
-    """A .tar.gz that is the same whenever and wherever it is made."""
+def _pack(name: str, files: dict[str, bytes], time: int) -> bytes:
+    """A .tar.gz whose bytes depend only on its files and the time."""
     packed = io.BytesIO()
     with (
         gzip.GzipFile(filename="", mode="wb", fileobj=packed, compresslevel=1, mtime=time) as zipped,
@@ -256,18 +256,20 @@ def _packed(name: str, files: dict[str, bytes], time: int) -> bytes:
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="make bundle", description=__doc__)
-    parser.add_argument("--target", default=USUAL, help="default %(default)s")
-    parser.add_argument("--model", help="network (.onnx), or one of the package; default: as the configuration says")
-    parser.add_argument("--config", type=Path, help="vm.toml; default: a drawn field, to try it out")
-    parser.add_argument("--wheels", type=Path, default=TOP / "build" / "wheels", help="where downloads are kept")
-    parser.add_argument("--dist", type=Path, default=TOP / "dist", help="where the bundle goes")
-    parser.add_argument("--download", action="store_true", help="only download what a bundle needs")
+    parser.add_argument("--target", default=DEFAULT_TARGET, help="default %(default)s")
+    parser.add_argument(
+        "--model", help="network (.onnx file, or one of the package); default: that of the configuration"
+    )
+    parser.add_argument("--config", type=Path, help="vm.toml; default: a synthetic camera, to try it out")
+    parser.add_argument("--wheels", type=Path, default=TOP / "build" / "wheels", help="folder for downloads")
+    parser.add_argument("--dist", type=Path, default=TOP / "dist", help="folder for the bundle")
+    parser.add_argument("--download", action="store_true", help="only download the packages")
     options = parser.parse_args()
     try:
         if options.download:
-            wheelhouse(Target.named(options.target), options.wheels)
+            wheelhouse(Target.parse(options.target), options.wheels)
             return 0
-        path = bundle(Target.named(options.target), options.config, options.model, options.wheels, options.dist)
+        path = write_bundle(Target.parse(options.target), options.config, options.model, options.wheels, options.dist)
     except VisualMeshError as error:
         print(f"make bundle: {error}", file=sys.stderr)
         return 1

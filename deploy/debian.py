@@ -1,7 +1,7 @@
-"""make deb: a bundle as a Debian package, for teams that make images of their robots.
+"""make deb: pack a bundle as a Debian package, for teams that build images of their robots.
 
-The package holds the bundle, and its scripts run install.sh and uninstall.sh, so that releases, checks and the way back
-are the same. The same bundle gives the same bytes.
+The package contains the bundle, and its scripts run install.sh and uninstall.sh: releases, checks and rollback are the
+same. The same bundle always gives the same bytes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pathlib import Path
 
 NAME = "vm-embedded-robot"
 ARCHITECTURES = {"x86_64": "amd64", "aarch64": "arm64"}
-WHO = "The vm-embedded team <vm-embedded@example.org>"
+MAINTAINER = "The vm-embedded team <vm-embedded@example.org>"
 LIBRARY = f"usr/lib/{NAME}"
 
 POSTINST = f"""#!/bin/sh
@@ -44,7 +44,7 @@ fi
 
 
 def package(bundle: Path) -> Path:
-    """Write a package beside a bundle, and return its path."""
+    """Write the package of a bundle beside it, and return its path."""
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder) / "root"
         with tarfile.open(bundle) as tar:
@@ -87,22 +87,22 @@ def _control(manifest: dict[str, str], version: str, size: int) -> str:
     return f"""Package: {NAME}
 Version: {version}
 Architecture: {ARCHITECTURES[manifest["machine"]]}
-Maintainer: {WHO}
+Maintainer: {MAINTAINER}
 Installed-Size: {size}
 Depends: python3 (>= 3.{minor}), python3 (<< 3.{minor + 1}), libc6 (>= {manifest["glibc"]})
 Section: science
 Priority: optional
 Description: Visual Mesh detector for robots, as a supervised service
- Finds balls and whatever else its network knows in the pictures of a camera
+ Finds balls and the other classes of its network in the images of a camera
  whose height and orientation are known, on one processor core.
  .
- Releases go to /opt/vm-embedded, each with its own Python environment. One that
- does not come up well gives way to the one before.
+ Releases go to /opt/vm-embedded, each with its own Python environment. A new
+ release that does not become healthy is rolled back.
 """
 
 
 def _documents(folder: Path, version: str, time: int) -> None:
-    """Copyright and changelog, as Debian wants them."""
+    """Write copyright and changelog, which Debian requires."""
     folder.mkdir(parents=True)
     license = (Path(__file__).parents[1] / "LICENSE").read_text()
     text = "".join(f" {line}\n" if line else " .\n" for line in license.splitlines())
@@ -112,7 +112,7 @@ def _documents(folder: Path, version: str, time: int) -> None:
     )
     changes = (
         f"{NAME} ({version}) unstable; urgency=medium\n\n  * See the project's history.\n\n"
-        f" -- {WHO}  {formatdate(time)}\n"
+        f" -- {MAINTAINER}  {formatdate(time)}\n"
     )
     (folder / "changelog.gz").write_bytes(gzip.compress(changes.encode(), 9, mtime=time))
 

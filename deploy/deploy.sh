@@ -1,5 +1,5 @@
 #!/bin/sh
-# From this workstation to a robot that answers ssh: copy a bundle, install it, and show what it sees.
+# Copy a bundle to a robot over ssh, install it there, and show the state and the last detections.
 set -eu
 
 if [ $# != 2 ]; then
@@ -7,11 +7,11 @@ if [ $# != 2 ]; then
     exit 2
 fi
 bundle=$1 robot=$2
-[ -r "$bundle" ] || { echo "deploy.sh: can't read $bundle: make bundle" >&2; exit 1; }
+[ -r "$bundle" ] || { echo "deploy.sh: can't read $bundle; make it with: make bundle" >&2; exit 1; }
 terminal=-T
 if [ -t 0 ]; then terminal=-t; fi # for sudo, which may ask for a password
 
-# shellcheck disable=SC2029 # names are of this side, and free of what a shell would read
+# shellcheck disable=SC2029 # variables expand on this side, and contain nothing special to a shell
 on_robot() { ssh "$terminal" "$robot" "$@"; }
 
 folder=$(ssh -T "$robot" 'mktemp -d /var/tmp/vm-embedded.XXXXXX')
@@ -24,7 +24,7 @@ else
     scp -q "$bundle" "$robot:$folder/bundle.tar.gz"
 fi
 ssh -T "$robot" "tar -xzf $folder/bundle.tar.gz -C $folder && rm $folder/bundle.tar.gz"
-# shellcheck disable=SC2016 # the robot asks itself who it is
+# shellcheck disable=SC2016 # the robot expands this
 root='if [ "$(id -u)" = 0 ]; then s=; else s=sudo; fi; $s'
 on_robot "$root sh $folder/*/install.sh"
 on_robot "$root /opt/vm-embedded/vm-deploy status"

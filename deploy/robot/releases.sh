@@ -1,12 +1,13 @@
-# Where releases are, and how one gives way to another; read by install.sh, vm-deploy and uninstall.sh, which set PREFIX.
+# The layout of releases, and how one release replaces another. install.sh, vm-deploy and uninstall.sh source this file
+# and set PREFIX.
 #
-#   PREFIX/releases/ID/bundle   what was delivered, but for the wheels
+#   PREFIX/releases/ID/bundle   the bundle without its wheels
 #   PREFIX/releases/ID/venv     the program
-#   PREFIX/releases/ID/etc      vm.toml, model and lens as they are used; .old.onnx while a new model is on trial
-#   PREFIX/releases/ID/complete written last: a release without it is none
-#   PREFIX/current, previous    links to releases; `current` is what the unit starts
-#   PREFIX/trial                while `current` has not shown yet that it is well: the two links before it
-#   PREFIX/supervisor           systemd, or none; whose folder this is
+#   PREFIX/releases/ID/etc      vm.toml, model and lens in use; .old.onnx while a new model is on trial
+#   PREFIX/releases/ID/complete written last: a release without it is incomplete
+#   PREFIX/current, previous    links to releases; the unit starts `current`
+#   PREFIX/trial                the two links before the switch; exists until `current` has proved healthy
+#   PREFIX/supervisor           systemd or none; marks the folder as ours
 # shellcheck shell=sh
 
 UNITS=/etc/systemd/system
@@ -17,7 +18,7 @@ RESCUE=vm-detect-rollback.service
 RULE=60-vm-embedded.rules
 PATIENCE=3 # times in a row, a second apart, that a release must be ok
 
-trap '' PIPE # who listens may go away; what was begun is finished
+trap '' PIPE # finish the work even if the reader of the output disappears
 
 say() { printf '%s\n' "$*" 2>/dev/null || :; }
 
@@ -26,19 +27,19 @@ fail() {
     exit 1
 }
 
-field() { # NAME FILE: an entry of a manifest.json, which has one on each line
+field() { # NAME FILE: print an entry of a manifest.json, which has one entry per line
     sed -n "s/^ *\"$1\": \"\{0,1\}\([^\",]*\)\"\{0,1\},\{0,1\}\$/\1/p" "$2" | head -n 1
 }
 
-linked() { # LINK: the release that it points to, or nothing
+linked() { # LINK: print the release that the link points to, or nothing
     if [ -L "$PREFIX/$1" ]; then basename "$(readlink "$PREFIX/$1")"; fi
 }
 
-written() { # FILE TEXT: at once, or not at all
+write_file() { # NAME TEXT: replace a file in PREFIX atomically
     printf '%s\n' "$2" >"$PREFIX/.$1.new" && mv -f "$PREFIX/.$1.new" "$PREFIX/$1"
 }
 
-point() { # LINK RELEASE, or no release: change or remove a link at once
+set_link() { # LINK RELEASE: change a link atomically; remove it if RELEASE is empty
     if [ -n "$2" ]; then
         ln -sfn "releases/$2" "$PREFIX/.$1.new" && mv -fT "$PREFIX/.$1.new" "$PREFIX/$1"
     else
@@ -46,68 +47,68 @@ point() { # LINK RELEASE, or no release: change or remove a link at once
     fi
 }
 
-whole() { [ -n "$1" ] && [ -e "$PREFIX/releases/$1/complete" ]; }
+is_complete() { [ -n "$1" ] && [ -e "$PREFIX/releases/$1/complete" ]; } # RELEASE
 
-supervised() {
+uses_systemd() {
     case $(cat "$PREFIX/supervisor" 2>/dev/null || echo none) in
     systemd) return 0 ;;
     none) return 1 ;;
-    *) fail "$PREFIX/supervisor must say systemd or none" ;;
+    *) fail "$PREFIX/supervisor must contain systemd or none" ;;
     esac
 }
 
-booted() { [ -d /run/systemd/system ]; } # or this is the image of a robot, in which nothing runs
+systemd_runs() { [ -d /run/systemd/system ]; } # it does not in a chroot, while the image of a robot is built
 
-lock() { # SECONDS: or fail, if another of these commands is at work for so long
-    (umask 077 && : >>"$PREFIX/.lock") 2>/dev/null || fail "can't write $PREFIX: be root, or give another --prefix"
+lock() { # SECONDS: wait for other commands of this program for so long, then fail
+    (umask 077 && : >>"$PREFIX/.lock") 2>/dev/null || fail "can't write $PREFIX: run as root or choose another --prefix"
     exec 9>>"$PREFIX/.lock"
-    flock -w "$1" 9 || fail "another install.sh or vm-deploy is at work"
+    flock -w "$1" 9 || fail "another install.sh or vm-deploy is running"
 }
 
-seconds() { cut -d . -f 1 /proc/uptime; } # that the machine runs: no clock that somebody sets
+uptime_seconds() { cut -d . -f 1 /proc/uptime; } # a clock that nobody can set
 
-detect() { # ARGUMENT...: vm-detect of the current release, with its configuration
+detect() { # ARGUMENT...: run vm-detect of the current release with its configuration
     RUNTIME_DIRECTORY=/run/vm-detect "$PREFIX/current/venv/bin/vm-detect" --config "$PREFIX/current/etc/vm.toml" "$@"
 }
 
-setting() { # NAME: an entry of [deploy]
+setting() { # NAME: print an entry of [deploy]
     printed=$(detect --print-config) || return 1
     say "$printed" | sed -n "/^\[deploy\]/,/^\[/ s/^$1 = \"\{0,1\}\([^\"]*\)\"\{0,1\}\$/\1/p"
 }
 
-state() { # of the detector that runs, and why; nothing if none does
+state() { # print the state of the running detector and the reason; print nothing if none runs
     detect --status 2>/dev/null | sed -n 's/^{"type": "state", "state": "\([a-z_]*\)".*"reason": "\([^"]*\)".*/\1 \2/p'
 }
 
-placed() { # FILE FOLDER: write a file of the current release where the system looks for it
+install_file() { # FILE FOLDER: copy a file of the current release to a folder of the system
     mkdir -p "$2" || return 1
     sed "s|@PREFIX@|$PREFIX|g" "$PREFIX/current/bundle/$1" >"$2/.$1.new" && mv -f "$2/.$1.new" "$2/$1"
 }
 
-start() { # the current release, and wait until it is READY
-    placed "$UNIT" "$UNITS" && placed "$RESCUE" "$UNITS" && placed "$RULE" "$RULES" || return 1
+start_service() { # start the current release, and wait until it is READY
+    install_file "$UNIT" "$UNITS" && install_file "$RESCUE" "$UNITS" && install_file "$RULE" "$RULES" || return 1
     mkdir -p "${COMMAND%/*}" && ln -sfn "$PREFIX/vm-deploy" "$COMMAND" || return 1
-    if booted; then systemctl daemon-reload || return 1; fi
+    if systemd_runs; then systemctl daemon-reload || return 1; fi
     systemctl enable --quiet "$UNIT" || return 1
-    booted || return 0
+    systemd_runs || return 0
     udevadm control --reload 2>/dev/null || :
     systemctl reset-failed "$UNIT" 2>/dev/null || :
     systemctl restart "$UNIT"
 }
 
-forgotten() { # by the system: unit, rule and command
+remove_service() { # remove unit, udev rule and command from the system
     systemctl disable --now "$UNIT" 2>/dev/null || :
     rm -f "$UNITS/$UNIT" "$UNITS/$RESCUE" "$RULES/$RULE" "$COMMAND"
-    if booted; then systemctl daemon-reload || :; fi
+    if systemd_runs; then systemctl daemon-reload || :; fi
     udevadm control --reload 2>/dev/null || :
 }
 
-well() { # STATE: whether the detector is ok in time, or at least no worse than the state that it was in before
+becomes_healthy() { # STATE: whether the detector becomes ok in time, or at least stays in its former state
     limit=$(setting healthy_s) || limit=
     limit=${limit:-30}
-    end=$(($(seconds) + ${limit%%.*}))
+    end=$(($(uptime_seconds) + ${limit%%.*}))
     good=0 found=
-    while [ "$(seconds)" -lt "$end" ] && ! systemctl is-failed --quiet "$UNIT"; do
+    while [ "$(uptime_seconds)" -lt "$end" ] && ! systemctl is-failed --quiet "$UNIT"; do
         found=$(state)
         case $found in
         ok*) good=$((good + 1)) ;;
@@ -117,31 +118,31 @@ well() { # STATE: whether the detector is ok in time, or at least no worse than 
         sleep 1
     done
     if [ -n "$found" ] && [ "${found%% *}" = "$1" ]; then
-        say "it is $found, as it was before"
+        say "the state is $found, as it was before"
         return 0
     fi
-    say "it is ${found:-not running}"
+    say "the state is ${found:-unknown, the detector does not run}"
     return 1
 }
 
-activate() { # RELEASE: put it in the place of the current one, and take that back if it is not well
+activate() { # RELEASE: make it the current one; roll back if it does not become healthy
     old=$(linked current) older=$(linked previous)
     before=$(if [ -n "$old" ]; then state; else say camera_lost; fi)
-    written trial "$old
+    write_file trial "$old
 $older" || return 1
-    trap 'set +e; say interrupted; back; exit 1' INT TERM HUP
+    trap 'set +e; say interrupted; roll_back; exit 1' INT TERM HUP
     sync
     say "switching from ${old:-nothing} to $1"
-    if ! { point current "$1" && point previous "$old"; }; then
-        back
+    if ! { set_link current "$1" && set_link previous "$old"; }; then
+        roll_back
         return 1
     fi
-    if supervised; then
+    if uses_systemd; then
         say "starting $UNIT"
-        if ! { start && say "watching it" && { ! booted || well "${before%% *}"; }; }; then
-            say "$1 is not well:"
+        if ! { start_service && say "watching its state" && { ! systemd_runs || becomes_healthy "${before%% *}"; }; }; then
+            say "$1 is not healthy:"
             journalctl --unit "$UNIT" --lines 10 --no-pager --output cat 2>/dev/null || :
-            back
+            roll_back
             return 1
         fi
     fi
@@ -150,43 +151,43 @@ $older" || return 1
     sync
 }
 
-back() { # to the release before the one on trial; can be done again if it was cut off
+roll_back() { # to the release before the one on trial; safe to repeat after an interruption
     old=$(sed -n 1p "$PREFIX/trial") older=$(sed -n 2p "$PREFIX/trial")
-    if whole "$old"; then
-        say "going back to $old"
-        point current "$old" && point previous "$older" || return 1
+    if is_complete "$old"; then
+        say "rolling back to $old"
+        set_link current "$old" && set_link previous "$older" || return 1
         sync
-        if supervised; then start || say "$old does not start either: systemctl status $UNIT"; fi
+        if uses_systemd; then start_service || say "$old does not start either; see systemctl status $UNIT"; fi
     else
-        say "there is no release to go back to"
-        if supervised; then forgotten; fi
-        point current ""
+        say "there is no release to roll back to"
+        if uses_systemd; then remove_service; fi
+        set_link current ""
     fi
     rm -f "$PREFIX/trial"
     sync
 }
 
-old_model() { # bring it back
-    say "going back to the old model"
+restore_model() { # bring the old model back
+    say "rolling back to the old model"
     mv -f "$PREFIX/current/etc/.old.onnx" "$PREFIX/current/etc/model.onnx"
     sync
 }
 
-settled() { # what was cut off and left on trial: it stays if it is well by now
+finish_trial() { # of an interrupted command: keep the release and the model on trial if the detector is ok
     [ -e "$PREFIX/trial" ] || [ -e "$PREFIX/current/etc/.old.onnx" ] || return 0
-    say "an earlier install.sh or vm-deploy was cut off"
-    case $(if supervised && booted; then state; else say ok; fi) in
+    say "an earlier install.sh or vm-deploy was interrupted"
+    case $(if uses_systemd && systemd_runs; then state; else say ok; fi) in
     ok*) rm -f "$PREFIX/trial" "$PREFIX/current/etc/.old.onnx" ;;
-    *) failed ;;
+    *) end_trial ;;
     esac
 }
 
-failed() { # what is on trial is no good
+end_trial() { # roll back the model and the release on trial
     if [ -e "$PREFIX/current/etc/.old.onnx" ]; then
-        old_model
-        if [ ! -e "$PREFIX/trial" ] && supervised; then start || :; fi
+        restore_model
+        if [ ! -e "$PREFIX/trial" ] && uses_systemd; then start_service || :; fi
     fi
-    if [ -e "$PREFIX/trial" ]; then back; fi
+    if [ -e "$PREFIX/trial" ]; then roll_back; fi
 }
 
 prune() { # remove releases that are neither current nor previous

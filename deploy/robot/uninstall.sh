@@ -6,7 +6,7 @@ umask 022
 HERE=$(cd "$(dirname "$0")" && pwd -P)
 PREFIX=/opt/vm-embedded
 PURGE=
-if [ -e "$HERE/../complete" ]; then PREFIX=${HERE%/releases/*}; fi # it is the one of a release
+if [ -e "$HERE/../complete" ]; then PREFIX=${HERE%/releases/*}; fi # this file belongs to an installed release
 
 # shellcheck source=deploy/robot/releases.sh
 . "$HERE/releases.sh"
@@ -15,8 +15,8 @@ usage() {
     cat <<END
 usage: uninstall.sh [--prefix DIR] [--purge]
 
-  --prefix DIR  where releases are; default /opt/vm-embedded, or where this file is
-  --purge       remove the configuration, too
+  --prefix DIR  folder of the releases; default: that of this file, or /opt/vm-embedded
+  --purge       also remove the configuration
 END
 }
 
@@ -44,7 +44,7 @@ PREFIX=${PREFIX%/}
 [ -e "$PREFIX/supervisor" ] || [ -e "$PREFIX/left/etc/vm.toml" ] || fail "nothing is installed at $PREFIX"
 
 lock 0
-if supervised; then forgotten; fi
+if uses_systemd; then remove_service; fi
 if [ -d "$PREFIX/current/etc" ]; then
     rm -rf "$PREFIX/.left.new"
     mkdir -p "$PREFIX/.left.new/bundle"
@@ -60,5 +60,5 @@ if [ -n "$PURGE" ]; then
     rmdir "$PREFIX" 2>/dev/null || :
     say "vm-embedded is removed"
 else
-    say "vm-embedded is removed; its configuration is in $PREFIX/left, for the next install.sh (--purge removes it)"
+    say "vm-embedded is removed; its configuration stays in $PREFIX/left for the next install.sh (--purge removes it)"
 fi

@@ -115,7 +115,7 @@ def test_an_upgrade_keeps_what_the_robot_has_changed_and_goes_back(prefix, bundl
     print(f"an upgrade that shares its packages: {time.monotonic() - began:.1f} s")
     assert (prefix.link("current"), prefix.link("previous")) == ("2-second", "1-first")
     assert "threshold = 0.6" in used.read_text()
-    assert "2-second is in use already" in prefix.install(tmp_path / "second").stdout
+    assert "2-second is already in use" in prefix.install(tmp_path / "second").stdout
 
     theirs = {"etc/vm.toml": lambda text: text.replace("threshold = 0.5", "threshold = 0.7")}
     ran = prefix.install(changed(bundle, tmp_path / "third", "3-third", theirs))
@@ -178,7 +178,7 @@ def test_only_one_is_at_work_at_a_time(prefix, bundle, tmp_path):
             subprocess.run(["pkill", "-P", str(holder.pid)])
             holder.kill()
     assert ran.returncode == 1
-    assert "at work" in ran.stderr
+    assert "is running" in ran.stderr
 
 
 @pytest.mark.parametrize("path", ["relative", "/a b", "", "/", "//"])
@@ -206,7 +206,7 @@ def test_files_that_are_not_of_the_bundle_are_noticed(prefix, bundle, tmp_path):
     (changed(bundle, tmp_path / "other", "9-other") / "etc" / "left-lens.yaml").write_text("")
     ran = prefix.install(tmp_path / "other")
     assert ran.returncode == 1
-    assert "not of it" in ran.stderr
+    assert "not part of it" in ran.stderr
 
 
 def test_unknown_words_are_wrong_usage(prefix, bundle):

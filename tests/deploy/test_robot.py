@@ -164,8 +164,12 @@ BLIND = [
 @pytest.mark.parametrize(
     ("release", "changes", "words"),
     [
-        ("8-blind", BLIND, ["camera_lost", "going back to 1-first"]),
-        ("8-slow", [("budget_ms = 0", "budget_ms = 0.01"), IMPATIENT], ["degraded", "budget", "going back to 1-first"]),
+        ("8-blind", BLIND, ["camera_lost", "rolling back to 1-first"]),
+        (
+            "8-slow",
+            [("budget_ms = 0", "budget_ms = 0.01"), IMPATIENT],
+            ["degraded", "budget", "rolling back to 1-first"],
+        ),
         ("8-typo", [("fps = 0", "fsp = 0")], ["fsp", "nothing has changed"]),
     ],
 )
@@ -249,7 +253,7 @@ def test_killed_at_any_step_the_old_or_the_new_release_runs(team, step):
 
 def test_killed_on_the_way_back_it_is_gone_on_with(team):
     slow = team.configured(("budget_ms = 0", "budget_ms = 0.01"), IMPATIENT)
-    team.install_until("going back", *team.bring("4-back", slow))
+    team.install_until("rolling back", *team.bring("4-back", slow))
     assert (team.robot.root / "opt/vm-embedded/trial").exists()
     team.robot.run(DEPLOY, "settle")
     team.check("1-first")
@@ -273,7 +277,7 @@ def test_told_to_stop_it_goes_back(team):
 
 def test_one_that_was_stopped_is_started_by_the_same_bundle(team):
     team.robot.run("systemctl", "stop", "vm-detect")
-    assert "in use already" in team.robot.run("/bin/sh", "/var/tmp/1-first/install.sh")[1]
+    assert "already in use" in team.robot.run("/bin/sh", "/var/tmp/1-first/install.sh")[1]
     team.check("1-first")
 
 
@@ -302,7 +306,7 @@ def test_a_model_alone_is_exchanged_while_it_runs(team, bundle):
     team.robot.root.joinpath("var/tmp/new.onnx").write_bytes((network / "ball-5x4.onnx").read_bytes())
     exchanged = f"while ! [ -e {CURRENT}/etc/.old.onnx ]; do sleep 0.01; done"
     interrupted = f"{DEPLOY} model /var/tmp/new.onnx & {exchanged}; kill -TERM $!; wait $!"
-    assert "going back to the old model" in team.robot.run("sh", "-c", interrupted, check=False)[1]
+    assert "rolling back to the old model" in team.robot.run("sh", "-c", interrupted, check=False)[1]
     team.check("1-first")
     assert team.status()["model_sha256"] == now["model_sha256"]
 
