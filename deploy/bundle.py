@@ -71,8 +71,9 @@ class Target:
         found = re.fullmatch(r"(?:linux|manylinux_2_(\d+))_(x86_64|aarch64)-(cp3(?:1[1-9]|[2-9]\d))", name)
         if not found:
             raise InputError(
-                f"TARGET must be like {DEFAULT_TARGET}, linux_aarch64-cp312 or manylinux_2_17_x86_64-cp311 (Python 3.11 or "
-                f"newer), not {name!r}"
+                f"TARGET must be like {DEFAULT_TARGET}, linux_aarch64-cp312 or manylinux_2_17_x86_64-cp311 "
+                f"(Python 3.11 or newer), not {name!r}"
+
             )
         glibc = (2, int(found[1])) if found[1] else DEFAULT_GLIBC
         return cls(name, glibc, found[2], found[3])
