@@ -73,7 +73,6 @@ class Target:
             raise InputError(
                 f"TARGET must be like {DEFAULT_TARGET}, linux_aarch64-cp312 or manylinux_2_17_x86_64-cp311 "
                 f"(Python 3.11 or newer), not {name!r}"
-
             )
         glibc = (2, int(found[1])) if found[1] else DEFAULT_GLIBC
         return cls(name, glibc, found[2], found[3])

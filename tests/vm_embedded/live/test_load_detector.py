@@ -35,8 +35,8 @@ def test_what_can_never_work_ends_it_at_the_start_with_a_status_of_its_own(tmp_p
 def test_what_can_not_be_read_or_written_is_said_without_a_traceback(tmp_path):
     command = arguments(tmp_path, "--camera", "synthetic")
     for more, says in (
-        ("--pose-source stdin </dev/null", "stdin need a pipe"),
-        ("--pose-source stdin <&-", "stdin need a pipe"),
+        ("--pose-source stdin </dev/null", "stdin needs a pipe"),
+        ("--pose-source stdin <&-", "stdin needs a pipe"),
         (">&-", "standard output is closed"),
     ):
         line = f"{' '.join(command)} {more}"
