@@ -19,7 +19,7 @@ from vm_embedded.cli.machine import describe_machine
 RESULTS = Path(__file__).with_name("synth.json")
 PAGE = Path(__file__).parents[1] / "docs" / "synth.md"
 CONFIG = Path(__file__).parents[1] / "export" / "vm_synth" / "polyhaven.toml"
-SUMMARY = re.compile(r"(\d+) pictures in (\d+) s, (\d+) an hour; (\d+) MiB a worker at most")
+SUMMARY = re.compile(r"(\d+) pictures in (\d+) s, (\d+) per hour; at most (\d+) MiB per worker")
 
 
 def rendered(hdri: Path, count: int, workers: int) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""vm-synth: render training pictures, look at them and check them."""
+"""vm-synth: renders training pictures, previews them and checks them."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from vm_workstation.contact_sheet import check_sheet_path, choose_indices, write
 from vm_workstation.option_types import at_least
 from vm_workstation.stopping import stoppable
 
-from .dataset.contact_sheet import cell, read_shown, sheet
-from .dataset.files import Plan, digest, indices_in, is_done, shard_of
-from .dataset.inspection import indices_of, inspect
+from .dataset.contact_sheet import cell, read_labeled, sheet
+from .dataset.files import indices_in, is_done
+from .dataset.inspection import inspect, read_checked_plan
+from .dataset.plan import Plan, digest, shard_of
 from .dataset.plots import load_matplotlib, plot
-from .dataset.report import as_json, complaints, tables
-from .dataset.workers import Done, Job, render_all
+from .dataset.report import as_json, problems, tables
+from .dataset.workers import FinishedPicture, Job, render_all
 from .render.mitsuba import find_llvm, load_mitsuba
 from .scene.configuration import SceneConfiguration
 from .scene.environment import Environment
@@ -34,13 +35,12 @@ EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 _EXAMPLE = "camera.picture_width=1280"
 
 _EPILOG = """\
-other commands, each with a --help of its own:
-  vm-synth preview OUT    a contact sheet of a set's pictures, with masks and the balls' true outlines
-  vm-synth check OUT      what a set holds, as tables and plots, and which files are missing or damaged
-  vm-synth config         all entries of scene.toml with their meanings, units, limits and defaults
+other commands, each with its own --help:
+  vm-synth preview OUT    draw a contact sheet with masks and the true outlines of the balls
+  vm-synth check OUT      describe the set in tables and plots; find missing and damaged files
+  vm-synth config         print all entries of scene.toml with meaning, unit, limits and default
 
-A run that was stopped goes on with the same command. Shards may write to one folder or to folders of their own whose
-files are then put together.
+To continue a stopped run, repeat the command. Shards can write to one folder, or to several whose files you join.
 """
 
 
@@ -48,25 +48,32 @@ def parser() -> argparse.ArgumentParser:
     """The options of vm-synth OUT."""
     made = argparse.ArgumentParser(
         prog="vm-synth",
-        description="Render pictures of a ball under 360 degree photographs, with masks, lens, pose and truth.",
+        description="Render pictures of a ball lit by 360 degree photographs, with masks, lens, camera pose and true "
+        "ball position.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    made.add_argument("out", type=Path, metavar="OUT", help="folder to write to; made if it is not there")
-    made.add_argument("--count", type=at_least(0), required=True, metavar="N", help="pictures in the whole set")
-    made.add_argument("--hdri", type=Path, required=True, metavar="DIR", help="folder of maps (.hdr, .exr, .pfm)")
-    made.add_argument("--seed", type=at_least(0), default=0, metavar="S", help="same seed, same pictures; default 0")
-    made.add_argument("--config", type=Path, metavar="FILE", help="scene.toml; what it leaves out keeps its default")
+    made.add_argument("out", type=Path, metavar="OUT", help="output folder; created if missing")
+    made.add_argument(
+        "--count", type=at_least(0), required=True, metavar="N", help="number of pictures in the whole set"
+    )
+    made.add_argument(
+        "--hdri", type=Path, required=True, metavar="DIR", help="folder of environment maps: .hdr, .exr, .pfm"
+    )
+    made.add_argument("--seed", type=at_least(0), default=0, metavar="S", help="random seed; default 0")
+    made.add_argument("--config", type=Path, metavar="FILE", help="scene.toml; missing entries keep their defaults")
     made.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="SECTION.ENTRY=VALUE",
-        help=f"override an entry of the configuration, as in --set {_EXAMPLE}; give it once for each",
+        help=f"override one configuration entry, for example {_EXAMPLE}; may be repeated",
     )
-    made.add_argument("--workers", type=at_least(0), metavar="W", help="processes, of one core each; default all cores")
-    made.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="render only part I of N, 1 to N")
-    made.add_argument("--held-out", action="store_true", help="render only the maps that are held out for testing")
+    made.add_argument(
+        "--workers", type=at_least(0), metavar="W", help="worker processes, one core each; default: all cores"
+    )
+    made.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="render only part I of N")
+    made.add_argument("--held-out", action="store_true", help="use only the maps that are held out for testing")
     return made
 
 
@@ -74,20 +81,20 @@ def preview_parser() -> argparse.ArgumentParser:
     """The options of vm-synth preview OUT."""
     made = argparse.ArgumentParser(
         prog="vm-synth preview",
-        description="Draw a contact sheet of a set: each picture as it is, and below it the same picture with its "
-        "classes tinted and the ball's outline as its true place, lens and pose give it, not as it was rendered. "
-        "Small balls are shown magnified too. A set that is still being rendered can be looked at.",
+        description="Draw a contact sheet of a set. Below each picture is a copy with tinted classes and the ball's "
+        "outline, which is computed from position, lens and pose, not from the rendered mask. Small balls are also "
+        "magnified. The set may still be rendering.",
     )
     made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
-    made.add_argument("--count", type=at_least(1), default=24, metavar="N", help="pictures to show; default 24")
-    made.add_argument("--columns", type=at_least(1), default=6, metavar="N", help="pictures in a row; default 6")
+    made.add_argument("--count", type=at_least(1), default=24, metavar="N", help="number of pictures; default 24")
+    made.add_argument("--columns", type=at_least(1), default=6, metavar="N", help="pictures per row; default 6")
     made.add_argument("--width", type=at_least(1), default=320, metavar="PX", help="width of each picture; default 320")
     which = made.add_mutually_exclusive_group()
     which.add_argument(
-        "--first", type=at_least(0), metavar="I", help="show number I and those after it; default all over"
+        "--first", type=at_least(0), metavar="I", help="start at picture I; default: evenly spread over the set"
     )
-    which.add_argument("--seed", type=at_least(0), metavar="S", help="choose by chance; same seed, same choice")
-    made.add_argument("--output", type=Path, metavar="FILE", help="a .jpg or .png; default OUT/preview.jpg")
+    which.add_argument("--seed", type=at_least(0), metavar="S", help="choose random pictures with this seed")
+    made.add_argument("--output", type=Path, metavar="FILE", help="output file, .jpg or .png; default OUT/preview.jpg")
     return made
 
 
@@ -95,34 +102,38 @@ def check_parser() -> argparse.ArgumentParser:
     """The options of vm-synth check OUT."""
     made = argparse.ArgumentParser(
         prog="vm-synth check",
-        description="Read all of a set back: how much of it is there, which files are missing or broken, and what the "
-        "pictures show. Exit status 0 if the set is complete and sound, else 1.",
+        description="Read a whole set: report missing and damaged files, and what the pictures show. "
+        "Exit status 0 if the set is complete and valid, else 1.",
     )
     made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
-    made.add_argument("--quick", action="store_true", help="read only lenses and truth, no images and masks")
-    made.add_argument("--shards", type=at_least(1), default=1, metavar="N", help="count each of N shards by itself")
-    made.add_argument("--plots", type=Path, metavar="FILE", help="histograms; .png, .svg or .pdf; needs matplotlib")
-    made.add_argument("--json", type=Path, metavar="FILE", help="all findings, and the numbers of each picture")
+    made.add_argument("--quick", action="store_true", help="skip images and masks")
+    made.add_argument("--shards", type=at_least(1), default=1, metavar="N", help="report each of N shards; default 1")
+    made.add_argument(
+        "--plots", type=Path, metavar="FILE", help="write histograms to a .png, .svg or .pdf; needs matplotlib"
+    )
+    made.add_argument(
+        "--json", type=Path, metavar="FILE", help="write all findings and the numbers of each picture as JSON"
+    )
     return made
 
 
 def config_parser() -> argparse.ArgumentParser:
-    """The options of vm-synth config: none."""
+    """The options of vm-synth config; it has none."""
     return argparse.ArgumentParser(
         prog="vm-synth config",
-        description="Write a scene.toml with all entries, their meanings, units, limits and defaults.",
+        description="Print a scene.toml with all entries, their meanings, units, limits and defaults.",
     )
 
 
 def parsers() -> dict[str, argparse.ArgumentParser]:
-    """All parsers, by what is typed."""
+    """All parsers, by the command that a user types."""
     return {each.prog: each for each in (parser(), preview_parser(), check_parser(), config_parser())}
 
 
 def _shard(text: str) -> tuple[int, int]:
     number, _, count = text.partition("/")
     if not (number.isdecimal() and count.isdecimal() and 1 <= int(number) <= int(count)):
-        raise argparse.ArgumentTypeError(f"{text!r} is no shard; write I/N with I from 1 to N, as in 1/4")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a shard; write I/N with I from 1 to N, for example 1/4")
     return int(number), int(count)
 
 
@@ -140,39 +151,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"vm-synth: {' '.join(str(error).split())}", file=sys.stderr)
         return EXIT_FAILED
     except KeyboardInterrupt:
-        print("vm-synth: stopped" + "; the same command goes on from here" * (command is None), file=sys.stderr)
+        print("vm-synth: stopped" + "; repeat the command to continue" * (command is None), file=sys.stderr)
         return EXIT_INTERRUPTED
 
 
 def _render(options: argparse.Namespace) -> int:
     workers = len(os.sched_getaffinity(0)) if options.workers is None else options.workers
     if workers < 1 or options.count < 1:
-        raise InputError("--workers and --count must be at least 1")
+        raise InputError(f"--workers ({workers}) and --count ({options.count}) must be at least 1")
     configuration = read_sections(SceneConfiguration, options.config, parse_overrides(options.set, _EXAMPLE))
     find_llvm()
-    chosen_maps = find_maps(options.hdri, configuration.maps, options.held_out)
+    found = find_maps(options.hdri, configuration.maps, options.held_out)
     missing = missing_held_out(options.hdri, configuration.maps)
     if missing:
-        print(f"vm-synth: held out, but not in {options.hdri}: {', '.join(missing)}", file=sys.stderr)
-    maps = _good_maps(chosen_maps, configuration)
+        print(f"vm-synth: held-out maps that are not in {options.hdri}: {', '.join(missing)}", file=sys.stderr)
+    maps = _valid_maps(found, configuration)
     load_mitsuba()
     if configuration.ground.photographed and not any(path.stem in configuration.maps.floors for path in maps):
-        print("vm-synth: no map has an entry in [maps.floors], so all pictures are on fields", file=sys.stderr)
+        print("vm-synth: none of the maps has an entry in [maps.floors], so all pictures show a field", file=sys.stderr)
     try:
         options.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"can't make folder {options.out}: {error.strerror or error}") from error
+        raise InputError(f"can't create folder {options.out}: {error.strerror or error}") from error
     Plan(options.seed, options.count, configuration, {path.stem: digest(path) for path in maps}).write(options.out)
 
     own = shard_of(range(options.count), *options.shard)
     left = [index for index in own if not is_done(options.out, index)]
     if len(left) < len(own):
-        print(f"vm-synth: {len(own) - len(left)} of {len(own)} pictures are there already", file=sys.stderr)
+        print(f"vm-synth: {len(own) - len(left)} of {len(own)} pictures already exist", file=sys.stderr)
     bar, memory = ProgressBar(len(left), "vm-synth"), 0
 
-    def report(done: Done) -> None:
+    def report(finished: FinishedPicture) -> None:
         nonlocal memory
-        memory = max(memory, done.memory)
+        memory = max(memory, finished.memory)
         bar.advance()
 
     try:
@@ -182,15 +193,15 @@ def _render(options: argparse.Namespace) -> int:
         if bar.done:
             print(
                 f"vm-synth: {bar.done} pictures in {bar.elapsed:.0f} s, "
-                f"{3600.0 * bar.done / bar.elapsed:.0f} an hour; {memory / 2**20:.0f} MiB a worker at most",
+                f"{3600.0 * bar.done / bar.elapsed:.0f} per hour; at most {memory / 2**20:.0f} MiB per worker",
                 file=sys.stderr,
             )
     print(f"{options.out}: {len(own)} pictures")
     return EXIT_OK
 
 
-def _good_maps(paths: Sequence[Path], configuration: SceneConfiguration) -> list[Path]:
-    """Maps that can be rendered; others are named and left out. Raises InputError if none is left."""
+def _valid_maps(paths: Sequence[Path], configuration: SceneConfiguration) -> list[Path]:
+    """The valid maps; the others are reported and skipped. Raises InputError if there is no valid map."""
     good = []
     for path in paths:
         try:
@@ -200,7 +211,7 @@ def _good_maps(paths: Sequence[Path], configuration: SceneConfiguration) -> list
         else:
             good.append(path)
     if not good:
-        raise InputError("no map is left that can be rendered")
+        raise InputError("none of the maps can be read")
     return good
 
 
@@ -214,12 +225,12 @@ def _preview(options: argparse.Namespace) -> int:
     cells = []
     for index in choose_indices(there, options.count, options.first, options.seed):
         try:
-            cells.append(cell(read_shown(options.out, index), options.width))
+            cells.append(cell(read_labeled(options.out, index), options.width))
         except InputError as error:
             print(f"vm-synth: skipped {error}", file=sys.stderr)
     if not cells:
         after = "" if options.first is None else f" from number {options.first} on"
-        raise InputError(f"{options.out} has no pictures that can be shown{after}")
+        raise InputError(f"{options.out} has no complete pictures{after}; run vm-synth check {options.out}")
     made = sheet(cells, options.columns, f"{options.out.resolve().name}: {len(cells)} of {len(there)} pictures")
     write_sheet(output, made)
     print(f"{output}: {len(cells)} pictures")
@@ -232,7 +243,7 @@ def _check(options: argparse.Namespace) -> int:
             check_writable(path)
     if options.plots is not None:
         load_matplotlib(options.plots)
-    bar = ProgressBar(len(indices_of(options.out)[2]), "vm-synth")
+    bar = ProgressBar(len(read_checked_plan(options.out)[2]), "vm-synth")
     try:
         found = inspect(options.out, options.quick, bar.advance)
     finally:
@@ -244,9 +255,9 @@ def _check(options: argparse.Namespace) -> int:
     if options.plots is not None and found.facts:
         title = f"{options.out.resolve().name}: {len(found.facts)} of {found.count} pictures"
         plot(found.facts, found.size, title, options.plots)
-    for line in complaints(found):
+    for line in problems(found):
         print(f"vm-synth: {line}", file=sys.stderr)
-    return EXIT_OK if found.good else EXIT_FAILED
+    return EXIT_OK if found.complete else EXIT_FAILED
 
 
 def _config(options: argparse.Namespace) -> int:

@@ -3,7 +3,8 @@
 import cv2
 import numpy as np
 
-from vm_synth.dataset.files import Plan, write_picture
+from vm_synth.dataset.picture_writer import write_picture
+from vm_synth.dataset.plan import Plan
 from vm_synth.render.picture import UNLABELED, Picture
 from vm_synth.scene.camera import CameraRanges
 from vm_synth.scene.configuration import CLASSES, GroundRanges, SceneConfiguration, TargetRanges, ThingRanges

@@ -32,9 +32,9 @@ def test_config_prints_a_configuration_that_vm_synth_reads(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--shard", "0/2"], "no shard"),
-        (["--shard", "3/2"], "no shard"),
-        (["--shard", "half"], "no shard"),
+        (["--shard", "0/2"], "not a shard"),
+        (["--shard", "3/2"], "not a shard"),
+        (["--shard", "half"], "not a shard"),
         (["--count", "-1"], "not a whole number"),
         (["--count", "many"], "not a whole number"),
     ],
@@ -94,4 +94,4 @@ def test_a_damaged_map_is_named_and_left_out(maps, tmp_path, capsys):
     assert "skipped map square.hdr: its size is 64 x 64 px; it must be twice as wide as high" in said
     (folder / "good.hdr").unlink()
     assert main([str(tmp_path / "other"), "--hdri", str(folder), *arguments]) == 1
-    assert "no map is left" in capsys.readouterr().err
+    assert "none of the maps can be read" in capsys.readouterr().err

@@ -10,9 +10,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from vm_embedded.geometry.lens_files import lens_text
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Rectilinear
-from vm_synth.dataset.files import lens_text
 
 SIZE = (160, 128)
 RADIUS = 0.07

@@ -1,1 +1,1 @@
-"""The folder of pictures that vm-synth writes, and its reports."""
+"""A set of pictures on disk: rendering, writing, checking, reports and contact sheets."""

@@ -1,4 +1,4 @@
-"""Contact sheets: pictures of a set, each above the same one with its classes tinted and the ball's true outline."""
+"""Contact sheets of a set: each picture, and below it a copy with tinted classes and the ball's true outline."""
 
 from __future__ import annotations
 
@@ -28,20 +28,23 @@ from vm_workstation.contact_sheet import (
 )
 from vm_workstation.sphere_outline import sphere_outline
 
-from .files import COLORS, file_of, read_truth
+from .files import CLASS_COLORS, file_of, read_truth
 
 OUTLINE = (255, 0, 255)
 """RGB color of the ball's true outline."""
 
-_TINT, _CONTOUR = 0.16, 0.8  # how much of a class's color its area and its rim get
-_SMALL = 1.0 / 20.0  # balls of a smaller radius, in widths of the tile, are shown magnified too
-_INSET = 0.3  # widths of the tile
+_TINT, _CONTOUR = 0.16, 0.8  # opacity of a class's color on its area and on its rim
+_SMALL = 1.0 / 20.0  # balls with a smaller radius, as a share of the tile's width, are magnified
+_INSET = 0.3  # width of the magnified part, as a share of the tile's width
 
 
 @dataclass(frozen=True)
-class Shown:
-    """A finished picture: image (h, w, 3) BGR, mask (h, w, 4) BGRA, truth, and the outline (n, 2) of its ball [px],
-    NaN where the lens does not see it, or None without a ball."""
+class LabeledPicture:
+    """A picture with its truth.
+
+    image: (h, w, 3) BGR. mask: (h, w, 4) BGRA. truth: content of scene*.json. outline: of the ball (n, 2) [px], NaN
+    outside of the lens's field of view, or None without a ball.
+    """
 
     index: int
     image: Image
@@ -50,25 +53,25 @@ class Shown:
     outline: Floats | None
 
 
-def read_shown(folder: Path, index: int) -> Shown:
-    """Read a picture and compute its ball's outline. Raises InputError naming the file at fault."""
+def read_labeled(folder: Path, index: int) -> LabeledPicture:
+    """Read a picture and compute its ball's outline. Raises InputError that names the invalid file."""
     image = read_image(file_of(folder, "image", index))
     mask = read_image(file_of(folder, "mask", index), raw=True)
     size = (image.shape[1], image.shape[0])
     if mask.shape != (*image.shape[:2], 4):
-        raise InputError(f"{file_of(folder, 'mask', index)} is no mask for a picture of {size[0]} x {size[1]} px")
+        raise InputError(f"{file_of(folder, 'mask', index)} must be a mask of {size[0]} x {size[1]} px with 4 channels")
     truth = read_truth(folder, index)
     lens_path = file_of(folder, "lens", index)
     lens = read_lens_file(lens_path)
     if lens.orientation is None:
-        raise InputError(f"{lens_path} has no Hoc")
+        raise InputError(f"{lens_path} has no camera pose (Hoc)")
     try:
         ball = truth["ball"]
         found = None
         if ball is not None:
             center, radius = np.array(ball["center"], dtype=np.float64), float(ball["radius"])
             found = sphere_outline(lens.lens.for_image(size), lens.orientation, center, radius, size)
-        shown = Shown(index, image, mask, truth, found)
+        shown = LabeledPicture(index, image, mask, truth, found)
         captions(shown)
     except VisualMeshError:
         raise
@@ -77,8 +80,8 @@ def read_shown(folder: Path, index: int) -> Shown:
     return shown
 
 
-def captions(shown: Shown) -> tuple[str, str]:
-    """Two lines on a picture: which it is, and its ball."""
+def captions(shown: LabeledPicture) -> tuple[str, str]:
+    """Two lines of text: the picture's number and map, and its ball."""
     ball = shown.truth["ball"]
     head = f"{shown.index}  {shown.truth['map']}"
     if ball is None:
@@ -88,23 +91,23 @@ def captions(shown: Shown) -> tuple[str, str]:
 
 
 def tinted(image: Image, mask: Image) -> Image:
-    """A picture (h, w, 3) BGR with its classes' colors: light on areas, strong on their rims."""
+    """A picture (h, w, 3) BGR with the colors of its classes: faint on areas, strong on their rims."""
     found = image.astype(np.float32)
-    for name, color in COLORS.items():
+    for name, color in CLASS_COLORS.items():
         if name == "environment":
             continue
         paint = np.array(color[::-1], dtype=np.float32)
         area = ((mask[..., :3] == paint.astype(np.uint8)).all(axis=-1) & (mask[..., 3] > 0)).astype(np.uint8)
         rim = area - cv2.erode(area, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)
         if name in ("ball", "field"):
-            rim[:] = 0  # the ball has its outline, the field's rim is that of all others
+            rim[:] = 0  # the ball gets its outline; the rim of the field is that of its neighbors
         strength = np.where(rim > 0, _CONTOUR, _TINT * area)[..., None].astype(np.float32)
         found += strength * (paint - found)
     return np.rint(found).astype(np.uint8)
 
 
-def cell(shown: Shown, width: int) -> Image:
-    """What the sheet shows of a picture (h, width, 3): the picture, the same with its truth, and two lines of text."""
+def cell(shown: LabeledPicture, width: int) -> Image:
+    """The cell of a picture (h, width, 3): the picture, a copy with its truth, and two lines of text."""
     height, full = shown.image.shape[:2]
     zoom = width / full
     size = (width, max(round(height * zoom), 1))
@@ -130,8 +133,8 @@ def _draw_outline(canvas: Image, pixels: Floats) -> None:
             cv2.line(canvas, first, last, OUTLINE[::-1], 1, cv2.LINE_AA, shift=4)
 
 
-def _add_inset(canvas: Image, shown: Shown, zoom: float) -> None:
-    """Show a small ball magnified, without tints, in the corner that is farthest from it."""
+def _add_inset(canvas: Image, shown: LabeledPicture, zoom: float) -> None:
+    """Draw a magnified cutout of a small ball, without tints, in the farthest corner."""
     assert shown.outline is not None
     pixels = shown.outline[np.isfinite(shown.outline).all(axis=1)]
     height, width = canvas.shape[:2]
@@ -157,7 +160,7 @@ def _add_inset(canvas: Image, shown: Shown, zoom: float) -> None:
 
 
 def sheet(cells: Sequence[Image], columns: int, title: str) -> Image:
-    """Cells of one size (h, w, 3) in rows, under a title and what the colors mean. Raises InputError if too large."""
+    """Cells of one size (h, w, 3) in rows below a title and a legend. Raises InputError if the sheet is too large."""
     height, width = cells[0].shape[:2]
     columns = min(columns, len(cells))
     rows = math.ceil(len(cells) / columns)
@@ -166,7 +169,7 @@ def sheet(cells: Sequence[Image], columns: int, title: str) -> Image:
     check_sheet_size(size[1], size[0])
     canvas = np.full((*size, 3), PAPER, dtype=np.uint8)
     place = GAP + write_text(canvas, title, (GAP, head - GAP - 3), INK) + 3 * GAP
-    legend = {name: COLORS[name] for name in ("field", "line", "goal", "robot", "ball")}
+    legend = {name: CLASS_COLORS[name] for name in ("field", "line", "goal", "robot", "ball")}
     draw_legend(canvas, {**legend, "true outline of the ball": OUTLINE}, (place, head - GAP - 3))
     for number, each in enumerate(cells):
         row, column = divmod(number, columns)

@@ -1,4 +1,4 @@
-"""Histograms of what a set of pictures holds."""
+"""Histograms of a set of pictures."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ _HISTOGRAMS = (
     "ball radius [px]",
     "ball visible [%]",
 )
-_UNEVEN = ("camera roll [deg]", "ball visible [%]")  # on a log scale
-_MOST = 14  # bars
-_DOT = 4000.0  # area of all dots together
+_UNEVEN = ("camera roll [deg]", "ball visible [%]")  # plotted on a log scale
+_MOST = 14  # largest number of bars
+_DOT = 4000.0  # total area of all dots
 
 
 def load_matplotlib(path: Path) -> Any:
-    """matplotlib, set up to draw to a file. Raises InputError if it is not installed or can't write such a file."""
+    """Import matplotlib without a display. Raises InputError if it is missing or can't write files of this kind."""
     try:
         import matplotlib
     except ImportError as error:
@@ -47,12 +47,12 @@ def load_matplotlib(path: Path) -> Any:
 
     known = Figure().canvas.get_supported_filetypes()
     if path.suffix[1:].lower() not in known:
-        raise InputError(f"can't plot to {path}: its suffix must be one of {', '.join(sorted(known))}")
+        raise InputError(f"can't write plots to {path}: its suffix must be one of {', '.join(sorted(known))}")
     return matplotlib
 
 
 def plot(facts: Sequence[Facts], size: Size, title: str, path: Path) -> None:
-    """Write histograms of pictures of this size to a file. Raises InputError if it can't."""
+    """Write histograms of pictures of this size (w, h) [px] to a file. Raises InputError if that fails."""
     load_matplotlib(path)
     from matplotlib import pyplot
 
@@ -66,7 +66,9 @@ def plot(facts: Sequence[Facts], size: Size, title: str, path: Path) -> None:
     _shares(axes[7], values)
     for each, whats in ((axes[8], ("ground", "lens")), (axes[9], ("ball", "other ball"))):
         _bars(each, {f"{what}: {name}": n for what in whats for name, n in kinds[what].items()}, "pictures")
-    _bars(axes[10], dict(kinds["ball design"].most_common(_MOST)), _titled("balls of a design", kinds["ball design"]))
+    _bars(
+        axes[10], dict(kinds["ball design"].most_common(_MOST)), _titled("balls with a pattern", kinds["ball design"])
+    )
     _map_use(axes[11], sorted(kinds["map"].values(), reverse=True))
     for each in axes:
         each.spines[["top", "right"]].set_visible(False)
@@ -81,7 +83,7 @@ def _histogram(axes: Axes, values: Sequence[float], name: str) -> None:
     axes.set_ylabel("pictures, log scale" if name in _UNEVEN else "pictures", fontsize=9)
     if not values:
         return _nothing(axes)
-    # A few balls at the rim of a rectilinear lens are endless; they stand in the last column.
+    # Balls at the edge of a rectilinear lens can be huge; they count in the last column.
     shown = np.minimum(values, np.quantile(values, 0.995) if name == "ball radius [px]" else np.inf)
     axes.hist(shown, bins=40, color=_GREEN, log=name in _UNEVEN)
     median, (low, high) = float(np.median(values)), axes.get_xlim()
@@ -98,7 +100,7 @@ def _places(axes: Axes, facts: Sequence[Facts], size: Size) -> None:
     axes.set_xlim(-0.5, size[0] - 0.5)
     axes.set_ylim(size[1] - 0.5, -0.5)
     axes.set_aspect("equal")
-    axes.set_xlabel("the balls' places in the picture [px]", fontsize=9)
+    axes.set_xlabel("ball positions in the picture [px]", fontsize=9)
 
 
 def _shares(axes: Axes, values: dict[str, list[float]]) -> None:
@@ -109,7 +111,7 @@ def _shares(axes: Axes, values: dict[str, list[float]]) -> None:
     heights = [float(np.mean(each)) for each in means.values()]
     bars = axes.barh(list(means), heights, color=[_CLASS_COLORS.get(name, _GRAY) for name in means])
     shown = [100.0 * float(np.mean(np.array(each) > 0.0)) for each in means.values()]
-    labels = [f" {mean:.2g} %, in {share:.0f} % of pictures" for mean, share in zip(heights, shown, strict=True)]
+    labels = [f" {mean:.2g} %, in {share:.0f} % of the pictures" for mean, share in zip(heights, shown, strict=True)]
     axes.bar_label(bars, labels=labels, fontsize=7)
     axes.set_xlim(0.0, 1.9 * max(heights))
     axes.invert_yaxis()
@@ -126,12 +128,12 @@ def _bars(axes: Axes, counts: dict[str, int], label: str) -> None:
 
 
 def _titled(label: str, counts: Counter[str]) -> str:
-    return label if len(counts) <= _MOST else f"{label}, the {_MOST} commonest of {len(counts)}"
+    return label if len(counts) <= _MOST else f"{label}, the {_MOST} most frequent of {len(counts)}"
 
 
 def _map_use(axes: Axes, counts: Sequence[int]) -> None:
     axes.bar(range(1, len(counts) + 1), counts, width=1.0, color=_GREEN)
-    axes.set_xlabel(f"{len(counts)} maps, by use", fontsize=9)
+    axes.set_xlabel(f"{len(counts)} maps, sorted by use", fontsize=9)
     axes.set_ylabel("pictures", fontsize=9)
 
 

@@ -1,28 +1,29 @@
-"""What a set of pictures holds, as tables and for other programs."""
+"""Reports on a set of pictures: as tables, as JSON, and its problems."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
+from itertools import pairwise
 from textwrap import wrap
 from typing import Any
 
 from vm_workstation.text_tables import aligned, summary
 
 from ..scene.configuration import CLASSES
-from .inspection import Facts, Inspection, shard_that_lacks, spans
+from .inspection import Facts, Inspection
 
-_NAMED = 20
-"""Faults and runs of missing pictures that are named."""
+_LISTED = 20
+"""Largest number of faults, and of gaps, that are listed."""
 
-_WIDTH = 100  # of lines
-_JOINED = "\xa0"  # a space that lines are not broken at
+_WIDTH = 100  # characters of a line
+_NO_BREAK = "\xa0"  # a space at which lines are not wrapped
 
 
 def quantities(facts: Sequence[Facts]) -> dict[str, list[float]]:
-    """Numbers of the pictures, each by its name with unit; those of balls only where there is one."""
+    """The values of all pictures, by name with unit. Values of balls come from pictures with a ball."""
     balls = [each.ball for each in facts if each.ball is not None]
     found = {
         "camera height [m]": [each.height for each in facts],
@@ -39,7 +40,7 @@ def quantities(facts: Sequence[Facts]) -> dict[str, list[float]]:
 
 
 def categories(facts: Sequence[Facts]) -> dict[str, Counter[str]]:
-    """How many pictures there are of each kind, by what is told apart."""
+    """The number of pictures in each category, by property."""
     return {
         "ground": Counter(each.ground for each in facts),
         "lens": Counter(each.projection for each in facts),
@@ -59,7 +60,7 @@ def _ball_state(facts: Facts) -> str:
 
 
 def as_json(found: Inspection) -> dict[str, Any]:
-    """All findings for other programs."""
+    """All findings, for JSON."""
     return {
         "count": found.count,
         "done": len(found.done),
@@ -72,7 +73,7 @@ def as_json(found: Inspection) -> dict[str, Any]:
 
 
 def tables(found: Inspection, shards: int = 1) -> str:
-    """A set's tables as text: how much is done, by shards if it has several, and what its pictures show."""
+    """Tables as text: the progress, per shard if there are several, and what the pictures show."""
     parts = [_progress(found, shards)]
     if found.facts:
         parts += [_quantity_table(found.facts), _category_table(found)]
@@ -80,7 +81,7 @@ def tables(found: Inspection, shards: int = 1) -> str:
 
 
 def _progress(found: Inspection, shards: int) -> str:
-    lines = [f"{len(found.done)} of {found.count} pictures are there, {len(found.faults)} of them at fault"]
+    lines = [f"{len(found.done)} of {found.count} pictures exist, {len(found.faults)} of them are invalid"]
     if shards > 1:
         rows = []
         for number in range(shards):
@@ -88,7 +89,7 @@ def _progress(found: Inspection, shards: int) -> str:
             there = sum(index % shards == number for index in found.done)
             bad = sum(each.index % shards == number for each in found.faults)
             rows.append([f"{number + 1}/{shards}", str(there), str(len(own)), str(bad)])
-        lines += ["", *aligned([["shard", "there", "of", "at fault"], *rows])]
+        lines += ["", *aligned([["shard", "exist", "of", "invalid"], *rows])]
     return "\n".join(lines)
 
 
@@ -110,31 +111,51 @@ def _category_table(found: Inspection) -> str:
         total = sum(counts.values())
         if name == "map":
             unused = sorted(set(found.plan.get("maps", {})).difference(counts))
-            text = f"{len(counts)} used, each by {min(counts.values())} to {max(counts.values())} pictures"
+            text = f"{len(counts)} used, each in {min(counts.values())} to {max(counts.values())} pictures"
             text += f"; not used: {', '.join(unused)}" if unused else ""
         else:
             items = (f"{kind} {n} ({100.0 * n / total:.1f} %)" for kind, n in counts.most_common())
-            text = ", ".join(item.replace(" ", _JOINED) for item in items)
+            text = ", ".join(item.replace(" ", _NO_BREAK) for item in items)
         if total:
             wrapped = wrap(text, _WIDTH, initial_indent=f"{name:<13}", subsequent_indent=13 * " ")
-            lines += [line.replace(_JOINED, " ") for line in wrapped]
+            lines += [line.replace(_NO_BREAK, " ") for line in wrapped]
     return "\n".join(lines)
 
 
-def complaints(found: Inspection) -> list[str]:
-    """Lines on what is missing or at fault and how to mend it; none if all is well."""
-    lines = [f"picture {each.index}: {each.text}" for each in found.faults[:_NAMED]]
-    if len(found.faults) > _NAMED:
-        lines.append(f"and {len(found.faults) - _NAMED} more pictures at fault; --json lists all")
+def problems(found: Inspection) -> list[str]:
+    """Lines on missing and invalid pictures and how to fix them; empty if the set is complete."""
+    lines = [f"picture {each.index}: {each.text}" for each in found.faults[:_LISTED]]
+    if len(found.faults) > _LISTED:
+        lines.append(f"and {len(found.faults) - _LISTED} more invalid pictures; --json lists all")
     if found.faults:
-        lines.append("to mend these, delete their scene*.json and run the command again that renders the set")
+        lines.append("to render these again, delete their scene*.json and repeat the command that rendered the set")
     missing = found.missing
     if missing:
-        runs = [f"{first}" if first == last else f"{first} to {last}" for first, last in spans(missing)]
-        more = f" and {len(runs) - _NAMED} more gaps" if len(runs) > _NAMED else ""
-        lines.append(f"{len(missing)} pictures are not there yet: {', '.join(runs[:_NAMED])}{more}")
-        shard = shard_that_lacks(missing)
+        runs = [f"{first}" if first == last else f"{first} to {last}" for first, last in runs_of(missing)]
+        more = f" and {len(runs) - _LISTED} more gaps" if len(runs) > _LISTED else ""
+        lines.append(f"missing pictures ({len(missing)}): {', '.join(runs[:_LISTED])}{more}")
+        shard = shard_of_missing(missing)
         if shard is not None:
-            lines.append(f"all of them belong to shard {shard[0]}/{shard[1]}")
-        lines.append("run the command again that renders the set; it goes on from here")
+            lines.append(f"all missing pictures belong to shard {shard[0]}/{shard[1]}")
+        lines.append("to render these, repeat the command that rendered the set")
     return lines
+
+
+def runs_of(numbers: Iterable[int]) -> list[tuple[int, int]]:
+    """The runs of successive numbers in a sorted sequence, each as (first, last)."""
+    found: list[tuple[int, int]] = []
+    for number in numbers:
+        if found and number == found[-1][1] + 1:
+            found[-1] = (found[-1][0], number)
+        else:
+            found.append((number, number))
+    return found
+
+
+def shard_of_missing(missing: Sequence[int]) -> tuple[int, int] | None:
+    """The shard (I, N) with the largest N that contains all missing numbers, or None.
+
+    A shard that was not started, or stopped early, leaves such gaps.
+    """
+    step = math.gcd(*(after - before for before, after in pairwise(missing)))
+    return (missing[0] % step + 1, step) if step > 1 and len(missing) > 2 else None

@@ -1,4 +1,4 @@
-"""Rendering with several processes, each on one core; which one renders a picture does not change it."""
+"""Renders pictures in several processes, one core each. The number of processes does not change the pictures."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from ..scene.configuration import SceneConfiguration
 from ..scene.draw_scene import draw_scene
 from ..scene.environment import Environment
 from ..scene.scene import Scene
-from .files import write_picture
+from .picture_writer import write_picture
 
 
 class WorkerLost(VisualMeshError):
-    """A worker process ended before its work was done."""
+    """A worker process ended early."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What every worker knows: where to write, the maps in their order, seed and ranges."""
+    """What all workers share: output folder, sorted maps, seed and configuration."""
 
     folder: Path
     maps: tuple[Path, ...]
@@ -41,33 +41,35 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Done:
-    """A picture that was written, and the most memory [bytes] that its worker has used so far."""
+class FinishedPicture:
+    """A picture that was written, and the peak memory [bytes] of its worker."""
 
     index: int
     memory: int
 
 
 def scene_of(job: Job, index: int) -> tuple[Scene, Environment]:
-    """The scene of a picture's number, from nothing but the job."""
+    """Draw the scene of a picture. It depends only on the job and the picture's number."""
     random = np.random.default_rng([job.seed, index])
     path = job.maps[random.integers(len(job.maps))]
     environment = Environment.read(path, job.configuration.maps)
     return draw_scene(random, job.configuration, environment), environment
 
 
-def render_all(job: Job, indices: Sequence[int], workers: int, report: Callable[[Done], None]) -> None:
-    """Render pictures with so many processes and report each.
+def render_all(job: Job, indices: Sequence[int], workers: int, report: Callable[[FinishedPicture], None]) -> None:
+    """Render the pictures in this many processes and report each.
 
-    When interrupted, pictures in work are finished and no others begun. Raises WorkerLost, and what a worker raised.
+    An interrupt waits for the pictures in progress. Raises WorkerLost if a worker ends early, and errors of workers.
     """
-    _one_core_each()
+    _limit_threads()
     with ProcessPoolExecutor(
         min(workers, max(len(indices), 1)), mp_context=get_context("spawn"), initializer=_start, initargs=(job,)
     ) as pool:
         waiting = iter(indices)
         with shielded():
-            running: set[Future[Done]] = {pool.submit(_render_one, index) for index in islice(waiting, 2 * workers)}
+            running: set[Future[FinishedPicture]] = {
+                pool.submit(_render_one, index) for index in islice(waiting, 2 * workers)
+            }
         try:
             while running:
                 finished, running = wait(running, return_when=FIRST_COMPLETED)
@@ -75,18 +77,21 @@ def render_all(job: Job, indices: Sequence[int], workers: int, report: Callable[
                     report(each.result())
                 running |= {pool.submit(_render_one, index) for index in islice(waiting, len(finished))}
         except BrokenProcessPool as error:
-            raise WorkerLost("a worker was killed (out of memory?); all finished pictures are kept") from error
+            raise WorkerLost(
+                "a worker process was killed (out of memory?); finished pictures are kept: "
+                "repeat the command, perhaps with fewer --workers"
+            ) from error
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _one_core_each() -> None:
+def _limit_threads() -> None:
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
 
 
 _worker: tuple[Job, Tracer] | None = None
-"""What a worker process keeps between pictures."""
+"""Kept by a worker process between pictures."""
 
 
 def _start(job: Job) -> None:
@@ -95,10 +100,10 @@ def _start(job: Job) -> None:
     _worker = (job, Tracer())
 
 
-def _render_one(index: int) -> Done:
+def _render_one(index: int) -> FinishedPicture:
     assert _worker is not None
     job, tracer = _worker
     scene, environment = scene_of(job, index)
     picture = render(scene, environment, tracer, job.configuration.ground)
     write_picture(job.folder, index, environment.name, scene, picture)
-    return Done(index, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+    return FinishedPicture(index, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)

@@ -8,7 +8,7 @@ from pathlib import Path
 from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.network.manifest import Manifest
-from vm_synth.dataset.files import COLORS
+from vm_synth.dataset.files import CLASS_COLORS
 
 from ..data.classes import Classes, Color
 from ..learning.configuration import TrainConfiguration
@@ -22,7 +22,7 @@ def default_colors(model: Path, chosen: Path | None) -> Mapping[str, tuple[Color
     for folder in (each.parent for each in (chosen, model) if each is not None and each.suffix in (".json", ".pt")):
         if (folder / "train.toml").exists():
             return read_sections(TrainConfiguration, folder / "train.toml").classes.colors
-    return {name: (color,) for name, color in COLORS.items()}
+    return {name: (color,) for name, color in CLASS_COLORS.items()}
 
 
 def classes_with_colors(

@@ -14,7 +14,7 @@ from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.manifest import KINDS, POINT_COLORS, POINT_SAMPLINGS, Manifest, ObjectClass
 from vm_export.grid import GRIDS, Grid
 from vm_export.network_shape import ACTIVATIONS, NetworkShape
-from vm_synth.dataset.files import COLORS
+from vm_synth.dataset.files import CLASS_COLORS
 
 from ..data.classes import Classes, Color
 from ..graphs.augmentation import Augmentation
@@ -40,7 +40,7 @@ class ClassTable:
     @classmethod
     def default(cls) -> ClassTable:
         """The classes and colors of vm-synth and the reference."""
-        colors = {name: (color,) for name, color in COLORS.items()}
+        colors = {name: (color,) for name, color in CLASS_COLORS.items()}
         return cls(colors, {name: KIND_OF.get(name, "area") for name in colors})
 
     @classmethod

@@ -10,7 +10,7 @@ import pytest
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_synth.cli import main, parsers
-from vm_synth.dataset.contact_sheet import OUTLINE, captions, cell, read_shown, sheet, tinted
+from vm_synth.dataset.contact_sheet import OUTLINE, captions, cell, read_labeled, sheet, tinted
 from vm_synth.dataset.files import PARTS, file_of, read_truth
 from vm_workstation.contact_sheet import scaled_pixels
 from vm_workstation.sphere_outline import polygon_area, sphere_outline
@@ -41,7 +41,7 @@ def with_ball(least=4.0):
 
 def test_the_outline_from_the_files_is_the_scene_s(folder):
     for index in range(COUNT):
-        scene, shown = scene_of(index), read_shown(folder, index)
+        scene, shown = scene_of(index), read_labeled(folder, index)
         assert (scene.ball is None) == (shown.outline is None)
         if scene.ball is not None:
             straight = sphere_outline(scene.lens, scene.orientation, scene.ball.center, scene.ball.radius, SIZE)
@@ -51,7 +51,7 @@ def test_the_outline_from_the_files_is_the_scene_s(folder):
 def test_rays_through_the_outline_touch_the_ball(folder):
     for index in with_ball():
         lens, ball = read_lens_file(file_of(folder, "lens", index)), read_truth(folder, index)["ball"]
-        rays = lens.lens.unproject(read_shown(folder, index).outline, SIZE) @ lens.orientation.rotation.T
+        rays = lens.lens.unproject(read_labeled(folder, index).outline, SIZE) @ lens.orientation.rotation.T
         toward = np.array(ball["center"]) - [0.0, 0.0, lens.orientation.height]
         off = np.linalg.norm(np.cross(rays, toward), axis=1)
         np.testing.assert_allclose(off, ball["radius"], rtol=1e-6)
@@ -60,7 +60,7 @@ def test_rays_through_the_outline_touch_the_ball(folder):
 @pytest.mark.parametrize("width", [48, 96, 240])
 def test_a_cell_draws_the_outline_on_the_ball_s_rim(folder, width):
     index = with_ball()[0]
-    shown = read_shown(folder, index)
+    shown = read_labeled(folder, index)
     made = cell(shown, width)
     height = round(SIZE[1] * width / SIZE[0])
     plain, lower = made[:height], made[height + 1 : 2 * height + 1]
@@ -73,7 +73,7 @@ def test_a_cell_draws_the_outline_on_the_ball_s_rim(folder, width):
 
 
 def test_tints_leave_the_environment_and_unlabeled_pixels_alone(folder):
-    shown = read_shown(folder, 0)
+    shown = read_labeled(folder, 0)
     made = tinted(shown.image, shown.mask)
     bare = (shown.mask[..., 3] == 0) | ~shown.mask[..., :3].any(axis=-1)
     assert (made[bare] == shown.image[bare]).all()
@@ -82,7 +82,7 @@ def test_tints_leave_the_environment_and_unlabeled_pixels_alone(folder):
 
 def test_captions_say_which_picture_and_which_ball(folder):
     index = with_ball()[0]
-    first, second = captions(read_shown(folder, index))
+    first, second = captions(read_labeled(folder, index))
     ball = read_truth(folder, index)["ball"]
     assert first == f"{index}  room"
     assert second.startswith(f"{ball['distance']:.2f} m, radius {ball['pixel_radius']:.1f} px")
@@ -132,7 +132,7 @@ def test_wrong_truth_is_named(folder, tmp_path, damage):
     damage(truth)
     file_of(folder, "scene", 0).write_text(json.dumps(truth))
     with pytest.raises(InputError, match=r"scene0000000\.json is damaged"):
-        read_shown(folder, 0)
+        read_labeled(folder, 0)
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_wrong_truth_is_named(folder, tmp_path, damage):
         (["nowhere"], "there is no folder nowhere"),
         (["{set}", "--output", "sheet.gif"], "must be a .jpg or a .png"),
         (["{set}", "--output", "no/such/sheet.jpg"], "there is no folder"),
-        (["{set}", "--first", "900"], "no pictures that can be shown from number 900 on"),
+        (["{set}", "--first", "900"], "has no complete pictures from number 900 on; run vm-synth check"),
     ],
 )
 def test_wrong_commands_are_one_line(folder, capsys, arguments, text):

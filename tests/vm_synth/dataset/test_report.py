@@ -12,8 +12,8 @@ import pytest
 
 from vm_synth.cli import main
 from vm_synth.dataset.files import PARTS, file_of, read_truth
-from vm_synth.dataset.inspection import inspect, shard_that_lacks, spans
-from vm_synth.dataset.report import as_json, categories, complaints, quantities, tables
+from vm_synth.dataset.inspection import inspect
+from vm_synth.dataset.report import as_json, categories, problems, quantities, runs_of, shard_of_missing, tables
 from vm_synth.scene.configuration import CLASSES
 
 from ..sets import SIZE, picture_of, scene_of, write_set
@@ -58,45 +58,49 @@ DAMAGES = {
     "image of another size": (
         "image",
         lambda path: cv2.imwrite(str(path), np.zeros((64, 90, 3), np.uint8)),
-        "image0000002.jpg has 90 x 64 px, not 96 x 64",
+        "image0000002.jpg has 90 x 64 px, not 96 x 64 px",
     ),
-    "lens of another picture": ("lens", swapped_with(3), "lens0000002.yaml has another pose than scene0000002.json"),
+    "lens of another picture": (
+        "lens",
+        swapped_with(3),
+        "lens0000002.yaml and scene0000002.json have different poses: one is of another picture",
+    ),
     "image gone": ("image", lambda path: path.unlink(), "image0000002.jpg is missing"),
     "mask gone": ("mask", lambda path: path.unlink(), "mask0000002.png is missing"),
     "mask cut": ("mask", cut, "mask0000002.png is cut short"),
     "mask of another size": (
         "mask",
         lambda path: cv2.imwrite(str(path), np.zeros((32, 96, 4), np.uint8)),
-        "mask0000002.png has 96 x 32 px, not 96 x 64",
+        "mask0000002.png has 96 x 32 px, not 96 x 64 px",
     ),
     "mask without transparency": (
         "mask",
         lambda path: cv2.imwrite(str(path), np.zeros((64, 96, 3), np.uint8)),
-        "mask0000002.png has not the 4 channels",
+        "mask0000002.png has 3 channels, not 4",
     ),
     "mask of other colors": (
         "mask",
         lambda path: cv2.imwrite(str(path), np.full((64, 96, 4), 200, np.uint8)),
-        "mask0000002.png has colors that are no class",
+        "mask0000002.png has colors that belong to no class",
     ),
     "coverage in color": (
         "coverage",
         lambda path: cv2.imwrite(str(path), np.zeros((64, 96, 3), np.uint8)),
-        "coverage0000002.png has not the 1 channels",
+        "coverage0000002.png has 3 channels, not 1",
     ),
     "lens gone": ("lens", lambda path: path.unlink(), "lens0000002.yaml is missing"),
     "lens damaged": ("lens", lambda path: path.write_text("projection: [1"), "lens0000002.yaml"),
     "lens without pose": (
         "lens",
         lambda path: path.write_text(path.read_text().split("Hoc")[0]),
-        "lens0000002.yaml has no Hoc",
+        "lens0000002.yaml has no camera pose (Hoc)",
     ),
     "truth cut": ("scene", cut, "scene0000002.json is damaged"),
-    "truth of another picture": ("scene", truth_with(index=4), "scene0000002.json is of picture 4"),
-    "truth of another set": ("scene", truth_with(map="attic"), "map attic is none of this set's"),
+    "truth of another picture": ("scene", truth_with(index=4), "scene0000002.json describes picture 4, not 2"),
+    "truth of another set": ("scene", truth_with(map="attic"), "map attic is not in set.json"),
     "truth without a height": ("scene", truth_with(height=None), "scene0000002.json is damaged"),
     "truth with another ball": ("scene", truth_with(ball={"distance": 1.0}), "scene0000002.json is damaged"),
-    "truth no table": ("scene", lambda path: path.write_text("[]"), "it holds no table"),
+    "truth no table": ("scene", lambda path: path.write_text("[]"), "it must contain a JSON object"),
 }
 QUICK = [name for name in DAMAGES if name.startswith(("lens", "truth")) or name.endswith("gone")]
 
@@ -104,7 +108,7 @@ QUICK = [name for name in DAMAGES if name.startswith(("lens", "truth")) or name.
 def test_a_sound_set_passes(folder, capsys):
     assert main(["check", str(folder)]) == 0
     said = capsys.readouterr()
-    assert said.out.startswith(f"{COUNT} of {COUNT} pictures are there, 0 of them at fault\n")
+    assert said.out.startswith(f"{COUNT} of {COUNT} pictures exist, 0 of them are invalid\n")
     assert "ball distance [m]" in said.out
     assert said.err == ""
 
@@ -115,7 +119,7 @@ def test_damage_is_found_and_named(folder, capsys, name):
     damage(file_of(folder, part, 2))
     assert main(["check", str(folder)]) == 1
     said = capsys.readouterr()
-    assert f"{COUNT} of {COUNT} pictures are there, 1 of them at fault" in said.out
+    assert f"{COUNT} of {COUNT} pictures exist, 1 of them are invalid" in said.out
     lines = said.err.splitlines()
     assert lines[0].startswith("vm-synth: picture 2: ")
     assert text in lines[0]
@@ -127,14 +131,14 @@ def test_damage_is_found_and_named(folder, capsys, name):
 def test_a_quick_check_finds_all_but_damaged_images(folder, name):
     part, damage, _ = DAMAGES[name]
     damage(file_of(folder, part, 2))
-    assert inspect(folder, quick=True).good == (name not in QUICK)
+    assert inspect(folder, quick=True).complete == (name not in QUICK)
 
 
 def test_as_advised_deleting_the_truth_leaves_a_gap_that_a_run_fills(folder, capsys):
     cut(file_of(folder, "image", 2))
     file_of(folder, "scene", 2).unlink()
     assert main(["check", str(folder)]) == 1
-    assert "1 pictures are not there yet: 2\n" in capsys.readouterr().err
+    assert "missing pictures (1): 2\n" in capsys.readouterr().err
     write_set(folder, [2], COUNT)
     assert main(["check", str(folder)]) == 0
 
@@ -145,9 +149,9 @@ def test_many_faults_are_counted_and_a_few_named(tmp_path):
         file_of(folder, "scene", index).write_text("{}")
     plan = json.loads((folder / "set.json").read_text())
     (folder / "set.json").write_text(json.dumps({**plan, "count": 40}))
-    lines = complaints(inspect(folder))
+    lines = problems(inspect(folder))
     assert len(lines) == 22
-    assert lines[20] == "and 18 more pictures at fault; --json lists all"
+    assert lines[20] == "and 18 more invalid pictures; --json lists all"
 
 
 def test_shards_are_counted_by_themselves(tmp_path, capsys):
@@ -157,27 +161,27 @@ def test_shards_are_counted_by_themselves(tmp_path, capsys):
     said = capsys.readouterr()
     rows = [line.split() for line in said.out.splitlines()[2:6]]
     assert rows == [
-        ["shard", "there", "of", "at", "fault"],
+        ["shard", "exist", "of", "invalid"],
         ["1/3", "4", "4", "1"],
         ["2/3", "0", "4", "0"],
         ["3/3", "4", "4", "0"],
     ]
-    assert "4 pictures are not there yet: 1, 4, 7, 10\n" in said.err
-    assert "all of them belong to shard 2/3" in said.err
+    assert "missing pictures (4): 1, 4, 7, 10\n" in said.err
+    assert "all missing pictures belong to shard 2/3" in said.err
 
 
 def test_a_shard_is_named_only_where_gaps_tell():
-    assert shard_that_lacks([1, 4, 7]) == (2, 3)
-    assert shard_that_lacks([10, 12, 16]) == (1, 2)
-    assert shard_that_lacks([1, 2, 3]) is None
-    assert shard_that_lacks([1, 900]) is None
-    assert shard_that_lacks([]) is None
+    assert shard_of_missing([1, 4, 7]) == (2, 3)
+    assert shard_of_missing([10, 12, 16]) == (1, 2)
+    assert shard_of_missing([1, 2, 3]) is None
+    assert shard_of_missing([1, 900]) is None
+    assert shard_of_missing([]) is None
 
 
-def test_spans():
-    assert spans([]) == []
-    assert spans([3]) == [(3, 3)]
-    assert spans([0, 1, 2, 5, 7, 8]) == [(0, 2), (5, 5), (7, 8)]
+def test_runs_of():
+    assert runs_of([]) == []
+    assert runs_of([3]) == [(3, 3)]
+    assert runs_of([0, 1, 2, 5, 7, 8]) == [(0, 2), (5, 5), (7, 8)]
 
 
 def test_numbers_are_those_of_the_pictures(folder):
@@ -202,15 +206,15 @@ def test_a_set_that_has_just_begun(tmp_path, capsys):
     folder = write_set(tmp_path, [], 9)
     assert main(["check", str(folder), "--plots", str(tmp_path / "plots.png")]) == 1
     said = capsys.readouterr()
-    assert said.out == "0 of 9 pictures are there, 0 of them at fault\n"
-    assert "9 pictures are not there yet: 0 to 8\n" in said.err
+    assert said.out == "0 of 9 pictures exist, 0 of them are invalid\n"
+    assert "missing pictures (9): 0 to 8\n" in said.err
     assert not (tmp_path / "plots.png").exists()
 
 
 def test_pictures_beyond_the_count_are_left_out(folder):
     plan = json.loads((folder / "set.json").read_text())
     (folder / "set.json").write_text(json.dumps({**plan, "count": 4}))
-    assert inspect(folder).good
+    assert inspect(folder).complete
     assert inspect(folder).done == (0, 1, 2, 3)
 
 
@@ -247,12 +251,12 @@ def test_plots_without_matplotlib_name_the_extra(folder, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("content", "text"),
     [
-        (None, "holds no set"),
+        (None, "is not a set of vm-synth"),
         ("{", "set.json is damaged"),
-        ("[]", "it holds no table"),
-        ('{"format": 99}', "of format 99, not 1"),
-        ('{"format": 1, "count": "many"}', "its count is 'many'"),
-        ('{"format": 1, "count": 3}', "it lacks the size of pictures"),
+        ("[]", "it must contain a JSON object"),
+        ('{"format": 99}', "has format 99; this version of vm-synth reads 1"),
+        ('{"format": 1, "count": "many"}', "count must be a whole number of at least 1, not 'many'"),
+        ('{"format": 1, "count": 3}', "it lacks the picture size"),
     ],
 )
 def test_a_folder_that_is_no_set(tmp_path, capsys, content, text):

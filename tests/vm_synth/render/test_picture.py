@@ -13,7 +13,8 @@ from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectiline
 from vm_synth.balls.balls import BallRanges, draw_design
 from vm_synth.bodies.clutter import carton
 from vm_synth.bodies.solids import joined
-from vm_synth.dataset.files import COLORS, file_of, write_picture
+from vm_synth.dataset.files import CLASS_COLORS, file_of
+from vm_synth.dataset.picture_writer import write_picture
 from vm_synth.render.picture import UNLABELED, render
 from vm_synth.render.rays import pixel_grid
 from vm_synth.scene.configuration import CLASSES, GroundRanges
@@ -114,7 +115,7 @@ def test_masks_have_the_colors_of_the_classes(tracer, environment, tmp_path):
     picture = render(made, environment, tracer, GroundRanges())
     write_picture(tmp_path, 0, "sky", made, picture)
     mask = cv2.imread(str(file_of(tmp_path, "mask", 0)), cv2.IMREAD_UNCHANGED)
-    assert (mask[picture.classes == BALL] == (*COLORS["ball"][::-1], 255)).all()
+    assert (mask[picture.classes == BALL] == (*CLASS_COLORS["ball"][::-1], 255)).all()
     unseen = picture.classes == UNLABELED
     assert unseen.any()
     assert (mask[unseen] == 0).all()

@@ -111,14 +111,14 @@ def test_what_is_stopped_goes_on_with_the_same_command(how, tmp_path, small, who
     assert process.returncode == (-signal.SIGKILL if how == signal.SIGKILL else 130)
     assert "Traceback" not in error
     if how != signal.SIGKILL:
-        assert "the same command goes on" in error
+        assert "repeat the command to continue" in error
     wait_for_end_of(process.pid)
 
     before = {index: file_of(tmp_path, "scene", index).stat().st_mtime_ns for index in indices_in(tmp_path)}
     assert 1 <= len(before) < 6
     again = run(tmp_path, [*small, "--workers", "1"])
     assert again.returncode == 0
-    assert f"{len(before)} of 6 pictures are there already" in again.stderr
+    assert f"{len(before)} of 6 pictures already exist" in again.stderr
     assert {index: file_of(tmp_path, "scene", index).stat().st_mtime_ns for index in before} == before
     assert contents(tmp_path) == whole
 
@@ -151,7 +151,7 @@ def test_a_killed_worker_is_reported_in_one_line_and_nothing_is_lost(tmp_path, s
     os.kill(worker, signal.SIGKILL)
     error = process.communicate(timeout=60)[1]
     assert process.returncode == 1
-    assert "a worker was killed" in error
+    assert "a worker process was killed" in error
     assert "Traceback" not in error
     assert run(tmp_path, [*small, "--workers", "1"]).returncode == 0
     assert contents(tmp_path) == whole
@@ -177,7 +177,7 @@ def test_another_set_is_not_mixed_in(tmp_path, small, whole):
     (tmp_path / "set.json").write_bytes(whole["set.json"])
     done = run(tmp_path, [*small[:4], "--seed", "4", *small[6:]])
     assert done.returncode == 1
-    assert "seed is 3, not 4" in done.stderr
+    assert "a set with another seed: 3, not 4" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["set.json"]
 
 
@@ -185,7 +185,7 @@ def test_a_folder_of_other_pictures_is_left_alone(tmp_path, small, whole):
     (tmp_path / "image0000001.jpg").write_bytes(b"mine")
     done = run(tmp_path, small)
     assert done.returncode == 1
-    assert "image0000001.jpg and no set.json" in done.stderr
+    assert "image0000001.jpg but no set.json" in done.stderr
     assert contents(tmp_path) == {"image0000001.jpg": b"mine"}
 
 
@@ -195,5 +195,5 @@ def test_pictures_that_lost_a_file_are_rendered_again(tmp_path, small, whole):
     (tmp_path / "mask0000002.png").unlink()
     (tmp_path / "image0000004.jpg").write_bytes(b"")
     done = run(tmp_path, [*small, "--workers", "1"])
-    assert "4 of 6 pictures are there already" in done.stderr
+    assert "4 of 6 pictures already exist" in done.stderr
     assert contents(tmp_path) == whole

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from tests.manifests import ball_manifest
 from vm_embedded import Orientation
 from vm_embedded.errors import InputError
+from vm_embedded.geometry.lens_files import lens_text
 from vm_embedded.geometry.radial_lenses import Equisolid
-from vm_synth.dataset.files import lens_text
 from vm_train.data.classes import UNLABELED, Classes
 from vm_train.data.picture_files import PictureFault
 from vm_train.data.pictures import find_pictures, read_picture
