@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import parent_process
+from multiprocessing import get_context, parent_process
 from threading import Thread
+from typing import Any
 
 import cv2
+
+from vm_embedded.errors import VisualMeshError
 
 
 @contextmanager
@@ -28,6 +33,24 @@ def begin() -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     cv2.setNumThreads(1)
     Thread(target=_end_with_parent, daemon=True).start()
+
+
+@contextmanager
+def worker_pool(
+    count: int, start: Callable[..., None] = begin, arguments: tuple[Any, ...] = ()
+) -> Iterator[ProcessPoolExecutor]:
+    """A pool of so many worker processes; at the end it cancels the work that has not begun.
+
+    start: the function that each process calls first, with these arguments; it must call `begin`. Raises
+    VisualMeshError if a worker was killed.
+    """
+    pool = ProcessPoolExecutor(count, get_context("spawn"), start, arguments)
+    try:
+        yield pool
+    except BrokenProcessPool as error:
+        raise VisualMeshError("a worker was killed (out of memory?)") from error
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _end_with_parent() -> None:

@@ -1,1 +1,1 @@
-"""Pictures, masks and poses on disk, and how a set is split."""
+"""Pictures, masks, lenses and poses on disk; classes; and the split of a data set."""

@@ -1,4 +1,4 @@
-"""Classes, and what the colors of a mask say: labels."""
+"""Classes and their colors in masks, and the labels that a mask gives to its pixels."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from vm_embedded.errors import InputError
 from .picture_files import PictureFault
 
 Labels = npt.NDArray[np.int8]
-"""Positions of classes; UNLABELED where a mask says nothing."""
+"""Numbers of classes, by pixel; UNLABELED where the mask is transparent."""
 
 UNLABELED = -1
 
 Color = tuple[int, int, int]
 
 _OPAQUE = 0xFF000000  # alpha, the highest byte of a BGRA pixel as one number
-_STRIP = 64  # rows
+_STRIP = 64  # rows to label at a time
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Classes:
 
     def __post_init__(self) -> None:
         if len(self.colors) < 2:
-            raise InputError(f"a network tells at least two classes apart, not {list(self.colors)}")
+            raise InputError(f"a network needs at least two classes, not only {list(self.colors)}")
         owner: dict[Color, str] = {}
         for name, colors in self.colors.items():
             for color in colors:
@@ -56,16 +56,16 @@ class Classes:
         bgra = mask if mask.shape[2] == 4 else cv2.cvtColor(mask, cv2.COLOR_BGR2BGRA)
         pixels = np.ascontiguousarray(bgra).view("<u4")[..., 0]
         labels = np.empty(pixels.shape, dtype=np.int8)
-        # By strips, whose intermediate results stay in the processor's cache: twice as fast as all at once.
+        # In strips: their intermediate results stay in the cache, which makes it twice as fast.
         for top in range(0, len(pixels), _STRIP):
             labels[top : top + _STRIP] = self._labels(pixels[top : top + _STRIP])
-        strange = labels == len(self.colors)
-        if strange.any():
-            raise PictureFault(self._strange(pixels[strange]), "color")
+        unknown = labels == len(self.colors)
+        if unknown.any():
+            raise PictureFault(self._unknown_color(pixels[unknown]), "color")
         return labels
 
     def _labels(self, pixels: npt.NDArray[np.uint32]) -> Labels:
-        """Labels (h, w) of BGRA pixels (h, w), the number of classes for colors that no class has."""
+        """Labels (h, w) of BGRA pixels (h, w); colors of no class get the number of classes."""
         keys = pixels | np.uint32(_OPAQUE)
         labels = np.full(pixels.shape, len(self.colors), dtype=np.int8)
         for number, colors in enumerate(self.colors.values()):
@@ -75,8 +75,8 @@ class Classes:
         np.putmask(labels, pixels < 1 << 24, UNLABELED)
         return labels
 
-    def _strange(self, pixels: npt.NDArray[np.uint32]) -> str:
-        """Say which colors (n,) no class has, and which class is nearest."""
+    def _unknown_color(self, pixels: npt.NDArray[np.uint32]) -> str:
+        """A message about pixels (n,) of unknown colors: the most frequent color, and the nearest color of a class."""
         keys, counts = np.unique(pixels & 0xFFFFFF, return_counts=True)
         often = int(keys[counts.argmax()])
         color = (often >> 16, often >> 8 & 255, often & 255)
@@ -84,6 +84,6 @@ class Classes:
         name, near = min(known, key=lambda each: sum((a - b) ** 2 for a, b in zip(each[1], color, strict=True)))
         others = f" and {len(keys) - 1} more" if len(keys) > 1 else ""
         return (
-            f"{len(pixels)} pixels of the mask have a color of no class, as {list(color)}{others}; "
+            f"{len(pixels)} pixels of the mask have colors that belong to no class: {list(color)}{others}; "
             f"the nearest is {list(near)} of {name}"
         )

@@ -1,7 +1,7 @@
-"""Decoded pictures on disk: a training looks at each many times, and decoding takes longer than all the rest.
+"""Decoded pictures on disk. A training reads each picture many times, and decoding is the slowest step of that.
 
-A file holds a header, the lens file's text, the image (h, w, 3) uint8 and the labels (h, w) int8, all raw. It is mapped
-into memory, so that only what a mesh looks at is read.
+A file holds a header, the text of the lens file, the image (h, w, 3) uint8 and the labels (h, w) int8, all raw. It is
+mapped into memory, so a mesh reads only the pixels that it needs.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from .classes import Classes
 from .picture_files import PARTS, PictureFiles
 from .pictures import Picture, parse_lens, read_picture
 
-_HEADER = struct.Struct("<8s32sIIII")  # magic, what it was made from, width, height, bytes of the lens, zero
+_HEADER = struct.Struct("<8s32sIIII")  # magic, fingerprint, width, height, bytes of the lens text, zero
 _MAGIC = b"vmtrain1"
 KEPT_FREE = 1 << 30
-"""Bytes that a training needs for its own files."""
+"""Disk space to leave for the other files of a training [bytes]."""
 
 
 def decoded_size(count: int, width: int, height: int) -> int:
-    """Room that decoded pictures of a size [px] take on disk [bytes]."""
+    """Disk space of decoded pictures [bytes]. width, height [px]."""
     return count * (4 * width * height + 4096)
 
 
 class DecodedCache:
-    """A folder of decoded pictures of one set. Entries that are stale or damaged count as absent.
+    """A folder of decoded pictures of one data set. Outdated or damaged entries count as absent.
 
-    Raises InputError if the folder can't be made.
+    Raises InputError if the folder can't be created.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -52,11 +52,11 @@ class DecodedCache:
 
     @property
     def full(self) -> bool:
-        """Whether any process on this folder has found no room for a picture; from then on no more are put there."""
+        """Whether any process with this folder found the disk full; from then on, none of them adds a picture."""
         return self._full or self._full_mark.exists()
 
     def get(self, files: PictureFiles, classes: Classes) -> Picture | None:
-        """A picture, read-only, if it is there as its files are now and with the labels of these classes."""
+        """The picture, read-only, or None if the entry is absent, or its files or the classes have changed since."""
         try:
             source = fingerprint(files, classes)
             with self._path(files).open("rb") as file:
@@ -73,14 +73,14 @@ class DecodedCache:
         return Picture(image, labels, lens)
 
     def put(self, files: PictureFiles, classes: Classes, picture: Picture) -> None:
-        """Keep a picture; without effect if it can't be written."""
+        """Add a picture. Does nothing if the disk is full or the file can't be written."""
         height, width = picture.labels.shape
         try:
             if shutil.disk_usage(self.folder).free < decoded_size(1, width, height) + KEPT_FREE:
                 raise OSError
             text = files.read("lens")
             header = _HEADER.pack(_MAGIC, fingerprint(files, classes), width, height, len(text), 0)
-            # Opened with x: where two processes put the same picture, neither writes into the other's file.
+            # Mode x: if two processes add the same picture, neither writes into the other's file.
             with atomic_write(self._path(files)) as part, part.open("xb") as file:
                 for each in (header, text, picture.image.tobytes(), picture.labels.tobytes()):
                     file.write(each)
@@ -93,27 +93,27 @@ class DecodedCache:
 
     @property
     def _full_mark(self) -> Path:
-        """An empty file tells worker processes, and the one that reports, that one of them found no room."""
+        """An empty file. It tells all processes that one of them found the disk full."""
         return self.folder / "full"
 
     def _path(self, files: PictureFiles) -> Path:
         return self.folder / f"{quote(files.number, safe='')}.raw"
 
 
-def read_through_cache(files: PictureFiles, classes: Classes, unpacked: DecodedCache | None) -> Picture:
-    """A picture from where it is unpacked, or from its files and then put there. Raises PictureFault."""
-    if unpacked is None:
+def read_through_cache(files: PictureFiles, classes: Classes, cache: DecodedCache | None) -> Picture:
+    """A picture from the cache, or else from its files, and then also added to the cache. Raises PictureFault."""
+    if cache is None:
         return read_picture(files, classes)
-    picture = unpacked.get(files, classes)
+    picture = cache.get(files, classes)
     if picture is None:
         picture = read_picture(files, classes)
-        if not unpacked.full:
-            unpacked.put(files, classes, picture)
+        if not cache.full:
+            cache.put(files, classes, picture)
     return picture
 
 
 def fingerprint(files: PictureFiles, classes: Classes) -> bytes:
-    """Digest of what a picture is made from: sizes and times of its files, and the colors of classes."""
+    """Digest of the sources of a decoded picture: sizes and times of its files, and the colors of the classes."""
     if files.shard is None:
         stats = [files.path(part).stat() for part in PARTS]
         places: tuple[object, ...] = ()

@@ -1,14 +1,11 @@
-"""Reading all pictures before a training: what they show, and every fault instead of the first."""
+"""Inspection of a data set: facts about each good picture, and the fault of each bad one."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 
 import cv2
 import numpy as np
@@ -18,22 +15,23 @@ from vm_embedded.geometry.calibrated_lenses import CalibratedLens
 from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.radial_lenses import RadialLens
-from vm_workstation.worker_process import begin, shielded
+from vm_workstation.worker_process import shielded, worker_pool
 
 from .classes import Classes, Labels
 from .picture_files import PictureFault, PictureFiles
 from .pictures import read_picture
 
-_CHUNK = 16  # pictures that a worker gets at once
+_CHUNK = 16  # pictures that a worker gets at a time
 
 
 @dataclass(frozen=True)
 class PictureFacts:
-    """What a good picture shows.
+    """Facts about a good picture.
 
-    size: width and height [px]. lens: kind; focal_length [px] and fov [rad]. height [m], pitch and roll [rad] of the
-    camera. pixels: of each class; unlabeled: of none. distances [m]: of the things that are connected pixels of an
-    object class, from the camera's foot to where the ray through their middle meets the plane; infinite if it doesn't.
+    size: width and height [px]. lens: kind, as "equisolid"; focal_length [px] and fov [rad]. height [m], pitch and
+    roll [rad]: of the camera. pixels: number for each class; unlabeled: number without a class. distances [m]: for each
+    connected piece of an object class, from the camera's foot to the point where the ray through the middle of the
+    piece meets the plane; infinite if it does not meet it.
     """
 
     number: str
@@ -51,7 +49,7 @@ class PictureFacts:
 
 @dataclass(frozen=True)
 class FaultyPicture:
-    """A picture that can't be used: its number, kind of the fault as PictureFault has it, and what it is."""
+    """A picture that can't be used: its number, the kind of fault as in PictureFault, and a description."""
 
     number: str
     kind: str
@@ -60,7 +58,7 @@ class FaultyPicture:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What came of reading pictures: the good ones with their facts, and the others' faults, all by number."""
+    """The result for a data set, in the order of numbers: good pictures with their facts, and faulty pictures."""
 
     classes: tuple[str, ...]
     good: tuple[PictureFiles, ...]
@@ -69,17 +67,17 @@ class Inspection:
 
     @property
     def count(self) -> int:
-        """Pictures that were read."""
+        """Number of all pictures."""
         return len(self.facts) + len(self.faults)
 
     @property
     def pixels(self) -> dict[str, int]:
-        """Pixels of each class."""
+        """Number of pixels of each class."""
         return {name: sum(each.pixels[index] for each in self.facts) for index, name in enumerate(self.classes)}
 
     @property
     def shown(self) -> dict[str, int]:
-        """Pictures that show each class."""
+        """Number of pictures that show each class."""
         return {name: sum(each.pixels[index] > 0 for each in self.facts) for index, name in enumerate(self.classes)}
 
     @property
@@ -89,12 +87,12 @@ class Inspection:
 
     @property
     def sizes(self) -> Counter[Size]:
-        """Pictures of each size [px]."""
+        """Number of pictures of each size [px]."""
         return Counter(each.size for each in self.facts)
 
     @property
     def lenses(self) -> Counter[str]:
-        """Pictures of each kind of lens."""
+        """Number of pictures with each kind of lens."""
         return Counter(each.lens for each in self.facts)
 
 
@@ -105,10 +103,10 @@ def inspect_pictures(
     report: Callable[[], None],
     objects: Sequence[str] = (),
 ) -> Inspection:
-    """Read all pictures with so many processes, 1 for none but this one, and report each.
+    """Read all pictures with so many processes; 1 uses only this process.
 
-    objects: classes whose distances are measured. Raises InputError for a class that is none, and VisualMeshError if a
-    worker was killed.
+    report: is called after each picture. objects: classes whose distances to measure. Raises VisualMeshError for an
+    unknown class and if a worker was killed.
     """
     positions = [_position(name, classes) for name in objects]
     good, facts, faults = [], [], []
@@ -136,15 +134,10 @@ def _found(
         yield from map(inspected, pictures)
         return
     chunks = -(-len(pictures) // _CHUNK)
-    pool = ProcessPoolExecutor(min(workers, chunks), get_context("spawn"), begin)
-    try:
+    with worker_pool(min(workers, chunks)) as pool:
         with shielded():
             results = pool.map(inspected, pictures, chunksize=_CHUNK)
         yield from results
-    except BrokenProcessPool as error:
-        raise VisualMeshError("a worker that read pictures was killed (out of memory?)") from error
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _inspected(files: PictureFiles, classes: Classes, objects: Sequence[int]) -> PictureFacts | FaultyPicture:
@@ -179,7 +172,7 @@ def _focal_length(lens: Lens) -> float:
 
 
 def _distances(here: Labels, lens: LensFile) -> list[float]:
-    """Distances [m] of what is connected where a mask (h, w) is not 0."""
+    """Distances of the connected pieces of a mask (h, w) [m]."""
     assert lens.orientation is not None
     size = (here.shape[1], here.shape[0])
     _, _, _, centers = cv2.connectedComponentsWithStats(here.view(np.uint8))

@@ -14,7 +14,7 @@ PARTS = ("image", "mask", "lens")
 
 
 class PictureFault(InputError):
-    """A picture that can't be used. kind: what is wrong: missing, damaged, size, lens or color."""
+    """A picture can't be used. kind: of the fault, one of missing, damaged, size, lens and color."""
 
     def __init__(self, text: str, kind: str = "damaged") -> None:
         super().__init__(text)
@@ -22,7 +22,7 @@ class PictureFault(InputError):
 
 
 class RawPicture(NamedTuple):
-    """A picture as its files have it: bytes of image and mask, text of the lens file."""
+    """The content of a picture's files: bytes of image and mask, text of the lens file."""
 
     number: str
     image: bytes
@@ -31,7 +31,7 @@ class RawPicture(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where a file lies in a shard [bytes]."""
+    """Position and size of a file in a shard [bytes]."""
 
     offset: int
     size: int
@@ -41,8 +41,8 @@ class Place(NamedTuple):
 class PictureFiles:
     """The files of one picture.
 
-    number: X of their names. shard: the tar that holds them, or None for files of their own. places: where in it, by
-    part; parts that it lacks are left out.
+    number: the X of imageX.jpg. shard: the tar file that holds them, or None for separate files. places: positions in
+    the shard, by part, for the parts that it holds.
     """
 
     number: str
@@ -53,11 +53,11 @@ class PictureFiles:
     places: tuple[tuple[str, Place], ...] = ()
 
     def path(self, part: str) -> Path:
-        """A part's file, or its name in the shard."""
+        """The path of a part, or its name inside the shard."""
         return {"image": self.image, "mask": self.mask, "lens": self.lens}[part]
 
     def place(self, part: str) -> Place | None:
-        """Where a part is in the shard, or None if it is not there."""
+        """The place of a part in the shard; None if it is missing."""
         return dict(self.places).get(part)
 
     def read(self, part: str) -> bytes:
@@ -82,9 +82,9 @@ class PictureFiles:
         return data
 
     def raw(self) -> RawPicture:
-        """All parts. Raises PictureFault naming the file."""
+        """The content of all parts. Raises PictureFault naming the file."""
         image, mask, lens = (self.read(part) for part in PARTS)
         try:
             return RawPicture(self.number, image, mask, lens.decode("utf-8"))
         except UnicodeDecodeError as error:
-            raise PictureFault(f"{self.lens.name}: is no text", "lens") from error
+            raise PictureFault(f"{self.lens.name}: is not UTF-8 text", "lens") from error

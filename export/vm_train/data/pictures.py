@@ -1,4 +1,4 @@
-"""Training pictures: imageX.jpg or .png, maskX.png, lensX.yaml, as the reference and vm-synth have them."""
+"""Pictures of a data set: imageX.jpg or .png, maskX.png and lensX.yaml, the names of the reference and of vm-synth."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Picture:
 def find_pictures(folder: Path) -> list[PictureFiles]:
     """All pictures of a folder, or of the tar shards in it, by number.
 
-    Raises InputError if there is none, or two have one number.
+    Raises InputError if there are none, or if two pictures have the same number.
     """
     if not folder.is_dir():
         raise InputError(f"there is no folder {folder}")
@@ -46,16 +46,19 @@ def find_pictures(folder: Path) -> list[PictureFiles]:
         if suffix in {"image": IMAGES, "mask": (".png",), "lens": (".yaml",)}.get(part, ()):
             before = parts[part].setdefault(stem.removeprefix(part), name)
             if before != name:
-                raise InputError(f"{folder} has {before} and {name}: two files for the {part} of one picture")
+                raise InputError(
+                    f"{folder} has {before} and {name}: two files for the {part} of one picture: remove one of them"
+                )
         else:
             other |= part == "image"
     if not parts["image"] and shards:
         return open_shards(folder)
     if shards:
-        raise InputError(f"{folder} has both pictures and shards, as {find_shards(folder)[0].name}: move one of them")
+        shard = find_shards(folder)[0].name
+        raise InputError(f"{folder} has both pictures and shards, for example {shard}: move one kind to another folder")
     if not parts["image"]:
-        hint = "; what is there as image* has another suffix" if other else ""
-        raise InputError(f"no pictures in {folder}: images are named imageX.jpg or imageX.png{hint}")
+        hint = "; the image* files in it have another suffix" if other else ""
+        raise InputError(f"no pictures in {folder}: images must be named imageX.jpg or imageX.png{hint}")
     return [
         PictureFiles(
             number,
@@ -73,7 +76,7 @@ def read_picture(files: PictureFiles, classes: Classes) -> Picture:
 
 
 def decode_picture(raw: RawPicture, classes: Classes, names: tuple[str, str, str] | None = None) -> Picture:
-    """A picture from the bytes of its files. names: of image, mask and lens, for messages.
+    """Decode the bytes of a picture's files. names: of image, mask and lens, for messages.
 
     Raises PictureFault, an InputError, naming the file and its fault.
     """
@@ -84,7 +87,7 @@ def decode_picture(raw: RawPicture, classes: Classes, names: tuple[str, str, str
     if mask.ndim != 3 or mask.shape[2] not in (3, 4) or mask.dtype != np.uint8:
         channels = mask.shape[2] if mask.ndim == 3 else 1
         found = f"{channels} channel{'s' * (channels > 1)} of {8 * mask.itemsize} bits"
-        raise PictureFault(f"{names[1]}: a mask is an RGB or RGBA picture of 8 bits, but this has {found}", "color")
+        raise PictureFault(f"{names[1]}: a mask must have 3 or 4 channels of 8 bits, not {found}", "color")
     if mask.shape[:2] != image.shape[:2]:
         sizes = (f"{each.shape[1]} x {each.shape[0]}" for each in (mask, image))
         raise PictureFault(f"{names[1]}: {' px, but the image is '.join(sizes)} px", "size")
@@ -102,7 +105,7 @@ def decode_picture(raw: RawPicture, classes: Classes, names: tuple[str, str, str
 
 
 def _decoded(data: bytes, name: str, how: int) -> Image:
-    # OpenCV fills up what is missing of a file that was cut short, and calls it success.
+    # OpenCV reads files that are cut short without an error, and fills in the missing rows.
     jpeg_cut = data.startswith(b"\xff\xd8") and b"\xff\xd9" not in data[-1024:]
     png_cut = data.startswith(b"\x89PNG") and b"IEND" not in data[-1024:]
     if jpeg_cut or png_cut:
@@ -117,7 +120,7 @@ def _decoded(data: bytes, name: str, how: int) -> Image:
 
 
 def parse_lens(text: str, name: str) -> LensFile:
-    """A lens file's content, parsed once in each process. Raises PictureFault beginning with its name."""
+    """The content of a lens file, parsed once in each process. Raises PictureFault that begins with `name`."""
     try:
         return _lens(text)
     except InputError as error:
@@ -126,7 +129,7 @@ def parse_lens(text: str, name: str) -> LensFile:
 
 @lru_cache(_LENSES_KEPT)
 def _lens(text: str) -> LensFile:
-    # read_lens_file wants a path; this one needs no disk, which may be full.
+    # read_lens_file needs a path; this file is in memory, because the disk may be full.
     with os.fdopen(os.memfd_create("lens"), "w", encoding="utf-8") as file:
         file.write(text)
         file.flush()

@@ -1,4 +1,4 @@
-"""Where pictures are in tar shards, so that each can be read by itself without unpacking."""
+"""Positions of pictures in tar shards: with them, each picture is read directly, without unpacking the shard."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from vm_embedded.errors import InputError, one_line
 from .picture_files import IMAGES, PictureFiles, Place
 
 PARTS_BY_SUFFIX = {**dict.fromkeys(IMAGES, "image"), ".mask.png": "mask", ".lens.yaml": "lens"}
-"""What files of a shard are; other suffixes are passed over."""
+"""Parts of a picture by suffix; files with other suffixes are ignored."""
 
 
 def key_and_part(name: str) -> tuple[str, str | None]:
-    """The number that a shard's file belongs to, up to the first dot of its name, and which part it is, if any."""
+    """The number of a file in a shard, which ends at the first dot of the name, and its part, or None."""
     number, dot, rest = name.rpartition("/")[2].partition(".")
     return number, PARTS_BY_SUFFIX.get((dot + rest).lower())
 
 
 def find_shards(where: Path) -> list[Path]:
-    """Shards by name: all of a folder, or those of a pattern such as DIR/pictures-*.tar. Raises InputError for none."""
+    """Shards of a folder, or of a pattern such as DIR/pictures-*.tar, by name. Raises InputError if there are none."""
     found = where.glob("*.tar") if where.is_dir() else where.parent.glob(where.name)
     shards = sorted(path for path in found if path.is_file())
     if not shards:
@@ -31,9 +31,9 @@ def find_shards(where: Path) -> list[Path]:
 
 
 def open_shards(where: Path) -> list[PictureFiles]:
-    """All pictures of a folder's shards, or of a pattern's, by number.
+    """All pictures of the shards in a folder or of a pattern, by number.
 
-    Only headers are read. Raises InputError if a shard is damaged, or two pictures have one number.
+    It reads only headers. Raises InputError if a shard is damaged, or if two pictures have the same number.
     """
     pictures: dict[str, PictureFiles] = {}
     for shard in find_shards(where):
@@ -43,13 +43,13 @@ def open_shards(where: Path) -> list[PictureFiles]:
             if other is not picture:
                 raise InputError(f"picture {picture.number} is both in {other.shard} and in {shard}")
     if not pictures:
-        raise InputError(f"the shards {where} hold no pictures: images are named X.jpg or X.png")
+        raise InputError(f"the shards {where} hold no pictures: images must be named X.jpg or X.png")
     return [picture for _, picture in sorted(pictures.items())]
 
 
 @dataclass
 class _Entry:
-    """What a shard holds of one picture: names and places of its parts."""
+    """The parts of one picture in a shard: names and places."""
 
     number: str
     parts: dict[str, tuple[str, Place]] = field(default_factory=dict)
@@ -63,9 +63,9 @@ class _Entry:
 
 
 def _entries(shard: Path) -> Iterator[_Entry]:
-    """Pictures of a shard with an image. Raises InputError naming the shard and where it is damaged."""
+    """The pictures of a shard that have an image. Raises InputError naming the shard and the place of any damage."""
     entries: dict[str, _Entry] = {}
-    after = "its begin"
+    after = "its start"
     try:
         with tarfile.open(shard, "r:") as tar:
             for member in tar:
@@ -77,7 +77,7 @@ def _entries(shard: Path) -> Iterator[_Entry]:
                     entry.parts[part] = member.name, Place(member.offset_data, member.size)
                 after = member.name
             end = tar.offset
-        # tarfile takes the end of a cut file for that of the archive.
+        # tarfile accepts a cut file as a complete archive.
         with shard.open("rb") as file:
             file.seek(end)
             if file.read(512) != bytes(512):

@@ -1,4 +1,4 @@
-"""Pictures of tar shards in the order in which their bytes come, from files, pipes or the network."""
+"""A stream of the pictures in tar shards, from files, pipes or the network."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from .picture_files import PARTS, PictureFault, RawPicture
 from .shard_index import key_and_part
 
 _BUFFER = 256
-"""Pictures that wait for their turn: about 50 MB of JPEG and PNG files of 640 x 512 px."""
+"""Pictures to shuffle at a time: about 50 MB of JPEG and PNG files of 640 x 512 px."""
 
-_PATIENCE = 60.0  # for a server's next bytes [s]
-_PATIENCE_AT_END = 5.0  # for a command to end after its last byte [s]
+_TIMEOUT = 60.0  # for the next bytes of a server [s]
+_TIMEOUT_AT_END = 5.0  # for a command to end after its last byte [s]
 
 
 def stream(
@@ -36,12 +36,12 @@ def stream(
     buffer: int = _BUFFER,
     report: Callable[[PictureFault], None] | None = None,
 ) -> Iterator[RawPicture]:
-    """All pictures of shards, one shard after the other: names of files, "-" for standard input, "pipe:" and a command
-    of the shell, or http and https addresses. A shard may be gzipped.
+    """All pictures of some shards, one shard after the other.
 
-    With a seed they come shuffled: each is drawn from the next `buffer` that are there. A picture that lacks a part is
-    reported and left out, or raised. Raises InputError naming the shard, and the picture and byte after which it is
-    damaged or cut short.
+    shards: file names, "-" for standard input, "pipe:" followed by a shell command, or http and https addresses; each
+    may be gzipped. seed: shuffles the pictures; each is drawn from a buffer with the next `buffer` pictures. report:
+    gets the fault of each picture that lacks a part, which is then skipped; without `report` the fault is raised.
+    Raises InputError for a shard that is damaged or cut short, naming the last good picture and the byte.
     """
     pictures = (picture for shard in shards for picture in _pictures(str(shard), report or _raise))
     return pictures if seed is None else _shuffled(pictures, seed, buffer)
@@ -69,7 +69,7 @@ def _drawn(waiting: list[RawPicture], random: np.random.Generator) -> RawPicture
 
 
 def _pictures(shard: str, report: Callable[[PictureFault], None]) -> Iterator[RawPicture]:
-    after, source = "its begin", _Counted(io.BytesIO())
+    after, source = "its start", _Counted(io.BytesIO())
     try:
         with _opened(shard) as opened:
             source = _Counted(opened)
@@ -84,33 +84,33 @@ def _pictures(shard: str, report: Callable[[PictureFault], None]) -> Iterator[Ra
                 after = f"picture {number}"
     except (tarfile.TarError, OSError, EOFError, zlib.error, HTTPException) as error:
         place = f"after {after}, at byte {source.count}"
-        raise InputError(f"{shard}: can't be read on {place}: {one_line(error)}") from error
+        raise InputError(f"{shard}: can't be read {place}: {one_line(error)}") from error
 
 
 def _picture(shard: str, number: str, parts: Sequence[tuple[str, bytes]]) -> RawPicture:
-    """A picture of parts with their names. Raises PictureFault if it has not one of each."""
+    """A picture from its named parts. Raises PictureFault unless there is exactly one of each."""
     found = dict(parts)
     missing = [part for part in PARTS if part not in found]
     if missing:
-        lacks = f"lacks its {' and '.join(missing)}, or its files are not in a row"
+        lacks = f"lacks its {' and '.join(missing)}, or its files are not next to each other"
         raise PictureFault(f"{shard}: picture {number} {lacks}", "missing")
     if len(parts) > len(found):
         raise PictureFault(f"{shard} has two files for one part of picture {number}")
     try:
         return RawPicture(number, found["image"], found["mask"], found["lens"].decode("utf-8"))
     except UnicodeDecodeError as error:
-        raise PictureFault(f"{shard}: the lens file of picture {number} is no text", "lens") from error
+        raise PictureFault(f"{shard}: the lens file of picture {number} is not UTF-8 text", "lens") from error
 
 
 def _files(source: _Counted) -> Iterator[tuple[str, str, bytes]]:
-    """Number, part and content of a tar's files."""
+    """Number, part and content of the files of a tar archive."""
     with tarfile.open(fileobj=source, mode="r|") as tar:
         for member in tar:
             number, part = key_and_part(member.name)
             content = tar.extractfile(member) if member.isfile() and part is not None else None
             if content is not None and part is not None:
                 yield number, part, content.read()
-    # tarfile takes the end of a cut stream for that of the archive, whose last 512 bytes are 0.
+    # tarfile accepts a cut stream as a complete archive; the last 512 bytes of a complete one are 0.
     while source.read(1 << 16):
         pass
     if source.last != bytes(512):
@@ -118,7 +118,7 @@ def _files(source: _Counted) -> Iterator[tuple[str, str, bytes]]:
 
 
 class _Counted(io.RawIOBase):
-    """A stream that knows how many bytes came, and the last 512 of them."""
+    """A stream that counts its bytes and keeps the last 512 of them."""
 
     def __init__(self, source: IO[bytes]) -> None:
         self._source, self.count, self.last = source, 0, b""
@@ -132,20 +132,20 @@ class _Counted(io.RawIOBase):
 
 @contextmanager
 def _opened(shard: str) -> Iterator[IO[bytes]]:
-    """A shard's bytes, unzipped. Raises OSError, also where a command failed."""
+    """The unzipped bytes of a shard. Raises OSError, also if a command failed."""
     if shard.startswith("pipe:"):
         with subprocess.Popen(shard.removeprefix("pipe:"), shell=True, stdout=subprocess.PIPE) as process:
             assert process.stdout is not None
             try:
                 yield _unzipped(process.stdout)
                 _end(process)
-            except tarfile.TarError:  # what a command writes that fails is no tar
+            except tarfile.TarError:  # a command that fails writes no valid archive
                 _end(process)
                 raise
             finally:
-                process.kill()  # also where the reader wants no more
+                process.kill()  # also if the reader stops early
     elif shard.startswith(("http://", "https://")):
-        with urlopen(shard, timeout=_PATIENCE) as answer:
+        with urlopen(shard, timeout=_TIMEOUT) as answer:
             yield _unzipped(io.BufferedReader(answer))
     elif shard == "-":
         yield _unzipped(sys.stdin.buffer)
@@ -155,9 +155,9 @@ def _opened(shard: str) -> Iterator[IO[bytes]]:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Raise OSError if a command failed; one that goes on for no reason is left alone."""
+    """Raise OSError if a command failed. A command that is still running has not failed."""
     with suppress(subprocess.TimeoutExpired):
-        if process.wait(_PATIENCE_AT_END):
+        if process.wait(_TIMEOUT_AT_END):
             raise OSError(f"its command ended with status {process.returncode}")
 
 

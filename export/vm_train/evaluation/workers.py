@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 from vm_embedded.detection.settings import Settings
-from vm_embedded.errors import VisualMeshError
-from vm_workstation.worker_process import begin, shielded
+from vm_workstation.worker_process import begin, shielded, worker_pool
 
 from ..data.classes import Classes
 from ..data.picture_files import PictureFiles
@@ -63,15 +59,10 @@ def _parts(job: Job, subject: Subject, chunks: Sequence[Sequence[PictureFiles]],
         return
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
-    pool = ProcessPoolExecutor(min(workers, len(chunks)), get_context("spawn"), _start, (job,))
-    try:
+    with worker_pool(min(workers, len(chunks)), _start, (job,)) as pool:
         with shielded():
             results = pool.map(_evaluate_chunk, chunks)
         yield from results
-    except BrokenProcessPool as error:
-        raise VisualMeshError("a worker was killed (out of memory?)") from error
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
 
 
 _worker: tuple[Job, Subject] | None = None

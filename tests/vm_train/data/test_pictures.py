@@ -73,17 +73,17 @@ FAULTS = {
     ),
     "gray mask": (
         "color",
-        "an RGB or RGBA picture of 8 bits, but this has 1 channel of 8 bits",
+        "a mask must have 3 or 4 channels of 8 bits, not 1 channel of 8 bits",
         lambda f: picture_file(f, "mask0000001.png", np.zeros((120, 160), np.uint8)),
     ),
     "deep mask": (
         "color",
-        "but this has 3 channels of 16 bits",
+        "not 3 channels of 16 bits",
         lambda f: picture_file(f, "mask0000001.png", np.zeros((120, 160, 3), np.uint16)),
     ),
     "unknown color": (
         "color",
-        "19200 pixels of the mask have a color of no class, as [250, 7, 7]; the nearest is [255, 0, 0] of ball",
+        "19200 pixels of the mask have colors that belong to no class: [250, 7, 7]; the nearest is [255, 0, 0] of ball",
         lambda f: picture_file(f, "mask0000001.png", np.full((120, 160, 3), (7, 7, 250), np.uint8)),
     ),
     "typo in a key": (
@@ -108,7 +108,7 @@ FAULTS = {
     ),
     "lens no text": (
         "lens",
-        "lens0000001.yaml: is no text",
+        "lens0000001.yaml: is not UTF-8 text",
         lambda f: (f / "lens0000001.yaml").write_bytes(b"\xff\xfe\x00"),
     ),
 }
@@ -209,7 +209,7 @@ def test_folders_without_pictures_are_refused(tmp_path):
     with pytest.raises(InputError, match="no pictures"):
         find_pictures(tmp_path)
     (tmp_path / "image1.bmp").touch()
-    with pytest.raises(InputError, match="has another suffix"):
+    with pytest.raises(InputError, match="files in it have another suffix"):
         find_pictures(tmp_path)
     with pytest.raises(InputError, match="no folder"):
         find_pictures(tmp_path / "nowhere")
