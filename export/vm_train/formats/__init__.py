@@ -1,1 +1,1 @@
-"""Files of other programs: TFRecord and tar shards."""
+"""Files of other programs: TFRecord files, which it imports, and tar shards, which it writes."""

@@ -1,4 +1,4 @@
-"""The checksum of TFRecord files, CRC-32C (Castagnoli), fast enough for pictures without a package."""
+"""CRC-32C (Castagnoli), the checksum of TFRecord files, in numpy and fast enough for pictures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _Registers = npt.NDArray[np.uint32]
 
 
 def masked_crc32c(data: bytes) -> int:
-    """The CRC-32C as TFRecord files have it: rotated by 15 bits, plus a constant."""
+    """The checksum in TFRecord files: the CRC-32C rotated by 15 bits, plus a constant."""
     crc = crc32c(data)
     return ((crc >> 15 | crc << 17) + 0xA282EAD8) & 0xFFFFFFFF
 
@@ -19,8 +19,8 @@ def masked_crc32c(data: bytes) -> int:
 def crc32c(data: bytes) -> int:
     """CRC-32C (Castagnoli).
 
-    The register is linear over GF(2), so the two halves of a text can be taken apart: that of the first, moved on by
-    as many zero bytes as the second has, plus (xor) that of the second. Long data are folded so in pairs, all pairs
+    The register is linear over GF(2). So the register of a text is that of its first half, moved on by as many zero
+    bytes as the second half has, plus (xor) that of the second half. Long data are folded in pairs this way, all pairs
     of a level at once.
     """
     if len(data) < 256:
@@ -28,10 +28,10 @@ def crc32c(data: bytes) -> int:
         for byte in data:
             register = table[(register ^ byte) & 255] ^ register >> 8
         return register ^ 0xFFFFFFFF
-    start = -len(data) % 4  # zeros in front change nothing while the register is zero
+    start = -len(data) % 4  # leading zeros do not change a register of zero
     text = np.zeros(start + len(data), dtype=np.uint8)
     text[start:] = np.frombuffer(data, dtype=np.uint8)
-    text[start : start + 4] ^= 255  # stands for the register's first value
+    text[start : start + 4] ^= 255  # has the effect of the initial register
     words = text.view(np.uint32)
     level = 0
     while len(words) > 1:
@@ -53,7 +53,7 @@ def _moved_on(registers: _Registers, level: int) -> _Registers:
 
 @cache
 def _tables(level: int) -> _Registers:
-    """What each byte of a register (4, 256) becomes after 4 * 2^level zero bytes."""
+    """Registers (4, 256) after 4 * 2^level zero bytes, from each value of each byte of a register."""
     if level > 0:
         return _moved_on(_tables(level - 1).ravel(), level - 1).reshape(4, 256)
     registers = np.arange(256, dtype=np.uint32) << np.array([[0], [8], [16], [24]], dtype=np.uint32)
@@ -64,7 +64,7 @@ def _tables(level: int) -> _Registers:
 
 @cache
 def _byte_table() -> _Registers:
-    """What each value (256,) of a register's lowest byte becomes after one zero byte."""
+    """Registers (256,) after one zero byte, from each value of a register's lowest byte."""
     registers = np.arange(256, dtype=np.uint32)
     for _ in range(8):
         registers = np.where(registers & 1, registers >> 1 ^ 0x82F63B78, registers >> 1).astype(np.uint32)

@@ -16,21 +16,21 @@ from vm_embedded.errors import InputError
 
 @dataclass(frozen=True)
 class BytesList:
-    """Values of a feature that is bytes."""
+    """Values of a feature of type bytes."""
 
     values: tuple[bytes, ...]
 
 
 @dataclass(frozen=True)
 class FloatList:
-    """Values of a feature that is float; the file keeps 32 bits of each."""
+    """Values of a feature of type float; the file stores 32 bits of each."""
 
     values: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Int64List:
-    """Values of a feature that is int64."""
+    """Values of a feature of type int64."""
 
     values: tuple[int, ...]
 
@@ -44,10 +44,10 @@ _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 
 
 def parse_example(payload: bytes) -> Example:
-    """The features of an Example by name; those that have no list are left out.
+    """The features of an Example by name, without those that have no list.
 
-    As protobuf has it, lists of numbers may be packed or not, fields that are not known are passed over, and a message
-    in parts is the sum of its parts. Raises InputError if the payload is no Example.
+    It follows the rules of protobuf: lists of numbers may be packed, unknown fields are ignored, and the parts of a
+    message are merged. Raises InputError if the payload is not an Example.
     """
     example: dict[str, Feature] = {}
     for entry in _inner(_joined(_inner(memoryview(payload), 1)), 1):
@@ -103,7 +103,7 @@ def _integers(message: memoryview) -> tuple[int, ...]:
 
 
 def _inner(message: memoryview, wanted: int) -> list[memoryview]:
-    """All values of a field that is bytes, text or a message."""
+    """All values of a field of type bytes, text or message."""
     found = []
     for number, wire, value in _fields(message):
         if number == wanted:
@@ -114,7 +114,7 @@ def _inner(message: memoryview, wanted: int) -> list[memoryview]:
 
 
 def _joined(parts: list[memoryview]) -> memoryview:
-    """A message from its parts: protobuf's sum of messages is their bytes one after the other."""
+    """A message from its parts: to merge messages, protobuf concatenates their bytes."""
     return parts[0] if len(parts) == 1 else memoryview(b"".join(parts))
 
 
@@ -126,13 +126,13 @@ def _text(value: memoryview) -> str:
 
 
 def _fields(message: memoryview) -> Iterator[tuple[int, int, int | memoryview]]:
-    """Number, wire type and value of each field: a number if the wire type is _VARINT, else its bytes."""
+    """Number, wire type and value of each field. The value is a number for _VARINT, otherwise bytes."""
     at = 0
     while at < len(message):
         tag, at = _varint(message, at)
         number, wire = tag >> 3, tag & 7
         if not 1 <= number < 2**29:
-            raise _no_example(f"there is no field {number}")
+            raise _no_example(f"field number {number} is out of range")
         if wire == _VARINT:
             value, at = _varint(message, at)
             yield number, wire, value
@@ -142,19 +142,19 @@ def _fields(message: memoryview) -> Iterator[tuple[int, int, int | memoryview]]:
         elif wire in (_FIXED32, _FIXED64):
             size = 4 if wire == _FIXED32 else 8
         else:
-            raise _no_example(f"wire type {wire} is not used")
+            raise _no_example(f"unknown wire type {wire}")
         if size > len(message) - at:
-            raise _no_example("it breaks off")
+            raise _no_example("it is cut short")
         yield number, wire, message[at : at + size]
         at += size
 
 
 def _varint(message: memoryview, at: int) -> tuple[int, int]:
-    """The number below 2^64 that begins at `at`, and where the next thing begins."""
+    """The number below 2^64 at position `at`, and the position after it."""
     value = 0
     for shift in range(0, 70, 7):
         if at >= len(message):
-            raise _no_example("it breaks off")
+            raise _no_example("it is cut short")
         byte = message[at]
         at += 1
         value |= (byte & 127) << shift
@@ -167,14 +167,14 @@ def _varint(message: memoryview, at: int) -> tuple[int, int]:
     return value, at
 
 
-def _no_example(what: str) -> InputError:
-    return InputError(f"not an Example: {what}")
+def _no_example(reason: str) -> InputError:
+    return InputError(f"not an Example: {reason}")
 
 
 def example_bytes(example: Example) -> bytes:
-    """The payload of an Example, as protobuf writes it, with the features in the order of the mapping.
+    """The payload of an Example as protobuf writes it, with the features in the order of the mapping.
 
-    Raises OverflowError for a number that the list can't hold.
+    Raises OverflowError for a number that does not fit into its list.
     """
     entries = (
         _field(1, _field(1, name.encode()) + _field(2, _feature_bytes(feature))) for name, feature in example.items()

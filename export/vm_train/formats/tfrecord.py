@@ -22,7 +22,7 @@ from .crc32c import masked_crc32c
 from .tfexample import Example, parse_example
 
 _LARGEST = 2**31 - 1  # bytes of a protobuf message
-_PIECE = 2**24  # bytes; read at a time, so that a wrong length does not ask for memory that the file can't fill
+_PIECE = 2**24  # bytes to read at a time, so a wrong length never allocates more memory than the file has bytes
 _HEADER = 12  # bytes
 
 
@@ -30,7 +30,7 @@ _HEADER = 12  # bytes
 class Record:
     """One record of a file.
 
-    checksum: of the payload, masked, as the file has it. position: how far the file is read [bytes on disk].
+    checksum: of the payload, masked, from the file. position: number of bytes read from the file so far.
     """
 
     path: Path
@@ -41,18 +41,18 @@ class Record:
 
     @property
     def where(self) -> str:
-        """File and number, for messages."""
+        """File and record number, for messages."""
         return f"{self.path}: record {self.number}"
 
     def check(self) -> None:
-        """Raise InputError if the payload does not fit its checksum."""
+        """Raise InputError if the payload does not match its checksum."""
         if masked_crc32c(self.payload) != self.checksum:
             raise InputError(f"{self.where} is damaged: the checksum of its content is wrong")
 
     def example(self, checked: bool = True) -> Example:
-        """The Example in the payload, after `check` unless told otherwise. Raises InputError naming file and record.
+        """The Example in the payload. checked: call `check` first. Raises InputError naming file and record.
 
-        The check takes some 3 ms a megabyte, far less than decoding its pictures.
+        The check takes about 3 ms per megabyte, far less than decoding the pictures.
         """
         if checked:
             self.check()
@@ -65,9 +65,9 @@ class Record:
 def read_records(path: Path) -> Iterator[Record]:
     """The records of a TFRecord file, plain or gzip, one in memory at a time.
 
-    Checksums of lengths are checked always, those of payloads by `Record.check` and `Record.example`: what follows a
-    damaged payload can still be read, what follows a damaged length can't. An empty file has no records. Raises
-    InputError naming file, record and fault.
+    The checksums of lengths are always checked; `Record.check` and `Record.example` check those of payloads. So records
+    after a damaged payload can be read, but not after a damaged length. An empty file has no records. Raises InputError
+    naming file, record and fault.
     """
     number = 0
     try:
@@ -81,7 +81,7 @@ def read_records(path: Path) -> Iterator[Record]:
                     raise _truncated(path, number)
                 yield Record(path, number, payload, int.from_bytes(end, "little"), file.tell())
                 number += 1
-    except EOFError as error:  # gzip's, of a file that breaks off
+    except EOFError as error:  # gzip raises it for a file that is cut short
         raise _truncated(path, number) from error
     except (zlib.error, gzip.BadGzipFile) as error:
         raise InputError(f"{path}: record {number}: the gzip file is damaged: {one_line(error)}") from error
@@ -90,9 +90,9 @@ def read_records(path: Path) -> Iterator[Record]:
 
 
 def write_records(path: Path, payloads: Iterable[bytes], compressed: bool = False) -> None:
-    """Write a TFRecord file, plain or gzip, that takes its place once it is whole. Raises InputError if it can't."""
+    """Write a TFRecord file, plain or gzip, atomically. Raises InputError if it can't be written."""
     with atomic_write(path) as part, part.open("wb") as file:
-        # Without time and name, so that the same records make the same file. Pictures are compressed already.
+        # Without time and name: the same records give the same file. Level 1, as pictures are compressed already.
         packed = gzip.GzipFile("", "wb", compresslevel=1, fileobj=file, mtime=0) if compressed else nullcontext(file)
         with packed as stream:
             for payload in payloads:
@@ -105,7 +105,7 @@ def write_records(path: Path, payloads: Iterable[bytes], compressed: bool = Fals
 def _is_gzip(file: io.BufferedReader) -> bool:
     head = file.read(_HEADER)
     file.seek(0)
-    # A plain record of 559,903 bytes begins as gzip does, so a length that fits its checksum goes first.
+    # A plain record of 559,903 bytes starts like a gzip file, so a length with a correct checksum takes precedence.
     return head.startswith(b"\x1f\x8b") and not _fits(head)
 
 
@@ -114,9 +114,9 @@ def _fits(header: bytes) -> bool:
 
 
 def _length(path: Path, number: int, header: bytes) -> int:
-    """Length [bytes] that a record's header tells. Raises InputError."""
+    """Length of a payload [bytes], from the header of its record. Raises InputError."""
     if number == 0 and not _fits(header):
-        raise InputError(f"{path} is not a TFRecord file, or damaged from its first bytes on")
+        raise InputError(f"{path} is not a TFRecord file, or its first bytes are damaged")
     if len(header) < _HEADER:
         raise _truncated(path, number)
     if not _fits(header):
@@ -128,11 +128,11 @@ def _length(path: Path, number: int, header: bytes) -> int:
 
 
 def _truncated(path: Path, number: int) -> InputError:
-    return InputError(f"{path} is truncated: it breaks off in record {number}")
+    return InputError(f"{path} is cut short in record {number}")
 
 
 def _read(stream: io.BufferedIOBase, count: int) -> bytes:
-    """The next `count` bytes, or fewer where the file ends."""
+    """The next `count` bytes, or fewer at the end of the file."""
     if count <= _PIECE:
         return stream.read(count)
     pieces = []

@@ -1,1 +1,1 @@
-"""How good answers are: scores of points and of objects, by distance."""
+"""Scores of points and of objects, by distance: precision, recall, curves, and errors of distance."""

@@ -1,6 +1,7 @@
-"""What scores of points and of objects have in common: outcomes of a threshold, and the curve over all of them.
+"""The base of the scores of points and of objects: the outcome at a threshold, and the precision-recall curve.
 
-A score without a value, as the recall of what does not occur, is NaN, never 0; `without_nan` makes it None for JSON.
+Scores without a value, such as the recall of a class that does not occur, are NaN, never 0; `without_nan` turns them
+into None for JSON.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ Counts = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Outcome:
-    """Numbers of what was reported rightly (hits) and wrongly (false), and of what was not but should be (missed)."""
+    """Numbers of true positives (hits), false positives (false) and false negatives (missed) at a threshold."""
 
     hits: int
     false: int
@@ -26,17 +27,17 @@ class Outcome:
 
     @property
     def precision(self) -> float:
-        """Share of what was reported that is right; NaN if nothing was."""
+        """Share of the reported ones that are right; NaN if nothing was reported."""
         return ratio(self.hits, self.hits + self.false)
 
     @property
     def recall(self) -> float:
-        """Share of what there is that was reported; NaN if there is nothing."""
+        """Share of the true ones that were reported; NaN if there are none."""
         return ratio(self.hits, self.hits + self.missed)
 
     @property
     def f1(self) -> float:
-        """Harmonic mean of precision and recall, 0 without a hit; NaN if there is nothing to be found."""
+        """Harmonic mean of precision and recall, 0 without a hit; NaN if there is nothing to find."""
         if self.hits + self.missed == 0:
             return math.nan
         return ratio(2 * self.hits, 2 * self.hits + self.false + self.missed)
@@ -44,8 +45,10 @@ class Outcome:
 
 @dataclass(frozen=True, eq=False)
 class PrecisionRecall:
-    """Precision and recall (m,) of what is at or above thresholds (m,), falling; without thresholds that add nothing.
-    positives: what there is to be found; if it is 0, recall is NaN."""
+    """Precision and recall (m,) at falling thresholds (m,); each threshold reports more than the one before.
+
+    positives: number of true ones; without any, recall is NaN.
+    """
 
     thresholds: Floats
     precision: Floats
@@ -54,10 +57,10 @@ class PrecisionRecall:
 
     @property
     def average_precision(self) -> float:
-        """Area under the curve as Pascal VOC takes it since 2010; NaN if there is nothing to be found.
+        """Area under the curve by the rule of Pascal VOC since 2010; NaN if there is nothing to find.
 
-        The precision at a recall is the highest that is reached at that recall or above, so the curve falls in steps,
-        and the area is the sum over all its steps. COCO takes the mean of the same steps at 101 recalls.
+        The precision at a recall is the highest at this recall or above, so the curve falls in steps, and the area is
+        the sum over all steps. COCO averages the same steps at 101 recalls.
         """
         if self.positives == 0:
             return math.nan
@@ -66,15 +69,15 @@ class PrecisionRecall:
 
 
 def ratio(part: float, whole: float) -> float:
-    """part / whole, NaN if there is no whole."""
+    """part / whole, NaN if whole is 0."""
     return part / whole if whole else math.nan
 
 
 def shares(parts: Counts, whole: int) -> Floats:
-    """parts (m,) / whole, NaN if there is no whole."""
+    """parts (m,) / whole, NaN if whole is 0."""
     return parts / whole if whole else np.full(len(parts), np.nan)
 
 
 def without_nan(values: dict[str, float]) -> dict[str, float | None]:
-    """The same with None for NaN, which JSON does not have."""
+    """The same values with None for NaN, which JSON does not have."""
     return {name: None if math.isnan(value) else value for name, value in values.items()}

@@ -1,4 +1,4 @@
-"""Bins of distance, by which all scores are told apart."""
+"""Distance bins, for scores by distance."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from vm_embedded.arrays import Floats
 from vm_embedded.errors import InputError
 
 DISTANCE_EDGES: Floats = np.linspace(0.0, 10.0, 21)
-"""Edges of distance bins [m], as far as the paper's figures go."""
+"""Edges of distance bins [m], up to the largest distance in the paper's figures."""
 
 
 def checked_edges(edges: Floats) -> Floats:
-    """A copy of the edges (D + 1,). Raises InputError unless they are two or more rising numbers."""
+    """A copy of the edges (D + 1,) [m]. Raises InputError unless there are two or more, and they rise."""
     copy = np.array(edges, dtype=np.float64)
     if copy.ndim != 1 or len(copy) < 2 or not np.isfinite(copy).all() or not (np.diff(copy) > 0.0).all():
-        raise InputError(f"edges of distances must be two or more rising numbers [m], not {np.asarray(edges).tolist()}")
+        raise InputError(f"distance edges must be two or more rising numbers [m], not {np.asarray(edges).tolist()}")
     return copy
 
 
 def bins_of(distances: Floats, edges: Floats) -> npt.NDArray[np.intp]:
-    """Bins (n,) of distances (n,) between edges (D + 1,), counted from 0; D for those in none, as NaN.
+    """Bin numbers (n,) of distances (n,) between edges (D + 1,), from 0; D for distances outside all bins and for NaN.
 
-    Bins include their lower edge.
+    A bin includes its lower edge.
     """
     bins = np.searchsorted(edges, distances, side="right") - 1
     return np.where(bins < 0, len(edges) - 1, bins)
 
 
 def named_bins(edges: Floats) -> dict[str, int | None]:
-    """Names of all distances together, `all`, and of each bin, as `0.5-1`, with the bins' numbers."""
+    """Bin numbers by name: None for `all` distances together, and a number for each bin, such as `0.5-1`."""
     return {"all": None} | {f"{low:g}-{high:g}": number for number, (low, high) in enumerate(pairwise(edges.tolist()))}

@@ -1,6 +1,6 @@
-"""Found objects in the order of their confidence: precision, recall, false ones, and errors of distance.
+"""Found objects ranked by confidence: precision, recall, false objects, and errors of distance.
 
-A score without a value, as the recall where no object is, is NaN, never 0; `as_dict` makes it None.
+Scores without a value, such as the recall without any true object, are NaN, never 0; `as_dict` writes None.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from .curves import Outcome, PrecisionRecall, ratio, shares, without_nan
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Of found objects that are right: their number, and errors [m] of distance and of place on the plane.
+    """Errors [m] of correctly found objects, and their number. All errors are NaN if there are none.
 
-    distance_*: of absolute errors. bias, low, high: median, 10 and 90 % quantiles of signed ones, above 0 if found too
-    far. relative_*: of absolute errors over the true distance. place_*: from the true point on the plane to the found
-    one. NaN if there is none.
+    distance_*: absolute error of the distance. bias, low, high: median, 10 % and 90 % quantile of the signed error,
+    positive if found too far away. relative_*: absolute error over the true distance. place_*: distance on the plane
+    from the true to the found position.
     """
 
     count: int
@@ -41,21 +41,24 @@ class Errors:
 
 @dataclass(frozen=True)
 class ObjectOutcome(Outcome):
-    """Numbers of objects that were found (hits) or not (missed), of false ones, and of pictures."""
+    """Numbers of objects found (hits), missed and false, and of pictures."""
 
     pictures: int
 
     @property
     def false_per_picture(self) -> float:
-        """False ones in a picture; NaN without pictures."""
+        """Mean number of false objects per picture; NaN without pictures."""
         return ratio(self.false, self.pictures)
 
 
 @dataclass(frozen=True, eq=False)
 class ObjectRanking:
-    """Found objects that count, at one overlap: of each confidence (m,), whether it is right (m,), true and found
-    distance (m,) [m], and error of place (m,) [m]; true distance and place are NaN for false ones. truths: number of
-    true objects that count. pictures: number of pictures, of all distances."""
+    """The found objects that count, at one overlap.
+
+    confidence (m,). right (m,): whether it matches a true object. true_distance, found_distance, place_error (m,) [m];
+    true distance and place error of false objects are NaN. truths: number of true objects that count. pictures: number
+    of all pictures, whatever the distance.
+    """
 
     confidence: Floats
     right: Mask
@@ -67,26 +70,26 @@ class ObjectRanking:
 
     @cached_property
     def precision_recall(self) -> PrecisionRecall:
-        """The curve over all confidences. Its average precision is 0 if there are objects and none is found."""
+        """The curve over all confidences. If there are true objects and none is found, its average precision is 0."""
         order = np.argsort(-self.confidence)
         ranked, hits = self.confidence[order], np.cumsum(self.right[order], dtype=np.int64)
-        # Equals are reported together, so that the curve does not depend on the order of pictures.
-        last = np.flatnonzero(np.diff(ranked, append=-np.inf))  # of each group of equals
+        # Equal confidences count together, so the curve does not depend on the order of the pictures.
+        last = np.flatnonzero(np.diff(ranked, append=-np.inf))  # of each group of equal confidences
         return PrecisionRecall(ranked[last], hits[last] / (last + 1.0), shares(hits[last], self.truths), self.truths)
 
     def at(self, confidence: float = 0.0) -> ObjectOutcome:
-        """What comes of reporting all of this confidence or above."""
+        """The outcome if all objects of at least this confidence are reported."""
         reported = self.confidence >= confidence
         hits = int((self.right & reported).sum())
         return ObjectOutcome(hits, int(reported.sum()) - hits, self.truths - hits, self.pictures)
 
     def errors(self, confidence: float = 0.0) -> Errors:
-        """Errors of the right ones of this confidence or above whose true place is known."""
+        """Errors of the correctly found objects of at least this confidence whose true position is known."""
         chosen = self.right & (self.confidence >= confidence) & np.isfinite(self.true_distance + self.found_distance)
         true = self.true_distance[chosen]
         signed = self.found_distance[chosen] - true
         absolute = np.abs(signed)
-        away = true > 0.0  # straight below the camera no error is a share of the distance
+        away = true > 0.0  # below the camera, a relative error is undefined
         relative = absolute[away] / true[away]
         place = self.place_error[chosen]
         return Errors(
@@ -103,7 +106,7 @@ class ObjectRanking:
         )
 
     def as_dict(self, confidence: float = 0.0) -> dict[str, Any]:
-        """All numbers but the curve, for JSON."""
+        """All numbers except the curve, for JSON."""
         outcome = self.at(confidence)
         counts = {"truths": self.truths, "pictures": self.pictures, "hits": outcome.hits, "false": outcome.false}
         values = {
@@ -118,5 +121,5 @@ class ObjectRanking:
 
 
 def _quantile(values: npt.NDArray[np.float64], share: float) -> float:
-    """Value below which that share of the values (n,) is; NaN if there is none."""
+    """The quantile of values (n,) for a share from 0 to 1; NaN without values."""
     return float(np.quantile(values, share)) if len(values) else math.nan

@@ -1,4 +1,4 @@
-"""True and found objects, and how much they have in common: the pixels of outlines and masks."""
+"""True and found objects, and the overlaps of their pixels."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from vm_embedded.arrays import Floats, Mask, Singles
 from vm_embedded.geometry.lens import Size
 
 _LINES = 8
-"""Scan lines per row of pixels, along which the share inside an outline is exact."""
+"""Scan lines per row of pixels. Along a scan line, the share inside an outline is exact."""
 
 Window = tuple[slice, slice]
 """Rows and columns of a picture."""
 
 
-class Found(Protocol):
-    """What is needed of a found object; `vm_embedded.detection.detections.Detection` is one.
+class FoundObject(Protocol):
+    """A found object, for example a `vm_embedded.detection.detections.Detection`.
 
-    confidence. outline (m, 2) [px]: of the whole object, also beyond the picture. position (3,) [m]: on the plane.
+    confidence: 0 to 1. outline (m, 2) [px]: of the whole object, also outside the picture. position (3,) [m]: on the
+    plane.
     """
 
     @property
@@ -34,12 +35,12 @@ class Found(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class TrueObject:
-    """An object that is in a picture.
+    """A true object of a picture.
 
-    mask (h, w): bool, or the share of each pixel that is the object's, 0 to 1. It is what shows of the object, or all
-    of it inside the picture, where that is known: of what shows, an outline of the whole can't overlap more than
-    `visible`. position (3,) [m]: on the plane, in the frame of what is found; NaN if not known. radius [px]: of a disk
-    as large as its whole outline. visible: share of that outline that shows.
+    mask (h, w): bool, or the share of each pixel that the object covers, 0 to 1. If known, it includes hidden parts
+    inside the picture: with the visible part alone, the IoU of a correct outline could not exceed `visible`. position
+    (3,) [m]: on the plane, in the same frame as found positions; NaN if unknown. radius [px]: of a disk with the area
+    of the whole outline. visible: visible share of the outline.
     """
 
     mask: Mask | Singles
@@ -49,9 +50,9 @@ class TrueObject:
 
 
 def coverage(outline: Floats, size: Size) -> tuple[Window, Floats]:
-    """A window of the picture that the polygon (m, 2) [px] lies in, and the share (h, w) of each of its pixels inside.
+    """The part of the picture around a polygon (m, 2) [px], and the share (h, w) of each pixel inside the polygon.
 
-    Corners that are not finite are left out. Where the outline crosses itself, what it goes around twice is outside.
+    Corners that are not finite are ignored. Areas that a polygon surrounds twice count as outside.
     """
     corners = outline[np.isfinite(outline).all(axis=1)]
     if len(corners) < 3:
@@ -68,7 +69,7 @@ def coverage(outline: Floats, size: Size) -> tuple[Window, Floats]:
         with np.errstate(divide="ignore", invalid="ignore"):
             crossings = np.where(crosses, x + (height - y) * ((next_x - x) / (next_y - y)), np.inf)
         crossings.sort(axis=1)
-        # What is right of a crossing turns from outside to inside, and at the next one back.
+        # Pixels right of the first crossing are inside, those right of the second are outside, and so on.
         for number in range(int(crosses.sum(axis=1).max(initial=0))):
             beyond = np.clip(columns + 0.5 - crossings[:, number, None], 0.0, 1.0)
             share += -beyond if number % 2 else beyond
@@ -76,31 +77,31 @@ def coverage(outline: Floats, size: Size) -> tuple[Window, Floats]:
 
 
 @dataclass(frozen=True, eq=False)
-class Common:
-    """Areas (n, m) [px^2] of n found and m true objects in the picture, and what they have in common."""
+class CommonAreas:
+    """Areas (n, m) [px^2] inside the picture: of n found objects, of m true objects, and of both at once."""
 
     found: Floats
     true: Floats
     both: Floats
 
     @property
-    def of_union(self) -> Floats:
-        """What they have in common over what either covers, IoU (n, m)."""
+    def iou(self) -> Floats:
+        """Intersection over union (n, m)."""
         return _over(self.both, self.found + self.true - self.both)
 
     @property
-    def of_lesser(self) -> Floats:
-        """What they have in common over the smaller of the two (n, m)."""
+    def over_smaller(self) -> Floats:
+        """Intersection over the smaller of the two areas (n, m)."""
         return _over(self.both, np.minimum(self.found, self.true))
 
 
-def common_areas(truths: Sequence[TrueObject], found: Sequence[Found]) -> Common:
-    """What the found and the true objects have in common.
+def common_areas(truths: Sequence[TrueObject], found: Sequence[FoundObject]) -> CommonAreas:
+    """The common areas of found and true objects.
 
-    With a mask of whole pixels, a pixel is the found one's if half of it or more is: a right outline then overlaps
-    wholly. With one of shares, the common share of a pixel is the lesser of the two.
+    With a bool mask, a found object covers a pixel if at least half of the pixel is inside its outline; so the correct
+    outline has an IoU of 1. With a mask of shares, the common share of a pixel is the smaller of both.
     """
-    areas = Common(*np.zeros((3, len(found), len(truths))))
+    areas = CommonAreas(*np.zeros((3, len(found), len(truths))))
     if not truths:
         return areas
     height, width = truths[0].mask.shape
@@ -117,5 +118,5 @@ def common_areas(truths: Sequence[TrueObject], found: Sequence[Found]) -> Common
 
 
 def _over(part: Floats, whole: Floats) -> Floats:
-    """part / whole (n, m), 0 where there is no whole."""
+    """part / whole (n, m), 0 where whole is 0."""
     return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0.0)

@@ -17,19 +17,23 @@ from vm_embedded.arrays import Floats
 from .curves import Counts, Outcome, PrecisionRecall, ratio, shares, without_nan
 
 BINS = 2048
+"""Bins of a histogram of probabilities."""
 
 PROBABILITY_EDGES: Floats = 0.5 + 0.5 * np.sin(np.pi * (np.arange(BINS + 1) / BINS - 0.5))
 """Edges (BINS + 1,) of the histograms, equally far apart in arcsin(sqrt(p)); 0, 0.5 and 1 are among them.
 
-Trained networks answer near 0 and 1, and there the ranks are to be kept: the bins at the ends are 6e-7 wide, the widest
-in the middle 8e-4. Bins include their lower edge, the last one also its upper.
+Trained networks give probabilities near 0 and 1, so bins are narrow there, to keep the order of points: 6e-7 at the
+ends, and 8e-4 in the middle. A bin includes its lower edge; the last bin also includes its upper edge.
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Roc:
-    """Outcome (m + 1,) of false and true positives at or above thresholds (m + 1,), from infinity and (0, 0) to (1, 1).
-    A rate is NaN if its class is empty."""
+    """The ROC curve: false and true positive rates (m + 1,) at falling thresholds (m + 1,), from (0, 0) to (1, 1).
+
+    The first threshold is infinite. Without points of the class, the true positive rate is NaN; without other points,
+    the false positive rate is NaN.
+    """
 
     thresholds: Floats
     false_positive_rate: Floats
@@ -37,8 +41,10 @@ class Roc:
 
     @property
     def area(self) -> float:
-        """Area under the straight lines between the points: the chance that a point of the class has the higher
-        probability than one that is not, where equal ones count half. NaN without both kinds."""
+        """Area under the curve by the trapezoidal rule; NaN if one of the rates is.
+
+        It is the chance that a point of the class has a higher probability than another point; equal ones count half.
+        """
         if math.isnan(self.true_positive_rate[-1] + self.false_positive_rate[-1]):
             return math.nan
         heights = (self.true_positive_rate[1:] + self.true_positive_rate[:-1]) / 2.0
@@ -47,25 +53,27 @@ class Roc:
 
 @dataclass(frozen=True)
 class PointOutcome(Outcome):
-    """Numbers of points of a class that were taken for it (hits) or not (missed), and of all others that were taken
-    for it (false) or not (rejected)."""
+    """Numbers of points at a threshold: of the class (hits, missed), and of other classes (false, rejected)."""
 
     rejected: int
 
     @property
     def mcc(self) -> float:
-        """Matthews' correlation of truth and answer, -1 to 1; NaN if all are of one truth or of one answer."""
+        """Matthews correlation coefficient, -1 to 1; NaN if all points have the same truth or the same answer."""
         product = (self.hits + self.false) * (self.missed + self.rejected) * self._positives * self._negatives
         return ratio(self.hits * self.rejected - self.false * self.missed, math.sqrt(product))
 
     @property
     def informedness(self) -> float:
-        """Recall plus share of the others that was rejected, minus 1; NaN if all are of one truth."""
+        """Recall plus the share of other points that are rejected, minus 1; NaN if all points have the same truth."""
         return self.recall + ratio(self.rejected, self._negatives) - 1.0
 
     @property
     def markedness(self) -> float:
-        """Precision plus share of the rejected that is right, minus 1; NaN if all are of one truth or of one answer."""
+        """Precision plus the correct share of the rejected points, minus 1.
+
+        NaN if all points have the same truth or the same answer.
+        """
         if not (self._positives and self._negatives):
             return math.nan
         return self.precision + ratio(self.rejected, self.missed + self.rejected) - 1.0
@@ -81,24 +89,24 @@ class PointOutcome(Outcome):
 
 @dataclass(frozen=True, eq=False)
 class PointRanking:
-    """How the points of a class and all others are ranked by its probability: counts (BINS,) of each."""
+    """Histograms of a class's probability: counts (BINS,) of all other points, and of the class's own points."""
 
     others: Counts
     own: Counts
 
     @property
     def positives(self) -> int:
-        """Points of the class."""
+        """Number of points of the class."""
         return int(self.own.sum())
 
     @property
     def negatives(self) -> int:
-        """Points of all other classes."""
+        """Number of points of all other classes."""
         return int(self.others.sum())
 
     @cached_property
     def _steps(self) -> tuple[Floats, Counts, Counts]:
-        """Thresholds (m,), and how many of the class and of the others are at or above them (m,)."""
+        """Thresholds (m,), and the numbers (m,) of points at or above them: of the class, and of the others."""
         taken = np.flatnonzero(self.own + self.others)[::-1]
         return PROBABILITY_EDGES[taken], np.cumsum(self.own[taken]), np.cumsum(self.others[taken])
 
@@ -117,13 +125,13 @@ class PointRanking:
         )
 
     def at(self, threshold: float) -> PointOutcome:
-        """What comes of reporting all at or above a threshold; exact at PROBABILITY_EDGES, else at the nearest one."""
+        """The outcome if points at or above a threshold count as the class; it is rounded to PROBABILITY_EDGES."""
         first = int(np.abs(PROBABILITY_EDGES[:-1] - threshold).argmin())
         hits, false = int(self.own[first:].sum()), int(self.others[first:].sum())
         return PointOutcome(hits, false, self.positives - hits, self.negatives - false)
 
     def as_dict(self, threshold: float = 0.5) -> dict[str, Any]:
-        """All numbers but the curves, for JSON."""
+        """All numbers except the curves, for JSON."""
         outcome = self.at(threshold)
         values = {
             "average_precision": self.precision_recall.average_precision,

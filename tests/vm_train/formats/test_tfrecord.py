@@ -126,7 +126,7 @@ def test_a_file_that_breaks_off_is_named_with_the_record(tmp_path, size):
     path.write_bytes((framed(b"good") + framed(b"lacks"))[:size])
     with pytest.raises(InputError) as error:
         payloads_of(path)
-    fault = "is not a TFRecord file" if size < 12 else f"breaks off in record {int(size > 20)}"
+    fault = "is not a TFRecord file" if size < 12 else f"is cut short in record {int(size > 20)}"
     assert str(error.value).startswith(str(path))
     assert fault in str(error.value)
 
@@ -170,7 +170,7 @@ def test_a_gzip_file_that_breaks_off_or_is_damaged_is_named(tmp_path):
     write_records(path, [np.random.default_rng(1).bytes(1000), b"second"], compressed=True)
     whole = path.read_bytes()
     path.write_bytes(whole[:500])
-    with pytest.raises(InputError, match="truncated: it breaks off in record 0"):
+    with pytest.raises(InputError, match="is cut short in record 0"):
         payloads_of(path)
     path.write_bytes(whole[:-6] + b"\0\0" + whole[-4:])
     with pytest.raises(InputError, match=f"{path}: .*gzip file is damaged"):

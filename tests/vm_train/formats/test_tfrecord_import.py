@@ -43,7 +43,7 @@ def test_a_damaged_payload_is_skipped_and_a_file_that_breaks_off_stops_the_impor
     assert made.count == 2
     assert "record 0 is damaged" in made.skipped[0]
     path.write_bytes(data[:-10])
-    with pytest.raises(InputError, match="breaks off in record 2"):
+    with pytest.raises(InputError, match="is cut short in record 2"):
         imported([path], tmp_path / "other")
     assert len(find_pictures(tmp_path / "other")) == 1
 

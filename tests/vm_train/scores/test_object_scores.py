@@ -279,11 +279,11 @@ def test_a_ball_straight_below_has_an_error_but_no_relative_one():
 
 
 def test_rules_that_make_no_sense_are_refused():
-    with pytest.raises(InputError, match="above 0 and up to 1"):
+    with pytest.raises(InputError, match="above 0 and at most 1"):
         ObjectScores(overlaps=(0.5, 75.0))
     with pytest.raises(InputError, match="two or more rising"):
         ObjectScores(np.array([3.0, 1.0]))
-    with pytest.raises(InputError, match="was not scored"):
+    with pytest.raises(InputError, match="no scores at overlap"):
         ObjectScores().ranking(0.6)
     with pytest.raises(InputError, match="do not add up"):
         ObjectScores() + ObjectScores(min_radius=2.0)

@@ -260,12 +260,12 @@ def test_a_softmax_that_is_rounded_up_counts_as_one():
 
 @pytest.mark.parametrize("wrong", [math.nan, -0.1, 1.00001, 1.1])
 def test_probabilities_that_are_none_are_refused(wrong):
-    with pytest.raises(ModelError, match="not all numbers from 0 to 1"):
+    with pytest.raises(ModelError, match="not all from 0 to 1"):
         scored(np.array([[wrong, 0.0, 0.0]]), np.array([0]), np.ones(1))
 
 
 def test_labels_names_edges_and_sums_that_do_not_fit_are_refused():
-    with pytest.raises(InputError, match="label 3 is of no class"):
+    with pytest.raises(InputError, match="label 3 has no class"):
         scored(np.eye(3), np.array([0, 1, 3]), np.ones(3))
     with pytest.raises(InputError, match="did you mean 'ball'"):
         PointScores(CLASSES).ranking("bal")
