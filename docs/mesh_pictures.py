@@ -22,7 +22,7 @@ from vm_workstation.plots import new_figure, save_figure
 FOLDER = Path(__file__).parent
 BALL = Sphere(0.095)
 POST = Cylinder(0.05, 1.8)
-RING, OURS, OBJECT, GREY = "#4c72b0", "#1b9e77", "#d95f02", "#999999"
+RING, OURS, OBJECT, GRAY = "#4c72b0", "#1b9e77", "#d95f02", "#999999"
 
 
 def main() -> None:
@@ -56,7 +56,7 @@ def shapes():
     axes = figure.subplots(2, 2)
     height, count = 1.0, 4
     for each, shape in zip(axes.flat, (Circle(0.15), Sphere(0.15), Cylinder(0.15, 0.45)), strict=False):
-        each.axhline(0.0, color=GREY, linewidth=1.0)
+        each.axhline(0.0, color=GRAY, linewidth=1.0)
         each.plot(0.0, height, "o", color="black", markersize=5)
         tops = {Circle: 0.0, Sphere: 2 * shape.radius}.get(type(shape), getattr(shape, "object_height", 0.0))
         for n in range(count + 1):
@@ -100,7 +100,7 @@ def shapes():
         end = 2.1
         each.plot([0.0, end * np.cos(half)], [0.0, sign * end * np.sin(half)], color=RING, linewidth=0.9)
     each.plot(0.0, 0.0, "o", color="black", markersize=5)
-    each.plot([0.0, away], [0.0, 0.0], color=GREY, linewidth=0.8, linestyle="--")
+    each.plot([0.0, away], [0.0, 0.0], color=GRAY, linewidth=0.8, linestyle="--")
     each.plot([away, away - radius * np.sin(half)], [0.0, radius * np.cos(half)], color="black", linewidth=0.9)
     each.annotate("$D$", (0.8, -0.08), fontsize=10)
     each.annotate("$r$", (away + 0.03, 0.12), fontsize=10)
@@ -188,7 +188,7 @@ def tall():
                 serving = np.argmin(np.abs(wall_distances(POST, 4.0, 10.0) / away - 1.0))
                 chosen &= made.walls == serving
             axes.plot(bearing[chosen], elevation[chosen], ".", color=RING if made is ring else OURS, markersize=1.5)
-        axes.axhline(0.0, color=GREY, linewidth=0.8, linestyle="--")
+        axes.axhline(0.0, color=GRAY, linewidth=0.8, linestyle="--")
         axes.set_xlim(-52.0, 40.0)
         axes.set_ylim(-68.0, 68.0)
         axes.set_xlabel("bearing [deg]")

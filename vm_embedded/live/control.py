@@ -51,7 +51,7 @@ class ControlServer:
         self._server = await asyncio.start_unix_server(self._reply, sock=self._file.socket, limit=1024)
 
     async def _reply(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        # asyncio logs a traceback for a cancelled handler, so suppress that too.
+        # asyncio logs a traceback for a canceled handler, so suppress that too.
         with suppress(OSError, ValueError, TimeoutError, asyncio.CancelledError):
             word = (await asyncio.wait_for(reader.readline(), _TIMEOUT)).decode("ascii", "replace").strip()
             command = self._commands.get(word)

@@ -59,7 +59,7 @@ class HttpServer:
         assert task is not None
         self._tasks.add(task)
         try:
-            # asyncio logs a traceback for a cancelled handler, so suppress that too.
+            # asyncio logs a traceback for a canceled handler, so suppress that too.
             with suppress(OSError, ValueError, EOFError, asyncio.LimitOverrunError, asyncio.CancelledError):
                 head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _TIMEOUT)
                 await self._respond(head.decode("latin-1").split("\r\n"), writer)

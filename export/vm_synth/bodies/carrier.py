@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .paints import black, cloth, glass, grey, metal, skin, white
+from .paints import black, cloth, glass, gray, metal, skin, white
 from .people import shoe
 from .primitives import axle, box, capsule, cylinder, rod, rounded_box, sphere
 from .solids import Body, Point, Solid, along, body, rotation
@@ -21,7 +21,7 @@ CLEARANCE = 0.06
 
 def tripod(random: np.random.Generator, height: float) -> list[Solid]:
     """Three legs, a column and a head right below the camera."""
-    paint, joint = (black, grey, metal)[random.integers(3)](random), black(random)
+    paint, joint = (black, gray, metal)[random.integers(3)](random), black(random)
     top = height - random.uniform(0.075, 0.12)
     hub = top - min(random.uniform(0.08, 0.3), 0.4 * top)
     thin, foot = random.uniform(0.008, 0.016), random.uniform(0.35, 0.6) * height
@@ -49,7 +49,7 @@ def tripod(random: np.random.Generator, height: float) -> list[Solid]:
 
 def robot(random: np.random.Generator, height: float) -> list[Solid]:
     """Chest, shoulders, arms, knees and feet of the robot whose head holds the camera."""
-    shell, inner = (white, white, black, grey)[random.integers(4)](random), (black, grey)[random.integers(2)](random)
+    shell, inner = (white, white, black, gray)[random.integers(4)](random), (black, gray)[random.integers(2)](random)
     h = height
     chest = h - max(0.16 * h, 0.11)
     back, wide = random.uniform(-0.1, -0.02) * h, random.uniform(0.11, 0.15) * h
@@ -87,7 +87,7 @@ def handheld(random: np.random.Generator, height: float) -> list[Solid]:
     """A hand that holds a phone, a tablet or a laptop in front of and below the camera, and its forearm."""
     width, deep = ((0.075, 0.155), (0.17, 0.24), (0.31, 0.22))[random.integers(3)]
     case, screen, tone, sleeve = (
-        (black, grey, white, metal)[random.integers(4)](random),
+        (black, gray, white, metal)[random.integers(4)](random),
         glass(random),
         skin(random),
         cloth(random),
@@ -116,7 +116,7 @@ def handheld(random: np.random.Generator, height: float) -> list[Solid]:
 
 def stick(random: np.random.Generator, height: float) -> list[Solid]:
     """The pole the camera is held on: straight down to a mount, then slanting to a hand or to the ground."""
-    paint, joint = (black, metal, grey)[random.integers(3)](random), black(random)
+    paint, joint = (black, metal, gray)[random.integers(3)](random), black(random)
     radius, top = random.uniform(0.006, 0.016), height - random.uniform(0.08, 0.12)
     bearing, slant = random.uniform(0.0, 2.0 * np.pi), random.uniform(0.0, 0.45)
     way = np.array([np.cos(bearing) * np.sin(slant), np.sin(bearing) * np.sin(slant), -np.cos(slant)])
@@ -140,7 +140,7 @@ def stick(random: np.random.Generator, height: float) -> list[Solid]:
 def person(random: np.random.Generator, height: float) -> list[Solid]:
     """Belly, arms, knees and shoes of a person who carries the camera at the head or the chest and looks down."""
     shirt, trousers, tone = cloth(random), cloth(random), skin(random)
-    paints = tuple((white, black, grey)[random.integers(3)](random) for _ in range(3))
+    paints = tuple((white, black, gray)[random.integers(3)](random) for _ in range(3))
     h = height
     back, top = random.uniform(-0.14, -0.06) * h, h - max(0.17 * h, 0.12)
     parts = [

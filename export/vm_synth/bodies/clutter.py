@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from .paints import black, common, glass, grey, hued, metal, team, vivid, white, wood
+from .paints import black, common, glass, gray, hued, metal, team, vivid, white, wood
 from .primitives import beam, box, capsule, cord, cylinder, lathe, rod, rounded_box, sheet, sphere
 from .solids import Body, Solid, rotation, sized, standing
 
@@ -55,7 +55,7 @@ def bottle(random: np.random.Generator, size: float) -> list[Body]:
         (0.05, 0.92),
         (0.0, 0.92),
     ]
-    paint = (white, grey, vivid, glass)[random.integers(4)](random)
+    paint = (white, gray, vivid, glass)[random.integers(4)](random)
     parts = [
         lathe(shape, 18).painted(paint),
         lathe([(r * 1.01, 0.2), (r * 1.01, 0.5)], 18).painted(common(random)),
@@ -135,7 +135,7 @@ def paper(random: np.random.Generator, size: float) -> list[Body]:
     parts = [sheet(outline, 0.003).painted((white, white, common)[random.integers(3)](random))]
     for _ in range(int(random.integers(0, 4))):
         print_ = box(*_two(random, 0.05, 0.3), 0.004).shifted((*random.uniform(-0.15, 0.15, 2), 0.002))
-        parts.append(print_.painted((black, vivid, grey)[random.integers(3)](random)))
+        parts.append(print_.painted((black, vivid, gray)[random.integers(3)](random)))
     return _thing(parts, size, "paper")
 
 
@@ -160,14 +160,14 @@ def cable(random: np.random.Generator, size: float) -> list[Body]:
     ]
     points = np.stack([t + waver[0], waver[1], np.full_like(t, thickness)], axis=1)
     return _thing(
-        [cord(points, thickness).painted((black, black, grey, white, vivid)[random.integers(5)](random))], size, "cable"
+        [cord(points, thickness).painted((black, black, gray, white, vivid)[random.integers(5)](random))], size, "cable"
     )
 
 
 def table(random: np.random.Generator, size: float) -> list[Body]:
     """A table: a top on four legs."""
     x, y, z = 1.0, random.uniform(0.5, 0.9), random.uniform(0.5, 0.7)
-    top = box(x, y, 0.03).shifted((0.0, 0.0, z)).painted((wood, white, grey)[random.integers(3)](random))
+    top = box(x, y, 0.03).shifted((0.0, 0.0, z)).painted((wood, white, gray)[random.integers(3)](random))
     leg = metal(random)
     feet = [(a * (x / 2.0 - 0.04), b * (y / 2.0 - 0.04)) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
     return _thing([top, *(rod((*at, 0.0), (*at, z), 0.02).painted(leg) for at in feet)], size, "table")

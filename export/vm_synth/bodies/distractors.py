@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .paints import Paint, black, common, grey, hued, skin, vivid, white
+from .paints import Paint, black, common, gray, hued, skin, vivid, white
 from .primitives import dome, icosphere, lathe, rod, sphere, torus
 from .solids import Body, Solid, rotation, sized, standing, waves
 
@@ -36,22 +36,22 @@ def patterned_ball(random: np.random.Generator, radius: float) -> list[Body]:
 
 
 def white_sphere(random: np.random.Generator, radius: float) -> list[Body]:
-    """A white or grey sphere without a pattern. Of a match ball's radius it is a match ball: draw it otherwise."""
-    paint = (white, white, grey)[random.integers(3)](random)
+    """A white or gray sphere without a pattern. Of a match ball's radius it is a match ball: draw it otherwise."""
+    paint = (white, white, gray)[random.integers(3)](random)
     return _round([sphere(1.0, 28).painted(paint).stained(random, 0.15, 0.6)], radius, "white sphere")
 
 
 def half_dome(random: np.random.Generator, radius: float) -> list[Body]:
     """Half a sphere or less of it that lies on the ground: a lamp, a lid, a training marker."""
     cap = dome(1.0, random.uniform(0.2, 0.85), 24)
-    return _round([cap.painted((white, white, grey, vivid)[random.integers(4)](random))], radius, "dome")
+    return _round([cap.painted((white, white, gray, vivid)[random.integers(4)](random))], radius, "dome")
 
 
 def white_disc(random: np.random.Generator, radius: float) -> list[Body]:
     """A flat round thing: a paper plate, a lid, a spot of tape; perhaps with a dark spot or a rim."""
     height = random.uniform(0.01, 0.08)
     profile = [(0.0, 0.0), (0.9, 0.0), (1.0, height), (0.85, height * 1.1), (0.75, height * 0.6), (0.0, height * 0.6)]
-    plate = lathe(profile, 32).painted((white, white, white, grey, vivid)[random.integers(5)](random))
+    plate = lathe(profile, 32).painted((white, white, white, gray, vivid)[random.integers(5)](random))
     parts = [plate]
     for _ in range(int(random.integers(0, 4))):
         spot = lathe([(0.2, 0.0), (0.2, height * 0.65), (0.0, height * 0.65)], 12)
@@ -105,7 +105,7 @@ def balloon(random: np.random.Generator, radius: float) -> list[Body]:
     """A balloon or a lamp: a sphere on a neck that lies on its side."""
     paint = (white, vivid, vivid)[random.integers(3)](random)
     parts = [sphere(0.75, 24).stretched(1.0, 1.0, 1.15), rod((0.0, 0.0, -0.8), (0.0, 0.0, -1.1), 0.3, 0.2, 16)]
-    neck = paint if random.uniform() < 0.5 else grey(random)
+    neck = paint if random.uniform() < 0.5 else gray(random)
     lying = [parts[0].painted(paint), parts[1].painted(neck)]
     turn = rotation(pitch=random.uniform(1.0, 2.0))
     return _round([each.turned(turn) for each in lying], radius, "balloon")
@@ -135,7 +135,7 @@ def _round(parts: list[Solid], radius: float, name: str) -> list[Body]:
 
 
 def _shell_paint(random: np.random.Generator) -> Paint:
-    return (white, white, grey, vivid, skin)[random.integers(5)](random)
+    return (white, white, gray, vivid, skin)[random.integers(5)](random)
 
 
 def _any_turn(random: np.random.Generator) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:

@@ -29,27 +29,27 @@ def hued(hue: float, saturation: float, value: float, roughness: float) -> Paint
 
 def white(random: np.random.Generator) -> Paint:
     """White plastic, paper or paint, a little warm, cold or dirty."""
-    return _near_grey(random, (0.55, 0.9), 0.05, (0.15, 0.9))
+    return _near_gray(random, (0.55, 0.9), 0.05, (0.15, 0.9))
 
 
-def grey(random: np.random.Generator) -> Paint:
-    """Grey plastic."""
-    return _near_grey(random, (0.08, 0.45), 0.08, (0.2, 0.9))
+def gray(random: np.random.Generator) -> Paint:
+    """Gray plastic."""
+    return _near_gray(random, (0.08, 0.45), 0.08, (0.2, 0.9))
 
 
 def black(random: np.random.Generator) -> Paint:
     """Black plastic or rubber."""
-    return _near_grey(random, (0.012, 0.06), 0.15, (0.12, 0.8))
+    return _near_gray(random, (0.012, 0.06), 0.15, (0.12, 0.8))
 
 
 def metal(random: np.random.Generator) -> Paint:
     """Brushed or anodized metal, without the mirror."""
-    return _near_grey(random, (0.2, 0.6), 0.06, (0.08, 0.4))
+    return _near_gray(random, (0.2, 0.6), 0.06, (0.08, 0.4))
 
 
 def glass(random: np.random.Generator) -> Paint:
     """A dark screen or a lens."""
-    return _near_grey(random, (0.01, 0.03), 0.3, (0.05, 0.1))
+    return _near_gray(random, (0.01, 0.03), 0.3, (0.05, 0.1))
 
 
 def vivid(random: np.random.Generator) -> Paint:
@@ -58,12 +58,12 @@ def vivid(random: np.random.Generator) -> Paint:
 
 
 def cloth(random: np.random.Generator) -> Paint:
-    """Clothes: jeans, black, grey or any color, always rough."""
+    """Clothes: jeans, black, gray or any color, always rough."""
     kind = random.choice(4, p=[0.3, 0.25, 0.15, 0.3])
     rough = random.uniform(0.75, 1.0)
     if kind == 0:
         return hued(random.uniform(0.57, 0.66), random.uniform(0.4, 0.8), random.uniform(0.04, 0.3), rough)
-    drawn = (black, grey, vivid)[kind - 1](random)
+    drawn = (black, gray, vivid)[kind - 1](random)
     return Paint(drawn.color, rough)
 
 
@@ -84,11 +84,11 @@ def team(random: np.random.Generator) -> Paint:
 
 
 def common(random: np.random.Generator) -> Paint:
-    """What lies around: as often white, black or grey as colored."""
-    return (white, white, grey, black, vivid, vivid, wood)[random.integers(7)](random)
+    """What lies around: as often white, black or gray as colored."""
+    return (white, white, gray, black, vivid, vivid, wood)[random.integers(7)](random)
 
 
-def _near_grey(
+def _near_gray(
     random: np.random.Generator, value: tuple[float, float], tint: float, roughness: tuple[float, float]
 ) -> Paint:
     return hued(random.uniform(), random.uniform(0.0, tint), random.uniform(*value), random.uniform(*roughness))

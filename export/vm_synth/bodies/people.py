@@ -6,7 +6,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats
 
-from .paints import Paint, black, cloth, grey, skin, vivid, white
+from .paints import Paint, black, cloth, gray, skin, vivid, white
 from .primitives import capsule, rod, rounded_box, sphere
 from .solids import Body, Solid, rotation, standing
 
@@ -51,7 +51,7 @@ def legs(random: np.random.Generator, height: float) -> list[Body]:
 def person(random: np.random.Generator, height: float) -> list[Body]:
     """A person of this height [m] who stands or walks."""
     parts, waist = _legs(random)
-    shirt, tone, hair = cloth(random), skin(random), (black, grey)[random.integers(2)](random)
+    shirt, tone, hair = cloth(random), skin(random), (black, gray)[random.integers(2)](random)
     lean = rotation(pitch=random.uniform(-0.05, 0.3))
     chest = rounded_box(0.13, 0.23, 0.31, 0.06).shifted((0.0, 0.0, 0.15)).painted(shirt)
     neck = rod((0.0, 0.0, 0.28), (0.005, 0.0, 0.36), 0.032).painted(tone)
@@ -114,6 +114,6 @@ def _hanging(forward: float) -> Floats:
 
 def _shoe_paints(random: np.random.Generator) -> tuple[Paint, Paint, Paint]:
     """Paints of a shoe's upper, sole and laces."""
-    upper = (white, white, black, grey, vivid, vivid)[random.integers(6)](random)
+    upper = (white, white, black, gray, vivid, vivid)[random.integers(6)](random)
     sole = (white, white, black, vivid)[random.integers(4)](random)
     return upper, sole, (white, black, vivid)[random.integers(3)](random)

@@ -9,7 +9,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats
 
-from .paints import Paint, black, glass, grey, metal, team, vivid, white
+from .paints import Paint, black, glass, gray, metal, team, vivid, white
 from .primitives import axle, beam, box, capsule, cylinder, dome, lathe, rod, rounded_box, sphere
 from .solids import Body, Point, Solid, between, distance, merged, rotation, sized, standing
 
@@ -49,7 +49,7 @@ class Build:
 
 def humanoid(random: np.random.Generator, height: float) -> list[Body]:
     """A humanoid robot of this height when upright [m], standing, walking or kicking."""
-    shell = (white, white, black, black, grey, metal)[random.integers(6)](random)
+    shell = (white, white, black, black, gray, metal)[random.integers(6)](random)
     limb = (_rods, _beams, _shells, _plates)[random.integers(4)]
     build = Build(
         hips=random.uniform(0.05, 0.08),
@@ -57,7 +57,7 @@ def humanoid(random: np.random.Generator, height: float) -> list[Body]:
         thickness=random.uniform(0.055, 0.095),
         limb=limb,
         shell=shell,
-        inner=(black, grey, metal)[random.integers(3)](random),
+        inner=(black, gray, metal)[random.integers(3)](random),
         torso=(team, vivid)[random.integers(2)](random) if random.uniform() < 0.45 else shell,
         marker=team(random),
     )
@@ -67,10 +67,10 @@ def humanoid(random: np.random.Generator, height: float) -> list[Body]:
 
 
 def nao(random: np.random.Generator, height: float = _NAO_HEIGHT) -> list[Body]:
-    """A robot like a NAO: white and grey, round. It is 0.58 m tall, whatever height is asked for."""
+    """A robot like a NAO: white and gray, round. It is 0.58 m tall, whatever height is asked for."""
     shell = white(random)
     jersey = team(random) if random.uniform() < 0.6 else shell
-    build = Build(0.085, 0.16, 0.125, _rods, shell, grey(random), jersey, team(random))
+    build = Build(0.085, 0.16, 0.125, _rods, shell, gray(random), jersey, team(random))
     pose = _pose(random)
     top = _trunk(pose)[1]
     turned = rotation(pitch=pose.head[1], yaw=pose.head[0])
@@ -97,7 +97,7 @@ def wheeled_robot(random: np.random.Generator, height: float) -> list[Body]:
     """A robot of this height [m] on wheels: a round or square base, a tower, and marks of its team on top."""
     width = random.uniform(0.5, 0.85)
     wheel = random.uniform(0.08, 0.14)
-    cover, inner = (black, white, grey, metal)[random.integers(4)](random), black(random)
+    cover, inner = (black, white, gray, metal)[random.integers(4)](random), black(random)
     count = int(random.integers(3, 5))
     parts = []
     for k in range(count):
@@ -124,7 +124,7 @@ def wheeled_robot(random: np.random.Generator, height: float) -> list[Body]:
         )
         camera = dome(0.1, 0.1, 14).shifted((0.0, 0.0, 0.9))
         parts += [
-            tower.painted((cover, grey(random), metal(random))[random.integers(3)]),
+            tower.painted((cover, gray(random), metal(random))[random.integers(3)]),
             camera.painted(glass(random)),
         ]
     else:

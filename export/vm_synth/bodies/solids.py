@@ -1,6 +1,6 @@
 """Triangle meshes with a color and a roughness per vertex, and the bodies of a scene that are made of them.
 
-Frame: observation plane z = 0, z up, metres. Rotations are 3 x 3 matrices that turn column vectors.
+Frame: observation plane z = 0, z up, meters. Rotations are 3 x 3 matrices that turn column vectors.
 """
 
 from __future__ import annotations

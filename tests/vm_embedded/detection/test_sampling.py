@@ -123,10 +123,10 @@ def test_all_color_formats_of_one_scene_give_the_same_colors(sampling, shape, se
 @given(shapes, seeds)
 def test_a_grey_scene_looks_grey_in_every_format(sampling, shape, seed):
     random = np.random.default_rng(seed)
-    grey = noise(random, *shape, 1)
+    gray = noise(random, *shape, 1)
     pixels = pixels_in(random, 20, *shape)
-    expected = sampled(np.repeat(grey, 3, axis=2), pixels, "rgb", sampling)
-    for image in (grey, grey[:, :, 0]):
+    expected = sampled(np.repeat(gray, 3, axis=2), pixels, "rgb", sampling)
+    for image in (gray, gray[:, :, 0]):
         np.testing.assert_array_equal(sampled(image, pixels, "gray", sampling), expected)
 
 

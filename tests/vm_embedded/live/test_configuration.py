@@ -206,9 +206,9 @@ def test_what_is_no_angle_is_refused_by_value(value):
 
 
 @given(st.floats(-1e6, 1e6))
-def test_a_length_is_a_number_or_its_text(metres):
-    assert parse_length(metres) == metres
-    assert parse_length(repr(metres)) == metres
+def test_a_length_is_a_number_or_its_text(meters):
+    assert parse_length(meters) == meters
+    assert parse_length(repr(meters)) == meters
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ def test_a_cut_across_a_line_is_as_long_as_the_line_is_wide(low, high, place, st
 
 
 def area_of_lines(its, step):
-    """Square metres of line on the whole field."""
+    """Square meters of line on the whole field."""
     half = np.array([its.length / 2.0 + 0.3, its.width / 2.0 + 0.3])
     return shares(its, -half, half, step).sum() * step * step
 
