@@ -164,7 +164,10 @@ def shipped(rounds: int) -> dict[str, Any]:
 
 
 def peers(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
-    """Whole calls in turns on the same frame: the Visual Mesh with five and nine layers, and its peers."""
+    """Whole calls in turns on the same frame: the Visual Mesh with five and nine layers, and its peers.
+
+    The paper's tab:visualmesh_performance.
+    """
     frame = median_frame(models, work, "5x4")
     calls: dict[str, Callable[[], object]] = {}
     kinds = [(name, sampling) for name in ("5x4", "9x4") for sampling in ("exact", "fast")]

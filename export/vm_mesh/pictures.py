@@ -30,7 +30,10 @@ _MOST_LINKS = 200_000
 
 
 def drawn(made: MadeMesh, view: str, reach: float, objects: tuple[float, ...] = ()) -> Figure:
-    """The mesh from above out to `reach` [m], with the outlines of objects at some distances [m]."""
+    """The mesh from above out to `reach` [m], with the outlines of objects at some distances [m].
+
+    The paper's fig:mesh_distance shows such rings.
+    """
     figure = new_figure(7.0, 7.2)
     axes = figure.subplots()
     draw_mesh(axes, made, view, reach, objects)
@@ -69,7 +72,10 @@ def draw_mesh(axes: Axes, made: MadeMesh, view: str, reach: float, objects: tupl
 
 
 def on_picture(made: MadeMesh, image: Image, lens: Lens, orientation: Orientation) -> Figure:
-    """The mesh in a BGR picture (height, width, 3) that a camera of that orientation took. Raises InputError."""
+    """The mesh in a BGR picture (height, width, 3) that a camera of that orientation took (paper: fig:mesh_projection).
+
+    Raises InputError.
+    """
     size = image.shape[1], image.shape[0]
     shown = project(made.mesh, orientation.level, lens.for_image(size), size)
     seen = np.flatnonzero(shown.on_screen)

@@ -88,7 +88,10 @@ def _around(observation: Observation, cluster: Members, center: Floats) -> Membe
 def _wrong_size(
     observation: Observation, cluster: Members, center: Floats, near: Members, settings: Settings
 ) -> str | None:
-    """Why a cluster around `center` has too few points or a too large graph diameter for an object, or None."""
+    """Why a cluster around `center` has too few points or a too large graph diameter for an object, or None.
+
+    So the scale helps to identify objects, as in the paper's fig:ball_detection_images_3.
+    """
     view = observation.view
     rays = view.layout.rays
     expected = int((view.shape.offset(rays[near], center[None], view.height) < 1.0).sum())

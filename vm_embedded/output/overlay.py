@@ -1,4 +1,4 @@
-"""Drawing mesh points and detections into images."""
+"""Drawing mesh points and detections into images, as in the paper's fig:ball_detection_images."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ _FEWEST = 10
 
 
 def object_curves(objects: Objects) -> Figure:
-    """Precision and the number of false objects per picture, over recall, at each overlap."""
+    """Precision and the number of false objects per picture, over recall, at each overlap (paper: fig:pr_curve)."""
     figure = new_figure(11.0, 4.6)
     curves, false = figure.subplots(1, 2)
     for name, scores, color in _with_colors(objects):
@@ -58,7 +58,10 @@ def object_curves(objects: Objects) -> Figure:
 
 
 def objects_over_distance(objects: Objects) -> Figure:
-    """Recall, precision, average precision and the number of true objects over distance."""
+    """Recall, precision, average precision and the number of true objects over distance.
+
+    The paper's fig:pr_map; its fig:ball_detection_images_2 shows a ball far away.
+    """
     figure = new_figure(11.0, 6.4)
     panels: Sequence[Axes] = list(figure.subplots(2, 2, sharex=True).flat)
     drawn: dict[str, Callable[[ObjectRanking], float]] = {

@@ -1,4 +1,4 @@
-"""Plots of the scores of points: curves, scores over distance, and the confusion of classes."""
+"""Plots of the scores of points: curves, scores over distance, and the confusion of classes (paper: fig:plots)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ _SCORES = ("precision", "recall", "f1", "average_precision", "mcc", "informednes
 
 
 def point_curves(scores: PointScores) -> Figure:
-    """Precision over recall, and the rate of true over that of false positives, with a line for each class."""
+    """Precision over recall, and the rate of true over that of false positives, with a line for each class.
+
+    The paper's fig:pr_curve.
+    """
     figure = new_figure(11.0, 4.6)
     curves, rocs = figure.subplots(1, 2)
     for name, color in zip(scores.classes, colors(len(scores.classes)), strict=True):
@@ -41,7 +44,10 @@ def point_curves(scores: PointScores) -> Figure:
 
 
 def points_over_distance(scores: PointScores, threshold: float) -> Figure:
-    """All scores of each class's points over their distance. threshold: probability from which a point counts."""
+    """All scores of each class's points over their distance, average precision as in the paper's fig:pr_map.
+
+    threshold: probability from which a point counts.
+    """
     figure = new_figure(13.0, 6.0)
     middles = bin_middles(scores.distance_edges)
     panels = list(figure.subplots(2, len(_SCORES) // 2, sharex=True).flat)

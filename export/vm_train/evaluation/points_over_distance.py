@@ -1,4 +1,4 @@
-"""Points of both meshes on a ball, over its distance: the curves of the paper's figure `ball_distance_graph`."""
+"""Points of both meshes on a ball, over its distance: the curves of the paper's figure fig:ball_distance_graph."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class Outcome:
 class PrecisionRecall:
     """Precision and recall (m,) at falling thresholds (m,); each threshold reports more than the one before.
 
-    positives: number of true ones; without any, recall is NaN.
+    The paper's fig:pr_curve. positives: number of true ones; without any, recall is NaN.
     """
 
     thresholds: Floats

@@ -47,7 +47,7 @@ class ObjectOutcome(Outcome):
 
     @property
     def false_per_picture(self) -> float:
-        """Mean number of false objects per picture; NaN without pictures."""
+        """Mean number of false objects per picture (paper: fig:ball_detection_images_1); NaN without pictures."""
         return ratio(self.false, self.pictures)
 
 
