@@ -1,4 +1,4 @@
-"""What is wrong with a machine, before it matters: each finding says what was seen, and the command that mends it."""
+"""The checks of vm-doctor: each returns a finding about the machine or the configuration, and a command as the fix."""
 
 from __future__ import annotations
 
@@ -21,18 +21,22 @@ from ..live.load_detector import load_checked_detector
 
 GOOD, WARNING, BAD = "ok", "warning", "failure"
 
-WHEELS = ("opencv-python", "opencv-python-headless", "opencv-contrib-python", "opencv-contrib-python-headless")
+OPENCV_PACKAGES = ("opencv-python", "opencv-python-headless", "opencv-contrib-python", "opencv-contrib-python-headless")
 
-_ENUMERATE_FORMATS = 0xC0405602  # VIDIOC_ENUM_FMT
-_DESCRIPTION = "=III32sI4I"  # struct v4l2_fmtdesc
-_CAPTURE = 1  # V4L2_BUF_TYPE_VIDEO_CAPTURE
+_VIDIOC_ENUM_FMT = 0xC0405602
+_V4L2_FMTDESC = "=III32sI4I"
+_V4L2_BUF_TYPE_VIDEO_CAPTURE = 1
 
-_OLDEST = 1735689600.0  # 2025: no clock that is right shows less
+_EARLIEST_TIME = 1735689600.0
+"""Start of 2025, since 1970 [s]: a clock that shows less is wrong."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """about: what was looked at. state: GOOD, WARNING or BAD. seen: in words. mend: a command, if one helps."""
+    """Result of a check.
+
+    about: the checked part. state: GOOD, WARNING or BAD. seen: description. mend: command that fixes it, if any.
+    """
 
     about: str
     state: str
@@ -40,21 +44,24 @@ class Finding:
     mend: str = ""
 
 
-def examine(configuration: Configuration, root: Path = Path("/")) -> Iterator[Finding]:
-    """All findings. root: where /proc, /sys and /dev are."""
-    yield processor(root / "proc/cpuinfo")
-    yield affinity(configuration.detector.threads, len(os.sched_getaffinity(0)), os.cpu_count() or 1)
-    yield governor(root / "sys/devices/system/cpu")
-    yield wheels({each.name.lower() for each in metadata.distributions() if each.name})
-    yield network(configuration)
-    yield from camera(configuration, root)
-    yield calibration(configuration)
-    yield clock(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", time.time())
-    yield socket_folder(configuration)
+def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator[Finding]:
+    """Run all checks, one finding after another. root: folder with proc, sys and dev."""
+    try:
+        yield check_processor(root / "proc/cpuinfo")
+        yield check_threads(configuration.detector.threads, len(os.sched_getaffinity(0)), os.cpu_count() or 1)
+        yield check_governor(root / "sys/devices/system/cpu")
+        yield check_opencv({each.name.lower() for each in metadata.distributions() if each.name})
+        yield check_model(configuration)
+        yield from check_cameras(configuration, root)
+        yield check_lens(configuration)
+        yield check_clock(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", time.time())
+        yield check_status_socket(configuration)
+    except OSError as error:
+        yield Finding("machine", WARNING, one_line(error))
 
 
-def processor(cpuinfo: Path) -> Finding:
-    """Whether the processor has what ONNX Runtime is fast with."""
+def check_processor(cpuinfo: Path) -> Finding:
+    """Whether the processor has the vector instructions that make ONNX Runtime fast."""
     try:
         lines = cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
@@ -65,115 +72,117 @@ def processor(cpuinfo: Path) -> Finding:
     model = named.get("model name", "unknown")
     missing = [name for name in ("avx2", "fma") if name not in flags]
     if missing:
-        return Finding("processor", WARNING, f"{model} has no {' and no '.join(missing)}, and will be slow")
+        return Finding("processor", WARNING, f"{model} has no {' and no '.join(missing)}; detection will be slow")
     extra = ", avx512" if "avx512f" in flags else ""
     return Finding("processor", GOOD, f"{model}: avx2, fma{extra}")
 
 
-def affinity(threads: int, allowed: int, cores: int) -> Finding:
-    """Whether there are as many cores as threads."""
+def check_threads(threads: int, allowed: int, cores: int) -> Finding:
+    """Whether the process may use as many cores as it has threads."""
     if threads > allowed:
         return Finding(
             "threads",
             WARNING,
-            f"{threads} threads are configured, and this process may use {allowed} of {cores} cores",
-            f"vm-detect --threads {allowed}, or CPUAffinity= in a drop-in of the unit",
+            f"{threads} threads are configured, but this process may use only {allowed} of {cores} cores",
+            f"vm-detect --threads {allowed}, or set CPUAffinity= in a drop-in of the systemd unit",
         )
-    return Finding("threads", GOOD, f"{threads} of the {allowed} cores that this process may use")
+    return Finding("threads", GOOD, f"{threads} configured; this process may use {allowed} cores")
 
 
-def governor(cpus: Path) -> Finding:
-    """Whether cores slow down between frames."""
+def check_governor(cpus: Path) -> Finding:
+    """Whether the frequency governor slows cores down between frames."""
     found = {each.read_text().strip() for each in sorted(cpus.glob("cpu[0-9]*/cpufreq/scaling_governor"))}
     if not found:
-        return Finding("governor", GOOD, "this machine has none that can be set")
+        return Finding("governor", GOOD, "this machine has no frequency governor to set")
     if found <= {"performance", "schedutil"}:
         return Finding("governor", GOOD, ", ".join(sorted(found)))
     return Finding(
         "governor",
         WARNING,
-        f"{', '.join(sorted(found))}: cores that sleep between frames wake up slowly",
+        f"{', '.join(sorted(found))}: cores slow down between frames and speed up late",
         "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor",
     )
 
 
-def wheels(installed: set[str]) -> Finding:
-    """Whether two packages have written over each other's cv2."""
-    found = [each for each in WHEELS if each in installed]
+def check_opencv(installed: set[str]) -> Finding:
+    """Whether two packages overwrote each other's cv2."""
+    found = [each for each in OPENCV_PACKAGES if each in installed]
     if len(found) > 1:
         return Finding(
             "OpenCV",
             BAD,
-            f"{' and '.join(found)} are installed, and share their files",
+            f"{' and '.join(found)} are installed and overwrite each other",
             f"pip uninstall -y {' '.join(found)} && pip install opencv-python-headless",
         )
-    return Finding("OpenCV", GOOD, f"{found[0]} {metadata.version(found[0])}" if found else "not from a wheel")
+    return Finding(
+        "OpenCV", GOOD, f"{found[0]} {metadata.version(found[0])}" if found else "not installed from a wheel"
+    )
 
 
-def network(configuration: Configuration) -> Finding:
-    """Whether the model loads and answers its self-test."""
+def check_model(configuration: Configuration) -> Finding:
+    """Whether the model loads and passes its self-test."""
     try:
         detector = load_checked_detector(configuration)
     except VisualMeshError as error:
-        return Finding("model", BAD, str(error), "vm-detect --check-config says whether it is mended")
+        return Finding("model", BAD, str(error), "vm-detect --check-config tells whether it works after a change")
     digest = detector.session.model.sha256
     return Finding("model", GOOD, f"{configuration.model}: self-test passed, sha256 {digest[:16]}...")
 
 
-def camera(configuration: Configuration, root: Path) -> Iterator[Finding]:
-    """Whether the configured camera is there and may be read, and which others are."""
+def check_cameras(configuration: Configuration, root: Path) -> Iterator[Finding]:
+    """Whether each video device can be opened, and whether the configured camera exists."""
     nodes = sorted((root / "dev").glob("video*"))
     for node in nodes:
-        yield _node(node)
+        yield _check_video_device(node)
     source = configuration.camera.source
     if not source:
         yield Finding(
-            "camera", WARNING, "none is configured", "vm-detect --camera SOURCE, or [camera] source in vm.toml"
+            "camera", WARNING, "no camera is configured", "vm-detect --camera SOURCE, or set [camera] source in vm.toml"
         )
         return
     device = device_path(source)
     try:
         camera_opener(configuration.camera, configuration.detector.format != "bgr")
         if device is not None and not (root / device.relative_to("/")).exists():
-            there = ", ".join(str(each) for each in nodes) or "no camera at all"
-            yield Finding("camera", BAD, f"there is no {device}; there is {there}", "ls -l /dev/v4l/by-id/")
+            there = ", ".join(str(each) for each in nodes) or "none"
+            yield Finding("camera", BAD, f"{device} does not exist; video devices: {there}", "ls -l /dev/v4l/by-id/")
             return
     except VisualMeshError as error:
-        yield Finding("camera", BAD, str(error), "vm-detect --help says what a camera may be")
+        yield Finding("camera", BAD, str(error), "vm-detect --help lists the allowed cameras")
         return
     moving = device is not None and "by-" not in str(device)
     yield Finding(
         "camera",
         WARNING if moving else GOOD,
-        f"{source}{': numbers change when cameras are plugged in another order' if moving else ''}",
-        "use a path of /dev/v4l/by-id/" if moving else "",
+        f"{source}{': the number may change when cameras are plugged in again' if moving else ''}",
+        "use a path in /dev/v4l/by-id/" if moving else "",
     )
 
 
-def _node(node: Path) -> Finding:
+def _check_video_device(node: Path) -> Finding:
     if not os.access(node, os.R_OK | os.W_OK):
-        return Finding(
-            str(node), BAD, "may not be opened by this user", "sudo usermod -aG video $USER, and log in again"
-        )
+        return Finding(str(node), BAD, "this user may not open it", "sudo usermod -aG video $USER, then log in again")
     try:
-        formats = formats_of(node)
+        formats = pixel_formats(node)
     except OSError as error:
         busy = error.errno == errno.EBUSY
-        return Finding(str(node), WARNING, f"can't be asked: {error.strerror}", f"fuser -v {node}" if busy else "")
+        return Finding(
+            str(node), WARNING, f"can't read its formats: {error.strerror}", f"fuser -v {node}" if busy else ""
+        )
     if not formats:
-        return Finding(str(node), GOOD, "no pictures: another node of the same camera gives them")
-    return Finding(str(node), GOOD, f"gives {', '.join(formats)}")
+        return Finding(str(node), GOOD, "no images; another device of the same camera delivers them")
+    return Finding(str(node), GOOD, f"delivers {', '.join(formats)}")
 
 
-def formats_of(node: Path) -> list[str]:
+def pixel_formats(node: Path) -> list[str]:
     """Pixel formats (FOURCC) of a V4L2 device. Raises OSError."""
     descriptor = os.open(node, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
     found: list[str] = []
     try:
         while True:
-            question = struct.pack(_DESCRIPTION, len(found), _CAPTURE, 0, b"", 0, 0, 0, 0, 0)
-            answer = fcntl.ioctl(descriptor, _ENUMERATE_FORMATS, question)
-            found.append(struct.unpack(_DESCRIPTION, answer)[4].to_bytes(4, "little").decode("ascii", "replace"))
+            request = struct.pack(_V4L2_FMTDESC, len(found), _V4L2_BUF_TYPE_VIDEO_CAPTURE, 0, b"", 0, 0, 0, 0, 0)
+            reply = fcntl.ioctl(descriptor, _VIDIOC_ENUM_FMT, request)
+            found.append(struct.unpack(_V4L2_FMTDESC, reply)[4].to_bytes(4, "little").decode("ascii", "replace"))
     except OSError as error:
         if error.errno not in (errno.EINVAL, errno.ENOTTY):
             raise
@@ -182,52 +191,47 @@ def formats_of(node: Path) -> list[str]:
         os.close(descriptor)
 
 
-def calibration(configuration: Configuration) -> Finding:
-    """Whether the lens is for the pictures that are asked for."""
-    lens, asked = configuration.lens, configuration.camera
+def check_lens(configuration: Configuration) -> Finding:
+    """Whether the lens fits the image size that the camera is configured for."""
+    lens, camera = configuration.lens, configuration.camera
     if lens is None:
-        return Finding("lens", WARNING, "none is configured", "vm-detect --lens FILE, or lens in vm.toml")
+        return Finding("lens", WARNING, "no lens is configured", "vm-detect --lens FILE, or set lens in vm.toml")
     if lens.lens.size is None:
+        return Finding("lens", WARNING, "the lens has no image size", "add size = [width, height] to the lens")
+    if not (camera.width and camera.height):
         return Finding(
-            "lens", WARNING, "it does not say for which size of picture it is", "add size = [width, height] to it"
+            "lens", GOOD, f"for {lens.lens.size[0]} x {lens.lens.size[1]} px; the camera chooses its own size"
         )
-    if not (asked.width and asked.height):
-        return Finding("lens", GOOD, f"for {lens.lens.size[0]} x {lens.lens.size[1]} px; the camera's size is its own")
     try:
-        lens.lens.for_image((asked.width, asked.height))
+        lens.lens.for_image((camera.width, camera.height))
     except VisualMeshError as error:
-        return Finding("lens", BAD, str(error), "calibrate at the camera's size, or ask it for the lens's")
-    return Finding("lens", GOOD, f"for {lens.lens.size[0]} x {lens.lens.size[1]} px, as the camera is asked for")
+        return Finding(
+            "lens", BAD, str(error), "calibrate at the camera's size, or configure the camera for the size of the lens"
+        )
+    return Finding("lens", GOOD, f"for {lens.lens.size[0]} x {lens.lens.size[1]} px; fits the camera")
 
 
-def clock(source: Path, now: float) -> Finding:
-    """Whether clocks are fast to read, and roughly right."""
+def check_clock(source: Path, now: float) -> Finding:
+    """Whether the clock is fast to read and roughly right."""
     try:
         name = source.read_text().strip()
     except OSError:
         name = "unknown"
-    if now < _OLDEST:
+    if now < _EARLIEST_TIME:
         return Finding(
-            "clock", WARNING, f"it says {time.strftime('%Y-%m-%d', time.gmtime(now))}", "sudo timedatectl set-ntp true"
+            "clock",
+            WARNING,
+            f"the date is wrong: {time.strftime('%Y-%m-%d', time.gmtime(now))}",
+            "sudo timedatectl set-ntp true",
         )
     if name in ("hpet", "acpi_pm"):
-        return Finding("clock", WARNING, f"{name} takes microseconds to read", "boot with clocksource=tsc")
-    return Finding("clock", GOOD, f"read from {name}")
+        return Finding("clock", WARNING, f"{name} is slow to read", "boot with clocksource=tsc")
+    return Finding("clock", GOOD, f"clock source {name}")
 
 
-def socket_folder(configuration: Configuration) -> Finding:
-    """Whether the status socket can be made."""
+def check_status_socket(configuration: Configuration) -> Finding:
+    """Whether the status socket can be created."""
     path = Path(configuration.status.socket) if configuration.status.socket else default_socket_path()
     if not os.access(path.parent, os.W_OK):
-        return Finding(
-            "status socket", BAD, f"{path.parent} can't be written", f"sudo install -d -o $USER {path.parent}"
-        )
+        return Finding("status socket", BAD, f"can't write to {path.parent}", f"sudo install -d -o $USER {path.parent}")
     return Finding("status socket", GOOD, str(path))
-
-
-def safely(configuration: Configuration) -> Iterator[Finding]:
-    """As examine; what can't even be looked at is a finding too."""
-    try:
-        yield from examine(configuration)
-    except OSError as error:
-        yield Finding("machine", WARNING, one_line(error))

@@ -1,4 +1,4 @@
-"""vm-doctor: what is wrong with this machine, and how to mend it."""
+"""vm-doctor: check this machine and the configuration of vm-detect, and say how to fix problems."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from dataclasses import asdict
 import cv2
 
 from ..errors import VisualMeshError
-from .checks import BAD, Finding, safely
+from .checks import BAD, Finding, run_checks
 from .options import add_live, add_model, add_pose, add_settings, read_options
 
 EXIT_OK, EXIT_FAILED = 0, 1
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command line of vm-doctor: that of vm-detect, whose configuration it looks at."""
+    """The command line of vm-doctor; it has the options of vm-detect, whose configuration it checks."""
     parser = argparse.ArgumentParser(
         prog="vm-doctor",
-        description="Look at processor, packages, model, camera, lens and clock, and say what to mend.",
-        epilog="Exit status: 0 nothing is in the way, 1 something is, 2 wrong usage.",
+        description="Check processor, packages, model, camera, lens and clock, and say how to fix problems.",
+        epilog="Exit status: 0 no failure (there may be warnings), 1 at least one failure, 2 wrong usage.",
     )
     parser.add_argument("--camera", metavar="SOURCE", help="as for vm-detect")
-    parser.add_argument("--json", action="store_true", help="print a line of JSON for each finding")
+    parser.add_argument("--json", action="store_true", help="print each finding as a line of JSON")
     add_model(parser)
     add_pose(parser, "as for vm-detect")
     add_settings(parser)
@@ -40,8 +40,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         configuration = read_options(options)
         worst = EXIT_OK
-        for each in safely(configuration):
-            print(json.dumps(asdict(each)) if options.json else _shown(each), flush=True)
+        for each in run_checks(configuration):
+            print(json.dumps(asdict(each)) if options.json else _as_text(each), flush=True)
             worst = EXIT_FAILED if each.state == BAD else worst
     except VisualMeshError as error:
         print(f"vm-doctor: {error}", file=sys.stderr)
@@ -51,9 +51,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return worst
 
 
-def _shown(finding: Finding) -> str:
-    mend = f"\n{'':10}mend: {finding.mend}" if finding.mend else ""
-    return f"{finding.state:9} {finding.about}: {finding.seen}{mend}"
+def _as_text(finding: Finding) -> str:
+    fix = f"\n{'':10}fix: {finding.mend}" if finding.mend else ""
+    return f"{finding.state:9} {finding.about}: {finding.seen}{fix}"
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Options that the commands share: model, lens, orientation and settings, from the command line and from vm.toml."""
+"""Options that the commands share, and the configuration that they and vm.toml give together."""
 
 from __future__ import annotations
 
@@ -24,54 +24,53 @@ LIVE = {
     "status": StatusSettings,
     "recorder": RecorderSettings,
 }
-"""Sections that are for live cameras."""
+"""Sections for live cameras."""
 
 ANGLES = (
-    "Angles are radians, or degrees with a suffix as in 20deg; negative ones in degrees need an equals sign, "
+    "Angles are in radians, or in degrees with a suffix as in 20deg. Write negative degrees with an equals sign, as in "
     "--pitch=-20deg."
 )
 
 
 def add_model(parser: argparse.ArgumentParser) -> None:
-    """The options --model and --config."""
+    """Add the options --model and --config."""
     parser.add_argument(
         "--model",
         metavar="MODEL",
-        help=f"network that vm-export wrote (.onnx), or {', '.join(SHIPPED[:-1])} or {SHIPPED[-1]}, which come with "
-        f"the package; default {DEFAULT}",
+        help=f"model file from vm-export (.onnx), or one from the package: {', '.join(SHIPPED[:-1])} or {SHIPPED[-1]}; "
+        f"default {DEFAULT}",
     )
-    parser.add_argument("--config", type=Path, metavar="FILE", help="vm.toml; options on the command line override it")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="configuration, vm.toml; options override it")
 
 
-def add_pose(parser: argparse.ArgumentParser, when: str) -> None:
-    """The options of lens and orientation, and `when` they count."""
-    pose = parser.add_argument_group("lens and orientation", when)
+def add_pose(parser: argparse.ArgumentParser, description: str) -> None:
+    """Add the options for lens and orientation. description: shown in the help."""
+    pose = parser.add_argument_group("lens and orientation", description)
     pose.add_argument("--lens", type=Path, metavar="FILE", help="lens file: reference or calibration YAML, or TOML")
-    pose.add_argument("--height", metavar="M", help="height of the camera over the plane [m]")
-    pose.add_argument("--pitch", metavar="ANGLE", help="angle of the optical axis below the horizon; default 0")
-    pose.add_argument("--roll", metavar="ANGLE", help="lean of the camera to the right; default 0")
+    pose.add_argument("--height", metavar="M", help="height of the camera above the ground plane [m]")
+    pose.add_argument("--pitch", metavar="ANGLE", help="angle of the optical axis below the horizon [rad]; default 0")
+    pose.add_argument("--roll", metavar="ANGLE", help="tilt of the camera to its right side [rad]; default 0")
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
-    """An option for each field of Settings."""
+    """Add an option for each field of Settings."""
     add_section(parser.add_argument_group("settings"), Settings, "")
 
 
 def add_live(parser: argparse.ArgumentParser) -> None:
-    """An option for each entry of the sections that are for live cameras."""
+    """Add an option for each entry of the sections for live cameras."""
     for name, section in LIVE.items():
         group = parser.add_argument_group(f"[{name}], for live cameras")
         add_section(group, section, f"{name}_", ("source",) if name == "camera" else ())
 
 
-def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, but: Sequence[str] = ()) -> None:
-    """An option for each entry of a section, `but` some; their names begin with `prefix`."""
+def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, skip: Sequence[str] = ()) -> None:
+    """Add an option for each entry of a section, except those in `skip`. prefix: first part of the option names."""
     for each in fields(section):
-        if each.name in but:
+        if each.name in skip:
             continue
-        unit = each.metadata["unit"]
-        default = "the model's" if each.default is None else "none" if each.default == "" else each.default
-        help = f"{each.metadata['help']}{f' [{unit}]' if unit else ''}; default {default}".replace("%", "%%")
+        unit = f" [{each.metadata['unit']}]" if each.metadata["unit"] else ""
+        help = f"{each.metadata['help']}{unit}; default {_default(each.default)}".replace("%", "%%")
         option = "--" + (prefix + each.name).replace("_", "-")
         if "allowed" in each.metadata:
             group.add_argument(option, choices=each.metadata["allowed"], help=help)
@@ -82,13 +81,22 @@ def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, but: 
             group.add_argument(option, type=kind, metavar={str: "TEXT", int: "N", float: "X"}[kind], help=help)
 
 
+def _default(value: Any) -> str:
+    """A default as the help shows it. None: the model decides."""
+    if value is None:
+        return "the model's"
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return "none" if value == "" else str(value)
+
+
 def read_options(options: argparse.Namespace) -> Configuration:
-    """What the command line and the configuration say together. Raises InputError."""
-    config = options.config or _recorded(getattr(options, "camera", None))
+    """The configuration from vm.toml, with the options of the command line on top. Raises InputError."""
+    config = options.config or _recording_configuration(getattr(options, "camera", None))
     configured = read_configuration(config) if config else Configuration()
     sections = {"orientation": (FixedPose, ""), "detector": (Settings, "")}
     sections |= {name: (section, f"{name}_") for name, section in LIVE.items()}
-    given = {name: _given(options, section, prefix) for name, (section, prefix) in sections.items()}
+    given = {name: _given_entries(options, section, prefix) for name, (section, prefix) in sections.items()}
     if getattr(options, "camera", None) is not None:
         given["camera"]["source"] = options.camera
     configured = with_overrides(configured, given)
@@ -99,14 +107,14 @@ def read_options(options: argparse.Namespace) -> Configuration:
     return configured
 
 
-def _recorded(source: str | None) -> Path | None:
-    """The vm.toml of a recording, if the source is one."""
+def _recording_configuration(source: str | None) -> Path | None:
+    """The vm.toml of a recording, if the camera source is one."""
     folder = Path(source or "")
-    recorded = source is not None and (folder / MESSAGES).is_file() and (folder / CONFIGURATION).is_file()
-    return folder / CONFIGURATION if recorded else None
+    is_recording = source is not None and (folder / MESSAGES).is_file() and (folder / CONFIGURATION).is_file()
+    return folder / CONFIGURATION if is_recording else None
 
 
-def _given(options: argparse.Namespace, section: Any, prefix: str) -> dict[str, Any]:
-    """The entries of a section that the command line gives."""
+def _given_entries(options: argparse.Namespace, section: Any, prefix: str) -> dict[str, Any]:
+    """The entries of a section that the command line sets."""
     given = {each.name: getattr(options, prefix + each.name, None) for each in fields(section)}
     return {name: value for name, value in given.items() if value is not None}

@@ -1,281 +1,20 @@
-"""vm-detect as a user types it: real processes, real files, and what goes wrong with them."""
+"""vm-detect as a user types it: options, exit statuses, signals and what it writes where."""
 
-import json
 import os
 import pty
 import shutil
 import signal
 import subprocess
-import sys
-import tomllib
 from dataclasses import fields
 from pathlib import Path
 
-import cv2
-import numpy as np
 import pytest
 
-from tests.drawn_scenes import FOLDER, IMAGES, MODEL, TRUTH
+from tests.drawn_scenes import IMAGES, MODEL
 from vm_embedded.cli.detect import parser
 from vm_embedded.detection.settings import Settings
 
-COMMAND = Path(sys.executable).parent / "vm-detect"
-STAGES = ["mesh", "project", "sample", "infer", "cluster", "total"]
-
-
-def run(*arguments, code=0, **more):
-    done = subprocess.run([str(COMMAND), *map(str, arguments)], capture_output=True, text=True, **more)
-    assert done.returncode == code, (done.returncode, done.stderr)
-    assert "Traceback" not in done.stderr
-    return done
-
-
-def detect(source, *options, **more):
-    return run("--camera", source, "--model", MODEL, *options, **more)
-
-
-def lines(done):
-    def no_constant(name):
-        raise AssertionError(f"{name} is no JSON")
-
-    return [json.loads(line, parse_constant=no_constant) for line in done.stdout.splitlines()]
-
-
-@pytest.fixture
-def folder(tmp_path):
-    """A directory with two of the drawn frames and their lens files."""
-    target = tmp_path / "frames"
-    target.mkdir()
-    for image in IMAGES[:2]:
-        shutil.copy(image, target)
-        shutil.copy(image.with_name(image.name.replace("image", "lens")).with_suffix(".yaml"), target)
-    return target
-
-
-@pytest.fixture(scope="module")
-def lens(tmp_path_factory):
-    """A lens file without an orientation."""
-    path = tmp_path_factory.mktemp("lens") / "lens.toml"
-    path.write_text('projection = "equisolid"\nfocal_length = 280.0\nfov = 2.4\nsize = [640, 512]\n')
-    return path
-
-
-def test_the_balls_of_the_drawn_frames_are_found():
-    truth = json.loads(TRUTH.read_text())
-    false = 0
-    for line in lines(detect(FOLDER)):
-        ball = truth[line["source"]]
-        hits = [
-            each
-            for each in line["detections"]
-            if np.hypot(*(np.array(each["center"]) - ball["center"])) < each["radius"]
-        ]
-        assert len(hits) == 1, line["source"]
-        assert hits[0]["distance"] == pytest.approx(ball["distance"], rel=0.05)
-        np.testing.assert_allclose(hits[0]["position"], ball["position"], atol=0.05 * ball["distance"] + 0.01)
-        false += len(line["detections"]) - 1
-    assert false <= 1
-
-
-def test_a_line_has_what_the_documentation_says():
-    (line,) = lines(detect(IMAGES[0]))
-    assert list(line) == ["frame", "source", "stamp", "points", "detections", "timing_ms"]
-    assert line["frame"] == 0
-    assert line["source"] == IMAGES[0].name
-    assert line["stamp"] is None
-    assert line["points"] > 100
-    assert list(line["timing_ms"]) == STAGES
-    ball = line["detections"][0]
-    assert list(ball) == [
-        *("class", "confidence", "center", "radius", "bearing", "position", "distance"),
-        *("angular_radius", "distance_by_angle", "distances_agree", "points"),
-    ]
-    assert np.linalg.norm(ball["bearing"]) == pytest.approx(1.0, abs=1e-4)
-
-
-def test_directory_glob_and_image_agree(folder):
-    by_directory = lines(detect(folder))
-    by_glob = lines(detect(folder / "image*.jpg"))
-    assert [line["frame"] for line in by_directory] == [0, 1]
-    for a, b in zip(by_directory, by_glob, strict=True):
-        assert a["detections"] == b["detections"]
-    assert lines(detect(folder / IMAGES[1].name))[0]["detections"] == by_directory[1]["detections"]
-
-
-def test_frames_are_in_natural_order(folder, lens):
-    for number in (10, 9, 1):
-        shutil.copy(IMAGES[0], folder / f"frame{number}.jpg")
-    found = lines(detect(folder / "frame*", "--lens", lens, "--height", "0.8"))
-    assert [line["source"] for line in found] == ["frame1.jpg", "frame9.jpg", "frame10.jpg"]
-
-
-def test_a_video_is_read_to_its_end(tmp_path, lens):
-    path = tmp_path / "clip.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, (640, 512))
-    for _ in range(5):
-        writer.write(cv2.imread(str(IMAGES[0])))
-    writer.release()
-    found = lines(detect(path, "--lens", lens, "--height", 0.8, "--pitch", "30deg", "--save-points", tmp_path))
-    assert [line["frame"] for line in found] == list(range(5))
-    assert [line["stamp"] for line in found] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4], abs=0.01)
-    assert len(list(tmp_path.glob("clip-*.npz"))) == 5
-
-
-def test_saved_points_are_the_mesh_on_screen(tmp_path):
-    (line,) = lines(detect(IMAGES[0], "--save-points", tmp_path / "points"))
-    with np.load(tmp_path / "points" / f"{IMAGES[0].stem}.npz") as saved:
-        assert sorted(saved) == ["pixels", "probabilities", "rays"]
-        assert len(saved["pixels"]) == len(saved["rays"]) == len(saved["probabilities"]) == line["points"]
-        np.testing.assert_allclose(np.linalg.norm(saved["rays"], axis=1), 1.0)
-        np.testing.assert_allclose(saved["probabilities"].sum(axis=1), 1.0, atol=1e-5)
-    assert [path.name for path in (tmp_path / "points").iterdir()] == [f"{IMAGES[0].stem}.npz"]
-
-
-def test_overlays_are_pictures_of_the_frame_s_size(tmp_path):
-    detect(IMAGES[0], "--save-overlay", tmp_path)
-    drawn, frame = cv2.imread(str(tmp_path / IMAGES[0].name)), cv2.imread(str(IMAGES[0]))
-    assert drawn.shape == frame.shape
-    assert (np.abs(drawn.astype(int) - frame).max(axis=2) > 60).sum() > 500
-
-
-def test_class_points_come_on_request():
-    (line,) = lines(detect(IMAGES[0], "--emit-points", "field,line"))
-    assert list(line["class_points"]) == ["field", "line"]
-    field = line["class_points"]["field"]
-    assert len(field["bearings"]) == len(field["probabilities"]) > 100
-    assert np.array(field["bearings"])[:, 2].max() < 0.0
-    assert "did you mean 'line'" in detect(IMAGES[0], "--emit-points", "lines", code=1).stderr
-
-
-def test_rejected_clusters_come_on_request():
-    with_reasons = lines(detect(FOLDER, "--explain", "--threshold", 0.2))
-    assert all("rejected" in line for line in with_reasons)
-    assert all(each["reason"] for line in with_reasons for each in line["rejected"])
-
-
-def test_configuration_and_options_agree(tmp_path, lens):
-    (tmp_path / "vm.toml").write_text(
-        f'model = "{MODEL}"\nlens = "{lens}"\n'
-        '[orientation]\nheight = 0.8\npitch = "30deg"\n[detector]\nthreads = 1\nthreshold = 0.6\n'
-    )
-    shutil.copy(IMAGES[0], tmp_path / "frame.jpg")
-    configured = lines(run("--camera", tmp_path / "frame.jpg", "--config", tmp_path / "vm.toml"))
-    pose = ("--lens", lens, "--height", 0.8, "--pitch", 0.5235987755982988)
-    given = lines(detect(tmp_path / "frame.jpg", *pose, "--threshold", 0.6))
-    assert configured[0]["points"] == given[0]["points"] > 0
-    assert configured[0]["detections"] == given[0]["detections"]
-    other = lines(run("--camera", tmp_path / "frame.jpg", "--config", tmp_path / "vm.toml", "--height", 1.1))
-    assert other[0]["points"] != given[0]["points"]
-
-
-def test_looking_at_the_sky_gives_an_empty_result(tmp_path, lens):
-    shutil.copy(IMAGES[0], tmp_path / "frame.jpg")
-    (line,) = lines(detect(tmp_path / "frame.jpg", "--lens", lens, "--height", 0.8, "--pitch=-90deg"))
-    assert line["points"] == 0
-    assert line["detections"] == []
-
-
-def test_raw_frames_are_read_in_their_format(tmp_path, lens):
-    picture = cv2.imread(str(IMAGES[0]))
-    mosaic = picture[:, :, 1].copy()
-    mosaic[0::2, 0::2], mosaic[1::2, 1::2] = picture[0::2, 0::2, 2], picture[1::2, 1::2, 0]
-    cv2.imwrite(str(tmp_path / "raw.png"), mosaic)
-    pose = ("--lens", lens, "--height", 0.8, "--pitch", "30deg")
-    (line,) = lines(detect(tmp_path / "raw.png", *pose, "--format", "bayer_rggb", "--save-overlay", tmp_path))
-    assert line["points"] > 0
-    one_complaint(detect(tmp_path / "raw.png", *pose, "--format", "rgba", code=1), "rgba", "bayer_rggb")
-    one_complaint(detect(IMAGES[0], "--format", "gray", code=1), "gray image must have the shape")
-
-
-def one_complaint(done, *parts):
-    (complaint,) = done.stderr.splitlines()
-    for part in parts:
-        assert part in complaint
-    return done
-
-
-def test_one_bad_frame_is_named_and_the_others_are_processed(folder):
-    content = IMAGES[0].read_bytes()
-    (folder / "image0000005.jpg").write_bytes(content[: len(content) // 2])
-    shutil.copy(folder / "lens0000000.yaml", folder / "lens0000005.yaml")
-    done = one_complaint(detect(folder), "image0000005.jpg", "cut short")
-    assert [line["frame"] for line in lines(done)] == [0, 1]
-
-
-@pytest.mark.parametrize("content", [b"", b"no picture", b"\xff\xd8\xff\xe0 broken \xff\xd9", b"\x89PNG\r\n\x1a\n"])
-def test_a_broken_image_is_named(tmp_path, content, lens):
-    (tmp_path / "broken.jpg").write_bytes(content)
-    done = detect(tmp_path / "broken.jpg", "--lens", lens, "--height", 0.8, code=1)
-    one_complaint(done, "broken.jpg")
-    assert done.stdout == ""
-
-
-@pytest.mark.parametrize("name", ["missing.jpg", "missing/", "none*.jpg"])
-def test_a_missing_source_is_named(name, tmp_path):
-    one_complaint(detect(name, code=1, cwd=tmp_path), name)
-
-
-def test_a_directory_without_images_is_named(tmp_path):
-    one_complaint(detect(tmp_path, code=1), "no images in directory", str(tmp_path))
-
-
-@pytest.mark.parametrize("content", [b"", b"no video at all", os.urandom(20000)])
-def test_an_unreadable_video_is_named(tmp_path, content):
-    (tmp_path / "clip.mp4").write_bytes(content)
-    one_complaint(detect(tmp_path / "clip.mp4", code=1), "clip.mp4")
-
-
-@pytest.mark.parametrize(
-    ("text", "parts"),
-    [
-        ("", ("not a table",)),
-        ("projection: FISH\nfocal_length: 300\nfov: 2\n", ("FISH", "equidistant")),
-        ("projection: EQUISOLID\nfocal_lenght: 300\nfov: 2\n", ("focal_lenght", "focal_length")),
-        ("projection: EQUISOLID\nfocal_length: -3\nfov: 2\n", ("focal length", "-3")),
-        ("projection: EQUISOLID\nfov: 2\n", ("focal_length",)),
-        ("projection: [EQUISOLID\n", ("line 1",)),
-        ("projection: EQUISOLID\nfocal_length: 280\nfov: 2\nsize: [300, 300]\n", ("300 x 300", "640 x 512")),
-        ("projection: EQUISOLID\nfocal_length: 280\nfov: 2\nHoc: [[1, 2], [3, 4]]\n", ("Hoc", "4 x 4")),
-    ],
-)
-def test_a_wrong_lens_file_is_named(tmp_path, text, parts):
-    shutil.copy(IMAGES[0], tmp_path / "imageX.jpg")
-    (tmp_path / "lensX.yaml").write_text(text)
-    one_complaint(detect(tmp_path, "--height", 0.8, code=1), *parts)
-
-
-def test_a_frame_without_lens_or_orientation_says_what_to_give(tmp_path, lens):
-    shutil.copy(IMAGES[0], tmp_path / "frame.jpg")
-    one_complaint(detect(tmp_path / "frame.jpg", code=1), "--lens")
-    one_complaint(detect(tmp_path / "frame.jpg", "--lens", lens, code=1), "--height")
-    one_complaint(detect(tmp_path / "frame.jpg", "--lens", lens, "--pitch", 1, code=1), "--height")
-
-
-@pytest.mark.parametrize(
-    ("pose", "part"),
-    [
-        (("--height", "nan"), "nan"),
-        (("--height", "high"), "high"),
-        (("--height", "-1"), "-1"),
-        (("--height", "0.15"), "0.19"),
-        (("--height", "0.8", "--pitch", "nan"), "nan"),
-        (("--height", "0.8", "--roll", "inf"), "inf"),
-        (("--height", "0.8", "--pitch", "20"), "20deg"),
-        (("--height", "0.8", "--object-radius", "0.5"), "diameter"),
-    ],
-)
-def test_impossible_geometry_is_named(tmp_path, lens, pose, part):
-    shutil.copy(IMAGES[0], tmp_path / "frame.jpg")
-    one_complaint(detect(tmp_path / "frame.jpg", "--lens", lens, *pose, code=1), part)
-
-
-def test_a_nan_in_hoc_is_named(folder):
-    path = folder / "lens0000000.yaml"
-    rows = path.read_text().splitlines()
-    rows[-4] = "  - [.nan, 0, 0, 0]"
-    path.write_text("\n".join(rows))
-    done = one_complaint(detect(folder), "image0000000.jpg", "finite")
-    assert len(lines(done)) == 1
+from .commands import COMMAND, detect, lines, one_complaint, run
 
 
 def test_an_unknown_key_in_the_configuration_is_named_with_the_nearest(tmp_path):
@@ -289,11 +28,6 @@ def test_models_that_are_none_are_refused(tmp_path):
     for model in (tmp_path / "model.onnx", tmp_path / "missing.onnx", IMAGES[0]):
         one_complaint(run("--camera", IMAGES[0], "--model", model, code=1), model.name)
     one_complaint(run("--camera", IMAGES[0], "--model", "ball-5x5", code=1), "'ball-5x5'", "did you mean 'ball-5x4'")
-
-
-def test_a_folder_that_can_t_be_made_is_named(tmp_path):
-    (tmp_path / "file").write_text("")
-    one_complaint(detect(IMAGES[0], "--save-overlay", tmp_path / "file", code=1), "file")
 
 
 @pytest.mark.parametrize("arguments", [(), ("--camera",), ("--camera", "x", "--threads", "many"), ("--sampling", "no")])
@@ -370,22 +104,3 @@ def test_progress_is_shown_on_a_terminal_and_nowhere_else(folder):
     os.close(master)
     assert b"1/2" in seen
     assert b"2/2" in seen
-
-
-def test_package_data_and_scripts_are_declared():
-    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
-    assert set(project["scripts"]) == {
-        "vm-detect",
-        "vm-doctor",
-        "vm-export",
-        "vm-bench",
-        "vm-synth",
-        "vm-train",
-        "vm-evaluate",
-        "vm-mesh",
-    }
-    assert [each.split(">")[0] for each in project["dependencies"]] == [
-        "numpy",
-        "onnxruntime",
-        "opencv-python-headless",
-    ]

@@ -11,7 +11,7 @@ def test_what_can_never_work_ends_it_at_the_start_with_a_status_of_its_own(tmp_p
         (("--camera", "synthetic", "--camera-fps", -1), "fps must be a number"),
         (("--camera", "synthetic", "--format", "gray"), "bgr"),
         (("--camera", "synthetic", "--recorder-trigger-class", "bal"), "'bal'"),
-        (("--camera", "synthetic", "--explain"), "--explain is for files"),
+        (("--camera", "synthetic", "--explain"), "--explain works only with files"),
         (("--camera", "/dev/video-none"), "needs a lens"),
         (("--config", tmp_path / "none.toml"), "none.toml"),
         (("--camera", "fault:none.toml"), "none.toml"),

@@ -1,0 +1,106 @@
+"""What vm-doctor finds on a good machine and on bad ones."""
+
+import os
+from dataclasses import replace
+
+import pytest
+
+from vm_embedded.cameras.camera import CameraSettings
+from vm_embedded.cli.checks import BAD, GOOD, WARNING, check_clock, check_opencv, check_threads, run_checks
+from vm_embedded.geometry.lens_files import LensFile
+from vm_embedded.geometry.radial_lenses import Equisolid
+from vm_embedded.live.configuration import Configuration, StatusSettings
+
+HEALTHY = Configuration(
+    camera=CameraSettings(source="synthetic", width=640, height=512),
+    lens=LensFile(Equisolid(focal_length=300.0, fov=2.0, size=(1280, 1024)), None),
+)
+
+
+@pytest.fixture
+def root(tmp_path):
+    """A machine on which everything is right."""
+    for name, text in (
+        ("proc/cpuinfo", "model name : A\nflags : avx2 fma\nmodel name : A\nflags : avx2 fma avx512f\n"),
+        ("sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "performance\n"),
+        ("sys/devices/system/clocksource/clocksource0/current_clocksource", "tsc\n"),
+    ):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True)
+        path.write_text(text)
+    (tmp_path / "dev").mkdir()
+    return tmp_path
+
+
+def found(configuration, root):
+    return {each.about: each for each in run_checks(configuration, root)}
+
+
+def test_a_machine_without_faults_has_none(root):
+    assert {each.state for each in run_checks(HEALTHY, root)} == {GOOD}
+
+
+def test_a_slow_processor_a_slow_governor_and_a_slow_clock_are_seen(root):
+    (root / "proc/cpuinfo").write_text("model name : Old\nflags : sse2\n")
+    (root / "sys/devices/system/cpu/cpu0/cpufreq/scaling_governor").write_text("powersave\n")
+    (root / "sys/devices/system/clocksource/clocksource0/current_clocksource").write_text("hpet\n")
+    seen = found(HEALTHY, root)
+    assert [seen[name].state for name in ("processor", "governor", "clock")] == [WARNING] * 3
+    assert "no avx2 and no fma" in seen["processor"].seen
+    assert "scaling_governor" in seen["governor"].mend
+
+
+def test_more_threads_than_cores_are_seen():
+    assert check_threads(4, 2, 8).state == WARNING
+    assert "--threads 2" in check_threads(4, 2, 8).mend
+    assert check_threads(2, 2, 8).state == GOOD
+
+
+def test_two_wheels_of_opencv_are_seen():
+    finding = check_opencv({"opencv-python", "opencv-python-headless", "numpy"})
+    assert finding.state == BAD
+    assert "pip uninstall" in finding.mend
+
+
+def test_a_wrong_clock_is_seen(tmp_path):
+    assert "timedatectl" in check_clock(tmp_path / "none", 1e9).mend
+
+
+def test_a_camera_that_is_not_there_or_may_move_is_seen(root):
+    wanted = replace(HEALTHY, camera=CameraSettings(source="0"))
+    assert found(wanted, root)["camera"].state == BAD
+    (root / "dev" / "video0").write_text("")
+    assert found(wanted, root)["camera"].state == WARNING
+    by_id = replace(HEALTHY, camera=CameraSettings(source="/dev/v4l/by-id/usb-camera"))
+    assert found(by_id, root)["camera"].state == BAD
+
+
+def test_a_camera_that_may_not_be_opened_is_seen(root, monkeypatch):
+    (root / "dev" / "video0").write_text("")
+    monkeypatch.setattr(os, "access", lambda path, mode: "video" not in str(path))  # root may open everything
+    node = found(HEALTHY, root)[str(root / "dev" / "video0")]
+    assert node.state == BAD
+    assert "usermod -aG video" in node.mend
+
+
+def test_a_model_that_is_none_is_seen(root, tmp_path):
+    (tmp_path / "model.onnx").write_text("no model")
+    assert found(replace(HEALTHY, model=str(tmp_path / "model.onnx")), root)["model"].state == BAD
+
+
+def test_a_lens_for_another_size_is_seen(root):
+    other = replace(HEALTHY, camera=CameraSettings(source="synthetic", width=640, height=480))
+    assert found(other, root)["lens"].state == BAD
+    assert "other proportions" in found(other, root)["lens"].seen
+    assert found(replace(HEALTHY, lens=None), root)["lens"].state == WARNING
+
+
+def test_a_status_socket_without_a_folder_is_seen(root):
+    nowhere = replace(HEALTHY, status=StatusSettings(socket="/nowhere/at/all"))
+    assert found(nowhere, root)["status socket"].state == BAD
+
+
+def test_every_fault_has_a_command_that_mends_it(root):
+    broken = Configuration(camera=CameraSettings(source="9"), status=StatusSettings(socket="/nowhere/at/all"))
+    for each in run_checks(broken, root):
+        assert each.state == GOOD or each.mend, each

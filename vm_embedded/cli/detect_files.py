@@ -1,0 +1,95 @@
+"""Detecting in the frames of images and video files, each frame once."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..cameras.image_files import Frame, check_file_format, lens_beside, open_source
+from ..detection.detector import Detector
+from ..errors import InputError, VisualMeshError
+from ..geometry.lens import Lens
+from ..geometry.lens_files import read_lens_file
+from ..geometry.orientation import Orientation
+from ..live.configuration import Configuration
+from ..output.messages import file_message
+from ..output.result_files import make_folder, save_overlay, save_points
+from .progress import ProgressBar
+
+
+def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
+    """Process each frame of the source, print a line of JSON for it, and return the number of processed frames.
+
+    A frame that can't be processed is reported on standard error and skipped. Raises VisualMeshError for errors that
+    concern all frames.
+    """
+    format = given.detector.format
+    pose = _DefaultPose(given.lens.lens if given.lens else None, given.orientation.orientation())
+    detector = Detector.from_file(given.model, given.detector)
+    emit_points = [name.strip() for name in options.emit_points.split(",")] if options.emit_points else []
+    for name in emit_points:
+        detector.manifest.column(name)
+    check_file_format(format)
+    source = open_source(given.camera.source, raw=format != "bgr")
+    for folder in (options.save_overlay, options.save_points):
+        if folder is not None:
+            make_folder(folder)
+
+    processed = 0
+    bar = ProgressBar(source.count)
+    for frame in source.frames:
+        try:
+            line = _process(frame, detector, pose, options, emit_points)
+        except VisualMeshError as error:
+            bar.clear()
+            complain(f"{frame.source}: {error}")
+            continue
+        bar.clear()
+        print(line, flush=True)
+        processed += 1
+        bar.show(frame.index + 1)
+    bar.clear()
+    return processed
+
+
+@dataclass(frozen=True)
+class _DefaultPose:
+    """Lens and orientation for frames without a lens file; None if the user gave none."""
+
+    lens: Lens | None
+    orientation: Orientation | None
+
+    def of(self, frame: Frame) -> tuple[Lens, Orientation]:
+        """Lens and orientation of a frame; the lens file beside it takes precedence. Raises InputError without one."""
+        lens, orientation = self.lens, self.orientation
+        beside = lens_beside(frame.path)
+        if beside is not None:
+            file = read_lens_file(beside)
+            lens, orientation = file.lens, file.orientation or orientation
+        if lens is None:
+            raise InputError("no lens: give --lens, or put lensNAME.yaml beside imageNAME")
+        if orientation is None:
+            raise InputError("no orientation: give --height (and --pitch, --roll), or Hoc in lensNAME.yaml")
+        return lens, orientation
+
+
+def _process(
+    frame: Frame, detector: Detector, pose: _DefaultPose, options: argparse.Namespace, emit_points: Sequence[str]
+) -> str:
+    """Detect in a frame, save the files that the options ask for, and return its line of JSON."""
+    image = frame.read()
+    lens, orientation = pose.of(frame)
+    detections = detector.detect(image, orientation, lens, explain=options.explain)
+    if options.save_points is not None:
+        save_points(options.save_points, frame, detections)
+    if options.save_overlay is not None:
+        save_overlay(options.save_overlay, frame, image, detections)
+    return json.dumps(file_message(frame, detections, emit_points, options.explain), allow_nan=False)
+
+
+def complain(message: str) -> None:
+    """Print an error of vm-detect as one line on standard error."""
+    print(f"vm-detect: {' '.join(message.split())}", file=sys.stderr)
