@@ -132,20 +132,22 @@ def trained(task: tuple[str, int, Path, Path]) -> Path:
 
     from vm_train.learning.hardware import Hardware
     from vm_train.learning.rounds import train
-    from vm_train.learning.run_folder import TrainingRun
+    from vm_train.learning.run_folder import begin_run, read_run
+    from vm_train.learning.training_data import TrainingData
 
     torch.set_num_threads(1)
     folder = folder_of(out, name, seed)
     if (folder / "run.json").exists():
-        job = TrainingRun.read(folder)
+        run = read_run(folder)
     else:
         table = tomllib.loads(BASE.read_text())
         for changes in (COMMON, VARIANTS[name].changes, {"training": {"seed": seed}}):
             for section, entries in changes.items():
                 table[section] = entries if section == "classes" else {**table.get(section, {}), **entries}
         configuration = read_sections(TrainConfiguration, None, table)
-        job = TrainingRun.begin(folder, data, configuration, split_of(data, VARIANTS[name].only), out / "unpacked")
-    train(job, Hardware("cpu", 0, 1, 0), lambda: False)
+        pictures = TrainingData(data, split_of(data, VARIANTS[name].only), out / "unpacked")
+        run = begin_run(folder, pictures, configuration)
+    train(run, Hardware("cpu", 0, 1, 0), lambda: False)
     return folder
 
 

@@ -30,8 +30,9 @@ from vm_train.graphs.schedule import Item
 from vm_train.learning.configuration import TrainConfiguration
 from vm_train.learning.hardware import Hardware
 from vm_train.learning.rounds import train
-from vm_train.learning.run_folder import TrainingRun
+from vm_train.learning.run_folder import begin_run
 from vm_train.learning.trainer import Trainer
+from vm_train.learning.training_data import TrainingData
 
 RESULTS = Path(__file__).with_name("training.json")
 PAGE = Path(__file__).parents[1] / "docs" / "training.md"
@@ -61,10 +62,10 @@ def per_second(call: Callable[[int], object], count: int) -> float:
 def parts(data: Path, numbers: tuple[str, ...], folder: Path) -> dict[str, float]:
     """Pictures per second on one core."""
     made = configuration(5, 4)
-    job = TrainingRun.begin(folder / "parts", data, made, Split(numbers, (), ()), folder / "unpacked")
-    kept = job.graphs(numbers)
-    plain = PictureGraphs(list(kept.pictures), kept.view, None)
-    still = PictureGraphs(list(kept.pictures), replace(kept.view, augmentation=NO_AUGMENTATION), kept.unpacked)
+    run = begin_run(folder / "parts", TrainingData(data, Split(numbers, (), ()), folder / "unpacked"), made)
+    kept = run.graphs(numbers)
+    plain = PictureGraphs(list(kept.pictures), kept.recipe, None)
+    still = PictureGraphs(list(kept.pictures), replace(kept.recipe, augmentation=NO_AUGMENTATION), kept.decoded)
     for each in range(len(numbers)):
         kept[Item(each)]
     found = {
@@ -95,11 +96,11 @@ def whole(data: Path, numbers: tuple[str, ...], folder: Path, workers: int) -> d
     for name, (depth, width) in NETWORKS.items():
         split = Split(numbers[8:], numbers[:8], ())
         made = configuration(depth, width)
-        job = TrainingRun.begin(folder / f"{depth}x{width}", data, made, split, folder / "unpacked")
-        graphs = job.graphs(numbers)
+        run = begin_run(folder / f"{depth}x{width}", TrainingData(data, split, folder / "unpacked"), made)
+        graphs = run.graphs(numbers)
         for each in range(len(numbers)):
             graphs[Item(each)]  # unpacks it
-        done = train(job, Hardware("cpu", 0, 1, workers), lambda: False)
+        done = train(run, Hardware("cpu", 0, 1, workers), lambda: False)
         found[name] = round(done.pictures / done.seconds, 1)
     return found
 

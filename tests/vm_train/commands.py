@@ -25,8 +25,18 @@ def environment():
 
 
 def run(*arguments, code=0):
+    """Run vm-train and check its exit status."""
+    return run_module("vm_train", *arguments, code=code)
+
+
+def run_module(module, *arguments, code=0):
+    """Run python -m MODULE and check its exit status."""
     done = subprocess.run(
-        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=240, env=environment()
+        [sys.executable, "-m", module, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=240,
+        env=environment(),
     )
     assert done.returncode == code, done.stderr
     assert "Traceback" not in done.stderr

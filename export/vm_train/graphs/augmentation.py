@@ -1,7 +1,7 @@
-"""Training pictures made a little different: another pose and lens are told, the image is softened, colors change.
+"""Augmentation of training pictures: errors of the camera, blur and compression, and changes of the colors.
 
-Labels stay right, because nothing in the image moves: a network is told a wrong camera, as a robot's joints and
-calibration tell it, and so gets other points of the same image.
+Labels stay correct because nothing in the image moves. A camera error changes the pose and lens that the mesh is
+projected with, as errors of a robot's joints and calibration do, so the network gets other points of the same image.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from ..data.pictures import Picture
 
 @dataclass(frozen=True)
 class Augmentation:
-    """Section [augmentation]: how far pictures are changed in training. 0 switches an entry off.
+    """Section [augmentation]: how strongly training pictures are changed. 0 switches an entry off.
 
     height, tilt, focal_length and center are standard deviations. brightness, contrast, saturation and gamma are
     factors: up to 1 + the entry, and as often down to 1 / (1 + the entry). Raises InputError.
     """
 
-    height: float = number(0.02, "usual error of the camera's height, as a share of it", "", (0.0, 0.5))
-    tilt: float = number(1.0, "usual error of the camera's roll, and of its pitch", "deg", (0.0, 20.0))
+    height: float = number(0.02, "usual error of the camera's height, as a share of the height", "", (0.0, 0.5))
+    tilt: float = number(1.0, "usual error of the camera's roll and pitch", "deg", (0.0, 20.0))
     focal_length: float = number(0.01, "usual error of the focal length, as a share of it", "", (0.0, 0.2))
     center: float = number(0.005, "usual error of the optical center, in image widths", "", (0.0, 0.1))
-    brightness: float = number(0.2, "colors are up to this share brighter, or as much darker", "", (0.0, 4.0))
-    contrast: float = number(0.15, "contrast is up to this share higher, or as much lower", "", (0.0, 4.0))
-    saturation: float = number(0.25, "colors are up to this share stronger, or as much paler", "", (0.0, 4.0))
-    hue: float = number(6.0, "hues are turned by up to this, either way", "deg", (0.0, 180.0))
-    gamma: float = number(0.15, "exponent of colors is up to this share above 1, or as much below", "", (0.0, 4.0))
-    noise: float = number(0.03, "noise is up to this strong, standard deviation as a share of white", "", (0.0, 1.0))
-    blur_share: float = share(0.15, "share of pictures that are blurred")
-    blur: tuple[float, float] = range_of(0.4, 1.2, "blur where there is one, standard deviation", "px", (0.1, 20.0))
-    jpeg_share: float = share(0.15, "share of pictures that are compressed again")
-    jpeg: tuple[float, float] = range_of(40.0, 90.0, "JPEG quality of those", "", (1.0, 100.0))
+    brightness: float = number(0.2, "colors get brighter or darker by up to this share", "", (0.0, 4.0))
+    contrast: float = number(0.15, "contrast gets higher or lower by up to this share", "", (0.0, 4.0))
+    saturation: float = number(0.25, "colors get stronger or paler by up to this share", "", (0.0, 4.0))
+    hue: float = number(6.0, "hues turn by up to this angle, in both directions", "deg", (0.0, 180.0))
+    gamma: float = number(0.15, "exponent of the colors is up to this share above or below 1", "", (0.0, 4.0))
+    noise: float = number(0.03, "largest standard deviation of the noise, as a share of white", "", (0.0, 1.0))
+    blur_share: float = share(0.15, "share of the pictures that are blurred")
+    blur: tuple[float, float] = range_of(0.4, 1.2, "range of the blur's standard deviation", "px", (0.1, 20.0))
+    jpeg_share: float = share(0.15, "share of the pictures that are compressed as JPEG")
+    jpeg: tuple[float, float] = range_of(40.0, 90.0, "range of the JPEG quality", "", (1.0, 100.0))
 
     def __post_init__(self) -> None:
         check_entries(self)
@@ -66,14 +66,14 @@ NO_AUGMENTATION = Augmentation(
     blur_share=0.0,
     jpeg_share=0.0,
 )
-"""Pictures stay as they are."""
+"""All entries are off."""
 
 
 @dataclass(frozen=True)
 class Tone:
-    """What becomes of a picture's colors; names are those of Augmentation. Defaults change nothing.
+    """A change of colors, with the names of Augmentation. The defaults change nothing.
 
-    brightness, contrast, saturation: factors. hue: a turn [deg]. gamma: exponent. noise: standard deviation [1].
+    brightness, contrast, saturation: factors. hue: angle [deg]. gamma: exponent. noise: standard deviation, 1 is white.
     """
 
     brightness: float = 1.0
@@ -84,28 +84,28 @@ class Tone:
     noise: float = 0.0
 
 
-# Each of these three draws the same numbers whether they are used or not: an entry that changes leaves the others'
-# draws as they were.
+# Each of the next three functions always draws the same amount of random numbers, used or not. So changing one entry
+# leaves the draws of the others as they were.
 
 
 def perturb_camera(picture: Picture, augmentation: Augmentation, random: np.random.Generator) -> Picture:
-    """The same image and labels, told to be from another pose and lens; the same object if all that is off."""
+    """The picture with a random error of pose and lens; the same object if those entries are off."""
     height, roll, pitch, focal_length, right, down = random.standard_normal(6).tolist()
-    told = augmentation
-    if not any((told.height, told.tilt, told.focal_length, told.center)):
+    error = augmentation
+    if not any((error.height, error.tilt, error.focal_length, error.center)):
         return picture
-    tilt = math.radians(told.tilt)
+    tilt = math.radians(error.tilt)
     return with_camera_error(
         picture,
-        height=math.exp(told.height * height),
+        height=math.exp(error.height * height),
         tilt=(tilt * roll, tilt * pitch),
-        focal_length=math.exp(told.focal_length * focal_length),
-        center=(told.center * right, told.center * down),
+        focal_length=math.exp(error.focal_length * focal_length),
+        center=(error.center * right, error.center * down),
     )
 
 
 def perturb_sharpness(picture: Picture, augmentation: Augmentation, random: np.random.Generator) -> Picture:
-    """The picture with its image blurred, compressed, both, or, the same object, neither."""
+    """The picture with its image blurred or compressed at random; the same object if neither happens."""
     blur, sigma, jpeg, quality = random.random(4).tolist()
     low, high = augmentation.blur
     worst, best = augmentation.jpeg
@@ -115,7 +115,7 @@ def perturb_sharpness(picture: Picture, augmentation: Augmentation, random: np.r
 
 
 def perturb_colors(colors: Singles, augmentation: Augmentation, random: np.random.Generator) -> Singles:
-    """Colors (n, 3), RGB from 0 to 1, as another camera or light would have them; the same shape and limits."""
+    """Colors (n, 3), RGB from 0 to 1, with a random tone, as of another camera or light; in the same limits."""
     brightness, contrast, saturation, hue, gamma, noise = random.uniform(-1.0, 1.0, 6).tolist()
     tone = Tone(
         brightness=(1.0 + augmentation.brightness) ** brightness,
@@ -135,25 +135,25 @@ def with_camera_error(
     focal_length: float = 1.0,
     center: tuple[float, float] = (0.0, 0.0),
 ) -> Picture:
-    """The same image and labels with another camera.
+    """The same image and labels with another pose and lens.
 
-    height, focal_length: factors above 0. tilt: the camera's turn about the plane's x and y, as a rotation vector
-    [rad]; nothing turns about the plane's normal. center: shift of the optical center [image widths]. Raises InputError
-    if the lens does not fit the image.
+    height, focal_length: factors above 0. tilt: rotation vector of the camera about the plane's x and y axes [rad].
+    center: shift of the optical center to the right and down [image widths]. Raises InputError if the lens does not fit
+    the image.
     """
     orientation = picture.lens.orientation
-    assert orientation is not None  # read_picture has seen to it
+    assert orientation is not None  # read_picture checked it
     turn = cv2.Rodrigues(np.array([*tilt, 0.0]))[0]
-    told = Orientation(orientation.height * height, np.asarray(turn @ orientation.rotation, dtype=np.float64))
+    changed = Orientation(orientation.height * height, np.asarray(turn @ orientation.rotation, dtype=np.float64))
     rows, columns = picture.labels.shape
     lens = _other_lens(picture.lens.lens, (columns, rows), focal_length, (center[0] * columns, center[1] * columns))
-    return replace(picture, lens=LensFile(lens, told))
+    return replace(picture, lens=LensFile(lens, changed))
 
 
 def _other_lens(lens: Lens, size: Size, factor: float, shift: tuple[float, float]) -> Lens:
-    """A lens for an image of this size with all its lengths times a factor, and its optical center shifted [px]."""
+    """A lens for an image of this size, its lengths scaled by a factor and its optical center shifted [px]."""
     fitted = lens.for_image(size)
-    # Scaling takes the distortion along, so that the lens sees as far from its axis as it did.
+    # Scaling includes the distortion, so the lens's field of view stays the same.
     scaled = fitted.scaled(factor, size)
     if isinstance(fitted, RadialLens):
         assert isinstance(scaled, RadialLens)
@@ -165,7 +165,7 @@ def _other_lens(lens: Lens, size: Size, factor: float, shift: tuple[float, float
 
 
 def soften(image: Image, blur: float = 0.0, jpeg: int = 0) -> Image:
-    """An image (h, w, 3) BGR after a Gaussian blur [px], then a JPEG file of that quality; 0 leaves each out."""
+    """An image (h, w, 3) BGR after a Gaussian blur [px] and JPEG compression of that quality; 0 skips either."""
     if blur:
         image = np.asarray(cv2.GaussianBlur(image, (0, 0), blur), dtype=np.uint8)
     if jpeg:
@@ -175,7 +175,7 @@ def soften(image: Image, blur: float = 0.0, jpeg: int = 0) -> Image:
 
 
 def apply_tone(colors: Singles, tone: Tone, random: np.random.Generator) -> Singles:
-    """Colors (n, 3), RGB from 0 to 1, with another tone, within the same limits. `random` is for the noise."""
+    """Colors (n, 3), RGB from 0 to 1, with another tone, clipped to the same limits. `random` draws the noise."""
     saturated = saturation_matrix(tone.saturation)
     matrix = tone.brightness * tone.contrast * saturated @ _hue_turn(math.radians(tone.hue))
     found = np.asarray(colors @ matrix.T.astype(np.float32), dtype=np.float32)

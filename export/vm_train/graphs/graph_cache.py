@@ -1,8 +1,8 @@
-"""Views of pictures kept on disk: a training of a small network takes longer to make a graph than to learn from it.
+"""Views of pictures on disk, because a small network learns from a graph in less time than it takes to make one.
 
-A view is the graph of a picture with one draw of pose, lens and sharpness. Windows and colors are drawn anew for each
-look at it. A file holds a header, then neighbors, colors, pixels, distances and labels, all raw. Trainings whose views
-are made alike share them.
+graph_recipe says what a view is. Windows, mirror images and tones are drawn anew for each look at it. A file holds a
+header, then neighbors, colors, pixels, distances and labels as raw arrays. Trainings share the views that they would
+make in the same way.
 """
 
 from __future__ import annotations
@@ -20,41 +20,30 @@ import numpy as np
 
 from vm_embedded.errors import InputError
 from vm_embedded.files import atomic_write
-from vm_embedded.network.manifest import Manifest
-from vm_export.grid import Grid
 
-from ..data.classes import Classes
 from ..data.decoded_cache import KEPT_FREE, fingerprint
 from ..data.picture_files import PictureFiles
-from .augmentation import Augmentation
+from .graph_recipe import GraphRecipe
 from .labeled_graph import LabeledGraph
 
-_HEADER = struct.Struct("<8s32sII")  # magic, what it was made from, points, neighbors
+_HEADER = struct.Struct("<8s32sII")  # magic, fingerprint of the picture's files, number of points, neighbors of a point
 _MAGIC = b"vmviews1"
-_PART = ("shape", "radius", "intersections", "mesh", "max_distance", "sampling")
-"""What of a manifest decides where points are."""
+_OF_MESH = ("shape", "radius", "intersections", "mesh", "max_distance", "sampling")
+"""Entries of a manifest that decide the points of a view."""
 
 
 class GraphCache:
-    """`count` views of each picture, in a folder of those that are made in the same way.
+    """`count` views of each picture, in a subfolder for all recipes that make the same views.
 
-    Files that are stale or damaged count as absent. Raises InputError if the folder can't be made.
+    Stale and damaged files count as absent. Raises InputError if the folder can't be made.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        count: int,
-        classes: Classes,
-        manifest: Manifest,
-        grid: Grid,
-        augmentation: Augmentation,
-        own_radius: bool,
-    ) -> None:
+    def __init__(self, folder: Path, count: int, recipe: GraphRecipe) -> None:
         self.count = count
-        self._classes = classes
-        made = [{name: getattr(manifest, name) for name in _PART}, asdict(grid), asdict(augmentation), own_radius]
-        digest = hashlib.sha256(json.dumps(made, sort_keys=True).encode()).hexdigest()
+        self._classes = recipe.classes
+        mesh = {name: getattr(recipe.manifest, name) for name in _OF_MESH}
+        decisive = [mesh, asdict(recipe.grid), asdict(recipe.augmentation), recipe.own_radius]
+        digest = hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
         self._folder = folder / f"views-{digest[:12]}"
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -62,11 +51,11 @@ class GraphCache:
             raise InputError(f"can't use folder {self._folder}: {error.strerror or error}") from error
 
     def random(self, files: PictureFiles, number: int) -> np.random.Generator:
-        """What decides a view."""
+        """The random numbers of a picture's view, the same in every training."""
         return np.random.default_rng([number, zlib.crc32(files.number.encode())])
 
     def get(self, files: PictureFiles, number: int) -> LabeledGraph | None:
-        """A view, if it is there as its picture's files are now."""
+        """A view, or None if it is absent or older than its picture's files."""
         try:
             content = self._path(files, number).read_bytes()
             magic, source, points, neighbors = _HEADER.unpack_from(content)
@@ -85,7 +74,7 @@ class GraphCache:
         return graph if read.place == len(content) else None
 
     def put(self, files: PictureFiles, number: int, graph: LabeledGraph) -> None:
-        """Keep a view; without effect if it can't be written."""
+        """Store a view. Without effect if it can't be written."""
         try:
             if shutil.disk_usage(self._folder).free < KEPT_FREE:
                 return
@@ -97,19 +86,19 @@ class GraphCache:
                 graph.distances.astype(np.float32),
                 graph.labels,
             )
-            # Opened with x: where two processes put the same view, neither writes into the other's file.
+            # Mode x: if two processes store the same view, neither writes into the other's file.
             with atomic_write(self._path(files, number)) as part, part.open("xb") as file:
                 for each in (header, *(array.tobytes() for array in parts)):
                     file.write(each)
         except (OSError, InputError):
-            return  # it is made anew next time
+            return  # the next look makes it again
 
     def _path(self, files: PictureFiles, number: int) -> Path:
         return self._folder / f"{quote(files.number, safe='')}-{number}.raw"
 
 
 class _Reader:
-    """Arrays one after the other in a file's content."""
+    """Reads arrays one after the other from a file's content."""
 
     def __init__(self, content: bytes, place: int) -> None:
         self._content, self.place = content, place

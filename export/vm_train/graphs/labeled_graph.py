@@ -1,4 +1,4 @@
-"""From a picture to what the network sees of it: colored points, their neighbors, and what each of them is."""
+"""From a labeled picture to the graph that a network learns from: colored points, their neighbors and labels."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ OFF_SCREEN = -1.0
 
 @dataclass(frozen=True)
 class LabeledGraph:
-    """n points of one picture, or of many put together.
+    """n points of one picture, or of several joined.
 
     points (n + 1, 3): colors, RGB from 0 to 1; row n is the off-screen point. neighbors (n + 1, N): rows of points.
-    labels (n,): positions of classes, -1 where the mask says nothing. distances (n,): from the camera's foot to where
-    an object at the point would stand [m]. pixels (n, 2): where the points are in their pictures, (x, y) [px].
+    labels (n,): positions of classes, -1 for unlabeled. distances (n,): along the plane, from the camera to an object
+    at the point [m]. pixels (n, 2): places of the points in their pictures, (x, y) [px].
     """
 
     points: Singles
@@ -47,7 +47,7 @@ class LabeledGraph:
         return len(self.labels)
 
     def part(self, kept: npt.NDArray[np.intp]) -> LabeledGraph:
-        """The graph of the points `kept`, in that order; links to all others lead to the off-screen point."""
+        """The graph of the points `kept`, in that order. Links to other points lead to the off-screen point."""
         position = np.full(len(self) + 1, len(kept), dtype=np.int32)
         position[kept] = np.arange(len(kept), dtype=np.int32)
         rows = np.append(kept, len(self))
@@ -58,14 +58,14 @@ class LabeledGraph:
 def seen_points(lens: LensFile, size: Size, manifest: Manifest, grid: Grid = VISUAL) -> Projection[Mesh]:
     """The points that a network gets of a picture: on screen all of them, rays in the observation-plane frame.
 
-    The lens file has an orientation. Raises GeometryError if the camera is too low for a mesh, and InputError if the
-    lens does not fit the picture or sees none of it.
+    The lens file must hold an orientation. Raises GeometryError if the camera is too low for a mesh, and InputError if
+    the lens does not fit the picture or sees none of it.
     """
     orientation = lens.orientation
-    assert orientation is not None  # read_picture has seen to it
+    assert orientation is not None  # read_picture checked it
     fitted = lens.lens.for_image(size)
     mesh = manifest.model.build(manifest.mesh_shape, orientation.height, manifest.intersections, manifest.max_distance)
-    mesh = _ahead(mesh, orientation.level, fitted, size)
+    mesh = _near_picture(mesh, orientation.level, fitted, size)
     if grid.kind == "visual":
         return project(mesh, orientation.level, fitted, size).visible
     if grid.equal_at:
@@ -77,20 +77,20 @@ def seen_points(lens: LensFile, size: Size, manifest: Manifest, grid: Grid = VIS
     return Projection(Mesh(rays, flat.neighbors), flat.pixels, np.ones(len(flat), dtype=bool))
 
 
-def _ahead(mesh: Mesh, rotation: Floats, lens: Lens, size: Size) -> Mesh:
-    """Of a mesh what lies in the cone around the picture's middle ray that holds the picture: less to project.
+def _near_picture(mesh: Mesh, rotation: Floats, lens: Lens, size: Size) -> Mesh:
+    """The part of a mesh in the cone around the picture's middle ray that contains the picture: less to project.
 
-    rotation (3, 3): camera to mesh frame. A picture that covers half of all directions, or whose border the lens does
-    not see, leaves the mesh as it is.
+    rotation (3, 3): camera to mesh frame. Returns the whole mesh if the picture covers a hemisphere or more, or if the
+    lens does not see the whole border.
     """
     x, y = np.linspace(0.0, size[0] - 1.0, 17), np.linspace(0.0, size[1] - 1.0, 17)
     sides = [np.stack(np.broadcast_arrays(x, at), axis=1) for at in (0.0, size[1] - 1.0)]
     sides += [np.stack(np.broadcast_arrays(at, y), axis=1) for at in (0.0, size[0] - 1.0)]
     middle = np.array([[size[0] - 1.0, size[1] - 1.0]]) / 2.0
     axis, *border = lens.unproject(np.concatenate([middle, *sides]), size)
-    # Between two of the pixels that were looked at the border may be a little farther out.
+    # Between two of these pixels the border may reach a little farther.
     reach = 1.05 * float(np.arccos(np.clip(np.stack(border) @ axis, -1.0, 1.0)).max()) + 0.01
-    if not reach < math.pi / 2.0:  # nor is it a number where the lens does not see
+    if not reach < math.pi / 2.0:  # NaN if the lens does not see part of the border
         return mesh
     return mesh.part(np.flatnonzero(along(mesh.rays, rotation @ axis) > math.cos(reach)))
 
@@ -98,7 +98,7 @@ def _ahead(mesh: Mesh, rotation: Floats, lens: Lens, size: Size) -> Mesh:
 def _equal_hexagonal_mesh(lens: Lens, size: Size, manifest: Manifest, height: float, distance: float) -> HexagonalMesh:
     """A mesh with as many points on an object at a distance [m] as the Visual Mesh has.
 
-    The Visual Mesh has k^2 points on the square around an object. The object's size in the picture is taken as on the
+    The Visual Mesh has k^2 points on the square around an object. The object's size in the picture is that on the
     lens's axis.
     """
     radius = manifest.radius
@@ -147,8 +147,19 @@ def plane_distances(rays: Floats, height: float) -> Floats:
         return np.asarray(np.where(down > 0.0, height * across / down, np.inf))
 
 
+def empty_graph(neighbors: int) -> LabeledGraph:
+    """A graph without points, whose off-screen point has that many neighbors."""
+    return LabeledGraph(
+        np.full((1, 3), OFF_SCREEN, dtype=np.float32),
+        np.zeros((1, neighbors), dtype=np.int32),
+        np.empty(0, dtype=np.int8),
+        np.empty(0),
+        np.empty((0, 2)),
+    )
+
+
 def join_graphs(graphs: Sequence[LabeledGraph]) -> tuple[LabeledGraph, npt.NDArray[np.intp]]:
-    """Graphs as one with one off-screen point, and where each begins (len(graphs) + 1,)."""
+    """Several graphs as one with a single off-screen point, and where each begins (len(graphs) + 1,)."""
     starts = np.cumsum([0, *map(len, graphs)])
     last = int(starts[-1])
     neighbors = [

@@ -1,4 +1,4 @@
-"""What a training looks at, and when: nothing but the seed and the numbers of pictures decide."""
+"""Which pictures a training uses in which step. Only the seed and the numbers of pictures decide."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_VALIDATED = 8  # pictures at once
+_VALIDATED = 8  # pictures in a batch of the validation
 
 
 @dataclass(frozen=True)
 class Item:
-    """A picture to be loaded: its position in the set, and the seed of its augmentation; None for none."""
+    """A picture to load: its position in the set, and the seed of its augmentation; None for no augmentation."""
 
     position: int
     seed: tuple[int, ...] | None = None
@@ -20,10 +20,10 @@ class Item:
 
 @dataclass(frozen=True)
 class Batch:
-    """Pictures of one step of training, or of a part of the validation after an epoch.
+    """Pictures of one training step, or one part of the validation after an epoch.
 
-    step: number of steps that are done after it, or that were done before the validation. last: of its epoch's
-    training, or of its validation.
+    step: for training, the number of this step, from 1; for validation, the number of the last step before it. last:
+    whether it ends its epoch's training, or the validation.
     """
 
     epoch: int
@@ -33,21 +33,21 @@ class Batch:
     last: bool
 
     def part(self, rank: int, size: int) -> Batch:
-        """What one of `size` processes has to do of it."""
+        """The share of one of `size` processes."""
         return Batch(self.epoch, self.step, self.items[rank::size], self.validates, self.last)
 
 
 def steps_an_epoch(training: int, batch: int) -> int:
-    """Steps in which `training` pictures are looked at once."""
+    """Number of steps that look once at each of `training` pictures."""
     return -(-training // batch)
 
 
 def schedule(
     seed: tuple[int, ...], epochs: int, batch: int, training: int, validation: int, looks: int = 1
 ) -> Iterator[Batch]:
-    """All batches of a training: in each epoch all pictures, shuffled, `looks` times, then all of the validation.
+    """All batches of a training: each epoch looks `looks` times at all pictures, shuffled, and then validates.
 
-    Positions from 0 are those of the training pictures, and from `training` on those of the validation.
+    Positions below `training` are training pictures; the `validation` positions after them are validation pictures.
     """
     step = 0
     for epoch in range(epochs):

@@ -1,8 +1,8 @@
-"""Training pictures that are streamed from shards: nothing of them is kept on disk.
+"""Training pictures streamed from shards; nothing is stored on disk.
 
-Readers, the worker processes of all processes of a training, have a lane each: in every epoch the shards are shuffled
-and dealt to the lanes, and begin again where a lane has too few pictures. Which picture an item of a batch is follows
-from the seed and the numbers of processes and workers that the training began with, so it goes on as it would have.
+Each reader (a worker process of any of the training's processes) has its own lane of shards. Every epoch shuffles the
+shards and deals them to the lanes; a lane that runs out of pictures begins again. The seed and the numbers of processes
+and workers at the beginning decide which picture each item is, so a resumed training sees the same pictures.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from vm_embedded.errors import InputError
 from ..data.picture_files import PictureFault, RawPicture
 from ..data.pictures import decode_picture
 from ..data.shard_stream import stream
-from .labeled_graph import LabeledGraph
-from .loading import PictureGraphs, empty_graph
+from .labeled_graph import LabeledGraph, empty_graph
+from .loading import PictureGraphs
 from .schedule import Batch, Item
 
 
 @dataclass(frozen=True)
 class StreamSource:
-    """Where training pictures come from.
+    """Where streamed training pictures come from. run.json keeps these entries.
 
-    shards: as shard_stream.stream takes them, but such as can begin again. epoch: pictures in an epoch. processes, and
-    workers of each (0: it reads by itself), that the training began with. strict: a picture at fault ends it.
-    Raises InputError if there are fewer shards than readers.
+    shards: for shard_stream.stream; each must be readable more than once. epoch: pictures in an epoch. processes,
+    workers: of the training when it began; workers of each process, 0 if the process reads by itself. strict: a damaged
+    picture ends the training. Raises InputError if there are fewer shards than readers.
     """
 
     shards: tuple[str, ...]
@@ -43,17 +43,19 @@ class StreamSource:
 
     def __post_init__(self) -> None:
         if len(self.shards) < self.lanes:
-            raise InputError(f"{self.lanes} processes that read need at least as many shards, not {len(self.shards)}")
+            raise InputError(
+                f"{self.lanes} reading processes need at least {self.lanes} shards, not {len(self.shards)}"
+            )
 
     @property
     def lanes(self) -> int:
-        """Readers, each with shards of its own."""
+        """Number of readers, each with its own shards."""
         return self.processes * max(self.workers, 1)
 
 
 @dataclass(frozen=True)
 class StreamedItem(Item):
-    """A picture of the stream: its place in a lane when the shards are in the order that a seed gives."""
+    """A picture of the stream: its place in a lane, when the seed `order` has shuffled the shards."""
 
     order: tuple[int, ...] = ()
     lane: int = 0
@@ -61,7 +63,7 @@ class StreamedItem(Item):
 
 
 def assign_lanes(batches: Iterable[Batch], seed: tuple[int, ...], source: StreamSource) -> Iterator[Batch]:
-    """All batches of `schedule` with StreamedItems for training. Each worker finds its own lane in its batches."""
+    """The batches of `schedule`, with StreamedItems for training. A worker's batches are all in its own lane."""
     places = Counter[tuple[int, int]]()
     for index, batch in enumerate(batches):
         if batch.validates:
@@ -77,10 +79,10 @@ def assign_lanes(batches: Iterable[Batch], seed: tuple[int, ...], source: Stream
 
 
 class StreamedGraphs(Dataset[LabeledGraph]):
-    """The graphs of a stream's pictures by StreamedItem, and those of the validation by Item, from source.epoch on.
+    """Graphs of streamed pictures by StreamedItem, and of validation pictures by Item, at positions from source.epoch.
 
-    A picture at fault is named on standard error and has a graph without points, so that the others keep their places.
-    Raises InputError if it must not be skipped, or a shard can't be read on.
+    A damaged picture is reported once on standard error and becomes a graph without points, so the others keep their
+    places. Reading an item raises InputError if `strict` forbids that, or if a shard can't be read to its end.
     """
 
     def __init__(self, source: StreamSource, validation: PictureGraphs) -> None:
@@ -91,13 +93,13 @@ class StreamedGraphs(Dataset[LabeledGraph]):
     def __getitem__(self, item: Item) -> LabeledGraph:
         if not isinstance(item, StreamedItem):
             return self._validation[replace(item, position=item.position - self._source.epoch)]
-        view, raw = self._validation.view, self._raw(item)
+        recipe, raw = self._validation.recipe, self._raw(item)
         try:
-            picture = decode_picture(raw, view.classes, ("image", "mask", "lens"))
-            return view.graph(picture, view.manifest, item.seed)
+            picture = decode_picture(raw, recipe.classes, ("image", "mask", "lens"))
+            return recipe.make_graph(picture, recipe.manifest, item.seed)
         except InputError as error:
             self._skip(InputError(f"picture {raw.number} of the stream: {error}"))
-            return empty_graph(view.manifest.neighbors)
+            return empty_graph(recipe.manifest.neighbors)
 
     def _raw(self, item: StreamedItem) -> RawPicture:
         lane = self._lanes.get(item.lane)
@@ -107,16 +109,16 @@ class StreamedGraphs(Dataset[LabeledGraph]):
         return lane.at(item.place)
 
     def _skip(self, fault: InputError) -> None:
-        """Name a fault once. Raises it, if none is allowed."""
+        """Report a fault once. Raises InputError if --strict is given."""
         if self._source.strict:
-            raise InputError(f"{fault}; --strict allows none") from fault
+            raise InputError(f"{fault}; with --strict, a damaged picture ends the training") from fault
         if str(fault) not in self._named:
             self._named.add(str(fault))
             print(f"vm-train: skipped: {' '.join(str(fault).split())}", file=sys.stderr)
 
 
 class _Lane:
-    """Pictures of a lane in an epoch, and how many of them were looked at or passed over."""
+    """Pictures of a lane in an epoch. done: how many of them were read or passed over."""
 
     def __init__(self, order: tuple[int, ...], pictures: Iterator[RawPicture]) -> None:
         self.order, self.done, self._pictures = order, 0, pictures
@@ -130,7 +132,7 @@ class _Lane:
 def _pictures(
     source: StreamSource, order: tuple[int, ...], lane: int, report: Callable[[PictureFault], None]
 ) -> Iterator[RawPicture]:
-    """The pictures of a lane without end. Raises InputError if its shards have none."""
+    """The pictures of a lane, endlessly. Raises InputError if its shards hold no complete picture."""
     for turn in count():
         seed = (*order, turn)
         shuffled = np.random.default_rng(seed).permutation(len(source.shards))
@@ -139,4 +141,4 @@ def _pictures(
         for picture in stream(own, (*seed, lane), report=report):
             yield picture
         if picture is None:
-            raise InputError(f"no whole picture in {', '.join(own[:3])}" + " and so on" * (len(own) > 3))
+            raise InputError(f"no complete picture in {', '.join(own[:3])}" + " and other shards" * (len(own) > 3))

@@ -21,14 +21,14 @@ from ..graphs.augmentation import Augmentation
 from .recipe import Recipe
 
 KIND_OF = {"ball": "object", "goal": "upright", "robot": "upright", "environment": "background"}
-"""What the classes of vm-synth are; all others are areas."""
+"""Kinds of vm-synth's classes; all others are areas."""
 
 
 @dataclass(frozen=True)
 class ClassTable:
     """Section [classes]: an entry for each class, in the order of the network's outputs. Raises InputError.
 
-    colors: what masks have for it. kinds: what it is, of KINDS.
+    colors: of the class in masks. kinds: one of KINDS for each class.
     """
 
     colors: Mapping[str, tuple[Color, ...]]
@@ -45,10 +45,10 @@ class ClassTable:
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> ClassTable:
-        """From `name = { kind = "object", colors = [[255, 0, 0]] }`. Raises InputError."""
+        """Read entries such as `name = { kind = "object", colors = [[255, 0, 0]] }`. Raises InputError."""
         colors, kinds = {}, {}
         if not isinstance(table, Mapping):
-            raise InputError(f"classes must be a section, [classes], not {table!r}")
+            raise InputError(f"classes must be a section [classes], not {table!r}")
         for name, entry in table.items():
             if not isinstance(entry, Mapping) or set(entry) != {"kind", "colors"}:
                 raise InputError(f'{name} must be like {{ kind = "object", colors = [[255, 0, 0]] }}, not {entry!r}')
@@ -59,19 +59,19 @@ class ClassTable:
 
     def to_commented_toml(self) -> str:
         """The section as TOML with a comment."""
-        lines = ["[classes]", f"# each class: its kind, one of {', '.join(KINDS)}, and its RGB colors in masks"]
+        lines = ["[classes]", f"# for each class its kind ({', '.join(KINDS)}) and its RGB colors in masks"]
         for name, colors in self.colors.items():
             shown = ", ".join(str(list(each)) for each in colors)
             lines.append(f'{name} = {{ kind = "{self.kinds[name]}", colors = [{shown}] }}')
         return "\n".join(lines)
 
     def mask_classes(self) -> Classes:
-        """The classes as masks show them. Raises InputError for shared colors, or fewer than two classes."""
+        """The classes and their colors in masks. Raises InputError for shared colors, or fewer than two classes."""
         return Classes(self.colors)
 
     @property
     def outputs(self) -> tuple[ObjectClass, ...]:
-        """The classes as a network has them."""
+        """The classes as the outputs of a network."""
         return tuple(ObjectClass(name, kind) for name, kind in self.kinds.items())
 
 
@@ -91,11 +91,11 @@ def _color(name: str, value: Any) -> Color:
 
 @dataclass(frozen=True)
 class DataSettings:
-    """Section [data]: what is kept out of the training, if no lists say so."""
+    """Section [data]: pictures that are not trained on, unless vm-train gets lists."""
 
-    validation: float = share(0.1, "pictures that choose the best network")
-    test: float = share(0.1, "pictures that are kept for vm-evaluate")
-    split_seed: int = number(0, "decides which pictures these are", "", (0, 2**31))
+    validation: float = share(0.1, "share of the pictures that choose the best network")
+    test: float = share(0.1, "share of the pictures that are kept for vm-evaluate")
+    split_seed: int = number(0, "seed that decides which pictures these are", "", (0, 2**31))
 
     def __post_init__(self) -> None:
         check_entries(self)
@@ -103,32 +103,34 @@ class DataSettings:
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """Section [mesh]: where the network looks."""
+    """Section [mesh]: the points that the network sees."""
 
-    shape: str = one_of(tuple(SHAPES), "sphere", "shape of the object")
-    radius: float = number(0.095, "radius of the object, for which the mesh is made", "m", (1e-3, 100.0))
-    object_height: float = number(0.0, "height of a cylinder; of all other shapes 0", "m", (0.0, 100.0))
+    shape: str = one_of(tuple(SHAPES), "sphere", "shape of the objects to detect")
+    radius: float = number(0.095, "radius of the object, which the mesh is built for", "m", (1e-3, 100.0))
+    object_height: float = number(0.0, "height of a cylinder; 0 for other shapes", "m", (0.0, 100.0))
     radius_of: str = one_of(
         ("all", "scene"),
         "all",
-        "all: the mesh is made for that radius in every picture; scene: for the radius of each picture's own ball, "
-        "from the sceneX.json that vm-synth wrote: one network then suits balls of any size",
+        "radius of the mesh; all: `radius` for every picture; scene: the radius of each picture's own ball, from the "
+        "sceneX.json of vm-synth, so one network suits balls of any size",
     )
-    intersections: float = number(4.0, "rings that cross an object, the paper's k", "", (0.1, 100.0))
-    model: str = one_of(tuple(MESH_MODELS), "ring6", "how points are placed and linked (docs/meshes.md)")
+    intersections: float = number(4.0, "rings of points that cross an object (the paper's k)", "", (0.1, 100.0))
+    model: str = one_of(tuple(MESH_MODELS), "ring6", "arrangement of points and neighbors (docs/meshes.md)")
     sampling: str = one_of(
         POINT_SAMPLINGS,
         "bilinear",
-        "color of a point: bilinear, between the four pixels around it; footprint, the mean of as much of the picture "
-        "as it stands for",
+        "color of a point; bilinear: interpolated from four pixels; footprint: mean of the area that it covers",
     )
     colors: str = one_of(
         POINT_COLORS,
         "absolute",
-        "colors that the network takes: absolute, or relative to the mean and the deviation of all points of a picture",
+        "colors that the network gets; absolute: as sampled; relative: minus the mean of the picture's points, over "
+        "their standard deviation",
     )
-    max_distance: float = number(10.0, "how far out the mesh reaches", "m", (0.1, 1e4))
-    grid: str = one_of(GRIDS, "visual", "the Visual Mesh, or the paper's baseline, which can't be exported")
+    max_distance: float = number(10.0, "how far the mesh reaches", "m", (0.1, 1e4))
+    grid: str = one_of(
+        GRIDS, "visual", "points; visual: the Visual Mesh; hexagonal: the paper's baseline, which can't be exported"
+    )
     equal_at: float = number(
         0.0,
         "distance at which a hexagonal grid has as many points on an object as the Visual Mesh; 0: as many in all",
@@ -139,17 +141,17 @@ class MeshSettings:
     def __post_init__(self) -> None:
         check_entries(self)
         if self.grid == "hexagonal" and MESH_MODELS[self.model].neighbors != 6:
-            raise InputError(f"a hexagonal grid has six neighbors, as model ring6, not {self.model}")
+            raise InputError(f"a hexagonal grid needs a mesh.model with six neighbors, such as ring6, not {self.model}")
 
 
 @dataclass(frozen=True)
 class NetworkSettings:
-    """Section [network]."""
+    """Section [network]: the layers of the network."""
 
-    depth: int = number(9, "graph convolutions", "", (1, 100))
-    width: int = number(8, "channels of each", "", (1, 1024))
-    activation: str = one_of(tuple(ACTIVATIONS), "selu", "between them; the paper found selu best")
-    kind: str = one_of(("convolution", "separable"), "convolution", "separable has fewer weights for its width")
+    depth: int = number(9, "number of graph convolutions", "", (1, 100))
+    width: int = number(8, "channels of each convolution", "", (1, 1024))
+    activation: str = one_of(tuple(ACTIVATIONS), "selu", "activation after each convolution; the paper found selu best")
+    kind: str = one_of(("convolution", "separable"), "convolution", "kind of convolution; separable has fewer weights")
 
     def __post_init__(self) -> None:
         check_entries(self)
@@ -157,10 +159,15 @@ class NetworkSettings:
 
 @dataclass(frozen=True)
 class SecondLookSettings:
-    """Section [second_look], for vm-train --first: which points the network gets of the one that looks first."""
+    """Section [second_look], for vm-train --first: points that the new network gets."""
 
-    above: float = number(0.05, "probability of an object above which a point is worth it", "", (0.0, 0.999))
-    rings: int = number(4, "steps around such points that are worth it too", "", (0, 100))
+    above: float = number(
+        0.05,
+        "a point gets a second look if the first network gives an object more than this probability",
+        "",
+        (0.0, 0.999),
+    )
+    rings: int = number(4, "points up to this many steps around such points get a second look, too", "", (0, 100))
 
     def __post_init__(self) -> None:
         check_entries(self)
@@ -183,7 +190,7 @@ class TrainConfiguration:
 
     @property
     def manifest(self) -> Manifest:
-        """What model files of this training will say, without provenance."""
+        """The manifest of this training's model files, without provenance."""
         mesh = self.mesh
         return Manifest(
             shape=mesh.shape,
@@ -207,7 +214,7 @@ class TrainConfiguration:
 
     @property
     def network_shape(self) -> NetworkShape:
-        """Layers of the network."""
+        """The layers of the network."""
         network = self.network
         return NetworkShape.uniform(
             network.depth,

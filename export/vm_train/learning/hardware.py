@@ -1,4 +1,4 @@
-"""What a training runs on: device, processes that torchrun started, worker processes that read pictures."""
+"""The hardware of a training: its device, the processes that torchrun started, and the workers that read pictures."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from vm_embedded.errors import InputError
 Value = TypeVar("Value")
 
 _PATIENCE = timedelta(days=1)
-"""For processes that wait while one checks all pictures."""
+"""How long processes wait for the one that checks all pictures."""
 
 
 @dataclass(frozen=True)
 class Hardware:
-    """One process's share. device: as torch names it. rank of size processes. workers: that read its pictures."""
+    """One process's share. device: as torch names it. rank: of `size` processes. workers: that read its pictures."""
 
     device: str
     rank: int
@@ -35,7 +35,7 @@ class Hardware:
         return self.rank == 0
 
     def broadcast(self, value: Value) -> Value:
-        """The leading process's value, in all of them."""
+        """Give every process the leader's value."""
         if self.size == 1:
             return value
         box = [value]
@@ -43,7 +43,7 @@ class Hardware:
         return box[0]
 
     def gather(self, value: Value) -> list[Value]:
-        """Every process's value, in all of them."""
+        """Give every process the values of all, by rank."""
         if self.size == 1:
             return [value]
         box: list[Any] = [None] * self.size
@@ -53,26 +53,28 @@ class Hardware:
 
 @contextmanager
 def set_up_hardware(device: str, workers: int | None, threads: int | None) -> Iterator[Hardware]:
-    """The hardware that is there: the processes of torchrun, if it started this one, meet here.
+    """Prepare torch for this process, and connect it with the others if torchrun started it.
 
-    device: auto, cpu or cuda. workers: None for as many as the processor has cores for. threads: None for one. Raises
-    InputError if there is no such device.
+    device: auto, cpu or cuda. workers: None for a number that suits the cores. threads: that compute; None for one.
+    Raises InputError if the device is missing.
     """
     size, rank = int(os.environ.get("WORLD_SIZE", "1")), int(os.environ.get("RANK", "0"))
     local, locals_ = int(os.environ.get("LOCAL_RANK", "0")), int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
     if device == "cuda" and not torch.cuda.is_available():
-        raise InputError("torch finds no GPU here; take --device cpu")
+        raise InputError("torch finds no GPU; use --device cpu")
     gpu = device != "cpu" and torch.cuda.is_available()
     if gpu and local >= torch.cuda.device_count():
-        raise InputError(f"{locals_} processes, but {torch.cuda.device_count()} GPUs: start one for each")
+        raise InputError(
+            f"{locals_} processes for {torch.cuda.device_count()} GPUs: start at most one process for each GPU"
+        )
     cores = max(len(os.sched_getaffinity(0)) // locals_, 1)
     if workers is None:
         workers = max(cores - 1, 1) if gpu else max(cores // 2, 1)
-    # With more threads the last digits differ from run to run, whatever torch is told.
+    # With more threads the last digits of sums differ from run to run, even in torch's deterministic mode.
     torch.set_num_threads(threads or 1)
-    # Sums whose order may change from run to run would make a resumed training another one.
+    # Without it the order of sums may change, and a resumed training would end with other weights.
     torch.use_deterministic_algorithms(True, warn_only=True)
-    # That would also write over all memory before it is used, which takes a quarter of a step of a large network.
+    # Deterministic mode also fills all new memory, which takes a quarter of a large network's step; switch that off.
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
     if gpu:
         torch.cuda.set_device(local)

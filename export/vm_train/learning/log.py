@@ -1,4 +1,4 @@
-"""What a training writes down while it runs: a line of JSON for each step and validation, and TensorBoard's files."""
+"""The log of a training: a line of JSON for each step and validation, and files for TensorBoard."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from vm_embedded.files import atomic_write
 
 
 class TrainingLog:
-    """log.jsonl and tensorboard/ in a folder. Records have a round and a step; scalars are shown in TensorBoard.
+    """log.jsonl and tensorboard/ in a folder. Each record has a round and a step; TensorBoard shows its numbers.
 
-    A training that goes on from a state of `step` steps and `validated` epochs forgets what came after it. Of several
-    processes one writes. Raises InputError.
+    A resumed training starts from a state of `step` steps and `validated` epochs; later records are removed. Only one
+    of several processes writes. Raises InputError.
     """
 
     def __init__(self, folder: Path, training_round: int, step: int, validated: int, writes: bool = True) -> None:
@@ -56,7 +56,7 @@ class TrainingLog:
 
 
 def _scalars(record: dict[str, Any], above: str = "") -> list[tuple[str, float]]:
-    """All numbers of a record, by their path."""
+    """All numbers of a record, each with its path in nested tables."""
     found = []
     for name, value in record.items():
         if isinstance(value, dict):
@@ -67,7 +67,7 @@ def _scalars(record: dict[str, Any], above: str = "") -> list[tuple[str, float]]
 
 
 def _cut(path: Path, training_round: int, step: int, validated: int) -> None:
-    """Leave out what came after a state, and all from a line on that is damaged."""
+    """Remove the records after a state, and everything from the first damaged line on."""
 
     def is_before(record: dict[str, Any]) -> bool:
         if record["round"] != training_round:
@@ -80,7 +80,7 @@ def _cut(path: Path, training_round: int, step: int, validated: int) -> None:
 
 
 def read_log(path: Path) -> list[tuple[str, dict[str, Any]]]:
-    """Whole lines of a log and their records, up to one that is damaged. Raises InputError if it can't be read."""
+    """Lines of a log with their records, up to the first damaged one. Raises InputError if it can't be read."""
     try:
         lines = path.read_bytes().splitlines(keepends=True)
     except OSError as error:

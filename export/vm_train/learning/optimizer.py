@@ -1,7 +1,7 @@
-"""How weights follow their gradients: an optimizer, and a learning rate that changes from step to step.
+"""The optimizer of a network's weights, with a learning rate that changes from step to step.
 
-muon: matrices take steps of the same size in every direction that their gradient has (K. Jordan and others, 2024), so
-that the few channels of a small network all learn; biases follow adamw.
+muon: the update of a weight matrix has the same size in every direction of its gradient (K. Jordan and others, 2024),
+so all of the few channels of a small network learn. Biases use adamw.
 """
 
 from __future__ import annotations
@@ -40,30 +40,30 @@ class ScheduledOptimizer:
                 group["lr"] = rate
 
     def zero_grad(self) -> None:
-        """Set all gradients to none."""
+        """Set all gradients to None."""
         for optimizer in self._optimizers:
             optimizer.zero_grad()
 
     def step(self) -> None:
-        """Let the weights follow their gradients, and the rate its schedule."""
+        """Update the weights by their gradients, and the rate by its schedule."""
         for optimizer in self._optimizers:
             optimizer.step()
         for schedule in self._schedules:
             schedule.step()
 
     def state_dict(self) -> dict[str, Any]:
-        """All that going on needs."""
+        """The state to resume from."""
         return {
             "optimizers": [each.state_dict() for each in self._optimizers],
             "schedules": [each.state_dict() for each in self._schedules],
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Go on from a state. Raises KeyError, ValueError or TypeError if it is of another descent."""
-        for optimizer, there in zip(self._optimizers, state["optimizers"], strict=True):
-            optimizer.load_state_dict(there)
-        for schedule, there in zip(self._schedules, state["schedules"], strict=True):
-            schedule.load_state_dict(there)
+        """Resume from a state. Raises KeyError, ValueError or TypeError if it belongs to another kind of optimizer."""
+        for optimizer, saved in zip(self._optimizers, state["optimizers"], strict=True):
+            optimizer.load_state_dict(saved)
+        for schedule, saved in zip(self._schedules, state["schedules"], strict=True):
+            schedule.load_state_dict(saved)
 
 
 def _optimizers(network: nn.Module, recipe: Recipe) -> list[torch.optim.Optimizer]:

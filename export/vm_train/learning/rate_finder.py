@@ -1,4 +1,4 @@
-"""vm-train rate: which learning rate suits, by a short training whose rate rises until the loss does too (L. Smith)."""
+"""vm-train rate: find a learning rate by a short training whose rate rises until the loss does (L. Smith, 2017)."""
 
 from __future__ import annotations
 
@@ -18,43 +18,44 @@ from ..graphs.loading import load_batches
 from ..graphs.schedule import schedule
 from .hardware import Hardware
 from .run_folder import TrainingRun
-from .selection import class_weights, selection_shares
 from .trainer import Trainer
 
 LOWEST, HIGHEST = 1e-5, 3.0
 _SMOOTHING = 0.9  # of the loss's moving average
-_DIVERGED = 3.0  # times the least loss
+_DIVERGED = 3.0  # times the smallest loss
 
 
 @dataclass(frozen=True)
 class RateSearch:
-    """Losses (m,), smoothed, at rising rates (m,), and the rate that is proposed."""
+    """Smoothed losses (m,) at rising learning rates (m,)."""
 
     rates: Floats
     losses: Floats
 
     @property
     def proposed(self) -> float:
-        """A third of the rate at which the loss is least: beyond that one it rises."""
+        """A third of the rate with the smallest loss; beyond that rate the loss rises."""
         return float(self.rates[self.losses.argmin()]) / 3.0
 
 
-def find_rate(job: TrainingRun, hardware: Hardware, network: Network, steps: int) -> RateSearch:
-    """Train for up to `steps` steps, each with a higher rate. The first round's selection counts."""
-    recipe = replace(job.configuration.training, schedule="constant")
-    epochs = -(-steps * recipe.batch // len(job.split.training))
-    batches = list(schedule((recipe.seed, 0), epochs, recipe.batch, len(job.split.training), 0))[:steps]
-    rule = recipe.selection_of(1)
-    shares, weights = selection_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
-    training = Trainer(network, recipe, len(batches), shares, weights, device=hardware.device)
+def find_rate(run: TrainingRun, hardware: Hardware, network: Network, steps: int) -> RateSearch:
+    """Train for up to `steps` steps, each with a higher rate, and with the point selection of the first round.
+
+    Stops early when the loss diverges. Raises InputError if it is NaN or infinite.
+    """
+    recipe = replace(run.configuration.training, schedule="constant")
+    training = run.data.split.training
+    epochs = -(-steps * recipe.batch // len(training))
+    batches = list(schedule((recipe.seed, 0), epochs, recipe.batch, len(training), 0))[:steps]
+    trainer = Trainer(network, recipe, len(batches), *run.shares_and_weights(1), device=hardware.device)
     rates = np.geomspace(LOWEST, HIGHEST, len(batches))
     bar = ProgressBar(len(batches), "vm-train")
     losses: list[float] = []
     average = 0.0
-    found = load_batches(job.graphs(job.split.training), batches, hardware.workers)
-    for number, (batch, graphs) in enumerate(zip(batches, found, strict=False), 1):
-        training.set_rate(float(rates[number - 1]))
-        average = _SMOOTHING * average + (1.0 - _SMOOTHING) * training.step(batch.items, graphs).loss
+    loaded = load_batches(run.graphs(training), batches, hardware.workers)
+    for number, (batch, graphs) in enumerate(zip(batches, loaded, strict=False), 1):
+        trainer.set_rate(float(rates[number - 1]))
+        average = _SMOOTHING * average + (1.0 - _SMOOTHING) * trainer.step(batch.items, graphs).loss
         losses.append(average / (1.0 - _SMOOTHING**number))
         bar.advance()
         if not np.isfinite(losses[-1]) or losses[-1] > _DIVERGED * min(losses):
@@ -62,12 +63,12 @@ def find_rate(job: TrainingRun, hardware: Hardware, network: Network, steps: int
     bar.clear()
     kept = np.isfinite(losses)
     if not kept.any():
-        raise InputError("the loss is no number from the first step on")
+        raise InputError("the loss is NaN or infinite from the first step on: check the pictures and [mesh]")
     return RateSearch(rates[: len(losses)][kept], np.array(losses)[kept])
 
 
 def check_plot(path: Path) -> None:
-    """Raise InputError if nothing can be plotted to that file."""
+    """Raise InputError unless the file is a .png or .svg that can be written."""
     if path.suffix.lower() not in (".png", ".svg"):
         raise InputError(f"can't plot to {path}: its suffix must be .png or .svg")
     check_writable(path)

@@ -1,10 +1,10 @@
-"""The rounds of a training: networks one after the other, each chosen by its validation, all of it resumable."""
+"""The rounds of a training: one network after the other, each from its best epoch. Any of it can be resumed."""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, replace
 from itertools import tee
@@ -19,24 +19,24 @@ from vm_embedded.errors import InputError
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
 
+from ..graphs.labeled_graph import LabeledGraph
 from ..graphs.loading import load_batches
 from ..graphs.schedule import Batch, steps_an_epoch
 from ..scores.point_scores import PointScores
 from .hardware import Hardware
 from .log import TrainingLog
 from .run_folder import TrainingRun
-from .selection import class_weights, selection_shares
 from .trainer import Trainer, read_state, sum_over_processes
 
-_SAVED = 30.0  # seconds between states
+_SAVE_INTERVAL = 30.0  # [s] between states
 
 
 @dataclass
 class TrainingProgress:
-    """How far a training is beside its weights.
+    """How far a training is, besides its weights; state.pt keeps these entries.
 
-    round: counted from 1. finished: whether the round is. validated: epochs of it that are. best: score of its best
-    network, and best_epoch, counted from 1, where it was reached. best_ever: of all rounds.
+    round: counted from 1. finished: whether the round is. validated: number of its validated epochs. best: score of
+    its best network. best_epoch: epoch of that network, counted from 1. best_ever: best score of all rounds.
     """
 
     round: int = 1
@@ -49,7 +49,7 @@ class TrainingProgress:
 
 @dataclass(frozen=True)
 class TrainingOutcome:
-    """What a call of `train` came to. finished: or stopped on request."""
+    """Result of a call of `train`. finished: False if it was stopped. pictures, seconds: looked at, in this call."""
 
     finished: bool
     progress: TrainingProgress
@@ -57,156 +57,191 @@ class TrainingOutcome:
     seconds: float
 
 
-def train(job: TrainingRun, hardware: Hardware, stopped: Callable[[], bool]) -> TrainingOutcome:
-    """Do all that is left of a training, or as much as there is until `stopped` says so. Raises InputError.
+def train(run: TrainingRun, hardware: Hardware, stop_requested: Callable[[], bool]) -> TrainingOutcome:
+    """Train until the end, or until `stop_requested` returns True. Raises InputError.
 
-    The final weights are the same however often it was stopped or killed.
+    The final weights are the same however often the training was stopped or killed.
     """
     began = perf_counter()
     progress = TrainingProgress()
-    if job.state_path.exists():
-        progress = TrainingProgress(**read_state(job.state_path)["more"])
+    if run.state_path.exists():
+        progress = TrainingProgress(**read_state(run.state_path)["more"])
     pictures = 0
     while True:
         if progress.finished:
-            if progress.round == job.configuration.training.trainings:
+            if progress.round == run.configuration.training.trainings:
                 return TrainingOutcome(True, progress, pictures, perf_counter() - began)
             progress = TrainingProgress(round=progress.round + 1, best_ever=progress.best_ever)
-        pictures += _train_round(job, hardware, progress, stopped)
+        pictures += _train_round(run, hardware, progress, stop_requested)
         if not progress.finished:
             return TrainingOutcome(False, progress, pictures, perf_counter() - began)
 
 
-def _train_round(job: TrainingRun, hardware: Hardware, progress: TrainingProgress, stopped: Callable[[], bool]) -> int:
-    """Do what is left of a round, and return the number of pictures that were looked at."""
-    training = _prepared(job, hardware, progress)
-    recipe = job.configuration.training
-    # The loader is some batches ahead of the training; a list of all would not fit into memory for large sets.
-    batches, ahead = tee(_left(job, progress.round, training.done, progress.validated))
-    own = (each.part(hardware.rank, hardware.size) for each in ahead)
-    scores = PointScores(tuple(job.configuration.classes.colors))
-    bar = ProgressBar(training.total, "vm-train", training.done)
-    pictures, saved = 0, perf_counter()
-
-    def save() -> None:
-        if hardware.is_leader:
-            training.save(job.state_path, asdict(progress))
-
-    with (
-        TrainingLog(job.folder, progress.round, training.done, progress.validated, hardware.is_leader) as log,
-        _resumable(job.folder, save),
-        closing(load_batches(job.scheduled(), own, hardware.workers)) as loader,
-    ):
-        for whole, found in zip(batches, loader, strict=True):
-            batch = whole.part(hardware.rank, hardware.size)
-            pictures += len(whole.items)
-            if batch.validates:
-                for each in found:
-                    scores.add(training.probabilities(each), each.labels, each.distances)
-                if batch.last:
-                    _validated(job, hardware, progress, training, log, scores)
-                    scores = PointScores(tuple(job.configuration.classes.colors))
-                    if recipe.patience and progress.validated - progress.best_epoch >= recipe.patience:
-                        break
-                    save()
-            else:
-                step = training.step(batch.items, found)
-                log.write(step.number, {"loss": step.loss, "points": step.points, "rate": step.rate})
-                bar.advance()
-                if batch.last or perf_counter() - saved > _SAVED:
-                    save()
-                    saved = perf_counter()
-            if sum_over_processes(torch.tensor(float(stopped()))) > 0.0:
-                if not batch.validates:
-                    save()
-                bar.clear()
-                return pictures
-    bar.clear()
-    progress.finished = True
-    save()
-    hardware.broadcast(None)  # the next round reads what the leading process has written by now
+def _train_round(
+    run: TrainingRun, hardware: Hardware, progress: TrainingProgress, stop_requested: Callable[[], bool]
+) -> int:
+    """Train the rest of a round, or until a stop. Updates progress; returns the number of pictures looked at."""
+    trainer = _round_trainer(run, hardware, progress)
+    # Workers read some batches ahead of the training. A list of all would not fit into memory for large sets.
+    batches, ahead = tee(_remaining_batches(run, progress.round, trainer.done, progress.validated))
+    own_ahead = (each.part(hardware.rank, hardware.size) for each in ahead)
+    pictures = 0
+    with TrainingLog(run.folder, progress.round, trainer.done, progress.validated, hardware.is_leader) as log:
+        current = _Round(run, hardware, progress, trainer, log)
+        with (
+            _saved_on_error(run.folder, current.save),
+            closing(load_batches(run.scheduled_graphs(), own_ahead, hardware.workers)) as loader,
+        ):
+            for whole, graphs in zip(batches, loader, strict=True):
+                batch = whole.part(hardware.rank, hardware.size)
+                pictures += len(batch.items)
+                current.process(batch, graphs)
+                if current.is_out_of_patience(batch):
+                    break
+                current.save_if_due(batch)
+                if sum_over_processes(torch.tensor(float(stop_requested()))) > 0.0:
+                    current.stop(batch)
+                    return pictures
+    current.finish()
     return pictures
 
 
-def _prepared(job: TrainingRun, hardware: Hardware, progress: TrainingProgress) -> Trainer:
-    """A round's training as far as it is."""
-    recipe = job.configuration.training
+class _Round:
+    """A round in work: its batches are learned or scored, and its state and best network saved."""
+
+    def __init__(
+        self,
+        run: TrainingRun,
+        hardware: Hardware,
+        progress: TrainingProgress,
+        trainer: Trainer,
+        log: TrainingLog,
+    ) -> None:
+        self._run, self._hardware, self._progress, self._trainer, self._log = run, hardware, progress, trainer, log
+        self._classes = tuple(run.configuration.classes.colors)
+        self._scores = PointScores(self._classes)
+        self._bar = ProgressBar(trainer.total, "vm-train", trainer.done)
+        self._saved = perf_counter()
+
+    def process(self, batch: Batch, graphs: Sequence[LabeledGraph]) -> None:
+        """Learn from this process's part of a batch, or score it for the validation."""
+        if batch.validates:
+            for each in graphs:
+                self._scores.add(self._trainer.probabilities(each), each.labels, each.distances)
+            if batch.last:
+                self._end_validation()
+        else:
+            step = self._trainer.step(batch.items, graphs)
+            self._log.write(step.number, {"loss": step.loss, "points": step.points, "rate": step.rate})
+            self._bar.advance()
+
+    def is_out_of_patience(self, batch: Batch) -> bool:
+        """Whether a batch ended the last validation that the recipe's patience allows."""
+        patience = self._run.configuration.training.patience
+        waited = self._progress.validated - self._progress.best_epoch
+        return batch.validates and batch.last and 0 < patience <= waited
+
+    def save(self) -> None:
+        """Write the state to resume from."""
+        if self._hardware.is_leader:
+            self._trainer.save(self._run.state_path, asdict(self._progress))
+        self._saved = perf_counter()
+
+    def save_if_due(self, batch: Batch) -> None:
+        """Save after an epoch's training and after its validation, and between steps twice a minute."""
+        if batch.last or (not batch.validates and perf_counter() - self._saved > _SAVE_INTERVAL):
+            self.save()
+
+    def stop(self, batch: Batch) -> None:
+        """Save before a stop. A validation that was stopped begins again; its state is saved already."""
+        if not batch.validates:
+            self.save()
+        self._bar.clear()
+
+    def finish(self) -> None:
+        """Mark the round as finished, in all processes."""
+        self._bar.clear()
+        self._progress.finished = True
+        self.save()
+        self._hardware.broadcast(None)  # wait until the leader has written the network that the next round reads
+
+    def _end_validation(self) -> None:
+        """Score the network over all processes, and keep it if it is the best so far."""
+        first, *others = self._hardware.gather(self._scores)
+        scores = sum(others, start=first)
+        self._scores = PointScores(self._classes)
+        precisions = {name: scores.ranking(name).precision_recall.average_precision for name in scores.classes}
+        known = {name: value for name, value in precisions.items() if not math.isnan(value)}
+        objects = [name for name, kind in self._run.configuration.classes.kinds.items() if kind == "object"]
+        score = _mean_precision(known, objects)
+        self._progress.validated += 1
+        unseen = bool(objects) and not known.keys() & set(objects)
+        if unseen and self._progress.validated == 1 and self._hardware.is_leader:
+            print(
+                f"vm-train: the validation shows no {' or '.join(objects)}: all classes choose the best network",
+                file=sys.stderr,
+            )
+        record = {"epoch": self._progress.validated, "score": score, "average_precision": known}
+        self._log.write(self._trainer.done, record)
+        if score > self._progress.best:
+            self._keep(score)
+
+    def _keep(self, score: float) -> None:
+        """Write the round's best network, and the best of all rounds if it is that, too."""
+        progress, run = self._progress, self._run
+        progress.best, progress.best_epoch = score, progress.validated
+        best_ever, progress.best_ever = progress.best_ever, max(progress.best_ever, score)
+        if not self._hardware.is_leader:
+            return
+        provenance = run.provenance() | {
+            "round": str(progress.round),
+            "epoch": str(progress.validated),
+            "validation_average_precision": f"{score:.4f}",
+            "torch": torch.__version__,
+        }
+        manifest = replace(run.configuration.manifest, provenance=provenance)
+        network = self._trainer.result if run.first is None else run.first.followed_by(self._trainer.result)
+        checkpoint = Checkpoint(network, manifest, run.configuration.grid)
+        checkpoint.save(run.round_path(progress.round))
+        if score > best_ever:
+            checkpoint.save(run.model_path)
+
+
+def _round_trainer(run: TrainingRun, hardware: Hardware, progress: TrainingProgress) -> Trainer:
+    """The trainer of a round, at the state that is saved."""
+    recipe = run.configuration.training
     torch.manual_seed(int(np.random.default_rng([recipe.seed, progress.round]).integers(2**31)))
-    network = Network(job.configuration.network_shape)
-    rule = recipe.selection_of(progress.round)
-    graders = [Checkpoint.load(job.round_path(each)).last_network for each in range(1, progress.round)]
-    total = recipe.epochs * steps_an_epoch(recipe.looks * job.epoch, recipe.batch)
-    shares, weights = selection_shares(rule, job.counts, job.objects), class_weights(rule, job.counts, recipe.balance)
-    teacher = None if job.teacher is None else job.teacher.checkpoint.network
-    training = Trainer(network, recipe, total, shares, weights, graders, teacher, hardware.device)
-    if job.state_path.exists():
-        state = read_state(job.state_path)
+    network = Network(run.configuration.network_shape)
+    graders = [Checkpoint.load(run.round_path(each)).last_network for each in range(1, progress.round)]
+    total = recipe.epochs * steps_an_epoch(recipe.looks * run.data.epoch, recipe.batch)
+    shares, weights = run.shares_and_weights(progress.round)
+    teacher = None if run.teacher is None else run.teacher.checkpoint.network
+    trainer = Trainer(network, recipe, total, shares, weights, graders, teacher, hardware.device)
+    if run.state_path.exists():
+        state = read_state(run.state_path)
         if state["more"]["round"] == progress.round:
-            training.load(state)
-    return training
+            trainer.load(state)
+    return trainer
 
 
-def _left(job: TrainingRun, training_round: int, done: int, validated: int) -> Iterator[Batch]:
-    """Batches of a round that are left after so many steps and validated epochs."""
-    for batch in job.batches(training_round):
+def _remaining_batches(run: TrainingRun, training_round: int, done: int, validated: int) -> Iterator[Batch]:
+    """Batches of a round after so many steps and validated epochs."""
+    for batch in run.data.batches(run.configuration.training, training_round):
         if batch.epoch >= validated if batch.validates else batch.step > done:
             yield batch
 
 
 @contextmanager
-def _resumable(folder: Path, save: Callable[[], None]) -> Iterator[None]:
-    """Save the state when a picture or shard ends the training, and say how it goes on."""
+def _saved_on_error(folder: Path, save: Callable[[], None]) -> Iterator[None]:
+    """Save the state when a picture or shard ends the training, and tell how to resume."""
     try:
         yield
     except InputError as error:
         save()
-        raise InputError(f"{error}; vm-train resume {folder} goes on") from error
+        raise InputError(f"{error}; continue with vm-train resume {folder}") from error
 
 
-def _validated(
-    job: TrainingRun,
-    hardware: Hardware,
-    progress: TrainingProgress,
-    training: Trainer,
-    log: TrainingLog,
-    own: PointScores,
-) -> None:
-    """Score a network, and keep it if it is the best so far."""
-    first, *others = hardware.gather(own)
-    scores = sum(others, start=first)
-    precisions = {name: scores.ranking(name).precision_recall.average_precision for name in scores.classes}
-    score, unseen = _score(job, precisions)
-    progress.validated += 1
-    if unseen and progress.validated == 1 and hardware.is_leader:
-        print(
-            f"vm-train: the validation shows no {' or '.join(unseen)}: networks are chosen by all classes",
-            file=sys.stderr,
-        )
-    known = {name: value for name, value in precisions.items() if not math.isnan(value)}
-    log.write(training.done, {"epoch": progress.validated, "score": score, "average_precision": known})
-    if score <= progress.best:
-        return
-    progress.best, progress.best_epoch = score, progress.validated
-    best_ever, progress.best_ever = progress.best_ever, max(progress.best_ever, score)
-    if not hardware.is_leader:
-        return
-    provenance = job.provenance() | {
-        "round": str(progress.round),
-        "epoch": str(progress.validated),
-        "validation_average_precision": f"{score:.4f}",
-        "torch": torch.__version__,
-    }
-    manifest = replace(job.configuration.manifest, provenance=provenance)
-    network = training.result if job.first is None else job.first.then(training.result)
-    checkpoint = Checkpoint(network, manifest, job.configuration.grid)
-    checkpoint.save(job.round_path(progress.round))
-    if score > best_ever:
-        checkpoint.save(job.model_path)
-
-
-def _score(job: TrainingRun, precisions: dict[str, float]) -> tuple[float, list[str]]:
-    """Mean average precision of the objects that occur, else of all classes that do; and the objects if none does."""
-    objects = [name for name, kind in job.configuration.classes.kinds.items() if kind == "object"]
-    known = {name: value for name, value in precisions.items() if not math.isnan(value)}
+def _mean_precision(known: dict[str, float], objects: Sequence[str]) -> float:
+    """Mean average precision of the objects among the known classes; of all known classes if there is no object."""
     seen = [known[name] for name in objects if name in known]
-    return float(np.mean(seen or list(known.values()) or [0.0])), [] if seen else objects
+    return float(np.mean(seen or list(known.values()) or [0.0]))

@@ -1,8 +1,8 @@
-"""Training a network: batches in, weights out, the same weights whether it was interrupted or not.
+"""Trains a network step by step, and saves and loads the state between two steps.
 
-What a step does depends on nothing but the seed, its number and the weights before it, so a training goes on from its
-last state as if it had never stopped. With several processes (torch.distributed) each takes its part of every batch,
-and gradients are averaged over the selected points of all parts.
+A step depends only on the seed, its number and the weights before it. So a training that resumes from its last state
+ends with the same weights. With several processes (torch.distributed), each takes its part of every batch, and the
+gradient is that of the mean loss over the selected points of all parts.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from vm_export.network import Network
 
 from ..graphs.labeled_graph import LabeledGraph, join_graphs
 from ..graphs.schedule import Item
+from .loss import point_losses, soft_targets
 from .optimizer import ScheduledOptimizer
 from .recipe import Recipe
 from .selection import class_totals, hardness_weights, point_errors, select_points
-from .targets import targets
 
 
 @dataclass(frozen=True)
-class Step:
-    """What one step did: its number, the mean loss of the points that gave gradients, how many, and the rate."""
+class StepResult:
+    """A step's number, from 1, the mean loss of its selected points, their number, and the learning rate."""
 
     number: int
     loss: float
@@ -43,12 +43,21 @@ class Step:
     rate: float
 
 
-class Trainer:
-    """A network while it is trained for `total` steps.
+@dataclass(frozen=True)
+class _BatchLoss:
+    """Sums over the selected points of this process's part of a batch: weighted loss (), weights, and their number."""
 
-    shares (C,): chance of each class's points to give gradients. weights (C,): how much each then counts. graders:
-    networks of earlier rounds; points that they were wrong about are selected rather than others of their class.
-    teacher: whose answers are learned beside the labels. device: where torch computes, "cpu" or "cuda".
+    loss: torch.Tensor
+    weight: float
+    points: int
+
+
+class Trainer:
+    """A network that is trained for `total` steps.
+
+    shares (C,): chance that a point of each class is selected. weights (C,): weight of a selected point in the loss.
+    graders: networks of earlier rounds; a point is more likely to be selected if they were wrong about it. teacher:
+    network whose probabilities are learned beside the labels. device: "cpu" or "cuda", as torch names it.
     """
 
     def __init__(
@@ -69,28 +78,30 @@ class Trainer:
         self._graders = [each.to(device).eval() for each in graders]
         self._teacher = None if teacher is None else teacher.to(device).eval()
         self._optimizer = ScheduledOptimizer(self.network, recipe, total)
-        self._average = _average_of(self.network, recipe.averaging) if recipe.averaging else None
+        self._average = _averaged(self.network, recipe.averaging) if recipe.averaging else None
 
     @property
     def result(self) -> Network:
-        """The network that answers: with averaged weights, if they are."""
+        """The network to validate and keep: with averaged weights if the recipe asks for them."""
         return self.network if self._average is None else cast(Network, self._average.module)
 
     def set_rate(self, rate: float) -> None:
-        """The learning rate of the next step, where the schedule is constant."""
+        """Set the learning rate of the next step. Lasts with a constant schedule only."""
         self._optimizer.rate = rate
 
-    def step(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> Step:
-        """Learn from the graphs of this process's part of a batch. Raises InputError if the loss is no number."""
+    def step(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> StepResult:
+        """Learn from this process's part of a batch. Raises InputError if the loss is NaN or infinite."""
         rate = self._optimizer.rate
-        loss, weight, points = self._loss(items, graphs)
-        weights = float(sum_over_processes(torch.tensor(weight))) or 1.0
-        mean = float(sum_over_processes(loss.detach().cpu())) / weights
+        part = self._batch_loss(items, graphs)
+        weight = float(sum_over_processes(torch.tensor(part.weight))) or 1.0
+        mean = float(sum_over_processes(part.loss.detach().cpu())) / weight
         if not math.isfinite(mean):
-            raise InputError(f"the loss of step {self.done + 1} is no number: begin again with a lower training.rate")
+            raise InputError(
+                f"the loss of step {self.done + 1} is NaN or infinite: begin again with a lower training.rate"
+            )
         self._optimizer.zero_grad()
-        if points:
-            (loss / weights).backward()  # type: ignore[no-untyped-call]
+        if part.points:
+            (part.loss / weight).backward()  # type: ignore[no-untyped-call]
         _sum_gradients(self.network)
         if self.recipe.clip:
             nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.clip)
@@ -98,70 +109,60 @@ class Trainer:
         if self._average is not None:
             self._average.update_parameters(self.network)
         self.done += 1
-        return Step(self.done, mean, int(sum_over_processes(torch.tensor(points))), rate)
+        return StepResult(self.done, mean, int(sum_over_processes(torch.tensor(part.points))), rate)
 
-    def _loss(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> tuple[torch.Tensor, float, int]:
-        """The weighed sum of losses of the selected points of some pictures, their summed weight and their number."""
-        classes = self.network.shape.classes
-        if not graphs:  # of a small batch other processes have all; they wait for the totals
-            if self._graders:
-                sum_over_processes(torch.zeros((2, classes), dtype=torch.float64))
-            return torch.zeros(()), 0.0, 0
+    def _batch_loss(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> _BatchLoss:
+        if not graphs:  # a small batch may leave this process nothing
+            if self._graders:  # the other processes wait for its part of the sum in _chances
+                sum_over_processes(torch.zeros((2, self.network.shape.classes), dtype=torch.float64))
+            return _BatchLoss(torch.zeros(()), 0.0, 0)
         graph, _ = join_graphs(graphs)
         points = torch.from_numpy(graph.points).to(self._device)
         neighbors = torch.from_numpy(graph.neighbors).to(self._device)
-        draws = [
-            np.random.default_rng([2, *(item.seed or ())]).random(len(each))
-            for item, each in zip(items, graphs, strict=True)
-        ]
+        # Section "Training" of the paper: gradients come from the selected points only; the others get label -1.
         chances = self._chances(points, neighbors, graph) if self._graders else None
-        chosen = select_points(graph.labels, self._shares, np.concatenate(draws), chances)
+        chosen = select_points(graph.labels, self._shares, _draws(items, graphs), chances)
+        labels = torch.from_numpy(np.where(chosen, graph.labels, -1).astype(np.int64)).to(self._device)
         with torch.autocast(torch.device(self._device).type, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
             logits = self.network.logits(points, neighbors)
-        labels = torch.from_numpy(np.where(chosen, graph.labels, -1).astype(np.int64)).to(self._device)
-        single = nn.functional.cross_entropy(
-            logits[:-1].float(), self._targets(graph, points, neighbors, labels), ignore_index=-1, reduction="none"
-        )
-        if self.recipe.loss == "focal":
-            # Not 0, where the gradient of a power below 1 is none.
-            single = (-torch.expm1(-single)).clamp(min=1e-7) ** self.recipe.gamma * single
+        losses = point_losses(logits[:-1], self._targets(graph, points, neighbors, labels), self.recipe)
         weights = torch.where(labels >= 0, self._weights[labels], 0.0)
-        return single @ weights, float(weights.sum()), int(chosen.sum())
+        return _BatchLoss(losses @ weights, float(weights.sum()), int(chosen.sum()))
 
     @torch.no_grad()
     def _targets(
         self, graph: LabeledGraph, points: torch.Tensor, neighbors: torch.Tensor, chosen: torch.Tensor
     ) -> torch.Tensor:
-        """What the selected points are to answer: their labels (n,), or probabilities (n, C)."""
+        """Targets of the points: the chosen labels (n,), or probabilities (n, C) with smoothing or a teacher."""
         recipe = self.recipe
         if self._teacher is None and not recipe.smoothing:
             return chosen
         labels = torch.from_numpy(graph.labels.astype(np.int64)).to(self._device)
         taught = None if self._teacher is None else self._teacher(points, neighbors)[:-1]
-        return targets(labels, self.network.shape.classes, neighbors, recipe.smoothing, taught, recipe.distillation)
+        classes = self.network.shape.classes
+        return soft_targets(labels, classes, neighbors, recipe.smoothing, taught, recipe.distillation)
 
     @torch.no_grad()
     def _chances(self, points: torch.Tensor, neighbors: torch.Tensor, graph: LabeledGraph) -> Floats:
-        """How much rather than others of their class the points (n,) are selected: 1 in the mean of each class."""
+        """Factors (n,) of the points' chances to be selected, from the graders' errors; mean 1 in each class."""
         errors = np.zeros(len(graph), dtype=np.float32)
         for grader in self._graders:
             errors += point_errors(grader(points, neighbors)[:-1].cpu().numpy(), graph.labels)
         weights = hardness_weights(errors)
-        sums, counts = sum_over_processes(
-            torch.from_numpy(class_totals(graph.labels, weights, len(self._shares)))
-        ).numpy()
+        totals = torch.from_numpy(class_totals(graph.labels, weights, len(self._shares)))
+        sums, counts = sum_over_processes(totals).numpy()
         means = np.divide(sums, counts, out=np.ones_like(sums), where=counts > 0)
         return np.asarray(weights / means[graph.labels])
 
     @torch.no_grad()
     def probabilities(self, graph: LabeledGraph) -> Singles:
-        """The network's answers (n, C)."""
+        """Probabilities (n, C) that `result` gives the points of a graph."""
         points, neighbors = torch.from_numpy(graph.points), torch.tensor(graph.neighbors)
         answers: Singles = self.result(points.to(self._device), neighbors.to(self._device))[:-1].cpu().numpy()
         return answers
 
     def save(self, path: Path, more: Mapping[str, Any]) -> None:
-        """Write all that going on needs, and `more` plain values. Raises InputError if it can't be written."""
+        """Write the state to resume from, with `more` plain values. Raises InputError if it can't be written."""
         state = {
             "done": self.done,
             "network": self.network.state_dict(),
@@ -169,13 +170,13 @@ class Trainer:
             "descent": self._optimizer.state_dict(),
             "more": dict(more),
         }
-        content = io.BytesIO()  # on a full disk torch would fail in its own way
+        content = io.BytesIO()  # torch reports a full disk in its own way; write_bytes raises OSError
         torch.save(state, content)
         with atomic_write(path) as part:
             part.write_bytes(content.getbuffer())
 
     def load(self, state: Mapping[str, Any]) -> None:
-        """Go on from a state that `read_state` read. Raises InputError if it is of another training."""
+        """Resume from a state that `read_state` read. Raises InputError if it belongs to another training."""
         try:
             self.network.load_state_dict(state["network"])
             self._optimizer.load_state_dict(state["descent"])
@@ -183,44 +184,49 @@ class Trainer:
                 self._average.load_state_dict(state["average"])
             self.done = int(state["done"])
         except (RuntimeError, KeyError, ValueError, TypeError) as error:
-            raise InputError(f"the state is of another training: {one_line(error)}") from error
+            raise InputError(f"the state belongs to another training: {one_line(error)}") from error
 
 
 def read_state(path: Path) -> dict[str, Any]:
-    """What `Trainer.save` wrote; nothing in it is executed. Raises InputError."""
+    """Read the file of `Trainer.save` without executing anything in it. Raises InputError."""
     try:
         state = torch.load(path, map_location="cpu", weights_only=True)
     except (OSError, RuntimeError, KeyError, ValueError, EOFError, pickle.UnpicklingError) as error:
         raise InputError(
-            f"can't go on from {path}, it is damaged: {one_line(error)}; begin again in a new folder"
+            f"can't resume from {path}, it is damaged: {one_line(error)}; begin again in a new folder"
         ) from error
     if not isinstance(state, dict) or not isinstance(state.get("more"), dict):
-        raise InputError(f"can't go on from {path}: it is no state of a training")
+        raise InputError(f"can't resume from {path}: it is not the state of a training; begin again in a new folder")
     return state
 
 
 def sum_over_processes(value: torch.Tensor) -> torch.Tensor:
-    """The sum over all processes, as every one of them gets it."""
+    """The sum of all processes' values, on the CPU; every process gets it."""
     if not distributed.is_initialized():
         return value
-    total = value.to(_meeting_place())
+    total = value.to("cuda" if distributed.get_backend() == "nccl" else "cpu")  # nccl sends tensors of GPUs only
     distributed.all_reduce(total)
     return total.cpu()
 
 
-def _meeting_place() -> str:
-    """Device of tensors that processes exchange: nccl has only GPUs."""
-    return "cuda" if distributed.get_backend() == "nccl" else "cpu"
+def _draws(items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> Floats:
+    """A random number from 0 to 1 for each point of a batch, decided by the seeds of its items."""
+    return np.concatenate(
+        [
+            np.random.default_rng([2, *(item.seed or ())]).random(len(each))
+            for item, each in zip(items, graphs, strict=True)
+        ]
+    )
 
 
-def _average_of(network: Network, decay: float) -> AveragedModel:
-    """A copy of a network whose weights become the mean of those it is given, older ones fading by `decay` a step."""
+def _averaged(network: Network, decay: float) -> AveragedModel:
+    """A copy of a network whose weights are the exponential moving average of those it is given."""
     fading = get_ema_multi_avg_fn(decay)  # type: ignore[no-untyped-call]
     return AveragedModel(network, multi_avg_fn=fading)
 
 
 def _sum_gradients(network: nn.Module) -> None:
-    """Every process gets the sum of all gradients."""
+    """Give every process the sum of all processes' gradients."""
     if distributed.is_initialized():
         for each in network.parameters():
             each.grad = torch.zeros_like(each) if each.grad is None else each.grad

@@ -9,7 +9,8 @@ import pytest
 from vm_train.data.pictures import find_pictures
 from vm_train.graphs.augmentation import Augmentation
 from vm_train.graphs.graph_cache import GraphCache
-from vm_train.graphs.loading import GraphRecipe, PictureGraphs
+from vm_train.graphs.graph_recipe import GraphRecipe
+from vm_train.graphs.loading import PictureGraphs
 from vm_train.graphs.schedule import Item
 from vm_train.learning.configuration import TrainConfiguration
 
@@ -29,13 +30,12 @@ def folder(drawn, tmp_path):
 
 
 def graphs_of(folder, kept, count=2, **changes):
-    view = GraphRecipe(
+    recipe = GraphRecipe(
         CONFIGURATION.classes.mask_classes(),
         replace(CONFIGURATION.manifest, max_distance=4.0, **changes),
         augmentation=Augmentation(brightness=0.0, contrast=0.0, saturation=0.0, hue=0.0, gamma=0.0, noise=0.0),
     )
-    views = GraphCache(kept, count, view.classes, view.manifest, view.grid, view.augmentation, view.own_radius)
-    return PictureGraphs(find_pictures(folder), view, None, views)
+    return PictureGraphs(find_pictures(folder), recipe, None, GraphCache(kept, count, recipe))
 
 
 def same(first, second):

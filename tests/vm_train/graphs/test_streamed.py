@@ -26,7 +26,8 @@ from vm_train.graphs.streamed import StreamedItem, StreamSource, assign_lanes
 from vm_train.learning.configuration import TrainConfiguration
 from vm_train.learning.hardware import Hardware, set_up_hardware
 from vm_train.learning.rounds import train
-from vm_train.learning.run_folder import TrainingRun
+from vm_train.learning.run_folder import begin_run, read_run
+from vm_train.learning.training_data import TrainingData
 
 SMALL = """
 [mesh]
@@ -71,18 +72,18 @@ def begun(place, folder, shards, workers=0, strict=False):
     configuration = read_sections(TrainConfiguration, place / "train.toml")
     split = Split((), tuple(each.number for each in find_pictures(place / "data")))
     source = StreamSource(tuple(map(str, shards)), EPOCH, 1, workers, strict)
-    return TrainingRun.begin(folder, place / "data", configuration, split, None, source)
+    return begin_run(folder, TrainingData(place / "data", split, None, source), configuration)
 
 
-def trained(job, stops=None):
+def trained(training, stops=None):
     """Train with a stop after so many batches, if any, and then to the end."""
-    here = Hardware("cpu", 0, 1, job.source.workers)
+    here = Hardware("cpu", 0, 1, training.data.source.workers)
     if stops is not None:
         asked = iter(range(stops))
-        assert not train(job, here, lambda: next(asked, None) is None).finished
-        job = TrainingRun.read(job.folder)
-    assert train(job, here, lambda: False).finished
-    return Checkpoint.load(job.model_path).network.state_dict()
+        assert not train(training, here, lambda: next(asked, None) is None).finished
+        training = read_run(training.folder)
+    assert train(training, here, lambda: False).finished
+    return Checkpoint.load(training.model_path).network.state_dict()
 
 
 def same(first, second):
@@ -121,15 +122,15 @@ def test_each_worker_has_a_lane_of_its_own_and_misses_none_of_it(processes, work
 
 
 def test_an_item_is_the_same_picture_after_a_stop(place, tmp_path):
-    job = begun(place, tmp_path / "run", sorted((place / "shards").glob("*.tar")), workers=2)
+    training = begun(place, tmp_path / "run", sorted((place / "shards").glob("*.tar")), workers=2)
     items = [StreamedItem(0, None, (0, 1, 4, 0), 1, each) for each in range(25)]
-    graphs = [job.scheduled()[each] for each in items[::6]]
-    whole = job.scheduled()
+    graphs = [training.scheduled_graphs()[each] for each in items[::6]]
+    whole = training.scheduled_graphs()
     ordered = [whole[each] for each in items]
     assert all((one.points == other.points).all() for one, other in zip(graphs, ordered[::6], strict=True))
     # A lane of 2 or 3 shards has 8 or 12 pictures, and then begins again with those of others.
     assert len({each.points.tobytes() for each in ordered[:8]}) == 8
-    other = job.scheduled()[replace(items[0], lane=0)]
+    other = training.scheduled_graphs()[replace(items[0], lane=0)]
     assert other.points.tobytes() not in {each.points.tobytes() for each in ordered[:8]}
 
 
@@ -142,8 +143,8 @@ def whole(place, tmp_path_factory):
 
 @pytest.mark.parametrize("stops", [0, 2, 5])
 def test_what_is_stopped_ends_with_the_same_weights(stops, place, whole, tmp_path):
-    job = begun(place, tmp_path / "run", sorted((place / "shards").glob("*.tar")))
-    assert same(trained(job, stops), whole)
+    training = begun(place, tmp_path / "run", sorted((place / "shards").glob("*.tar")))
+    assert same(trained(training, stops), whole)
 
 
 @pytest.mark.slow
@@ -184,8 +185,8 @@ def test_pictures_at_fault_are_named_and_skipped(place, shards, tmp_path, capfd)
     damaged = {"0001.jpg": b"none", "0003.lens.yaml": b"lens: 1", "0004.mask.png": None}
     for shard in shards[:2]:
         rewritten(shard, lambda name, content: damaged.get(name, content))
-    job = begun(place, tmp_path / "run", shards)
-    trained(job)
+    training = begun(place, tmp_path / "run", shards)
+    trained(training)
     said = capfd.readouterr().err
     assert "skipped: picture 0001 of the stream: image: can't be read as a picture" in said
     assert "skipped: picture 0003 of the stream: lens: " in said
@@ -193,40 +194,42 @@ def test_pictures_at_fault_are_named_and_skipped(place, shards, tmp_path, capfd)
 
 
 def test_strict_ends_at_a_fault_and_goes_on_when_it_is_mended(place, shards, whole, tmp_path):
-    job = begun(place, tmp_path / "run", shards, strict=True)
+    training = begun(place, tmp_path / "run", shards, strict=True)
     before = [shard.read_bytes() for shard in shards]
     for shard in shards:
         rewritten(shard, lambda name, content: b"none" if name.endswith(".jpg") else content)
     with pytest.raises(
-        InputError, match=r"picture \d+ of the stream: image: .*--strict allows none.*resume .* goes on"
+        InputError,
+        match=r"picture \d+ of the stream: image: .*with --strict, a damaged picture ends the training; "
+        "continue with vm-train resume ",
     ):
-        trained(job)
+        trained(training)
     for shard, content in zip(shards, before, strict=True):
         shard.write_bytes(content)
-    assert same(trained(TrainingRun.read(job.folder)), whole)
+    assert same(trained(read_run(training.folder)), whole)
 
 
 def test_a_cut_shard_is_named_with_its_byte_and_the_training_goes_on_when_it_is_whole(place, shards, whole, tmp_path):
-    job = begun(place, tmp_path / "run", shards)
+    training = begun(place, tmp_path / "run", shards)
     here = Hardware("cpu", 0, 1, 0)
     asked = iter(range(1))
-    assert not train(job, here, lambda: next(asked, None) is None).finished
+    assert not train(training, here, lambda: next(asked, None) is None).finished
     before = [shard.read_bytes() for shard in shards]
     for shard in shards:
         shard.write_bytes(shard.read_bytes()[:5000])
     with pytest.raises(
-        InputError, match=r"pictures-00000\d\.tar: can't be read on .*, at byte 5000: .*resume .* goes on"
+        InputError, match=r"pictures-00000\d\.tar: can't be read on .*, at byte 5000: .*continue with vm-train resume "
     ):
-        train(TrainingRun.read(job.folder), here, lambda: False)
+        train(read_run(training.folder), here, lambda: False)
     for shard, content in zip(shards, before, strict=True):
         shard.write_bytes(content)
-    assert same(trained(TrainingRun.read(job.folder)), whole)
+    assert same(trained(read_run(training.folder)), whole)
 
 
 def test_shards_without_a_picture_are_named(place, tmp_path):
     with tarfile.open(tmp_path / "empty.tar", "w"):
         pass
-    with pytest.raises(InputError, match=r"no whole picture in .*empty\.tar"):
+    with pytest.raises(InputError, match=r"no complete picture in .*empty\.tar"):
         begun(place, tmp_path / "run", [tmp_path / "empty.tar"])
 
 
@@ -265,5 +268,5 @@ def test_wrong_options_end_in_one_line(arguments, said, place, tmp_path, capsys)
 
 
 def test_there_are_no_more_readers_than_shards():
-    with pytest.raises(InputError, match="4 processes that read need at least as many shards, not 3"):
+    with pytest.raises(InputError, match="4 reading processes need at least 4 shards, not 3"):
         StreamSource(("a", "b", "c"), 9, 2, 2)

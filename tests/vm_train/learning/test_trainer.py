@@ -9,8 +9,7 @@ import torch
 from vm_embedded.errors import InputError
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape
-from vm_train.graphs.labeled_graph import LabeledGraph, join_graphs
-from vm_train.graphs.loading import empty_graph
+from vm_train.graphs.labeled_graph import LabeledGraph, empty_graph, join_graphs
 from vm_train.graphs.schedule import schedule
 from vm_train.learning.recipe import Recipe
 from vm_train.learning.trainer import Trainer, read_state
@@ -167,7 +166,7 @@ def test_a_batch_without_points_changes_no_weights():
 @pytest.mark.parametrize("content", [b"no state", b""])
 def test_a_damaged_state_is_refused(content, tmp_path):
     (tmp_path / "state.pt").write_bytes(content)
-    with pytest.raises(InputError, match="can't go on"):
+    with pytest.raises(InputError, match="can't resume from"):
         read_state(tmp_path / "state.pt")
 
 

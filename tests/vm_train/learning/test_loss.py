@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from vm_train.learning.targets import targets
+from vm_train.learning.loss import soft_targets
 
 
 @st.composite
@@ -22,7 +22,7 @@ def graphs(draw):
 @given(graphs(), st.floats(0.0, 1.0))
 def test_they_are_probabilities_that_a_loop_over_points_agrees_with(graph, smoothing):
     labels, neighbors = graph
-    found = targets(labels, 3, neighbors, smoothing)
+    found = soft_targets(labels, 3, neighbors, smoothing)
     for point, label in enumerate(labels.tolist()):
         if label < 0:
             continue
@@ -37,7 +37,7 @@ def test_they_are_probabilities_that_a_loop_over_points_agrees_with(graph, smoot
 @given(graphs())
 def test_without_smoothing_and_teacher_they_are_the_labels(graph):
     labels, neighbors = graph
-    found = targets(labels, 3, neighbors, 0.0)
+    found = soft_targets(labels, 3, neighbors, 0.0)
     assert (found.argmax(dim=1)[labels >= 0] == labels[labels >= 0]).all()
     assert (found.max(dim=1).values[labels >= 0] == 1.0).all()
 
@@ -46,7 +46,7 @@ def test_inside_an_object_labels_stay_hard():
     row = torch.tensor([0, 0, 0, 0, 1, 1, 1, 1])
     places = np.arange(8)[:, None] + (-1, 1)
     neighbors = torch.from_numpy(np.append(np.where((places >= 0) & (places < 8), places, 8), [[8, 8]], axis=0))
-    found = targets(row, 2, neighbors, 0.5)
+    found = soft_targets(row, 2, neighbors, 0.5)
     assert found[:, 0].tolist() == [1.0, 1.0, 1.0, 0.75, 0.25, 0.0, 0.0, 0.0]
 
 
@@ -54,5 +54,5 @@ def test_inside_an_object_labels_stay_hard():
 def test_a_teacher_has_its_share(graph, share):
     labels, neighbors = graph
     taught = torch.full((len(labels), 3), 1.0 / 3.0)
-    alone, with_it = targets(labels, 3, neighbors, 0.0), targets(labels, 3, neighbors, 0.0, taught, share)
+    alone, with_it = soft_targets(labels, 3, neighbors, 0.0), soft_targets(labels, 3, neighbors, 0.0, taught, share)
     assert torch.allclose(with_it, (1.0 - share) * alone + share * taught, atol=1e-6)

@@ -1,0 +1,191 @@
+"""vm-train DATA and vm-train resume: begin a training, or resume one, and train until it ends or is stopped."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vm_embedded.cli.progress import ProgressBar
+from vm_embedded.config.sections import parse_overrides, read_sections
+from vm_embedded.errors import InputError, VisualMeshError
+
+from ..data.inspection import inspect_pictures
+from ..data.picture_files import PictureFiles
+from ..data.pictures import find_pictures
+from ..data.split import Split, split_by_lists, split_by_seed
+from ..learning.configuration import TrainConfiguration
+from .check import complaints
+from .stream_options import stream_source
+
+if TYPE_CHECKING:
+    from ..learning.hardware import Hardware
+    from ..learning.rounds import TrainingOutcome
+    from ..learning.run_folder import TrainingRun
+
+_FEW = 10.0
+"""Selected points per picture; with fewer, vm-train warns."""
+
+EXIT_OK, EXIT_INTERRUPTED = 0, 130
+
+
+def run_training(options: argparse.Namespace) -> int:
+    """Begin a training, train, and return the exit status. Raises VisualMeshError."""
+    from ..learning.hardware import set_up_hardware
+
+    configuration = read_configuration(options)
+    with set_up_hardware(options.device, options.workers, options.threads) as hardware:
+        # The leader prepares everything; the other processes wait for its error message, or None.
+        error = _message_of_error(lambda: _begin(options, configuration, hardware)) if hardware.is_leader else None
+        error = hardware.broadcast(error)
+        if error is not None:
+            raise InputError(error)
+        return _train(options.output, hardware)
+
+
+def run_resume(options: argparse.Namespace) -> int:
+    """Resume a training and return the exit status. Raises VisualMeshError."""
+    from ..learning.hardware import set_up_hardware
+
+    with set_up_hardware(options.device, options.workers, options.threads) as hardware:
+        return _train(options.run, hardware, options.data)
+
+
+def read_configuration(options: argparse.Namespace) -> TrainConfiguration:
+    """The configuration of --config and --set. Raises InputError, and ModelError if no model file could hold it."""
+    configuration = read_sections(TrainConfiguration, options.config, parse_overrides(options.set, "training.epochs=5"))
+    _ = configuration.manifest  # raises ModelError now, before anything takes time
+    return configuration
+
+
+def find_good_pictures(
+    data: Path, configuration: TrainConfiguration, hardware: Hardware, strict: bool
+) -> list[PictureFiles]:
+    """Check all pictures, report the damaged ones, and return the others.
+
+    Raises InputError if no picture is left, or, with strict, if any is damaged.
+    """
+    pictures = find_pictures(data)
+    bar = ProgressBar(len(pictures), "vm-train")
+    try:
+        found = inspect_pictures(pictures, configuration.classes.mask_classes(), hardware.workers + 1, bar.advance)
+    finally:
+        bar.clear()
+    lines = list(complaints(found))
+    for line in lines:
+        print(f"vm-train: {line}", file=sys.stderr)
+    if strict and lines:
+        raise InputError("some pictures are damaged, see above: repair them, or leave out --strict to skip them")
+    if not found.good:
+        raise InputError(f"no picture of {data} can be used: vm-train check {data} tells why")
+    return list(found.good)
+
+
+def _begin(options: argparse.Namespace, configuration: TrainConfiguration, hardware: Hardware) -> None:
+    """Check all pictures, and write the folder of a new training."""
+    from ..learning.run_folder import begin_run, check_unused
+    from ..learning.training_data import TrainingData
+
+    check_unused(options.output)
+    source = stream_source(options, configuration, hardware)
+    good = find_good_pictures(options.data, configuration, hardware, options.strict)
+    if source is None:
+        split = _split(options, configuration, good)
+        training = str(len(split.training))
+    else:
+        split = Split((), tuple(each.number for each in good))
+        training = f"{source.epoch} an epoch of {len(source.shards)} shards"
+    parts = f"{training} for training, {len(split.validation)} for validation, {len(split.test)} for test"
+    print(f"{options.data}: {len(good)} pictures: {parts}")
+    unpacked = None if options.no_unpacked else options.unpacked or options.output / "unpacked"
+    data = TrainingData(options.data, split, unpacked, source)
+    run = begin_run(options.output, data, configuration, options.first, options.teacher)
+    if run.selected_points_per_picture < _FEW:
+        print(
+            f"vm-train: only {run.selected_points_per_picture:.1f} points of a picture give gradients, because each "
+            "class gets as many as the rarest object; training.selection=all uses all points",
+            file=sys.stderr,
+        )
+
+
+def _split(options: argparse.Namespace, configuration: TrainConfiguration, good: Sequence[PictureFiles]) -> Split:
+    numbers = [each.number for each in good]
+    if options.training or options.validation or options.test:
+        return split_by_lists(numbers, options.training, options.validation, options.test)
+    data = configuration.data
+    return split_by_seed(numbers, data.validation, data.test, data.split_seed)
+
+
+def _train(folder: Path, hardware: Hardware, moved_to: Path | None = None) -> int:
+    """Train from the last state of a folder on; moved_to: where the pictures are now. Returns the exit status."""
+    from ..learning.rounds import train
+    from ..learning.run_folder import locked, read_run
+
+    run = read_run(folder)
+    if moved_to is not None:
+        run = replace(run, data=replace(run.data, folder=moved_to.resolve()))
+    source = run.data.source
+    if source is not None and source.workers != hardware.workers:
+        hardware = replace(hardware, workers=source.workers)
+        if hardware.is_leader:
+            print(f"vm-train: {hardware.workers} workers read the stream, as run.json says", file=sys.stderr)
+    with locked(folder) if hardware.is_leader else nullcontext(), _stop_requests() as stop_requested:
+        outcome = train(run, hardware, stop_requested)
+    if hardware.is_leader:
+        _report(run, outcome)
+    return EXIT_OK if outcome.finished else EXIT_INTERRUPTED
+
+
+def _report(run: TrainingRun, outcome: TrainingOutcome) -> None:
+    """Print the result of a training and the commands to use next; remove the cache that it made for itself."""
+    if not outcome.finished:
+        print(f"vm-train: stopped; continue with vm-train resume {run.folder}", file=sys.stderr)
+        return
+    data, model = run.data, run.model_path
+    if data.unpacked is not None and data.unpacked.parent.resolve() == run.folder.resolve():
+        shutil.rmtree(data.unpacked, ignore_errors=True)
+    if outcome.pictures:
+        speed = outcome.pictures / max(outcome.seconds, 1e-9)
+        score = outcome.progress.best_ever
+        print(f"{model}: average precision {score:.3f} on the validation, {speed:.0f} pictures/s")
+    else:
+        print(f"{model}: the training was finished already")
+    if data.split.test:
+        print(f"next: vm-evaluate {model} {data.folder} --list {run.folder / 'pictures.json'} --part test -o report")
+    print(f"next: vm-export {model}")
+
+
+def _message_of_error(work: Callable[[], object]) -> str | None:
+    """Message of the VisualMeshError that work raises, or None."""
+    try:
+        work()
+    except VisualMeshError as error:
+        return str(error)
+    return None
+
+
+@contextmanager
+def _stop_requests() -> Iterator[Callable[[], bool]]:
+    """Yield a function that tells whether Ctrl-C or SIGTERM has asked for a stop after the current step.
+
+    The same signal once more stops at once; the other one does not, because torchrun sends one after the other.
+    """
+    received: list[int] = []
+
+    def handle(number: int, frame: object) -> None:
+        if number in received:
+            raise KeyboardInterrupt
+        received.append(number)
+
+    before = {each: signal.signal(each, handle) for each in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(received)
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)

@@ -1,0 +1,92 @@
+"""How a picture becomes a labeled graph: as it is for the validation, augmented for the training.
+
+Augmentation has two steps. A view is the graph of the whole picture for one draw of camera error and sharpness;
+graph_cache keeps some views of each picture on disk. A look is one training example: a view with another tone, cut to a
+window, perhaps mirrored.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from vm_embedded.detection.color_normalization import normalize_colors
+from vm_embedded.errors import GeometryError, InputError
+from vm_embedded.network.manifest import Manifest
+from vm_export.grid import Grid
+
+from ..data.classes import Classes
+from ..data.picture_files import PictureFiles
+from ..data.pictures import Picture
+from .augmentation import Augmentation, perturb_camera, perturb_colors, perturb_sharpness
+from .frozen_network import FirstLook
+from .graph_augmentation import mirror_image, random_window
+from .labeled_graph import LabeledGraph, empty_graph, graph_of
+
+
+@dataclass(frozen=True)
+class GraphRecipe:
+    """Everything besides the picture that decides its graph.
+
+    own_radius: build the mesh for the radius of each picture's own ball, from its sceneX.json. window: share of width
+    and height that looks are cut to. mirrored: share of looks that are mirror images. first: network that selects the
+    points of each graph; None keeps all points.
+    """
+
+    classes: Classes
+    manifest: Manifest
+    grid: Grid = field(default_factory=Grid)
+    augmentation: Augmentation = field(default_factory=Augmentation)
+    own_radius: bool = False
+    window: float = 1.0
+    first: FirstLook | None = None
+    mirrored: float = 0.0
+
+    def manifest_for(self, files: PictureFiles) -> Manifest:
+        """The manifest, with the radius of the picture's own ball if own_radius is set. Raises InputError."""
+        return replace(self.manifest, radius=ball_radius(files)) if self.own_radius else self.manifest
+
+    def make_graph(self, picture: Picture, manifest: Manifest, seed: tuple[int, ...] | None) -> LabeledGraph:
+        """The graph of a picture: as it is without a seed, else augmented. Raises InputError."""
+        if seed is None:
+            return self._select(self._whole_graph(picture, manifest))
+        random = np.random.default_rng(seed)
+        return self.draw_look(self.draw_view(picture, manifest, random), random)
+
+    def draw_view(self, picture: Picture, manifest: Manifest, random: np.random.Generator) -> LabeledGraph:
+        """The whole graph of a picture with random camera error and blur, in absolute colors. Raises InputError."""
+        changed = perturb_sharpness(perturb_camera(picture, self.augmentation, random), self.augmentation, random)
+        return self._whole_graph(changed, replace(manifest, colors="absolute"))
+
+    def draw_look(self, view: LabeledGraph, random: np.random.Generator) -> LabeledGraph:
+        """A random window of a view with random tone, reduced to the points that the first network selects."""
+        objects = [at for at, each in enumerate(self.manifest.classes) if each.kind == "object"]
+        colors = perturb_colors(view.points[:-1], self.augmentation, random)
+        normalize_colors(colors, self.manifest.colors)
+        colored = replace(view, points=np.concatenate([colors, view.points[-1:]]))
+        seen = random_window(colored, self.window, objects, random)
+        if self.mirrored and random.random() < self.mirrored:  # at 0, draw no number: old seeds keep their meaning
+            seen = mirror_image(seen, self.manifest.model)
+        return self._select(seen)
+
+    def _select(self, graph: LabeledGraph) -> LabeledGraph:
+        return graph if self.first is None else self.first.selected_part(graph)
+
+    def _whole_graph(self, picture: Picture, manifest: Manifest) -> LabeledGraph:
+        try:
+            return graph_of(picture, manifest, self.grid)
+        except GeometryError:  # the camera is too low to see any point of the mesh
+            return empty_graph(manifest.neighbors)
+
+
+def ball_radius(files: PictureFiles) -> float:
+    """Radius [m] of the balls in a picture of vm-synth, even if it shows none. Raises InputError."""
+    path = files.image.with_name(f"scene{files.number}.json")
+    try:
+        return float(json.loads(path.read_text(encoding="utf-8"))["ball_radius"])
+    except OSError as error:
+        raise InputError(f"can't read the ball's radius from {path.name}: {error.strerror or error}") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path.name} has no number ball_radius, the ball's radius [m]") from error

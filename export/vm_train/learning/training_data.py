@@ -1,0 +1,113 @@
+"""The pictures of a training: in a folder or a stream, for training or validation, read in batches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from vm_embedded.errors import InputError
+
+from ..data.decoded_cache import DecodedCache
+from ..data.pictures import find_pictures
+from ..data.split import Split
+from ..graphs.frozen_network import FirstLook
+from ..graphs.graph_cache import GraphCache
+from ..graphs.graph_recipe import GraphRecipe
+from ..graphs.loading import PictureGraphs
+from ..graphs.schedule import Batch, Item, schedule
+from ..graphs.streamed import StreamedGraphs, StreamedItem, StreamSource, assign_lanes
+from .configuration import TrainConfiguration
+from .recipe import Recipe
+
+_COUNTED = 300
+"""Pictures whose points are counted by class."""
+
+
+@dataclass(frozen=True)
+class TrainingData:
+    """Which pictures a training uses, and for what.
+
+    folder: of the pictures. split: numbers of those for training, validation and test. unpacked: folder for decoded
+    pictures and views, or None for no cache. source: the stream of training pictures; None if they are in the folder.
+    """
+
+    folder: Path
+    split: Split
+    unpacked: Path | None = None
+    source: StreamSource | None = None
+
+    @property
+    def epoch(self) -> int:
+        """Number of training pictures in an epoch."""
+        return len(self.split.training) if self.source is None else self.source.epoch
+
+    @property
+    def counted(self) -> int:
+        """Number of training pictures whose points `count_points` counts."""
+        return min(_COUNTED, self.epoch)
+
+    def batches(self, recipe: Recipe, training_round: int) -> Iterator[Batch]:
+        """All batches of a round, counted from 1."""
+        seed = (recipe.seed, training_round)
+        validation = len(self.split.validation)
+        batches = schedule(seed, recipe.epochs, recipe.batch, self.epoch, validation, recipe.looks)
+        return batches if self.source is None else assign_lanes(batches, seed, self.source)
+
+    def scheduled_graphs(
+        self, configuration: TrainConfiguration, first: FirstLook | None
+    ) -> PictureGraphs | StreamedGraphs:
+        """The graphs of the items in `batches`. Raises InputError if a picture has left the folder."""
+        graphs = self.graphs((*self.split.training, *self.split.validation), configuration, first)
+        return graphs if self.source is None else StreamedGraphs(self.source, graphs)
+
+    def graphs(
+        self, numbers: Sequence[str], configuration: TrainConfiguration, first: FirstLook | None
+    ) -> PictureGraphs:
+        """The graphs of some pictures of the folder. Raises InputError if a picture is missing."""
+        found = {each.number: each for each in find_pictures(self.folder)}
+        missing = [number for number in numbers if number not in found]
+        if missing:
+            raise InputError(
+                f"{len(missing)} pictures of the training are missing in {self.folder}, for example {missing[0]}"
+            )
+        recipe = _graph_recipe(configuration, first)
+        pictures = [found[number] for number in numbers]
+        if self.unpacked is None:
+            return PictureGraphs(pictures, recipe)
+        count = configuration.training.views
+        views = GraphCache(self.unpacked, count, recipe) if count else None
+        return PictureGraphs(pictures, recipe, DecodedCache(self.unpacked), views)
+
+    def count_points(self, configuration: TrainConfiguration, first: FirstLook | None) -> npt.NDArray[np.int64]:
+        """Number (C,) of each class's points in some training pictures, without augmentation.
+
+        The pictures are spread over the folder, or are the first ones of one lane of the stream. Raises InputError.
+        """
+        if self.source is None:
+            items = [Item(int(each)) for each in np.linspace(0, self.epoch - 1, self.counted)]
+        else:
+            order = (configuration.training.seed, 0)
+            items = [StreamedItem(0, None, order, 0, place) for place in range(self.counted)]
+        graphs = self.scheduled_graphs(configuration, first)
+        counts = np.zeros(len(configuration.classes.colors), dtype=np.int64)
+        for item in items:
+            labels = graphs[item].labels
+            counts += np.bincount(labels[labels >= 0], minlength=len(counts))
+        return counts
+
+
+def _graph_recipe(configuration: TrainConfiguration, first: FirstLook | None) -> GraphRecipe:
+    return GraphRecipe(
+        configuration.classes.mask_classes(),
+        configuration.manifest,
+        configuration.grid,
+        configuration.augmentation,
+        own_radius=configuration.mesh.radius_of == "scene",
+        window=configuration.training.window,
+        first=first,
+        mirrored=configuration.training.mirrored,
+    )

@@ -1,0 +1,189 @@
+"""Trainings as a user runs them: real processes that are stopped, killed and resumed."""
+
+import fcntl
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import torch
+
+from tests.vm_train.commands import COMMAND, environment, run
+from vm_export.checkpoint import Checkpoint
+from vm_train.learning.log import read_log
+
+
+def weights(path):
+    return Checkpoint.load(path).network.state_dict()
+
+
+def same(first, second):
+    one, other = weights(first), weights(second)
+    return one.keys() == other.keys() and all(torch.equal(one[name], other[name]) for name in one)
+
+
+def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, data):
+    folder, done = whole
+    assert re.search(r"30 pictures: \d+ for training, \d+ for validation, \d+ for test", done.stdout)
+    assert re.search(r"model\.pt: average precision 0\.\d+ on the validation, \d+ pictures/s", done.stdout)
+    assert {path.name for path in folder.iterdir()} == {
+        "train.toml",
+        "pictures.json",
+        "run.json",
+        "state.pt",
+        "log.jsonl",
+        "tensorboard",
+        "round1.pt",
+        "round2.pt",
+        "model.pt",
+    }
+    split = json.loads((folder / "pictures.json").read_text())
+    count = len(split["training"])
+    records = [record for _, record in read_log(folder / "log.jsonl")]
+    steps = [each for each in records if "loss" in each]
+    assert [(each["round"], each["step"]) for each in steps] == [
+        (each, step) for each in (1, 2) for step in range(1, 3 * -(-count // 4) + 1)
+    ]
+    assert [each["epoch"] for each in records if "score" in each] == [1, 2, 3, 1, 2, 3]
+    assert len(list((folder / "tensorboard" / "round2").glob("events*"))) == 1
+    checkpoint = Checkpoint.load(folder / "model.pt")
+    assert checkpoint.manifest.provenance["training_pictures"] == str(count)
+    assert checkpoint.manifest.provenance["data"] == data.name
+    assert [each.name for each in checkpoint.manifest.classes] == ["ball", "line", "field", "environment"]
+
+
+def test_its_network_is_exported_with_its_provenance(whole, tmp_path):
+    from vm_embedded.network.model_file import read_model
+
+    folder, _ = whole
+    done = subprocess.run(
+        [sys.executable, "-m", "vm_export.cli", str(folder / "model.pt"), "-o", str(tmp_path / "model.onnx")],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    made = read_model(tmp_path / "model.onnx").manifest
+    assert made.provenance["made_by"].startswith("vm-train")
+    assert made.provenance["selection"] == "hard"
+
+
+def test_the_same_command_gives_the_same_weights(whole, data, configuration, tmp_path):
+    run(data, "-o", tmp_path / "run", "--config", configuration, "--workers", 0, "--threads", 1, "--no-unpacked")
+    assert same(tmp_path / "run" / "model.pt", whole[0] / "model.pt")
+    assert same(tmp_path / "run" / "round2.pt", whole[0] / "round2.pt")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("how", "steps"), [(signal.SIGINT, 2), (signal.SIGTERM, 9), (signal.SIGKILL, 9), (signal.SIGKILL, 24)]
+)
+def test_what_is_stopped_at_any_moment_ends_with_the_same_weights(how, steps, whole, data, configuration, tmp_path):
+    folder = tmp_path / "run"
+    arguments = [*COMMAND, data, "-o", folder, "--config", configuration, "--workers", "1", "--threads", "1"]
+    process = subprocess.Popen(
+        [str(each) for each in arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    wait_for_steps(folder / "log.jsonl", steps, process)
+    process.send_signal(how)
+    error = process.communicate(timeout=60)[1]
+    assert process.returncode == (-signal.SIGKILL if how == signal.SIGKILL else 130)
+    assert "Traceback" not in error
+    if how != signal.SIGKILL:
+        assert f"continue with vm-train resume {folder}" in error
+    run("resume", folder, "--workers", 1, "--threads", 1)
+    for name in ("model.pt", "round1.pt", "round2.pt"):
+        assert same(folder / name, whole[0] / name)
+    assert (folder / "log.jsonl").read_text() == (whole[0] / "log.jsonl").read_text()
+
+
+def wait_for_steps(path, count, process):
+    deadline = time.monotonic() + 120
+    while not path.exists() or path.read_text().count("loss") < count:
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+@pytest.mark.slow
+def test_two_processes_have_the_same_loss_curve(whole, data, configuration, tmp_path):
+    command = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node=2", "--master-port=0", "--standalone"]
+    done = subprocess.run(
+        [*command, "-m", "vm_train", data, "-o", tmp_path / "run", "--config", configuration, "--workers", "0"],
+        capture_output=True,
+        text=True,
+        timeout=240,
+        env=environment(),
+    )
+    assert done.returncode == 0, done.stderr
+    curves = [
+        [record["loss"] for _, record in read_log(folder / "log.jsonl") if "loss" in record]
+        for folder in (whole[0], tmp_path / "run")
+    ]
+    assert curves[1] == pytest.approx(curves[0], rel=2e-3)
+    scores = [
+        [record["score"] for _, record in read_log(folder / "log.jsonl") if "score" in record]
+        for folder in (whole[0], tmp_path / "run")
+    ]
+    assert scores[1] == pytest.approx(scores[0], abs=0.02)
+
+
+def test_a_finished_training_says_so_and_a_begun_one_is_not_begun_again(whole, data, configuration):
+    folder, _ = whole
+    assert "finished already" in run("resume", folder).stdout
+    again = run(data, "-o", folder, "--config", configuration, code=1)
+    assert f"vm-train resume {folder}" in again.stderr
+
+
+def copied(whole, tmp_path):
+    return Path(shutil.copytree(whole[0], tmp_path / "run"))
+
+
+def test_a_configuration_that_was_edited_is_refused(whole, tmp_path):
+    folder = copied(whole, tmp_path)
+    path = folder / "train.toml"
+    path.write_text(path.read_text().replace("epochs = 3", "epochs = 5"))
+    assert "train.toml or pictures.json was changed" in run("resume", folder, code=1).stderr
+
+
+def test_a_training_in_work_is_left_alone(whole, tmp_path):
+    folder = copied(whole, tmp_path)
+    with (folder / "run.json").open() as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        assert f"another process is training in {folder}" in run("resume", folder, code=1).stderr
+
+
+def test_files_of_others_are_not_written_over(data, configuration, tmp_path):
+    (tmp_path / "train.toml").write_text("# mine\n" + configuration.read_text())
+    done = run(data, "-o", tmp_path, "--config", tmp_path / "train.toml", code=1)
+    assert "holds train.toml, which a training would overwrite" in done.stderr
+    assert (tmp_path / "train.toml").read_text().startswith("# mine")
+
+
+def test_a_training_goes_on_where_its_folders_were_moved_to(whole, data, tmp_path):
+    folder = copied(whole, tmp_path)
+    (folder / "state.pt").unlink()
+    moved = Path(shutil.copytree(data, tmp_path / "moved"))
+    run("resume", folder, "--data", moved, "--workers", 1, "--threads", 1)
+    assert same(folder / "model.pt", whole[0] / "model.pt")
+    assert not (folder / "unpacked").exists()
+
+
+def test_a_damaged_log_is_cut_where_it_is_damaged(whole, tmp_path):
+    folder = copied(whole, tmp_path)
+    (folder / "state.pt").unlink()
+    with (folder / "log.jsonl").open("a") as file:
+        file.write("\0\0\n")
+    run("resume", folder, "--workers", 1, "--threads", 1)
+    assert (folder / "log.jsonl").read_text() == (whole[0] / "log.jsonl").read_text()
