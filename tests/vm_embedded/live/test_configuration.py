@@ -131,7 +131,7 @@ WRONG = {
     "model that is no path": ("model = 5\n", "model must be a path, not 5"),
     "lens that is neither path nor table": ("lens = 5\n", r"lens must be a path or a table, \[lens\], not 5"),
     "lens file that is missing": ('lens = "none.yaml"\n', r"none\.yaml.*No such file"),
-    "lens that lacks a key": ("[lens]\nprojection = 'equisolid'\nfov = 1\n", "lacks focal_length"),
+    "lens that lacks a key": ("[lens]\nprojection = 'equisolid'\nfov = 1\n", "needs focal_length"),
     "lens out of range": (FULL.replace("fov = 1.8", "fov = 103"), "fov .*103"),
     "orientation that is no table": ("orientation = 0.8\n", r"\[orientation\], not 0\.8"),
     "detector that is no table": ('detector = "fast"\n', r"\[detector\], not 'fast'"),
