@@ -24,13 +24,14 @@ demo: .venv/runtime ## find the balls in the twelve test pictures
 	@$(BIN)/vm-detect --camera $(DEMO) --save-overlay demo-out
 	@echo "Annotated pictures: $(CURDIR)/demo-out/"
 
-test: lint ## lint, types and tests; LONG=1 adds tests that take minutes: 200 camera faults, a booted robot
+test: lint ## lint and tests; LONG=1 adds tests that take minutes: 200 camera faults, a booted robot
 	$(BIN)/python deploy/bundle.py --download
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder $(if $(LONG),,-m 'not long')
 
-lint: .venv/dev ## style and types
+lint: .venv/dev ## style, spelling and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/codespell
 	$(BIN)/mypy
 
 bundle: .venv/bundle ## pack all that a robot needs in one file: make bundle [MODEL=model.onnx] [CONFIG=vm.toml] [TARGET=linux_x86_64-cp311]

@@ -64,8 +64,8 @@ def plot(facts: Sequence[Facts], size: Size, title: str, path: Path) -> None:
         _histogram(each, values.get(name, []), name)
     _places(axes[6], facts, size)
     _shares(axes[7], values)
-    for each, whats in ((axes[8], ("ground", "lens")), (axes[9], ("ball", "other ball"))):
-        _bars(each, {f"{what}: {name}": n for what in whats for name, n in kinds[what].items()}, "pictures")
+    for each, shown in ((axes[8], ("ground", "lens")), (axes[9], ("ball", "other ball"))):
+        _bars(each, {f"{what}: {name}": n for what in shown for name, n in kinds[what].items()}, "pictures")
     _bars(
         axes[10], dict(kinds["ball design"].most_common(_MOST)), _titled("balls with a pattern", kinds["ball design"])
     )
