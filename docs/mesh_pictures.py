@@ -13,9 +13,9 @@ from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.walls import wall_distances
-from vm_mesh.made_mesh import MadeMesh, Plan
-from vm_mesh.pictures import draw_mesh
-from vm_mesh.quality import on_object
+from vm_mesh.built_mesh import BuiltMesh, MeshPlan
+from vm_mesh.drawing import draw_mesh
+from vm_mesh.quality import points_on_object
 from vm_train.evaluation.points_on_ball import EarlySphere
 from vm_workstation.plots import new_figure, save_figure
 
@@ -36,10 +36,10 @@ def models():
     """The reference's twelve models from above, with balls at 0, 0.5 and 1 m."""
     figure = new_figure(8.4, 11.4)
     axes = figure.subplots(4, 3)
-    plan = Plan(BALL, 1.0, 2.0, 4.0)
+    plan = MeshPlan(BALL, 1.0, 2.0, 4.0)
     for row, kind in zip(axes, ("ring", "xygrid", "xmgrid", "nmgrid"), strict=True):
         for each, neighbors in zip(row, (4, 6, 8), strict=True):
-            made = MadeMesh.build(f"{kind}{neighbors}", plan)
+            made = BuiltMesh.build(f"{kind}{neighbors}", plan)
             draw_mesh(each, made, "ground", 1.7, (0.0, 0.6, 1.2))
             each.set_title(made.model, fontsize=10)
             each.set_xlim(-1.7, 1.7)
@@ -115,9 +115,9 @@ def below():
     """Below the camera: both meshes, and the equivalent k."""
     figure = new_figure(10.5, 8.4)
     top, bottom = figure.subfigures(2, 1, height_ratios=(1.25, 1.0))
-    plan = Plan(BALL, 1.0, 4.0, 6.0)
+    plan = MeshPlan(BALL, 1.0, 4.0, 6.0)
     for axes, model in zip(top.subplots(1, 2), ("ring6", "cap6"), strict=True):
-        draw_mesh(axes, MadeMesh.build(model, plan), "ground", 0.62, (0.0, 0.35))
+        draw_mesh(axes, BuiltMesh.build(model, plan), "ground", 0.62, (0.0, 0.35))
         axes.set_title(f"{model}, k = 4", fontsize=10)
         axes.set_xlim(-0.6, 0.6)
         axes.set_ylim(-0.6, 0.6)
@@ -130,7 +130,7 @@ def below():
         ("ring6", "ring6", BALL, RING),
         ("cap6", "cap6", BALL, OURS),
     ):
-        curve = curves[name] = on_object(MadeMesh.build(model, Plan(shape, 1.0, 4.0, 6.0)), distances)
+        curve = curves[name] = points_on_object(BuiltMesh.build(model, MeshPlan(shape, 1.0, 4.0, 6.0)), distances)
         axes.plot(distances, curve.mean, color=color, linewidth=1.3, label=name)
         axes.fill_between(distances, curve.low, curve.high, color=color, alpha=0.18, linewidth=0)
     axes.set_xlabel("distance of a ball from the point below the camera [m]")
@@ -142,8 +142,8 @@ def below():
     for height in (0.5, 1.0, 1.2):
         for k in (3.0, 4.0, 6.0):
             for model in ("ring6", "cap6"):
-                made = MadeMesh.build(model, Plan(BALL, height, k, 6.0))
-                found = on_object(made, distances)
+                made = BuiltMesh.build(model, MeshPlan(BALL, height, k, 6.0))
+                found = points_on_object(made, distances)
                 near = distances <= 0.7
                 print(
                     f"h {height} k {k:g} {model}: {len(made.mesh)} points, k {found.low.min():.2f} to "
@@ -162,8 +162,8 @@ def tall():
     figure = new_figure(10.5, 8.6)
     top, bottom = figure.subfigures(2, 1, height_ratios=(1.25, 1.0))
     height, places = 1.0, ((0.5, -35.0), (1.6, 0.0), (6.0, 25.0))
-    ring = MadeMesh.build("ring6", Plan(Circle(POST.radius), height, 4.0, 10.0))
-    walls = MadeMesh.build("wall6", Plan(POST, height, 4.0, 10.0))
+    ring = BuiltMesh.build("ring6", MeshPlan(Circle(POST.radius), height, 4.0, 10.0))
+    walls = BuiltMesh.build("wall6", MeshPlan(POST, height, 4.0, 10.0))
     for axes, made, title in zip(
         top.subplots(1, 2, sharey=True),
         (ring, walls),
@@ -201,7 +201,7 @@ def tall():
         axes.axhspan(3.0, 5.0, color="#dddddd", alpha=0.6, linewidth=0)
         for camera, style in ((0.5, ":"), (1.2, "-")):
             for model, shape, color in (("ring6", Circle(POST.radius), RING), ("wall6", POST, OURS)):
-                found = across(MadeMesh.build(model, Plan(shape, camera, 4.0, 10.0)), distances)
+                found = across(BuiltMesh.build(model, MeshPlan(shape, camera, 4.0, 10.0)), distances)
                 values = found[0] if what.startswith("rows") else found[1]
                 axes.loglog(
                     distances,
@@ -222,7 +222,7 @@ def tall():
     return figure
 
 
-def across(made: MadeMesh, distances):
+def across(made: BuiltMesh, distances):
     """Rows that cross a post, and the median of their points (m, bearings), at distances (m,) [m]."""
     rays = np.ascontiguousarray(made.mesh.rays)
     level, bearing = np.round(rays[:, 2], 12), np.arctan2(rays[:, 1], rays[:, 0])

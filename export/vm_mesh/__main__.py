@@ -1,4 +1,4 @@
-"""python -m vm_mesh is vm-mesh."""
+"""python -m vm_mesh runs vm-mesh."""
 
 import sys
 

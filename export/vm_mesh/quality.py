@@ -1,11 +1,13 @@
-"""How evenly a mesh samples: points on an object over its distance and bearing, and how the links lie.
+"""How evenly a mesh samples: points on an object over its distance and bearing, and lengths and angles of links.
 
-Links are measured in steps: an object is k steps across, in the direction of its distance and at right angles to it.
+Lengths of links are in steps: an object is k steps across, both in the direction of its distance and at right angles
+to it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,18 +16,18 @@ from vm_embedded.errors import InputError
 from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.mesh.walls import NEAREST
 
-from .made_mesh import MadeMesh
+from .built_mesh import BuiltMesh
 
 BEARINGS = 61
-"""Bearings at which objects are put, spread over the whole turn in step with no ring."""
+"""Number of bearings of an object, evenly spread; a prime, so that they repeat with no ring of points."""
 
 
 @dataclass(frozen=True, eq=False)
-class OnObject:
-    """Points on objects over distances (m,) [m]: mean, low and high (m,) of the equivalent k over all bearings.
+class PointsOnObject:
+    """The equivalent k of an object at distances (m,) [m]: mean, low and high (m,) over all bearings.
 
-    The equivalent k is the side of a square lattice that would put as many points on the object: sqrt(4 N / pi) for
-    circles and spheres. Of wall6 it counts the points of the wall whose distance is nearest in ratio, row by row.
+    The equivalent k is the side of a square lattice with the same number of points on the object: sqrt(4 N / pi) for
+    circles and spheres. In wall6 only the points of the nearest wall count, by the ratio of distances.
     """
 
     distances: Floats
@@ -36,80 +38,102 @@ class OnObject:
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean and standard deviation."""
+    """Mean and standard deviation; NaN without values."""
 
     mean: float
     deviation: float
 
     @classmethod
     def of(cls, values: Floats) -> Spread:
-        """Of finite values; NaN of none."""
+        """The spread of finite values."""
         return cls(float(values.mean()), float(values.std())) if len(values) else cls(np.nan, np.nan)
 
 
 @dataclass(frozen=True)
 class Links:
-    """radial: length of the links from a point to its neighbors [steps]. cyclic: from one neighbor to the next around
-    the point [steps]. angular: angle between them [deg]. In an even mesh of six neighbors they are 1, 1 and 60 or, with
-    square cells, sqrt(2) and less for some."""
+    """Lengths and angles of the links of a mesh.
+
+    radial: length of the links from a point to its neighbors [steps]. cyclic: distance from one neighbor to the next
+    around the point [steps]. angular: angle between two neighbors in turn [deg]. An even mesh of six neighbors has 1, 1
+    and 60.
+    """
 
     radial: Spread
     cyclic: Spread
     angular: Spread
 
 
-def on_object(made: MadeMesh, distances: Floats) -> OnObject:
-    """The equivalent k on objects at distances (m,) [m] from the camera's foot; of wall6 at those that it serves.
+@dataclass(frozen=True, eq=False)
+class Quality:
+    """How evenly a mesh samples."""
 
-    Raises InputError if it serves none.
+    points: PointsOnObject
+    links: Links
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON."""
+        names = ("distances", "mean", "low", "high")
+        points = {name: np.round(getattr(self.points, name), 4).tolist() for name in names}
+        return {"on_object": points, "links": asdict(self.links)}
+
+
+def measure_quality(built: BuiltMesh, distances: Floats) -> Quality:
+    """The quality of a mesh for objects at distances (m,) [m] and, for links, in the first 80 % of its reach."""
+    return Quality(points_on_object(built, distances), measure_links(built, 0.0, 0.8 * built.plan.max_distance))
+
+
+def points_on_object(built: BuiltMesh, distances: Floats) -> PointsOnObject:
+    """The equivalent k of objects at distances (m,) [m] from the camera's foot; wall6 leaves out those too near for it.
+
+    Raises InputError if no distance is left.
     """
-    plan, rays = made.plan, np.ascontiguousarray(made.mesh.rays)
-    if made.walls is not None:
+    plan, rays = built.plan, np.ascontiguousarray(built.mesh.rays)
+    if built.walls is not None:
         distances = distances[distances >= NEAREST]
         if len(distances) == 0:
             raise InputError(f"wall6 begins at {NEAREST:g} m; give a greater --distance or --max-distance")
-    turn = 2.0 * np.pi * (np.arange(BEARINGS) + 0.37) / BEARINGS
+    bearings = 2.0 * np.pi * (np.arange(BEARINGS) + 0.37) / BEARINGS
     found = np.empty((len(distances), BEARINGS))
     for row, distance in enumerate(distances.tolist()):
         centers = np.empty((BEARINGS, 3))
-        centers[:, 0], centers[:, 1] = distance * np.cos(turn), distance * np.sin(turn)
+        centers[:, 0], centers[:, 1] = distance * np.cos(bearings), distance * np.sin(bearings)
         centers[:, 2] = plan.shape.center_height - plan.height
         chosen = np.arange(len(rays))
-        if made.walls is not None:
-            chosen = np.flatnonzero(made.walls == _serving_wall(made, distance))
+        if built.walls is not None:
+            chosen = np.flatnonzero(built.walls == _nearest_wall(built, distance))
         hits = plan.shape.offset(rays[chosen], centers, plan.height) < 1.0
-        found[row] = np.sqrt(hits.sum(axis=1) / plan.whole)
-    return OnObject(distances, found.mean(axis=1), found.min(axis=1), found.max(axis=1))
+        found[row] = np.sqrt(hits.sum(axis=1) / plan.filled_share)
+    return PointsOnObject(distances, found.mean(axis=1), found.min(axis=1), found.max(axis=1))
 
 
-def links_of(made: MadeMesh, low: float, high: float) -> Links:
-    """How the links lie of points that are meant for distances from `low` to `high` [m] and lack no neighbor."""
-    mesh, plan = made.mesh, made.plan
-    whole = (mesh.neighbors[:-1] < len(mesh)).all(axis=1)
-    points = np.flatnonzero(whole & (made.distances >= low) & (made.distances <= high))
+def measure_links(built: BuiltMesh, low: float, high: float) -> Links:
+    """The links of points that have all neighbors and serve distances from `low` to `high` [m]."""
+    mesh, plan = built.mesh, built.plan
+    complete = (mesh.neighbors[:-1] < len(mesh)).all(axis=1)
+    points = np.flatnonzero(complete & (built.distances >= low) & (built.distances <= high))
     rays = mesh.rays[points]
-    beside = mesh.rays[mesh.neighbors[points]]  # (m, N, 3)
-    outward, around = _frame(rays)
-    away = beside - rays[:, None]
-    vectors = np.stack([np.einsum("mni,mi->mn", away, outward), np.einsum("mni,mi->mn", away, around)], axis=2)
-    vectors *= plan.intersections / np.stack(_extent(made, points), axis=1)[:, None]
+    to_neighbors = mesh.rays[mesh.neighbors[points]] - rays[:, None]  # (m, N, 3)
+    outward, around = _tangents(rays)
+    components = [np.einsum("mni,mi->mn", to_neighbors, tangent) for tangent in (outward, around)]
+    steps = np.stack(_object_angles(built, points), axis=1) / plan.intersections  # (m, 2) [rad]
+    vectors = np.stack(components, axis=2) / steps[:, None]  # (m, N, 2) [steps]
     length = np.linalg.norm(vectors, axis=2)
-    after = np.roll(vectors, -1, axis=1)
-    gap = np.linalg.norm(after - vectors, axis=2)
-    cross = vectors[:, :, 0] * after[:, :, 1] - vectors[:, :, 1] * after[:, :, 0]
-    angle = np.degrees(np.abs(np.arctan2(cross, (vectors * after).sum(axis=2))))
+    following = np.roll(vectors, -1, axis=1)
+    gap = np.linalg.norm(following - vectors, axis=2)
+    cross = vectors[:, :, 0] * following[:, :, 1] - vectors[:, :, 1] * following[:, :, 0]
+    angle = np.degrees(np.abs(np.arctan2(cross, (vectors * following).sum(axis=2))))
     return Links(*(Spread.of(each.ravel()) for each in (length, gap, angle)))
 
 
-def _serving_wall(made: MadeMesh, distance: float) -> int:
-    """The wall whose steps fit an object at a distance [m] best."""
-    assert made.walls is not None
-    first = np.flatnonzero(np.diff(made.walls, prepend=-1))
-    return int(np.argmin(np.abs(made.distances[first] / distance - 1.0)))
+def _nearest_wall(built: BuiltMesh, distance: float) -> int:
+    """The wall whose distance [m] has the ratio nearest to 1 to the distance of an object."""
+    assert built.walls is not None
+    first = np.flatnonzero(np.diff(built.walls, prepend=-1))
+    return int(np.argmin(np.abs(built.distances[first] / distance - 1.0)))
 
 
-def _frame(rays: Floats) -> tuple[Floats, Floats]:
-    """Unit vectors (m, 3) at right angles to rays (m, 3): towards greater inclination, and around the vertical."""
+def _tangents(rays: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors (m, 3) at right angles to rays (m, 3): toward greater inclination, and around the vertical."""
     level = np.hypot(rays[:, 0], rays[:, 1])
     x = np.where(level > 1e-12, rays[:, 0] / np.maximum(level, 1e-12), 1.0)
     y = np.where(level > 1e-12, rays[:, 1] / np.maximum(level, 1e-12), 0.0)
@@ -118,11 +142,11 @@ def _frame(rays: Floats) -> tuple[Floats, Floats]:
     return outward, around
 
 
-def _extent(made: MadeMesh, points: np.ndarray) -> tuple[Floats, Floats]:
-    """Angle [rad] that an object fills where each point (m,) is: in inclination, and across."""
-    plan, shape = made.plan, made.plan.shape
-    rays, distance = made.mesh.rays[points], made.distances[points]
-    if made.walls is not None:
+def _object_angles(built: BuiltMesh, points: np.ndarray) -> tuple[Floats, Floats]:
+    """Angles (m,) [rad] that an object covers at the places of points (m,): in inclination, and across."""
+    plan, shape = built.plan, built.plan.shape
+    rays, distance = built.mesh.rays[points], built.distances[points]
+    if built.walls is not None:
         assert isinstance(shape, Cylinder)
         low, high = np.arctan2(-plan.height, distance), np.arctan2(shape.object_height - plan.height, distance)
         level = np.hypot(rays[:, 0], rays[:, 1])

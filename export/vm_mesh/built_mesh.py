@@ -1,4 +1,4 @@
-"""A mesh together with what it was made for."""
+"""A mesh together with its plan: the object, camera and reach that it is built for."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from vm_embedded.mesh.walls import wall_counts, wall_distances
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What a mesh is made for: an object's shape, camera height [m], intersections and reach [m]."""
+class MeshPlan:
+    """The object's shape, the camera height [m], the intersections k and the reach [m] that a mesh is built for."""
 
     shape: Shape
     height: float
@@ -27,30 +27,33 @@ class Plan:
     max_distance: float
 
     @property
-    def whole(self) -> float:
-        """Points on an object, over k^2: the share of its bounding box that an object fills."""
+    def filled_share(self) -> float:
+        """The share of its bounding box that an object fills: points on the object, divided by k^2."""
         return 1.0 if isinstance(self.shape, Cylinder) else math.pi / 4.0
+
+    def __str__(self) -> str:
+        return f"{self.shape}, camera {self.height:g} m high, k = {self.intersections:g}, reach {self.max_distance:g} m"
 
 
 @dataclass(frozen=True, eq=False)
-class MadeMesh:
-    """A model's mesh for a plan, and the milliseconds that building it took."""
+class BuiltMesh:
+    """The mesh of a model for a plan, and the time that it took to build [ms]."""
 
     model: str
-    plan: Plan
+    plan: MeshPlan
     mesh: Mesh
     build_ms: float
 
     @classmethod
-    def build(cls, model: str, plan: Plan) -> MadeMesh:
-        """Raises InputError or GeometryError as build_mesh does."""
+    def build(cls, model: str, plan: MeshPlan) -> BuiltMesh:
+        """Build the mesh. Raises InputError or GeometryError as build_mesh does."""
         started = time.perf_counter()
         mesh = mesh_model(model).build(plan.shape, plan.height, plan.intersections, plan.max_distance)
         return cls(model, plan, mesh, 1e3 * (time.perf_counter() - started))
 
     @cached_property
     def walls(self) -> Indices | None:
-        """The wall (n,) that each point of wall6 lies on, else None."""
+        """The wall (n,) of each point of a wall6 mesh; None for other models."""
         if self.model != "wall6":
             return None
         counts = wall_counts(self.plan.shape, self.plan.intersections, self.plan.max_distance)
@@ -58,7 +61,7 @@ class MadeMesh:
 
     @cached_property
     def distances(self) -> Floats:
-        """Distance (n,) [m] from the camera's foot to the object that each point is meant for."""
+        """Distance (n,) [m] from the camera's foot to the object that each point serves."""
         plan, rays = self.plan, self.mesh.rays
         if self.walls is not None:
             return np.asarray(wall_distances(plan.shape, plan.intersections, plan.max_distance)[self.walls])
