@@ -30,7 +30,7 @@ _HEADER = 12  # bytes
 class Record:
     """One record of a file.
 
-    checksum: of the payload, masked, from the file. position: number of bytes read from the file so far.
+    checksum: of the payload, masked, from the file. position: bytes of the file on disk that are read so far.
     """
 
     path: Path
