@@ -1,4 +1,4 @@
-"""vm-train check: what pictures hold as tables and for other programs, and which are at fault."""
+"""vm-train check: facts about the pictures of a data set, and the pictures that can't be used."""
 
 from __future__ import annotations
 
@@ -27,39 +27,39 @@ from ..data.pictures import find_pictures
 EXIT_OK, EXIT_FAULTS = 0, 1
 
 _NAMED = 20
-"""Pictures at fault that are named, of each kind of fault."""
+"""Faulty pictures to name, for each kind of fault."""
 
 _KINDS = {
     "missing": "lack a file",
     "damaged": "have a file that can't be read",
-    "size": "have masks of another size than the image",
-    "lens": "have lens files at fault",
-    "color": "have masks that are not of the classes' colors",
+    "size": "have a mask of another size than the image",
+    "lens": "have an invalid lens file",
+    "color": "have a mask with unknown colors or another pixel format",
 }
 
 _EDGES = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-"""Of distances [m]."""
+"""Edges of the distance bins in the table [m]."""
 
 
 def check_parser() -> argparse.ArgumentParser:
     """The options of vm-train check DATA."""
     made = argparse.ArgumentParser(
         prog="vm-train check",
-        description="Read all pictures of a folder, or of the shards in it: what they show, and which are at fault. "
-        "Exit status 0 if all are sound, else 1.",
+        description="Read all pictures of a folder, or of the shards in it. Print tables of their contents, and name "
+        "the pictures that can't be used. Exit status: 0 if all can be used, 1 otherwise.",
     )
     made.add_argument("data", type=Path, metavar="DATA", help="folder of imageX.jpg or .png, maskX.png, lensX.yaml")
     made.add_argument("--config", type=Path, metavar="FILE", help="train.toml with the classes; default vm-synth's")
-    made.add_argument("--workers", type=at_least(1), metavar="N", help="processes that read; default all cores")
-    made.add_argument("--json", type=Path, metavar="FILE", help="all findings, and all faults by number")
-    made.add_argument("--strict", action="store_true", help="also exit with 1 if no picture shows one of the classes")
+    made.add_argument("--workers", type=at_least(1), metavar="N", help="reading processes; default all cores")
+    made.add_argument("--json", type=Path, metavar="FILE", help="file for all results, with every fault")
+    made.add_argument("--strict", action="store_true", help="exit with 1 also if a class is in no picture")
     return made
 
 
 def run_check(options: argparse.Namespace, classes: Classes, objects: Sequence[str] = ()) -> int:
-    """Check as the options say and return the exit status. objects: classes whose distances are told.
+    """Check as the options say and return the exit status. objects: classes whose distances to print.
 
-    Raises InputError if there are no pictures, or the findings can't be written.
+    Raises InputError if there are no pictures, or if the results can't be written.
     """
     if options.json is not None:
         check_writable(options.json)
@@ -80,8 +80,8 @@ def run_check(options: argparse.Namespace, classes: Classes, objects: Sequence[s
 
 
 def tables(found: Inspection) -> Iterator[str]:
-    """Lines of a report."""
-    yield f"{found.count} pictures, {len(found.faults)} of them at fault"
+    """The lines of the report."""
+    yield f"{found.count} pictures, {len(found.faults)} of them can't be used"
     if not found.facts:
         return
     count = len(found.facts)
@@ -108,7 +108,7 @@ def tables(found: Inspection) -> Iterator[str]:
 
 
 def _quantities(found: Inspection) -> dict[str, dict[str, float]]:
-    """Least, median, largest and so on of what differs from picture to picture."""
+    """A summary of each quantity of camera and lens: its least, median and largest value and so on."""
     values = {
         "camera height [m]": [each.height for each in found.facts],
         "camera pitch [deg]": [math.degrees(each.pitch) for each in found.facts],
@@ -120,7 +120,7 @@ def _quantities(found: Inspection) -> dict[str, dict[str, float]]:
 
 
 def _distances(found: Inspection) -> dict[str, int]:
-    """How many things of object classes are how far away; none if distances were not measured."""
+    """Numbers of objects by distance; empty if there are none or distances were not measured."""
     distances = [each for facts in found.facts for each in facts.distances]
     if not distances:
         return {}
@@ -130,7 +130,7 @@ def _distances(found: Inspection) -> dict[str, int]:
 
 
 def as_json(found: Inspection) -> dict[str, Any]:
-    """All findings for other programs."""
+    """All results, for other programs."""
     return {
         "count": found.count,
         "good": len(found.good),
@@ -146,7 +146,7 @@ def as_json(found: Inspection) -> dict[str, Any]:
 
 
 def complaints(found: Inspection) -> list[str]:
-    """Lines on what is at fault; none if all is well."""
+    """Lines about faulty pictures and absent classes; none if there are neither."""
     lines = []
     order = list(_KINDS)
     for kind, some in groupby(sorted(found.faults, key=lambda each: order.index(each.kind)), lambda each: each.kind):
@@ -154,6 +154,6 @@ def complaints(found: Inspection) -> list[str]:
         lines.append(f"{len(faults)} of {found.count} pictures {_KINDS[kind]}")
         lines += [f"  {each.text}" for each in faults[:_NAMED]]
         if len(faults) > _NAMED:
-            lines.append(f"  and {len(faults) - _NAMED} more; vm-train check --json names all")
-    lines += [f"no picture shows class {name}: is its color in masks the right one?" for name in found.absent]
+            lines.append(f"  and {len(faults) - _NAMED} more; vm-train check --json lists all")
+    lines += [f"no picture shows class {name}: check its color in the configuration" for name in found.absent]
     return lines

@@ -1,4 +1,4 @@
-"""vm-evaluate: how good a network is, over points and objects, by distance."""
+"""vm-evaluate: scores of a network on pictures, for points and objects, by distance."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("vm-evaluate: stopped", file=sys.stderr)
         sys.stdout.flush()
-        os._exit(EXIT_INTERRUPTED)  # the workers end with this process, which else might wait for them in vain
+        os._exit(EXIT_INTERRUPTED)  # the workers end with this process; a normal exit might wait for them forever
     return EXIT_FAILED
 
 
 def _evaluate(options: argparse.Namespace) -> int:
-    # Imported here, so that a machine without torch still gets help texts and one clear line.
+    # Imported here: without torch or matplotlib, help works and the error is one clear line.
     from vm_embedded.cli.progress import ProgressBar
     from vm_workstation.plots import new_figure
 
@@ -64,8 +64,8 @@ def _evaluate(options: argparse.Namespace) -> int:
     pictures = select_pictures(options.data, options.list, options.part)
     rules = Rules(options.radius_of, options.min_radius, options.strict)
     if options.output.exists() and not options.output.is_dir():
-        raise InputError(f"can't write to {options.output}: it is no folder")
-    new_figure(1.0, 1.0)  # better no plots now than after an hour
+        raise InputError(f"can't write to {options.output}: it is not a folder")
+    new_figure(1.0, 1.0)  # fails now, not after an hour, if matplotlib is missing
     subject = _subject(options, settings)
     classes = classes_with_colors(subject.manifest, default_colors(options.model, options.list), options.color)
     job = Job(options.model, settings, options.as_robot, classes, rules)
@@ -85,7 +85,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     print(lines(scores))
     for note in about["notes"]:
         print(f"vm-evaluate: {note}", file=sys.stderr)
-    print(f"\n{options.output / 'report.html'}: written, with scores.json, tables and plots beside it")
+    print(f"\n{options.output / 'report.html'}: written; scores.json, tables and plots are beside it")
     return EXIT_OK
 
 
@@ -94,8 +94,8 @@ def _subject(options: argparse.Namespace, settings: Settings) -> Subject:
 
     if options.radius_of == "scene" and (options.as_robot or settings.object_radius is not None):
         raise InputError(
-            "--radius-of scene gives each picture a mesh of its own, so neither --as-robot nor "
-            "--object-radius goes with it"
+            "--radius-of scene makes a mesh for each picture's ball: it can't be combined with --as-robot or "
+            "--object-radius"
         )
     return load_subject(options.model, settings, options.as_robot)
 
@@ -104,13 +104,13 @@ def _settings(options: argparse.Namespace) -> Settings:
     configured = read_configuration(options.config).detector if options.config else Settings()
     given = {each.name: getattr(options, each.name) for each in fields(Settings)}
     if given["format"] not in (None, "bgr"):
-        raise InputError(f"--format {given['format']} is for a robot's camera; pictures of a folder are read as bgr")
+        raise InputError(f"--format must be bgr, not {given['format']}: vm-evaluate reads all pictures as bgr")
     chosen = {name: value for name, value in given.items() if value is not None}
     return replace(configured, **{**chosen, "format": "bgr"})
 
 
 def _about(options: argparse.Namespace, settings: Settings, subject: Subject, colors: Any) -> dict[str, Any]:
-    """What was evaluated, on what and how, for scores.json."""
+    """Model, data, rules and settings, for scores.json."""
     manifest, grid = subject.manifest, subject.grid
     return {
         "made_by": f"vm-evaluate {vm_embedded.__version__}",
@@ -139,22 +139,20 @@ def _about(options: argparse.Namespace, settings: Settings, subject: Subject, co
 
 
 def _notes(options: argparse.Namespace, settings: Settings, subject: Subject, result: Evaluation) -> list[str]:
-    """What a reader of the scores should know."""
+    """Remarks that help to understand the scores."""
     notes = []
     if subject.grid.kind != "visual":
-        notes.append(
-            f"A network of a {subject.grid.kind} grid has scores of points only: objects are found in the Visual Mesh."
-        )
+        notes.append(f"A network of a {subject.grid.kind} grid has scores of points only; objects need a Visual Mesh.")
     radius = settings.object_radius or subject.manifest.object_radius
     if options.radius_of == "all" and any(abs(each - radius) > 0.02 * radius for each in result.radii):
         low, high = min(result.radii), max(result.radii)
         found = f"radii from {low:.3f} to {high:.3f} m" if high > low else f"a radius of {low:.3f} m"
         notes.append(
-            f"Balls in these pictures have {found}, and the fit is for {radius:g} m. --radius-of scene gives each "
-            "picture mesh and fit for its own ball."
+            f"The balls in these pictures have {found}, but mesh and fit are for {radius:g} m. --radius-of scene uses "
+            "the radius of each picture's ball."
         )
     if options.radius_of == "scene":
-        notes.append("Mesh and fit are for the radius of each picture's own ball.")
+        notes.append("Mesh and fit use the radius of each picture's ball.")
     return notes
 
 
@@ -181,7 +179,7 @@ def _points(options: argparse.Namespace) -> int:
     save_figure(points_figure(curves, title), options.output)
     for curve in curves:
         shown = ", ".join(f"{curve.at(each)[0]:.1f} at {each:g} m" for each in (1.0, 2.0, 5.0, 10.0))
-        print(f"{curve.mesh:9s}  k = {curve.intersections:g}, {curve.count} points on screen, on the ball {shown}")
+        print(f"{curve.mesh:9s}  k = {curve.intersections:g}, {curve.count} points on screen; on the ball: {shown}")
     print(f"{options.output}: written")
     return EXIT_OK
 

@@ -1,5 +1,4 @@
-"""A contact sheet of augmentation: pictures with the points that a network gets, as training sees them, and each entry
-by itself."""
+"""The contact sheet of vm-train preview: augmented pictures with mesh points, and each kind of augmentation alone."""
 
 from __future__ import annotations
 
@@ -30,8 +29,8 @@ from ..graphs.augmentation import (
 )
 from .preview_cells import CIRCLES, add_circles, cell, legend, middle, padded, point_colors, scaled, with_points
 
-_DEVIATIONS = 2.0  # of errors of the camera, shown as their ends
-_TRUE, _TOLD = (190, 190, 190), (255, 150, 0)  # RGB colors of circles
+_DEVIATIONS = 2.0  # standard deviations to show of a camera error
+_TRUE, _ASSUMED = (190, 190, 190), (255, 150, 0)  # RGB colors of circles
 
 
 def sheet(
@@ -43,59 +42,59 @@ def sheet(
     versions: int = 5,
     width: int = 320,
 ) -> Image:
-    """A row for each picture: as it is, then `versions` of it as training may see them. BGR (h, w, 3).
+    """A sheet (h, w, 3) BGR with a row for each picture: the original and `versions` augmented versions of it.
 
-    Dots are points that a network with this manifest and grid gets, in the colors of their classes, thinned out where
-    they are dense. Rows below show the first picture with one entry at a time at both of its ends; errors of the
-    camera end at two standard deviations. width: of each image [px]. Raises InputError if there is no picture, or a
-    lens does not fit its image or sees none of it.
+    Dots are the points of the network's mesh, in the colors of their classes; dense points are thinned out. The rows
+    below show the first picture with one augmentation entry at a time, at both of its ends. The ends of camera errors
+    are two standard deviations. width: of each image [px]. Raises InputError if there are no pictures, and if a lens
+    does not fit its image or sees nothing of it.
     """
     if not pictures:
         raise InputError("there are no pictures to show")
     columns = versions + 1
     rows = [legend([each.name for each in manifest.classes], point_colors(manifest), columns * (width + GAP))]
     for number, picture in enumerate(pictures):
-        cells = [cell(with_points(picture, manifest, grid, width), "as it is")]
+        cells = [cell(with_points(picture, manifest, grid, width), "original")]
         for version in range(versions):
             random = np.random.default_rng([seed, 3, version, number])
-            told = perturb_camera(picture, augmentation, random)
-            soft = perturb_sharpness(told, augmentation, random)
+            perturbed = perturb_camera(picture, augmentation, random)
+            soft = perturb_sharpness(perturbed, augmentation, random)
             made = _with_colors(soft, perturb_colors(_colors(soft.image), augmentation, random))
-            cells.append(cell(with_points(made, manifest, grid, width), _camera_error(picture, told)))
+            cells.append(cell(with_points(made, manifest, grid, width), _camera_error(picture, perturbed)))
         rows.append(np.hstack(cells))
     alone = [_both_ends(pictures[0], entry, augmentation, seed, width) for entry in _switched_on(augmentation)]
     if alone:
         meters = ", ".join(f"{each:g}" for each in CIRCLES)
-        names = [f"true circles of {meters} m on the plane", "those that a network is told of"]
-        rows.append(legend(names, [_TRUE, _TOLD], columns * (width + GAP)))
+        names = [f"circles of {meters} m on the plane", "the same circles with the camera error"]
+        rows.append(legend(names, [_TRUE, _ASSUMED], columns * (width + GAP)))
     rows += [np.hstack(alone[start : start + columns]) for start in range(0, len(alone), columns)]
     return np.vstack([padded(row, len(row), rows[0].shape[1]) for row in rows])
 
 
 def _switched_on(augmentation: Augmentation) -> list[Field[Any]]:
-    """Entries that change anything, but for shares of pictures."""
+    """Entries that have an effect, without the shares of pictures."""
     entries = [each for each in fields(augmentation) if not each.name.endswith("_share")]
     return [each for each in entries if getattr(augmentation, f"{each.name}_share", getattr(augmentation, each.name))]
 
 
 def _both_ends(picture: Picture, entry: Field[Any], augmentation: Augmentation, seed: int, width: int) -> Image:
-    """Two cells: a picture changed by one entry alone, as far as that goes down and up."""
+    """Two cells: a picture changed by one entry alone, at the lower and at the upper end of the entry."""
     cells = []
     for value in _ends(entry.name, getattr(augmentation, entry.name)):
         made = _changed(picture, entry.name, value, np.random.default_rng([seed, 4]))
         image = made.image
-        if entry.name in ("noise", "blur", "jpeg"):  # which are lost in a smaller picture
+        if entry.name in ("noise", "blur", "jpeg"):  # a smaller picture would hide them
             image = middle(image, width)
         canvas = scaled(image, width)
         if made.lens is not picture.lens:
-            for lens, color in ((picture.lens, _TRUE), (made.lens, _TOLD)):
+            for lens, color in ((picture.lens, _TRUE), (made.lens, _ASSUMED)):
                 add_circles(canvas, lens, picture.image.shape, color)
         cells.append(cell(canvas, f"{entry.name} {value:.3g} {entry.metadata['unit']}"))
     return np.vstack(cells)
 
 
 def _ends(name: str, entry: Any) -> tuple[float, float]:
-    """What an entry of Augmentation changes at least and at most."""
+    """The lower and the upper end of an entry of Augmentation."""
     match name:
         case "height" | "focal_length":
             return math.exp(-_DEVIATIONS * entry), math.exp(_DEVIATIONS * entry)
@@ -112,7 +111,7 @@ def _ends(name: str, entry: Any) -> tuple[float, float]:
 
 
 def _changed(picture: Picture, name: str, value: float, random: np.random.Generator) -> Picture:
-    """A picture with one change, named as its entry."""
+    """A picture with one change. name: of the entry in Augmentation."""
     match name:
         case "height":
             return with_camera_error(picture, height=value)
@@ -141,9 +140,9 @@ def _with_colors(picture: Picture, colors: Singles) -> Picture:
     return replace(picture, image=levels.reshape(picture.image.shape)[..., ::-1])
 
 
-def _camera_error(picture: Picture, told: Picture) -> str:
-    """How another camera differs from a picture's own."""
-    true, other = picture.lens.orientation, told.lens.orientation
+def _camera_error(picture: Picture, perturbed: Picture) -> str:
+    """The camera error of a perturbed picture, as text."""
+    true, other = picture.lens.orientation, perturbed.lens.orientation
     assert true is not None
     assert other is not None
     turn = cv2.Rodrigues(other.rotation @ true.rotation.T)[0]

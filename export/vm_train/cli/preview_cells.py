@@ -1,4 +1,4 @@
-"""Cells of a preview: a picture with mesh points or circles on the plane, and a line of text."""
+"""Cells of a preview: a picture with mesh points or circles on the plane, and a line of text below it."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ _PALETTE = (
     (0, 230, 230),
     (255, 150, 0),
 )
-"""RGB colors of all other classes, in order; those of masks may be as dark as the picture."""
+"""RGB colors of all other classes, in order. Colors of masks could be as dark as the picture."""
 
-_STRENGTH = 0.7  # how much of its class's color a point gets
-_SPACING = 4  # [px] of the sheet, a square of which shows one point of a class
+_STRENGTH = 0.7  # opacity of a point
+_SPACING = 4  # side of a square of the sheet that shows one point of each class [px]
 _CROSS = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 
 
 def scaled(image: Image, width: int) -> Image:
-    """A copy of an image of another width [px]."""
+    """A copy of an image, scaled to a width [px]."""
     height, full = image.shape[:2]
     how = cv2.INTER_AREA if width < full else cv2.INTER_LINEAR
     return np.asarray(cv2.resize(image, (width, max(round(height * width / full), 1)), interpolation=how))
 
 
 def middle(image: Image, width: int) -> Image:
-    """The part of an image around its middle that is at most `width` wide, in the image's proportions."""
+    """The middle of an image: at most `width` wide [px], with the proportions of the image."""
     height, full = image.shape[:2]
     columns = min(width, full)
     rows = max(round(height * columns / full), 1)
@@ -58,7 +58,7 @@ def middle(image: Image, width: int) -> Image:
 
 
 def with_points(picture: Picture, manifest: Manifest, grid: Grid, width: int) -> Image:
-    """A picture of another width with the points that a network gets; none for a camera too low for a mesh."""
+    """A picture, scaled to a width [px], with the network's mesh points; without points if the camera is too low."""
     canvas = scaled(picture.image, width)
     height, full = picture.labels.shape
     try:
@@ -85,7 +85,7 @@ def _dot(canvas: Image, x: npt.NDArray[np.intp], y: npt.NDArray[np.intp], color:
 
 
 def add_circles(canvas: Image, lens: LensFile, shape: tuple[int, ...], color: Color) -> None:
-    """Circles on the plane around the camera's foot, as a camera with images of this shape (h, w, 3) sees them."""
+    """Draw circles on the plane around the camera's foot. shape: of the camera's images, (h, w, 3)."""
     assert lens.orientation is not None
     size = (shape[1], shape[0])
     around = np.linspace(0.0, 2.0 * math.pi, 2000)
@@ -100,7 +100,7 @@ def add_circles(canvas: Image, lens: LensFile, shape: tuple[int, ...], color: Co
 
 
 def _places(pixels: Floats, full: int, canvas: Image) -> npt.NDArray[np.intp]:
-    """Pixels (n, 2) of an image `full` wide as columns and rows (2, n) of a canvas that shows it."""
+    """Columns and rows (2, n) in a canvas of pixels (n, 2) in an image of width `full` [px]."""
     x, y = np.rint(scaled_pixels(pixels, (0.0, 0.0), canvas.shape[1] / full)).astype(np.intp).T
     return np.stack([np.clip(x, 0, canvas.shape[1] - 1), np.clip(y, 0, canvas.shape[0] - 1)])
 
@@ -122,13 +122,13 @@ def point_colors(manifest: Manifest) -> list[Color]:
 
 
 def legend(names: Sequence[str], colors: Sequence[Color], width: int) -> Image:
-    """A line of text that says what colors mean."""
+    """A line of text with the meaning of colors."""
     line = np.full((LINE + 2 * GAP, width, 3), PAPER, dtype=np.uint8)
     draw_legend(line, dict(zip(names, colors, strict=True)), (GAP, len(line) - GAP - 3))
     return line
 
 
 def padded(image: Image, height: int, width: int) -> Image:
-    """The image with paper to its right and below it."""
+    """The image with background to its right and below it."""
     below, right = height - image.shape[0], width - image.shape[1]
     return np.asarray(cv2.copyMakeBorder(image, 0, below, 0, right, cv2.BORDER_CONSTANT, value=PAPER), dtype=np.uint8)

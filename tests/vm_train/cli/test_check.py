@@ -63,8 +63,8 @@ def test_of_each_kind_of_fault_twenty_are_named(tmp_path):
     found = checked(tmp_path)
     lines = complaints(found)
     assert lines[0] == "25 of 27 pictures lack a file"
-    assert lines[21] == "  and 5 more; vm-train check --json names all"
-    assert lines[22] == "1 of 27 pictures have lens files at fault"
+    assert lines[21] == "  and 5 more; vm-train check --json lists all"
+    assert lines[22] == "1 of 27 pictures have an invalid lens file"
     assert len(lines) == 24
     assert len(as_json(found)["faults"]) == 26
 
@@ -102,7 +102,7 @@ def test_worker_processes_find_the_same(tmp_path):
 def test_the_report_and_the_exit_status(folder, capsys):
     assert run(folder, "--json", str(folder / "found.json")) == 0
     said = capsys.readouterr()
-    assert "2 pictures, 0 of them at fault" in said.out
+    assert "2 pictures, 0 of them can't be used" in said.out
     assert "160 x 120 px 2 (100.0 %)" in said.out
     assert "camera height [m]" in said.out
     assert said.err == ""
@@ -124,7 +124,7 @@ def test_a_set_without_a_good_picture_has_a_report_too(folder):
     for path in folder.glob("mask*"):
         path.unlink()
     found = checked(folder)
-    assert list(tables(found)) == ["2 pictures, 2 of them at fault"]
+    assert list(tables(found)) == ["2 pictures, 2 of them can't be used"]
     assert found.absent == []
     json.dumps(as_json(found), allow_nan=False)
 

@@ -178,7 +178,7 @@ def test_what_can_t_be_used_is_named_in_one_line(capsys, data, tmp_path):
     assert "bgr" in complaint(capsys, MODEL, data, *out, "--format", "rgb")
     assert "threshold" in complaint(capsys, MODEL, data, *out, "--threshold", "7")
     (tmp_path / "file").write_text("")
-    assert "no folder" in complaint(capsys, MODEL, data, "-o", tmp_path / "file")
+    assert "not a folder" in complaint(capsys, MODEL, data, "-o", tmp_path / "file")
     assert not (tmp_path / "out").exists()
 
 
