@@ -1,4 +1,4 @@
-"""The one error that this project raises for what a user can mend."""
+"""The errors of this project, and functions for their messages."""
 
 from __future__ import annotations
 
@@ -7,28 +7,28 @@ from difflib import get_close_matches
 
 
 class VisualMeshError(Exception):
-    """Base of every error raised on purpose; its text is one line, fit for a terminal."""
+    """Base of all errors that a user can fix; the message is one line."""
 
 
 class GeometryError(VisualMeshError):
-    """A camera, plane or object that has no Visual Mesh."""
+    """A camera pose or object for which no Visual Mesh exists."""
 
 
 class InputError(VisualMeshError):
-    """A frame, file or option that can't be used."""
+    """An unusable frame, file or option."""
 
 
 class ModelError(VisualMeshError):
-    """A model file that can't be trusted or run."""
+    """A damaged or unusable model file."""
 
 
 def one_line(error: BaseException) -> str:
-    """Another library's error as one line of at most 200 characters."""
+    """The message of another library's error, as one line of at most 200 characters."""
     return (" ".join(str(error).split()) or type(error).__name__)[:200]
 
 
 def unknown(what: str, value: object, allowed: Iterable[str]) -> str:
-    """Say which value is not known, what is allowed, and the nearest right one."""
+    """Message for an unknown value: the value, the nearest allowed one, and all allowed ones."""
     names = list(allowed)
     near = get_close_matches(str(value).lower(), names, n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else ""

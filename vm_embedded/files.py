@@ -1,4 +1,4 @@
-"""Writing files so that nothing already written is lost."""
+"""Writing files without losing the previous content if something fails."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from .errors import InputError
 
 @contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
-    """A path to write to, in the same folder, that takes the place of `path` once all went well.
+    """A temporary path beside `path`, which replaces `path` when the block ends without an error.
 
-    What a link leads to is replaced, not the link. A file keeps its mode. What is no ordinary file, such as a pipe, is
-    written to itself. Raises InputError if it can't be written.
+    A symbolic link stays: its target is replaced. The file keeps its mode. A special file, such as a pipe, is written
+    directly. Raises InputError if the file can't be written.
     """
     target = Path(os.path.realpath(path))
     part = target.with_name(target.name + ".part")
@@ -25,7 +25,7 @@ def atomic_write(path: Path) -> Iterator[Path]:
             yield target
             return
         if target.is_file() and not os.access(target, os.W_OK):
-            raise PermissionError(0, "it is read-only")
+            raise PermissionError(0, "the file is read-only")
         yield part
         if target.is_file():
             part.chmod(stat.S_IMODE(target.stat().st_mode))
@@ -33,13 +33,13 @@ def atomic_write(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise InputError(f"can't write {path}: {error.strerror or error}") from error
     finally:
-        with suppress(OSError):  # on a disk that can't be written there is none, or it stays
+        with suppress(OSError):  # on a disk that can't be written it was never created, or can't be removed
             part.unlink(missing_ok=True)
 
 
 def check_writable(path: Path) -> None:
-    """Raise InputError if a file can't be written for want of its folder, so that work is not done in vain."""
+    """Raise InputError if a file can't be created because of its folder; check this before long work."""
     if not path.resolve().parent.is_dir():
         raise InputError(f"can't write {path}: there is no folder {path.parent}")
     if path.is_dir():
-        raise InputError(f"can't write {path}: it is a folder")
+        raise InputError(f"can't write {path}: this is a folder")

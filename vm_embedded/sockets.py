@@ -1,4 +1,4 @@
-"""Unix sockets that are made, and addresses that are sent to."""
+"""Unix sockets to listen on, and addresses and sockets for UDP."""
 
 from __future__ import annotations
 
@@ -11,27 +11,28 @@ from typing import Any
 
 from .errors import InputError
 
-_LONGEST = 107
-"""Bytes of a socket's path, as Linux has it."""
+_MAX_PATH_BYTES = 107
+"""Longest path of a Unix socket on Linux [bytes]."""
 
-_MASK = 0o117
-"""What the mode 0660 leaves out."""
+_UMASK = 0o117
+"""Gives the socket's file mode 0660."""
 
 
 class UnixListener:
-    """A listening stream socket with a path. Raises InputError if another process listens there, or it can't be made.
+    """A Unix stream socket that listens at a path.
 
-    A file that a process left behind which listens no more is replaced.
+    It replaces a socket file on which no process listens anymore. Raises InputError if another process listens there,
+    or if the socket can't be created.
     """
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        if len(os.fsencode(self.path)) > _LONGEST:
-            raise InputError(f"path of a socket has more than {_LONGEST} bytes: {path}")
+        if len(os.fsencode(self.path)) > _MAX_PATH_BYTES:
+            raise InputError(f"the path of a socket must have at most {_MAX_PATH_BYTES} bytes: {path}")
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
         try:
-            self._clear()
-            mask = os.umask(_MASK)
+            self._remove_stale_file()
+            mask = os.umask(_UMASK)
             try:
                 self.socket.bind(str(self.path))
             finally:
@@ -46,14 +47,14 @@ class UnixListener:
             self.socket.close()
             raise
 
-    def _clear(self) -> None:
-        """Remove what a process has left that is no more."""
+    def _remove_stale_file(self) -> None:
+        """Remove a socket file on which no process listens. Raises InputError for any other file."""
         try:
             mode = self.path.lstat().st_mode
         except FileNotFoundError:
             return
         if not stat.S_ISSOCK(mode):
-            raise InputError(f"can't listen at {self.path}: there is a file that is no socket")
+            raise InputError(f"can't listen at {self.path}: this file exists and is not a socket")
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as other:
             other.settimeout(1.0)
             try:
@@ -61,10 +62,10 @@ class UnixListener:
             except ConnectionRefusedError:
                 self.path.unlink(missing_ok=True)
                 return
-        raise InputError(f"can't listen at {self.path}: another process does")
+        raise InputError(f"can't listen at {self.path}: another process already does")
 
     def close(self) -> None:
-        """Stop listening, and remove the file if it is still this one's."""
+        """Stop listening, and remove the file unless another process replaced it."""
         self.socket.close()
         try:
             if self.path.stat().st_ino == self._inode:
@@ -74,38 +75,43 @@ class UnixListener:
 
 
 def checked_address(entry: Field[Any], value: object) -> str:
-    """An entry that is ADDRESS:PORT, several with commas between, unix:PATH, or nothing. Raises InputError."""
+    """Check of an entry: ADDRESS:PORT or unix:PATH, several separated by commas, or empty. Raises InputError."""
     if not isinstance(value, str):
-        raise InputError(f"{entry.name} must be a text, not {value!r}")
+        raise InputError(f"{entry.name} must be a string, not {value!r}")
     for each in filter(None, value.split(",")):
         if not (each.startswith("unix:") and len(each) > len("unix:")):
             parse_address(each, entry.name)
     return value
 
 
-def parse_address(text: str, what: str) -> tuple[str, int]:
-    """Host and port of "192.168.0.20:5600" or "[::1]:5600". Raises InputError."""
+def parse_address(text: str, name: str) -> tuple[str, int]:
+    """Host and port of "192.168.0.20:5600" or "[::1]:5600". name: of the value in the error message. Raises InputError."""
     host, colon, port = text.strip().rpartition(":")
     host = host.removeprefix("[").removesuffix("]")
     if not (colon and host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):
-        raise InputError(f"{what} must be like 127.0.0.1:5600, not {text!r}")
+        raise InputError(f"{name} must be ADDRESS:PORT, as in 127.0.0.1:5600, not {text!r}")
     return host, int(port)
 
 
-def datagram_socket(host: str, port: int, what: str, listen: bool = False) -> tuple[socket.socket, tuple[object, ...]]:
-    """A UDP socket that does not block, and the address to send to; bound to it to `listen`. Raises InputError."""
+def datagram_socket(
+    host: str, port: int, failure: str, listen: bool = False
+) -> tuple[socket.socket, tuple[object, ...]]:
+    """A non-blocking UDP socket, and the resolved address to send to.
+
+    listen: bind the socket to that address. failure: start of the error message. Raises InputError.
+    """
     try:
-        family, kind, protocol, _, where = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-        made = socket.socket(family, kind | socket.SOCK_CLOEXEC, protocol)
+        family, kind, protocol, _, resolved = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        opened = socket.socket(family, kind | socket.SOCK_CLOEXEC, protocol)
         try:
-            made.setblocking(False)
+            opened.setblocking(False)
             if listen:
-                made.bind(where)
+                opened.bind(resolved)
             elif family == socket.AF_INET:
-                made.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+                opened.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         except OSError:
-            made.close()
+            opened.close()
             raise
     except OSError as error:
-        raise InputError(f"{what} {host}:{port}: {error.strerror or error}") from error
-    return made, where
+        raise InputError(f"{failure} {host}:{port}: {error.strerror or error}") from error
+    return opened, resolved

@@ -1,9 +1,14 @@
-"""The part of YAML that lens and calibration files use, read strictly.
+"""A strict reader for the part of YAML that lens and calibration files use.
 
-The robot has no YAML package, and OpenCV's reader does not know sequences that start in their key's column, as most
-writers put them. Read here: nested block mappings and sequences, flow sequences and mappings (over several lines
-too), plain and quoted scalars, comments; a `%YAML` line, one `---` and tags are skipped. Anchors, aliases, block
-scalars, several documents and duplicate keys are refused.
+The robot has no YAML package. OpenCV's reader rejects sequences that start in the column of their key, which is how
+most programs write them.
+
+Supported: nested block mappings and sequences; flow sequences and mappings, also over several lines; plain and quoted
+scalars; comments. Skipped: a `%YAML` line, one `---`, and tags. Rejected: anchors, aliases, block scalars, several
+documents, and duplicate keys.
+
+A recursive descent: each function below `read_yaml` gets a position (a line, or a column in a flow value) and returns
+the value that begins there with the position after it. `depth` counts the nesting.
 """
 
 from __future__ import annotations
@@ -31,7 +36,7 @@ _WORDS: dict[str, Any] = {
     "+.inf": math.inf,
     "-.inf": -math.inf,
 }
-_DEEPEST = 32
+_MAX_DEPTH = 32
 
 
 @dataclass
@@ -42,35 +47,35 @@ class _Line:
 
 
 def read_yaml(text: str) -> Any:
-    """Values of a YAML text: dict, list, str, int, float, bool or None. Raises InputError naming the line."""
+    """The value of a YAML text: dict, list, str, int, float, bool or None. Raises InputError with the line."""
     lines = _joined(_lines(text))
     if not lines:
         return None
     value, rest = _block(lines, 0, lines[0].indent, 0)
     if rest < len(lines):
-        raise _wrong(lines[rest], "unexpected indentation")
+        raise _error(lines[rest], "unexpected indentation")
     return value
 
 
-def _wrong(line: _Line, what: str) -> InputError:
-    return InputError(f"line {line.number}: {what}: {line.text[:60]!r}")
+def _error(line: _Line, problem: str) -> InputError:
+    return InputError(f"line {line.number}: {problem}: {line.text[:60]!r}")
 
 
 def _lines(text: str) -> list[_Line]:
-    """Lines with content, without comments."""
+    """Lines with content, without comments, each with its number and indentation."""
     lines: list[_Line] = []
     for number, raw in enumerate(text.splitlines(), start=1):
         try:
             content = _without_comment(raw).rstrip(" \t")
         except ValueError as error:
-            raise _wrong(_Line(number, 0, raw.strip(" \t")), str(error)) from error
+            raise _error(_Line(number, 0, raw.strip(" \t")), str(error)) from error
         if not content.strip(" \t") or (not lines and (content.startswith("%") or content == "---")):
             continue
         if content == "...":
             break
         line = _Line(number, len(content) - len(content.lstrip(" ")), content.strip(" \t"))
         if "\t" in raw[: line.indent + 1] or content.startswith("---"):
-            raise _wrong(line, "tabs for indentation and several documents are not supported")
+            raise _error(line, "tabs in the indentation and several documents are not supported")
         lines.append(line)
     return lines
 
@@ -87,12 +92,12 @@ def _without_comment(raw: str) -> str:
         elif character == "#" and (position == 0 or raw[position - 1] in " \t"):
             return raw[:position]
     if quote:
-        raise ValueError("quote is never closed")
+        raise ValueError("quote is not closed")
     return raw
 
 
 def _joined(lines: list[_Line]) -> list[_Line]:
-    """Lines, with flow collections that span several put together."""
+    """Lines; the lines of a flow collection are joined into one."""
     joined: list[_Line] = []
     depth = 0
     for line in lines:
@@ -102,14 +107,14 @@ def _joined(lines: list[_Line]) -> list[_Line]:
             joined.append(line)
         depth += sum(line.text.count(c) for c in "[{") - sum(line.text.count(c) for c in "]}")
     if depth > 0:
-        raise _wrong(joined[-1], "bracket is never closed")
+        raise _error(joined[-1], "bracket is not closed")
     return joined
 
 
 def _block(lines: list[_Line], at: int, indent: int, depth: int) -> tuple[Any, int]:
     """The value that begins at a line, and the line after it."""
-    if depth > _DEEPEST:
-        raise _wrong(lines[at], "nested too deeply")
+    if depth > _MAX_DEPTH:
+        raise _error(lines[at], "nested too deeply")
     first = lines[at].text
     if first == "-" or first.startswith("- "):
         return _sequence(lines, at, indent, depth)
@@ -124,7 +129,7 @@ def _sequence(lines: list[_Line], at: int, indent: int, depth: int) -> tuple[lis
         line = lines[at]
         content = line.text[1:].lstrip(" \t")
         if content:
-            # What follows the dash is a block of its own that begins in that column.
+            # The text after the dash is a block that begins in that column.
             lines[at] = _Line(line.number, indent + len(line.text) - len(content), content)
             value, at = _block(lines, at, lines[at].indent, depth + 1)
         else:
@@ -142,7 +147,7 @@ def _mapping(lines: list[_Line], at: int, indent: int, depth: int) -> tuple[dict
             break
         key, content = _unquoted(match.group(1)), _TAG.sub("", match.group(2) or "", count=1)
         if key in table:
-            raise _wrong(line, "key stands there twice")
+            raise _error(line, "duplicate key")
         if content:
             table[key], at = _inline(line, content), at + 1
         else:
@@ -156,7 +161,7 @@ def _unquoted(key: str) -> str:
 
 
 def _nested(lines: list[_Line], at: int, least: int, depth: int) -> tuple[Any, int]:
-    """The block that begins at a line if it is indented by `least` or more, else nothing."""
+    """The block that begins at a line, if its indentation is at least `least`; else None."""
     if at < len(lines) and lines[at].indent >= least:
         return _block(lines, at, lines[at].indent, depth + 1)
     return None, at
@@ -167,48 +172,48 @@ def _inline(line: _Line, content: str) -> Any:
     if content[0] in "[{":
         value, end = _flow(line, content, 0, 0)
         if content[end:].strip(" \t"):
-            raise _wrong(line, "something follows a closed bracket")
+            raise _error(line, "unexpected text after the closing bracket")
         return value
     return _scalar(line, content)
 
 
 def _flow(line: _Line, content: str, at: int, depth: int) -> tuple[Any, int]:
     """The flow value at a position, and the position after it."""
-    at = _space(content, at)
-    if depth > _DEEPEST or at >= len(content):
-        raise _wrong(line, "flow value is cut short or nested too deeply")
+    at = _skip_spaces(content, at)
+    if depth > _MAX_DEPTH or at >= len(content):
+        raise _error(line, "flow value is incomplete or nested too deeply")
     if content[at] in "\"'":
         end = content.find(content[at], at + 1)
         if end < 0:
-            raise _wrong(line, "quote is never closed")
+            raise _error(line, "quote is not closed")
         return content[at + 1 : end], end + 1
     if content[at] not in "[{":
         match = _PLAIN_IN_FLOW.match(content, at)
         if not match or not match.group().strip(" \t") or match.group().startswith("? "):
-            raise _wrong(line, "a value is missing")
+            raise _error(line, "missing value")
         return _scalar(line, match.group().strip(" \t")), match.end()
     closing = "]" if content[at] == "[" else "}"
     items: list[Any] = []
     table: dict[str, Any] = {}
-    at = _space(content, at + 1)
+    at = _skip_spaces(content, at + 1)
     while content[at : at + 1] != closing:
         value, at = _flow(line, content, at, depth + 1)
-        at = _space(content, at)
+        at = _skip_spaces(content, at)
         if closing == "}":
             if content[at : at + 1] != ":" or str(value) in table:
-                raise _wrong(line, "a colon is missing, or a key stands there twice")
+                raise _error(line, "missing colon or duplicate key")
             table[str(value)], at = _flow(line, content, at + 1, depth + 1)
-            at = _space(content, at)
+            at = _skip_spaces(content, at)
         else:
             items.append(value)
         if content[at : at + 1] == ",":
-            at = _space(content, at + 1)
+            at = _skip_spaces(content, at + 1)
         elif content[at : at + 1] != closing:
-            raise _wrong(line, "a comma or closing bracket is missing")
+            raise _error(line, "missing comma or closing bracket")
     return (items if closing == "]" else table), at + 1
 
 
-def _space(content: str, at: int) -> int:
+def _skip_spaces(content: str, at: int) -> int:
     while content[at : at + 1] == " ":
         at += 1
     return at
@@ -217,7 +222,7 @@ def _space(content: str, at: int) -> int:
 def _scalar(line: _Line, content: str) -> Any:
     if content[0] in "\"'":
         if len(content) < 2 or content[-1] != content[0] or content[0] in content[1:-1]:
-            raise _wrong(line, "quote is never closed")
+            raise _error(line, "quote is not closed")
         return content[1:-1]
     if content.lower() in _WORDS:
         return _WORDS[content.lower()]
@@ -226,5 +231,5 @@ def _scalar(line: _Line, content: str) -> Any:
     if _REAL.fullmatch(content):
         return float(content)
     if content[0] in "&*|>%@`]}," or ": " in content:
-        raise _wrong(line, "this part of YAML is not supported")
+        raise _error(line, "this part of YAML is not supported")
     return content
