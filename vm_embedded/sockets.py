@@ -85,7 +85,7 @@ def checked_address(entry: Field[Any], value: object) -> str:
 
 
 def parse_address(text: str, name: str) -> tuple[str, int]:
-    """Host and port of "192.168.0.20:5600" or "[::1]:5600". name: of the value in the error message. Raises InputError."""
+    """Host and port of "192.168.0.20:5600" or "[::1]:5600". name: for the error message. Raises InputError."""
     host, colon, port = text.strip().rpartition(":")
     host = host.removeprefix("[").removesuffix("]")
     if not (colon and host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):
