@@ -11,7 +11,7 @@ from vm_embedded.errors import InputError
 from vm_synth.cli import main
 from vm_synth.render.mitsuba import load_mitsuba
 
-from .render.test_render import environment_of
+from .dataset.test_workers import environment_of
 
 
 def fails(capsys, *arguments):

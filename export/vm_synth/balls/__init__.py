@@ -1,1 +1,1 @@
-"""What balls look like: designs drawn from ranges, painted as textures without poles and seams."""
+"""The appearance of balls: designs drawn from ranges, and their textures."""

@@ -1,4 +1,4 @@
-"""Words and marks that are printed on balls."""
+"""Words and logos that are printed on balls."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Number, Singles
 
-from .painting_sphere import Sphere
+from .painting_sphere import PaintingSphere
 
 
-def print_images(sphere: Sphere, centers: Floats, half: float, images: list[Singles], turns: Floats) -> Singles:
-    """Images (size, size) of 0..1 printed at the centers (n, 3), each 2 * half [rad] wide and turned [rad]."""
-    # Without a blur as wide as a texel a fine image would alias.
+def print_images(sphere: PaintingSphere, centers: Floats, half: float, images: list[Singles], turns: Floats) -> Singles:
+    """Mask with images (size, size) at the centers (n, 3), each 2 * half [rad] wide and turned by an angle [rad]."""
+    # A blur as wide as a texel prevents aliasing.
     blur = max(0.4 * sphere.texel * images[0].shape[0] / (2.0 * half), 0.3)
     images = [np.asarray(cv2.GaussianBlur(image, (0, 0), blur)) for image in images]
 
@@ -23,7 +23,7 @@ def print_images(sphere: Sphere, centers: Floats, half: float, images: list[Sing
         places = (
             (along / half + 1.0) * 0.5 * len(image) - 0.5 for along in (cosine * x + sine * y, sine * x - cosine * y)
         )
-        # remap takes no more than 32767 columns.
+        # cv2.remap accepts at most 32767 columns.
         column, row = (np.resize(place, (len(x) // 1024 + 1, 1024)).astype(np.float32) for place in places)
         return np.asarray(cv2.remap(image, column, row, cv2.INTER_LINEAR), np.float32).ravel()[: len(x)]
 
@@ -31,7 +31,7 @@ def print_images(sphere: Sphere, centers: Floats, half: float, images: list[Sing
 
 
 def word(random: np.random.Generator) -> Singles:
-    """A word or number (96, 96) of 0..1 in chance letters."""
+    """A random word or number as a mask (96, 96)."""
     image = np.zeros((96, 96), np.uint8)
     text = "".join(random.choice(list("ABCDEFGHIKLMNOPRSTUVXYZ0123456789"), size=random.integers(1, 7)))
     font, thick = int(random.choice([0, 2, 3, 4])), int(random.integers(2, 7))
@@ -43,7 +43,7 @@ def word(random: np.random.Generator) -> Singles:
 
 
 def logo(random: np.random.Generator) -> Singles:
-    """A mark (96, 96) of 0..1 of a few arcs, rings and polygons."""
+    """A random logo of arcs, rings and polygons as a mask (96, 96)."""
     image = np.zeros((96, 96), np.uint8)
     for _ in range(random.integers(1, 4)):
         if random.random() < 0.5:

@@ -1,1 +1,1 @@
-"""Solid things of a scene: robots, people, goals, clutter, and balls that are not the ball."""
+"""The objects of a scene: robots, people, goals, clutter, round distractors and the camera's carrier."""

@@ -1,7 +1,7 @@
-"""What a camera sees of its own carrier: a tripod, a robot's body, a hand, a pole, a person.
+"""The camera's carrier, as the camera sees it: a tripod, a robot's body, a hand, a pole or a person.
 
-Frame: the origin is on the plane straight below the camera, which is at (0, 0, height); x is the camera's heading,
-y left, z up. Everything keeps clear of the camera and, but for thin things, well below the horizon.
+Frame: the origin is on the plane below the camera, which is at (0, 0, height); x is the camera's heading, y left, z up.
+All parts stay away from the camera and, except for thin ones, well below the horizon.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from .primitives import axle, box, capsule, cylinder, rod, rounded_box, sphere
 from .solids import Body, Point, Solid, along, body, rotation
 
 CLEARANCE = 0.06
-"""Distance [m] that everything keeps from the camera's center."""
+"""Smallest distance of all parts from the camera's center [m]."""
 
 
 def tripod(random: np.random.Generator, height: float) -> list[Solid]:
-    """Three legs, a column and a head right below the camera."""
+    """Three legs, a column and a head below the camera."""
     paint, joint = (black, gray, metal)[random.integers(3)](random), black(random)
     top = height - random.uniform(0.075, 0.12)
     hub = top - min(random.uniform(0.08, 0.3), 0.4 * top)
@@ -48,7 +48,7 @@ def tripod(random: np.random.Generator, height: float) -> list[Solid]:
 
 
 def robot(random: np.random.Generator, height: float) -> list[Solid]:
-    """Chest, shoulders, arms, knees and feet of the robot whose head holds the camera."""
+    """The body of a robot with the camera in its head."""
     shell, inner = (white, white, black, gray)[random.integers(4)](random), (black, gray)[random.integers(2)](random)
     h = height
     chest = h - max(0.16 * h, 0.11)
@@ -84,7 +84,7 @@ def robot(random: np.random.Generator, height: float) -> list[Solid]:
 
 
 def handheld(random: np.random.Generator, height: float) -> list[Solid]:
-    """A hand that holds a phone, a tablet or a laptop in front of and below the camera, and its forearm."""
+    """A hand and forearm that hold a phone, a tablet or a laptop in front of and below the camera."""
     width, deep = ((0.075, 0.155), (0.17, 0.24), (0.31, 0.22))[random.integers(3)]
     case, screen, tone, sleeve = (
         (black, gray, white, metal)[random.integers(4)](random),
@@ -115,7 +115,7 @@ def handheld(random: np.random.Generator, height: float) -> list[Solid]:
 
 
 def stick(random: np.random.Generator, height: float) -> list[Solid]:
-    """The pole the camera is held on: straight down to a mount, then slanting to a hand or to the ground."""
+    """A slanting pole below the camera, held by a hand or standing on the ground."""
     paint, joint = (black, metal, gray)[random.integers(3)](random), black(random)
     radius, top = random.uniform(0.006, 0.016), height - random.uniform(0.08, 0.12)
     bearing, slant = random.uniform(0.0, 2.0 * np.pi), random.uniform(0.0, 0.45)
@@ -138,7 +138,7 @@ def stick(random: np.random.Generator, height: float) -> list[Solid]:
 
 
 def person(random: np.random.Generator, height: float) -> list[Solid]:
-    """Belly, arms, knees and shoes of a person who carries the camera at the head or the chest and looks down."""
+    """The body of a person who carries the camera at the head or the chest."""
     shirt, trousers, tone = cloth(random), cloth(random), skin(random)
     paints = tuple((white, black, gray)[random.integers(3)](random) for _ in range(3))
     h = height
@@ -177,33 +177,33 @@ CARRIERS: dict[str, Callable[[np.random.Generator, float], list[Solid]]] = {
     "stick": stick,
     "person": person,
 }
-"""Functions of (random, height of the camera [m]) by name; they give the parts in the carrier's frame."""
+"""Carriers by name: functions of (random, camera height [m]) that return the parts."""
 
 LOWEST = {"tripod": 0.2, "robot": 0.3, "handheld": 0.5, "stick": 0.25, "person": 0.8}
-"""The least height of the camera [m] for which a carrier makes sense."""
+"""Smallest camera height for each carrier [m]."""
 
 
-def carriers(height: float) -> tuple[str, ...]:
-    """Names of carriers that can hold a camera at this height [m]."""
+def carriers_for(height: float) -> tuple[str, ...]:
+    """Names of the carriers that can hold a camera at this height [m]."""
     return tuple(name for name, lowest in LOWEST.items() if height >= lowest)
 
 
-def own_body(random: np.random.Generator, height: float, kind: str) -> Body:
-    """The carrier of a camera at this height [m]: its kind is one of CARRIERS, in the carrier's frame."""
+def camera_carrier(random: np.random.Generator, height: float, kind: str) -> Body:
+    """The carrier of a camera at this height [m]. kind: one of CARRIERS."""
     return body(_above_plane(CARRIERS[kind](random, height)), "environment", f"own {kind}")
 
 
 def _turned(random: np.random.Generator, parts: list[Solid], spread: float) -> list[Solid]:
-    """Parts turned around the camera's vertical, for a camera that does not look straight ahead."""
+    """Parts rotated about the vertical, for a camera that does not look straight ahead."""
     yaw = rotation(yaw=random.normal(0.0, 0.5) * spread)
     return [each.turned(yaw) for each in parts]
 
 
 def _above_plane(parts: list[Solid]) -> list[Solid]:
-    """Parts of which none reaches below the plane."""
+    """Parts, moved up if they reach below the plane."""
     return [each.shifted((0.0, 0.0, max(0.0, -each.low[2]))) for each in parts]
 
 
 def _upright(way: Point) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Rotation (3, 3) that takes y to a direction (3,)."""
+    """Rotation (3, 3) that maps y to a direction (3,)."""
     return along((0.0, 0.0, 0.0), way) @ rotation(roll=np.pi / 2.0)

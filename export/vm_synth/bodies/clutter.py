@@ -1,21 +1,21 @@
-"""Things that lie and stand around a field. Each is drawn with a size [m], its longest side, around the origin."""
+"""Objects around a field. Each is drawn around the origin with the length of its longest side [m].
+
+The module is long because it holds 14 kinds of objects; each is a short function of its own.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 
 from .paints import black, common, glass, gray, hued, metal, team, vivid, white, wood
 from .primitives import beam, box, capsule, cord, cylinder, lathe, rod, rounded_box, sheet, sphere
-from .solids import Body, Solid, rotation, sized, standing
-
-Draw = Callable[[np.random.Generator, float], list[Body]]
-"""A function of (random, size [m])."""
+from .solids import Body, DrawBody, Solid, rotation, sized, standing
 
 
 def carton(random: np.random.Generator, size: float) -> list[Body]:
-    """A box: cardboard or painted, perhaps with a label and tape."""
+    """A box of cardboard or painted, sometimes with a label and tape."""
     x, y, z = random.uniform(0.35, 1.0, 3)
     parts = [box(x, y, z).painted(common(random)).stained(random, 0.25, 0.5)]
     if random.uniform() < 0.5:
@@ -65,7 +65,7 @@ def bottle(random: np.random.Generator, size: float) -> list[Body]:
 
 
 def cone(random: np.random.Generator, size: float) -> list[Body]:
-    """A traffic cone with bands, or a flat one of the training ground."""
+    """A traffic cone with bands, or a flat training cone."""
     paint, band = hued(random.choice([0.03, 0.05, 0.15, random.uniform()]), 0.9, 0.7, 0.6), white(random)
     foot = random.uniform(0.24, 0.5)
     tip = foot * random.uniform(0.1, 0.25)
@@ -107,7 +107,7 @@ def bag(random: np.random.Generator, size: float) -> list[Body]:
 
 
 def tool(random: np.random.Generator, size: float) -> list[Body]:
-    """Something small and odd of a few rods, boxes and knobs: a charger, a screwdriver, a toy."""
+    """A small device of rods, boxes and knobs: a charger, a screwdriver, a toy."""
     parts: list[Solid] = []
     for _ in range(int(random.integers(2, 6))):
         place = random.uniform(-0.15, 0.15, 3)
@@ -125,7 +125,7 @@ def tool(random: np.random.Generator, size: float) -> list[Body]:
 
 
 def paper(random: np.random.Generator, size: float) -> list[Body]:
-    """A flat sheet on the ground: paper or a cloth with a ragged outline, perhaps printed."""
+    """A flat sheet on the ground: paper or ragged cloth, sometimes printed."""
     if random.uniform() < 0.6:
         half = np.array([1.0, random.uniform(0.4, 1.0)]) / 2.0
         outline = half * [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
@@ -140,7 +140,7 @@ def paper(random: np.random.Generator, size: float) -> list[Body]:
 
 
 def tape(random: np.random.Generator, size: float) -> list[Body]:
-    """Stripes of tape on the ground: one, a cross or a corner."""
+    """Tape on the ground: a stripe, a cross or a corner."""
     paint, width = (white, white, black, vivid)[random.integers(4)](random), random.uniform(0.05, 0.2)
     stripe = box(1.0, width, 0.003).shifted((0.0, 0.0, 0.0015))
     kind = random.integers(3)
@@ -152,7 +152,7 @@ def tape(random: np.random.Generator, size: float) -> list[Body]:
 
 
 def cable(random: np.random.Generator, size: float) -> list[Body]:
-    """A cable that winds over the ground."""
+    """A winding cable on the ground."""
     t, thickness = np.linspace(0.0, 1.0, 50), random.uniform(0.004, 0.012)
     waver = [
         sum(random.normal(0.0, 0.35 / k) * np.sin(k * np.pi * t + random.uniform(0.0, 6.3)) for k in (1, 2, 3))
@@ -202,7 +202,7 @@ def pole(random: np.random.Generator, size: float) -> list[Body]:
 
 
 def board(random: np.random.Generator, size: float) -> list[Body]:
-    """A wall or an advertising board along y with colored fields on its front, +x."""
+    """A wall or an advertising board along y, with colored fields on its front at +x."""
     tall = random.uniform(0.15, 0.5)
     parts = [box(0.02, 1.0, tall).painted(common(random))]
     for k in range(int(random.integers(0, 12))):
@@ -218,7 +218,7 @@ def board(random: np.random.Generator, size: float) -> list[Body]:
 
 
 def pedestal(random: np.random.Generator, height: float, width: float) -> list[Body]:
-    """Something to put a ball on: its top is flat at exactly this height [m], `width` [m] around the origin."""
+    """A pedestal for a ball. Its flat top is at this height [m] and `width` wide [m], centered on the z axis."""
     kind = random.integers(4)
     if kind == 0:
         parts = [box(width, width * random.uniform(1.0, 1.6), height)]
@@ -245,7 +245,7 @@ def pedestal(random: np.random.Generator, height: float, width: float) -> list[B
     return [standing([each.painted(paint).stained(random, 0.15, width) for each in parts], "environment", "pedestal")]
 
 
-CLUTTER: dict[str, Draw] = {
+CLUTTER: dict[str, DrawBody] = {
     "box": carton,
     "can": can,
     "bottle": bottle,
@@ -257,10 +257,10 @@ CLUTTER: dict[str, Draw] = {
     "tape": tape,
     "cable": cable,
 }
-"""Things of 5 to 50 cm, by name: functions of (random, size [m])."""
+"""Small objects (5 to 50 cm) by name."""
 
-FURNITURE: dict[str, Draw] = {"table": table, "chair": chair, "pole": pole, "board": board}
-"""Things that are large, by name: functions of (random, size [m])."""
+FURNITURE: dict[str, DrawBody] = {"table": table, "chair": chair, "pole": pole, "board": board}
+"""Large objects by name."""
 
 
 def _thing(parts: Iterable[Solid], size: float, name: str) -> list[Body]:
@@ -272,12 +272,12 @@ def _two(random: np.random.Generator, low: float, high: float) -> tuple[float, f
 
 
 def _cup(foot: float, rim: float, height: float, wall: float = 0.02) -> Solid:
-    """An open vessel on z = 0."""
+    """An open cup on z = 0."""
     inside = [(rim - wall, height), (foot - wall, wall), (0.0, wall)]
     return lathe([(0.0, 0.0), (foot, 0.0), (rim, height), *inside], 22)
 
 
 def _tipped(random: np.random.Generator, parts: list[Solid], chance: float) -> list[Solid]:
-    """Parts, by chance put on their side."""
+    """The parts, put on their side with this probability."""
     turn = rotation(pitch=np.pi / 2.0) if random.uniform() < chance else rotation()
     return [each.turned(turn) for each in parts]

@@ -1,18 +1,16 @@
-"""Round things that are not the ball. Each is drawn with a radius [m], the half of its widest extent."""
+"""Round objects that are not the ball. Each is drawn with a radius [m]: half of its longest side."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import numpy as np
 
 from .paints import Paint, black, common, gray, hued, skin, vivid, white
 from .primitives import dome, icosphere, lathe, rod, sphere, torus
-from .solids import Body, Solid, rotation, sized, standing, waves
+from .solids import Body, DrawBody, Solid, rotation, sized, standing, waves
 
 
 def plain_ball(random: np.random.Generator, radius: float) -> list[Body]:
-    """A sphere of one strong color: orange, tennis yellow or any."""
+    """A sphere of one saturated color: orange, tennis yellow or any."""
     hues = (0.05, 0.19, random.uniform())
     paint = hued(
         hues[random.integers(3)], random.uniform(0.7, 0.97), random.uniform(0.3, 0.8), random.uniform(0.1, 0.9)
@@ -21,7 +19,7 @@ def plain_ball(random: np.random.Generator, radius: float) -> list[Body]:
 
 
 def patterned_ball(random: np.random.Generator, radius: float) -> list[Body]:
-    """A sphere with stripes, panels or spots in colors that no match ball has."""
+    """A sphere with stripes, panels or spots in saturated colors."""
     ball = icosphere(1.0, 4).painted(vivid(random))
     second = (vivid, vivid, black, white)[random.integers(4)](random)
     points = ball.vertices.astype(np.float64)
@@ -36,19 +34,19 @@ def patterned_ball(random: np.random.Generator, radius: float) -> list[Body]:
 
 
 def white_sphere(random: np.random.Generator, radius: float) -> list[Body]:
-    """A white or gray sphere without a pattern. Of a match ball's radius it is a match ball: draw it otherwise."""
+    """A white or gray sphere without a pattern. Draw it with a radius that the ball does not have."""
     paint = (white, white, gray)[random.integers(3)](random)
     return _round([sphere(1.0, 28).painted(paint).stained(random, 0.15, 0.6)], radius, "white sphere")
 
 
 def half_dome(random: np.random.Generator, radius: float) -> list[Body]:
-    """Half a sphere or less of it that lies on the ground: a lamp, a lid, a training marker."""
+    """A dome on the ground: a lamp, a lid, a training marker."""
     cap = dome(1.0, random.uniform(0.2, 0.85), 24)
     return _round([cap.painted((white, white, gray, vivid)[random.integers(4)](random))], radius, "dome")
 
 
 def white_disc(random: np.random.Generator, radius: float) -> list[Body]:
-    """A flat round thing: a paper plate, a lid, a spot of tape; perhaps with a dark spot or a rim."""
+    """A flat disc with a rim, sometimes with spots: a paper plate, a lid, a piece of tape."""
     height = random.uniform(0.01, 0.08)
     profile = [(0.0, 0.0), (0.9, 0.0), (1.0, height), (0.85, height * 1.1), (0.75, height * 0.6), (0.0, height * 0.6)]
     plate = lathe(profile, 32).painted((white, white, white, gray, vivid)[random.integers(5)](random))
@@ -61,7 +59,7 @@ def white_disc(random: np.random.Generator, radius: float) -> list[Body]:
 
 
 def ring(random: np.random.Generator, radius: float) -> list[Body]:
-    """A ring that lies on the ground or stands: tape, a hoop, a wheel."""
+    """A ring, lying or standing: tape, a hoop, a wheel."""
     thickness = random.uniform(0.12, 0.7)
     if random.uniform() < 0.4:
         inner, height = 1.0 - thickness, random.uniform(0.2, 0.9)
@@ -92,7 +90,7 @@ def egg(random: np.random.Generator, radius: float) -> list[Body]:
 
 
 def deflated(random: np.random.Generator, radius: float) -> list[Body]:
-    """A ball without air: flat, with a dent on top."""
+    """A deflated ball with a dent on top."""
     dent = random.uniform(0.1, 0.5)
     profile = [(0.0, 0.0), (0.7, 0.02), (0.95, 0.2), (1.0, 0.4), (0.9, 0.65), (0.65, 0.75), (0.35, 0.75 - dent)]
     ball = lathe([*profile, (0.0, 0.7 - dent)], 28).painted(_shell_paint(random))
@@ -102,7 +100,7 @@ def deflated(random: np.random.Generator, radius: float) -> list[Body]:
 
 
 def balloon(random: np.random.Generator, radius: float) -> list[Body]:
-    """A balloon or a lamp: a sphere on a neck that lies on its side."""
+    """A balloon or a lamp: a sphere with a neck, on its side."""
     paint = (white, vivid, vivid)[random.integers(3)](random)
     parts = [sphere(0.75, 24).stretched(1.0, 1.0, 1.15), rod((0.0, 0.0, -0.8), (0.0, 0.0, -1.1), 0.3, 0.2, 16)]
     neck = paint if random.uniform() < 0.5 else gray(random)
@@ -111,7 +109,7 @@ def balloon(random: np.random.Generator, radius: float) -> list[Body]:
     return _round([each.turned(turn) for each in lying], radius, "balloon")
 
 
-DISTRACTORS: dict[str, Callable[[np.random.Generator, float], list[Body]]] = {
+DISTRACTORS: dict[str, DrawBody] = {
     "plain_ball": plain_ball,
     "patterned_ball": patterned_ball,
     "white_sphere": white_sphere,
@@ -122,12 +120,7 @@ DISTRACTORS: dict[str, Callable[[np.random.Generator, float], list[Body]]] = {
     "deflated": deflated,
     "balloon": balloon,
 }
-"""Functions of (random, radius [m]) by name."""
-
-
-def distractor_ball(random: np.random.Generator, radius: float) -> list[Body]:
-    """One of the round things that are not the ball."""
-    return DISTRACTORS[str(random.choice(list(DISTRACTORS)))](random, radius)
+"""Round objects by name: functions of (random, radius [m])."""
 
 
 def _round(parts: list[Solid], radius: float, name: str) -> list[Body]:

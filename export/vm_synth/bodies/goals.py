@@ -1,4 +1,4 @@
-"""Goals: posts and bar, and what is behind them."""
+"""Goals: posts, crossbar, back frame and net."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ _SQUARE_SHARE = 0.15
 
 
 def goal(random: np.random.Generator, width: float, height: float, depth: float) -> list[Body]:
-    """A goal that opens to +x: width between its posts, height below its bar and depth behind them [m].
+    """A goal that opens to +x, with posts at x = 0.
 
-    The posts stand on x = 0. Posts and bar count as goal; back frame and net count as environment.
+    width: between the posts [m]. height: below the crossbar [m]. depth: behind the posts [m]. Posts and crossbar are of
+    class goal, back frame and net of class environment.
     """
     thickness = random.uniform(0.10, 0.12)
     paint = _goal_paint(random)
@@ -32,7 +33,7 @@ def goal(random: np.random.Generator, width: float, height: float, depth: float)
     bodies = [body([each.painted(paint).stained(random, 0.12, 0.3) for each in front], "goal", "goal")]
     thin = random.uniform(0.01, 0.03)
     frame_paint = paint if random.uniform() < 0.5 else metal(random)
-    # The upper end of a goal's back reaches less far than its foot, if there is a roof at all.
+    # The top of the back is as deep as its foot, less deep, or without a roof.
     roof = depth * random.choice([0.0, 0.4, 1.0])
     frame = []
     for y in (-side, side):
@@ -56,7 +57,7 @@ def _goal_paint(random: np.random.Generator) -> Paint:
 
 
 def _net(random: np.random.Generator, side: float, top: float, depth: float, roof: float) -> Body:
-    """A net over the back, the roof and both sides that hangs in a little."""
+    """A slightly sagging net over the back, the roof and both sides."""
     spacing = random.uniform(0.10, 0.18)
     radius = random.uniform(0.0015, 0.004)
     paint = white(random) if random.uniform() < 0.8 else hued(random.uniform(), 0.5, 0.2, 0.9)
@@ -76,7 +77,7 @@ def _net(random: np.random.Generator, side: float, top: float, depth: float, roo
 
 
 def _panel(a: Floats, b: Floats, c: Floats, d: Floats, spacing: float) -> list[Floats]:
-    """Strands (5, 3) of a net between the edges a-b and c-d, both ways."""
+    """Strands (5, 3) [m] of a net between the edges a-b and c-d, in both directions."""
 
     def strands(a: Floats, b: Floats, c: Floats, d: Floats) -> list[Floats]:
         count = max(int(distance(a + b, c + d) / 2.0 / spacing), 2)

@@ -1,4 +1,4 @@
-"""People who walk over the field: their shoes, their legs, or all of them. They face +x."""
+"""People on the field: shoes, legs or whole people. They face +x."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .solids import Body, Solid, rotation, standing
 
 
 def shoe(random: np.random.Generator, upper: Paint, sole: Paint, lace: Paint) -> list[Solid]:
-    """A shoe of length 1 with its toes at +x and its ankle over the origin, standing on z = 0."""
+    """A shoe of length 1 on z = 0, with its toes at +x and its ankle above the origin."""
     toe = sphere(0.17, 14).stretched(1.5, 1.0, 0.75).shifted((0.5, 0.0, 0.13))
     middle = sphere(0.2, 14).stretched(1.9, 0.85, 0.8).shifted((0.22, 0.0, 0.16))
     heel = sphere(0.16, 14).stretched(1.0, 0.95, 1.2).shifted((-0.06, 0.0, 0.18))
@@ -24,14 +24,14 @@ def shoe(random: np.random.Generator, upper: Paint, sole: Paint, lace: Paint) ->
     for k in range(4):
         x, z = 0.12 + 0.08 * k, 0.345 - 0.035 * k
         parts.append(capsule((x, -0.07, z), (x, 0.07, z), 0.018, segments=6).painted(lace))
-    # A stripe on both sides, as sport shoes have.
+    # A stripe on both sides.
     for side in (-1.0, 1.0):
         parts.append(capsule((0.18, side * 0.165, 0.12), (0.28, side * 0.135, 0.26), 0.02, segments=6).painted(lace))
     return parts
 
 
 def shoes(random: np.random.Generator, size: float) -> list[Body]:
-    """A shoe of this length [m] or, more often, a pair that somebody left."""
+    """A shoe of this length [m] or, more often, a pair."""
     paints = _shoe_paints(random)
     count = 2 if random.uniform() < 0.7 else 1
     parts: list[Solid] = []
@@ -43,13 +43,13 @@ def shoes(random: np.random.Generator, size: float) -> list[Body]:
 
 
 def legs(random: np.random.Generator, height: float) -> list[Body]:
-    """Legs of a person of this height [m], who stands or walks, up to the waist."""
+    """The legs, up to the waist, of a standing or walking person of this height [m]."""
     parts, _ = _legs(random)
     return [standing(parts, "environment", "legs").stretched(height, height, height)]
 
 
 def person(random: np.random.Generator, height: float) -> list[Body]:
-    """A person of this height [m] who stands or walks."""
+    """A standing or walking person of this height [m]."""
     parts, waist = _legs(random)
     shirt, tone, hair = cloth(random), skin(random), (black, gray)[random.integers(2)](random)
     lean = rotation(pitch=random.uniform(-0.05, 0.3))
@@ -74,7 +74,7 @@ def person(random: np.random.Generator, height: float) -> list[Body]:
 
 
 def _legs(random: np.random.Generator) -> tuple[list[Solid], Floats]:
-    """Legs of a person of height 1, and the place (3,) of the waist; the middle of the hips is the origin."""
+    """Legs of a person of height 1, and the position (3,) of the waist. The origin is between the hips."""
     trousers, tone, sock = cloth(random), skin(random), (white, black, vivid)[random.integers(3)](random)
     shorts = random.uniform() < 0.35
     paints = _shoe_paints(random)
@@ -85,7 +85,7 @@ def _legs(random: np.random.Generator) -> tuple[list[Solid], Floats]:
         angle = side * stride
         hip = np.array([0.0, side * 0.05, 0.0])
         knee = hip + 0.24 * _hanging(angle)
-        # Only the leg behind is bent.
+        # Only the rear leg is bent.
         ankle = knee + 0.24 * _hanging(angle - (0.1 if angle > 0.0 else random.uniform(0.1, 0.7)))
         calf = knee + 0.5 * (ankle - knee)
         if shorts:
@@ -113,7 +113,7 @@ def _hanging(forward: float) -> Floats:
 
 
 def _shoe_paints(random: np.random.Generator) -> tuple[Paint, Paint, Paint]:
-    """Paints of a shoe's upper, sole and laces."""
+    """Paints of the upper, the sole and the laces of a shoe."""
     upper = (white, white, black, gray, vivid, vivid)[random.integers(6)](random)
     sole = (white, white, black, vivid)[random.integers(4)](random)
     return upper, sole, (white, black, vivid)[random.integers(3)](random)

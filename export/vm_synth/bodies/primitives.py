@@ -1,6 +1,6 @@
-"""Primitive solids: flat faces have vertices of their own, round ones share them with smooth normals.
+"""Primitive solids. Flat faces have separate vertices; round ones share vertices with smooth normals.
 
-Unless said otherwise a primitive is centered on the origin with its axis along z. All are white until painted.
+By default a primitive is centered on the origin with its axis along z. All are white until they are painted.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from vm_embedded.arrays import Floats
 from .solids import Point, Solid, along, between, distance, rotation
 
 _SMOOTH = float(np.cos(np.radians(50.0)))
-"""Faces of a profile that turn by less than this angle share a smooth normal."""
+"""Cosine of the largest angle between faces of a profile that share a smooth normal."""
 
 
 def box(x: float, y: float, z: float) -> Solid:
@@ -32,7 +32,7 @@ def rounded_box(x: float, y: float, z: float, radius: float) -> Solid:
 
 
 def lathe(profile: Sequence[tuple[float, float]], segments: int = 16) -> Solid:
-    """A profile of (radius, z) [m] turned around z; it runs upwards on the outside, and inwards on top."""
+    """A profile of points (radius, z) [m] rotated about z. It runs upward on the outside and inward on top."""
     steps = [(a, b) for a, b in pairwise(profile) if a != b]
     slopes = np.array([(b[1] - a[1], a[0] - b[0]) for a, b in steps])
     slopes /= np.linalg.norm(slopes, axis=1, keepdims=True)
@@ -55,32 +55,32 @@ def lathe(profile: Sequence[tuple[float, float]], segments: int = 16) -> Solid:
 
 
 def cylinder(radius: float, height: float, segments: int = 16, top: float | None = None) -> Solid:
-    """A closed cylinder, or a cone or its stump where the radius at the top [m] is another."""
+    """A closed cylinder; with another radius at the top [m], a cone or truncated cone."""
     upper = radius if top is None else top
     half = height / 2.0
     return lathe([(0.0, -half), (radius, -half), (upper, half), (0.0, half)], segments)
 
 
 def sphere(radius: float, segments: int = 16) -> Solid:
-    """A sphere; stretch it for an ellipsoid."""
+    """A sphere. Stretch it for an ellipsoid."""
     return lathe(arc(radius, -np.pi / 2.0, np.pi / 2.0, max(segments // 2, 4)), segments)
 
 
 def dome(radius: float, height: float, segments: int = 20) -> Solid:
-    """Half an ellipsoid that lies on z = 0."""
+    """Half an ellipsoid on z = 0."""
     upper = lathe([(0.0, 0.0), *arc(radius, 0.0, np.pi / 2.0, segments // 3)], segments)
     return upper.stretched(1.0, 1.0, height / radius)
 
 
 def torus(radius: float, thickness: float, segments: int = 32, sides: int = 12) -> Solid:
-    """A ring around z: radius of its middle line [m] and thickness [m]."""
+    """A ring around z, with the radius of its center line [m] and its thickness [m]."""
     around = np.append(np.arange(sides), 0) * (2.0 * np.pi / sides) - np.pi / 2.0
     ring = [(radius + thickness / 2.0 * float(np.cos(a)), thickness / 2.0 * float(np.sin(a))) for a in around]
     return lathe(ring, segments)
 
 
 def capsule(start: Point, end: Point, radius: float, last: float | None = None, segments: int = 10) -> Solid:
-    """A rod with round ends from point to point, with a radius [m] at its start and another at its end."""
+    """A rod with round ends between two points; `last` is its radius [m] at the end if it differs."""
     final = radius if last is None else last
     half = max(distance(start, end), 1e-4) / 2.0
     lower = [(r, z - half) for r, z in arc(radius, -np.pi / 2.0, 0.0, 3)]
@@ -89,22 +89,22 @@ def capsule(start: Point, end: Point, radius: float, last: float | None = None, 
 
 
 def rod(start: Point, end: Point, radius: float, last: float | None = None, segments: int = 10) -> Solid:
-    """A rod with flat ends from point to point."""
+    """A rod with flat ends between two points; `last` is its radius [m] at the end if it differs."""
     return between(cylinder(radius, distance(start, end), segments, last), start, end)
 
 
 def beam(start: Point, end: Point, x: float, y: float) -> Solid:
-    """A box from point to point with sides x and y [m] across."""
+    """A box between two points with a cross section of x by y [m]."""
     return between(box(x, y, distance(start, end)), start, end)
 
 
 def axle(center: Point, radius: float, width: float, segments: int = 14) -> Solid:
-    """A closed cylinder with its axis along y: wheels, joints, ears."""
+    """A closed cylinder with its axis along y, for wheels, joints and ears."""
     return cylinder(radius, width, segments).turned(rotation(roll=np.pi / 2.0)).shifted(center)
 
 
 def cord(points: Floats, radius: float, sides: int = 5) -> Solid:
-    """A string along points (k, 3) [m], open at its ends."""
+    """A cord along points (k, 3) [m] with open ends."""
     ahead = np.gradient(points, axis=0)
     around = np.arange(sides) * (2.0 * np.pi / sides)
     circle = np.stack([np.cos(around), np.sin(around), np.zeros(sides)], axis=1)
@@ -120,7 +120,7 @@ def cord(points: Floats, radius: float, sides: int = 5) -> Solid:
 
 
 def sheet(outline: Floats, thickness: float) -> Solid:
-    """A flat thing on z = 0 with an outline (k, 2) [m], counterclockwise and seen whole from the origin."""
+    """A flat sheet on z = 0. Its outline (k, 2) [m] is counterclockwise and star-shaped around the origin."""
     count = len(outline)
     ring = np.column_stack([outline, np.full(count, thickness)])
     wall = np.column_stack([np.roll(outline, -1, axis=0) - outline, np.zeros(count)])
@@ -137,7 +137,7 @@ def sheet(outline: Floats, thickness: float) -> Solid:
 
 
 def icosphere(radius: float, splits: int = 3) -> Solid:
-    """A sphere of even triangles (20 * 4 ** splits), for patterns."""
+    """A sphere of 20 * 4 ** splits triangles of about equal size, for patterns."""
     golden = (1.0 + 5.0**0.5) / 2.0
     corners = [(a, b * golden, 0.0) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
     points = np.array([np.roll(corner, k) for k in range(3) for corner in corners])
@@ -157,21 +157,22 @@ def icosphere(radius: float, splits: int = 3) -> Solid:
             [np.stack(each, axis=1) for each in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
         )
         corner /= np.linalg.norm(corner, axis=2, keepdims=True)
-    # Rounding makes equal corners of neighboring triangles the same bits.
+    # Rounding makes the corners that neighboring triangles share bitwise equal.
     corners_, triangles = np.unique(corner.reshape(-1, 3).round(9), axis=0, return_inverse=True)
     normals = corners_ / np.linalg.norm(corners_, axis=1, keepdims=True)
     return _solid(radius * normals, normals, triangles.reshape(-1, 3))
 
 
 def arc(radius: float, first: float, last: float, steps: int) -> list[tuple[float, float]]:
-    """Part of a circle as a profile of a lathe, between two angles [rad] over the horizontal."""
+    """Part of a circle as the profile of a lathe, between two angles above the horizontal [rad]."""
     angles = np.linspace(first, last, steps + 1)
     across = np.where(np.isclose(np.abs(angles), np.pi / 2.0), 0.0, radius * np.cos(angles))
     return [(float(r), float(radius * np.sin(a))) for r, a in zip(across, angles, strict=True)]
 
 
 def _cube(grid: Floats, half: Floats, radius: float) -> Solid:
-    """Six faces with lines at `grid`: -1 and 1 are the faces of the box, 0 where its rounding begins."""
+    """A box of six faces, rounded by a radius [m]. grid: lines on each face; -1 and 1 are its edges, 0 the start of the
+    rounding."""
     count = len(grid)
     side = np.sign(grid + np.linspace(-1e-9, 1e-9, count))
     first, second = (each.ravel() for each in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
@@ -197,7 +198,7 @@ def _cube(grid: Floats, half: Floats, radius: float) -> Solid:
 
 
 def _shared(slopes: Floats, face: int, neighbor: int) -> tuple[float, float]:
-    """Normal (radius, z) of a face at its border with a neighbor."""
+    """Normal (radius, z) of a face at its edge with a neighbor."""
     normal = slopes[face]
     if 0 <= neighbor < len(slopes) and normal @ slopes[neighbor] > _SMOOTH:
         normal = normal + slopes[neighbor]
@@ -206,7 +207,7 @@ def _shared(slopes: Floats, face: int, neighbor: int) -> tuple[float, float]:
 
 
 def _swept(rows: Floats, circle: Floats) -> Floats:
-    """Rows of (radius, z) (k, 2) around a circle (n, 2) as points (k * n, 3)."""
+    """Points (k * n, 3) of profile points (radius, z) (k, 2) rotated around a circle (n, 2)."""
     around = rows[:, None, :1] * circle[None]
     return np.concatenate([around, np.broadcast_to(rows[:, None, 1:], (len(rows), len(circle), 1))], 2).reshape(-1, 3)
 

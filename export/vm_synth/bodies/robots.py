@@ -1,4 +1,4 @@
-"""Robots on the field. A robot faces +x; its hips or its base are over the origin."""
+"""Robots on the field. They face +x with their hips or base above the origin."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .primitives import axle, beam, box, capsule, cylinder, dome, lathe, rod, ro
 from .solids import Body, Point, Solid, between, distance, merged, rotation, sized, standing
 
 Limb = Callable[[Point, Point, float], Solid]
-"""A limb from point to point, with a thickness [m]."""
+"""Makes a limb between two points with a thickness [m]."""
 
 _NAO_HEIGHT = 0.58
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Angles [rad] of a humanoid's joints; pairs are (right, left). Forward and outward are positive."""
+    """Joint angles of a humanoid [rad]; pairs are (right, left). Forward and outward are positive."""
 
     lean: float
     hips: tuple[float, float]
@@ -35,7 +35,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class Build:
-    """How a humanoid of height 1 is built: half widths of hips and shoulders, thickness of limbs, and its paints."""
+    """The build of a humanoid of height 1: half widths of hips and shoulders, thickness of limbs, and paints."""
 
     hips: float
     shoulders: float
@@ -48,7 +48,7 @@ class Build:
 
 
 def humanoid(random: np.random.Generator, height: float) -> list[Body]:
-    """A humanoid robot of this height when upright [m], standing, walking or kicking."""
+    """A standing, walking or kicking humanoid robot; height: when upright [m]."""
     shell = (white, white, black, black, gray, metal)[random.integers(6)](random)
     limb = (_rods, _beams, _shells, _plates)[random.integers(4)]
     build = Build(
@@ -67,7 +67,7 @@ def humanoid(random: np.random.Generator, height: float) -> list[Body]:
 
 
 def nao(random: np.random.Generator, height: float = _NAO_HEIGHT) -> list[Body]:
-    """A robot like a NAO: white and gray, round. It is 0.58 m tall, whatever height is asked for."""
+    """A white and gray robot like a NAO. It is always 0.58 m tall; the height is ignored."""
     shell = white(random)
     jersey = team(random) if random.uniform() < 0.6 else shell
     build = Build(0.085, 0.16, 0.125, _rods, shell, gray(random), jersey, team(random))
@@ -85,7 +85,7 @@ def nao(random: np.random.Generator, height: float = _NAO_HEIGHT) -> list[Body]:
 
 
 def fallen(random: np.random.Generator, height: float) -> list[Body]:
-    """A humanoid robot of this height that lies on its front, back or side."""
+    """A humanoid robot that lies on its front, back or side; height: when upright [m]."""
     (robot,) = nao(random) if random.uniform() < 0.4 else humanoid(random, height)
     flat = robot.turned(rotation(pitch=random.choice([-1.0, 1.0]) * np.pi / 2.0))
     turned = flat.turned(rotation(roll=random.choice([0.0, 0.0, np.pi / 2.0])))
@@ -94,7 +94,7 @@ def fallen(random: np.random.Generator, height: float) -> list[Body]:
 
 
 def wheeled_robot(random: np.random.Generator, height: float) -> list[Body]:
-    """A robot of this height [m] on wheels: a round or square base, a tower, and marks of its team on top."""
+    """A wheeled robot of this height [m]: a round or square base with a tower or with team markers on top."""
     width = random.uniform(0.5, 0.85)
     wheel = random.uniform(0.08, 0.14)
     cover, inner = (black, white, gray, metal)[random.integers(4)](random), black(random)
@@ -165,7 +165,7 @@ def _pose(random: np.random.Generator) -> Pose:
 
 
 def _lower(build: Build, pose: Pose) -> list[Solid]:
-    """Legs and feet; the middle of the hips is the origin."""
+    """Legs and feet. The origin is between the hips."""
     thick = build.thickness
     parts = [rounded_box(1.3 * thick, 2.0 * build.hips + thick, thick, 0.3 * thick).painted(build.inner)]
     for k, side in enumerate((-1.0, 1.0)):
@@ -212,7 +212,7 @@ def _upper(build: Build, pose: Pose) -> list[Solid]:
 
 
 def _head(random: np.random.Generator, build: Build, pose: Pose) -> list[Solid]:
-    """A head with a neck, eyes or a visor: round, a box or a bare camera."""
+    """A neck and a head: a sphere with eyes, a box with a visor, or a camera."""
     _, top = _trunk(pose)
     kind = random.integers(3)
     eye = glass(random)
@@ -231,13 +231,13 @@ def _head(random: np.random.Generator, build: Build, pose: Pose) -> list[Solid]:
 
 
 def _trunk(pose: Pose) -> tuple[Floats, Floats]:
-    """Rotation (3, 3) of the trunk and the place (3,) of the neck."""
+    """Rotation (3, 3) of the trunk and position (3,) of the neck."""
     upright = rotation(pitch=pose.lean)
     return upright, upright @ np.array([0.0, 0.0, 0.33])
 
 
 def _downward(forward: float, outward: float) -> Floats:
-    """Direction (3,) of a limb that hangs down at zero angles [rad]; outward is to +y."""
+    """Direction (3,) of a limb, downward at zero angles [rad]; outward is +y."""
     return np.array([np.sin(forward) * np.cos(outward), np.sin(outward), -np.cos(forward) * np.cos(outward)])
 
 
@@ -254,7 +254,7 @@ def _shells(start: Point, end: Point, thickness: float) -> Solid:
 
 
 def _plates(start: Point, end: Point, thickness: float) -> Solid:
-    """Two parallel brackets, as servos are mounted on."""
+    """Two parallel brackets, like those of servos."""
     plate = box(0.8 * thickness, 0.12 * thickness, distance(start, end))
     pair = [plate.shifted((0.0, side * 0.45 * thickness, 0.0)) for side in (-1.0, 1.0)]
     return between(merged([*pair, box(0.5 * thickness, 0.78 * thickness, 0.6 * distance(start, end))]), start, end)

@@ -1,11 +1,11 @@
-"""Triangle meshes with a color and a roughness per vertex, and the bodies of a scene that are made of them.
+"""Triangle meshes with a color and a roughness per vertex, and the bodies of a scene, which consist of them.
 
-Frame: observation plane z = 0, z up, meters. Rotations are 3 x 3 matrices that turn column vectors.
+Frame: z up [m], the observation plane is z = 0. Rotations are 3 x 3 matrices for column vectors.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -16,10 +16,10 @@ from vm_embedded.arrays import Floats, Indices, Mask, Singles
 from .paints import Paint
 
 LABELS = ("goal", "environment", "robot")
-"""What a body counts as."""
+"""The classes of bodies."""
 
 Point = Sequence[float] | Floats
-"""Three numbers [m]."""
+"""Three coordinates [m]."""
 
 
 @dataclass(frozen=True)
@@ -34,30 +34,30 @@ class Solid:
 
     @property
     def low(self) -> Floats:
-        """Lowest coordinates (3,) [m]."""
+        """Smallest coordinates (3,) [m]."""
         return np.asarray(self.vertices.min(axis=0), dtype=np.float64)
 
     @property
     def high(self) -> Floats:
-        """Highest coordinates (3,) [m]."""
+        """Largest coordinates (3,) [m]."""
         return np.asarray(self.vertices.max(axis=0), dtype=np.float64)
 
     def shifted(self, by: Point) -> Self:
-        """The same, moved by (3,) [m]."""
+        """The solid moved by (3,) [m]."""
         return replace(self, vertices=self.vertices + np.asarray(by, dtype=np.float32))
 
     def turned(self, rotation: Floats) -> Self:
-        """The same, turned by a rotation (3, 3) around the origin."""
+        """The solid rotated about the origin by a rotation (3, 3)."""
         turn = rotation.T.astype(np.float32)
         return replace(self, vertices=self.vertices @ turn, normals=_unit(self.normals @ turn))
 
     def stretched(self, x: float, y: float, z: float) -> Self:
-        """The same, scaled along the axes by positive factors."""
+        """The solid scaled along the axes by positive factors."""
         factors = np.array([x, y, z], dtype=np.float32)
         return replace(self, vertices=self.vertices * factors, normals=_unit(self.normals / factors))
 
     def painted(self, paint: Paint, where: Mask | None = None) -> Self:
-        """The same with a paint, on the vertices of a mask (n,) or on all."""
+        """The solid with a paint on all vertices, or on those of a mask (n,)."""
         chosen = np.ones(len(self.vertices), dtype=np.bool_) if where is None else where
         color = np.asarray(paint.color, dtype=np.float32)
         return replace(
@@ -67,39 +67,43 @@ class Solid:
         )
 
     def stained(self, random: np.random.Generator, depth: float, scale: float) -> Self:
-        """The same with smooth brightness changes of up to `depth` (0..1) and of the size `scale` [m]."""
+        """The solid with smooth stains. depth: largest loss of brightness, 0 to 1. scale: size of the stains [m]."""
         shade = 1.0 - depth * (0.5 + 0.5 * waves(random, self.vertices, scale))
         return replace(self, colors=np.clip(self.colors * shade[:, None], 0.0, 1.0).astype(np.float32))
 
 
 @dataclass(frozen=True)
 class Body(Solid):
-    """A solid in the scene: its label, one of LABELS, and a name for what it is."""
+    """A solid in the scene with its class, one of LABELS, and its name."""
 
     label: str
     name: str
 
     def moved(self, rotation_about_z: float, position: Point) -> Self:
-        """The same, turned around the vertical axis by an angle [rad], then moved by a position (3,) [m]."""
+        """The body rotated about the vertical axis by an angle [rad], then moved by a position (3,) [m]."""
         return self.turned(rotation(yaw=rotation_about_z)).shifted(position)
 
 
+DrawBody = Callable[[np.random.Generator, float], list[Body]]
+"""Draws a body: a function of (random, size [m])."""
+
+
 @dataclass(frozen=True)
-class Joined(Solid):
-    """Many bodies as one mesh; labels (m,) are positions in LABELS, one per triangle."""
+class JoinedBodies(Solid):
+    """Many bodies as one mesh. labels: position in LABELS of each triangle (m,)."""
 
     labels: Indices
 
 
-def joined(bodies: Sequence[Body]) -> Joined:
-    """Bodies as one mesh, which may be empty."""
+def join_bodies(bodies: Sequence[Body]) -> JoinedBodies:
+    """Bodies as one mesh. Without bodies the mesh is empty."""
     whole = merged(bodies)
     labels = [np.full(len(body.triangles), LABELS.index(body.label), dtype=np.int32) for body in bodies]
-    return Joined(**vars(whole), labels=np.concatenate([np.zeros(0, dtype=np.int32), *labels]))
+    return JoinedBodies(**vars(whole), labels=np.concatenate([np.zeros(0, dtype=np.int32), *labels]))
 
 
 def merged(solids: Iterable[Solid]) -> Solid:
-    """Solids as one."""
+    """Several solids as one."""
     parts = [_EMPTY, *solids]
     starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     return Solid(
@@ -112,18 +116,18 @@ def merged(solids: Iterable[Solid]) -> Solid:
 
 
 def body(solids: Iterable[Solid], label: str, name: str) -> Body:
-    """A body from solids that are in their places."""
+    """A body from solids in their final positions."""
     return Body(**vars(merged(solids)), label=label, name=name)
 
 
 def standing(solids: Iterable[Solid], label: str, name: str) -> Body:
-    """A body from solids, moved up or down so that it stands on the plane."""
+    """A body from solids, moved vertically to stand on the plane."""
     whole = body(solids, label, name)
     return whole.shifted((0.0, 0.0, -whole.low[2]))
 
 
 def sized(whole: Body, size: float) -> Body:
-    """The same body, scaled so that its longest side is `size` [m], standing on the plane around the origin."""
+    """The body scaled to a longest side of `size` [m], on the plane around the origin."""
     factor = size / float((whole.high - whole.low).max())
     middle = (whole.low + whole.high) / 2.0
     return whole.shifted((-middle[0], -middle[1], -whole.low[2])).stretched(factor, factor, factor)
@@ -139,7 +143,7 @@ def rotation(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Floats:
 
 
 def along(start: Point, end: Point) -> Floats:
-    """Rotation (3, 3) that takes z to the direction from start to end, and x as near to forward as it can."""
+    """Rotation (3, 3) that maps z to the direction from start to end, and x as close to forward as possible."""
     up = _direction(np.subtract(end, start))
     forward = np.array([1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 else np.array([0.0, 0.0, -1.0])
     side = _direction(np.cross(up, forward))
@@ -147,12 +151,12 @@ def along(start: Point, end: Point) -> Floats:
 
 
 def between(solid: Solid, start: Point, end: Point) -> Solid:
-    """A solid that is centered on the origin, put midway between two points with its z axis along them."""
+    """A solid around the origin, moved midway between two points with its z axis along them."""
     return solid.turned(along(start, end)).shifted(np.add(start, end) / 2.0)
 
 
 def distance(start: Point, end: Point) -> float:
-    """Distance of two points [m]."""
+    """Distance between two points [m]."""
     return float(np.linalg.norm(np.subtract(end, start)))
 
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from vm_embedded.arrays import Floats, Singles
 from vm_embedded.errors import InputError
 
-from ..balls.balls import paint
+from ..balls.texture import paint_texture
 from ..scene.environment import Environment
 from ..scene.scene import PlacedBall, Scene
 from .mitsuba import load_mitsuba
@@ -130,7 +130,7 @@ class Tracer:
         if ball is not None:
             matrix[:3, :3] = ball.radius * ball.attitude
             matrix[:3, 3] = ball.center
-            texture = paint(ball.design, _TEXTURE)
+            texture = paint_texture(ball.design, _TEXTURE)
             p[f"{name}.bsdf.base_color.data"] = mi.TensorXf(self._float(texture), texture.shape)
             p[f"{name}.bsdf.roughness.value"] = self._opaque(ball.design.roughness)
             p[f"{name}.bsdf.specular"] = self._opaque(ball.design.specular)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from vm_embedded.config.entries import check_entries, one_of, share
 from vm_workstation.ranges import range_of
 
-from ..balls.balls import BallRanges
+from ..balls.draw_design import DesignRanges
 from ..bodies.catalog import BodyRanges
 from .camera import CameraRanges
 from .field import FieldRanges
@@ -85,7 +85,7 @@ class SceneConfiguration:
     ground: GroundRanges = dataclasses.field(default_factory=GroundRanges)
     field: FieldRanges = dataclasses.field(default_factory=FieldRanges)
     ball: TargetRanges = dataclasses.field(default_factory=TargetRanges)
-    ball_design: BallRanges = dataclasses.field(default_factory=BallRanges)
+    ball_design: DesignRanges = dataclasses.field(default_factory=DesignRanges)
     things: ThingRanges = dataclasses.field(default_factory=ThingRanges)
     bodies: BodyRanges = dataclasses.field(default_factory=BodyRanges)
     sensor: SensorRanges = dataclasses.field(default_factory=SensorRanges)

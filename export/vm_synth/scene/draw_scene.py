@@ -11,7 +11,7 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import RadialLens
 from vm_workstation.ranges import uniform
 
-from ..bodies.solids import joined
+from ..bodies.solids import join_bodies
 from .camera import draw_lens, draw_orientation
 from .configuration import SceneConfiguration
 from .environment import Environment
@@ -52,7 +52,7 @@ def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environm
         other_label=label,
         names=tuple(each.name for each in bodies),
         counts=tuple(len(each.vertices) for each in bodies),
-        mesh=joined(bodies),
+        mesh=join_bodies(bodies),
         ground_albedo=field.grass if field else environment.floor_albedo,
         sensor=draw_sensor(random, ranges.sensor),
         seed=int(random.integers(1 << 31)),

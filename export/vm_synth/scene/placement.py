@@ -12,7 +12,7 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import RadialLens
 from vm_workstation.ranges import Range, log_uniform, uniform
 
-from ..balls.balls import draw_design
+from ..balls.draw_design import draw_design
 from ..bodies.catalog import draw_carrier, draw_clutter, draw_distractor, draw_furniture, draw_person, draw_robot
 from ..bodies.clutter import pedestal
 from ..bodies.goals import goal

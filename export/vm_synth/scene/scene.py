@@ -15,7 +15,7 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import RadialLens
 
 from ..balls.design import BallDesign
-from ..bodies.solids import Joined
+from ..bodies.solids import JoinedBodies
 from .field import Field
 from .sensor import Sensor
 
@@ -51,7 +51,7 @@ class Scene:
     other_label: str
     names: tuple[str, ...]
     counts: tuple[int, ...]
-    mesh: Joined
+    mesh: JoinedBodies
     ground_albedo: tuple[float, float, float]
     sensor: Sensor
     seed: int

@@ -7,9 +7,12 @@ import pytest
 
 from vm_embedded.errors import InputError
 from vm_synth.bodies import catalog as bodies
-from vm_synth.bodies.carrier import CLEARANCE, LOWEST
-from vm_synth.bodies.catalog import CARRIERS, CLUTTER, DISTRACTORS, FURNITURE, KINDS, LABELS, ROBOTS, Body, BodyRanges
-from vm_synth.bodies.solids import merged
+from vm_synth.bodies.carrier import CARRIERS, CLEARANCE, LOWEST, camera_carrier
+from vm_synth.bodies.catalog import KINDS, ROBOTS, BodyRanges
+from vm_synth.bodies.clutter import CLUTTER, FURNITURE, pedestal
+from vm_synth.bodies.distractors import DISTRACTORS
+from vm_synth.bodies.goals import goal
+from vm_synth.bodies.solids import LABELS, Body, join_bodies, merged
 
 SEEDS = range(12)
 HEIGHTS = (0.2, 0.35, 0.55, 0.8, 1.0, 1.6, 2.2)
@@ -100,7 +103,7 @@ def test_labels_tell_robots_from_the_rest() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_goal(seed: int) -> None:
-    posts, *rest = bodies.goal(random(seed), 2.6, 1.2, 0.6)
+    posts, *rest = goal(random(seed), 2.6, 1.2, 0.6)
     for body in (posts, *rest):
         check(body)
         assert body.low[2] > -1e-3
@@ -116,7 +119,7 @@ def test_goal(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_pedestal_is_flat_at_its_height(seed: int) -> None:
-    (body,) = bodies.pedestal(random(seed), 0.35, 0.2)
+    (body,) = pedestal(random(seed), 0.35, 0.2)
     check(body)
     np.testing.assert_allclose([body.low[2], body.high[2]], [0.0, 0.35], atol=1e-5)
     top = body.vertices[body.vertices[:, 2] > 0.35 - 1e-5]
@@ -127,7 +130,7 @@ def test_pedestal_is_flat_at_its_height(seed: int) -> None:
 def test_own_body_keeps_clear_of_the_camera(kind: str) -> None:
     for height in (each for each in HEIGHTS if each >= LOWEST[kind]):
         for seed in SEEDS:
-            body = bodies.own_body(random(seed), height, kind)
+            body = camera_carrier(random(seed), height, kind)
             check(body)
             assert body.label == "environment"
             assert body.low[2] > -1e-3
@@ -155,8 +158,8 @@ def test_moved_turns_before_it_moves() -> None:
 
 
 def test_joined_keeps_triangles_and_labels_apart() -> None:
-    parts = [*bodies.goal(random(1), 2.6, 1.2, 0.6), *ROBOTS["nao"](random(1), 0.6), *CLUTTER["can"](random(1), 0.1)]
-    whole = bodies.joined(parts)
+    parts = [*goal(random(1), 2.6, 1.2, 0.6), *ROBOTS["nao"](random(1), 0.6), *CLUTTER["can"](random(1), 0.1)]
+    whole = join_bodies(parts)
     np.testing.assert_array_equal(
         whole.vertices[whole.triangles], np.concatenate([part.vertices[part.triangles] for part in parts])
     )
@@ -165,7 +168,7 @@ def test_joined_keeps_triangles_and_labels_apart() -> None:
 
 
 def test_joined_of_nothing_is_empty() -> None:
-    whole = bodies.joined([])
+    whole = join_bodies([])
     assert whole.vertices.shape == (0, 3)
     assert whole.triangles.shape == (0, 3)
     assert whole.labels.shape == (0,)

@@ -10,9 +10,9 @@ import pytest
 from vm_embedded import read_lens_file
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
-from vm_synth.balls.balls import BallRanges, draw_design
+from vm_synth.balls.draw_design import DesignRanges, draw_design
 from vm_synth.bodies.clutter import carton
-from vm_synth.bodies.solids import joined
+from vm_synth.bodies.solids import join_bodies
 from vm_synth.dataset.files import CLASS_COLORS, file_of
 from vm_synth.dataset.picture_writer import write_picture
 from vm_synth.render.picture import UNLABELED, render
@@ -36,7 +36,7 @@ def scene(lens, pitch=0.6, roll=0.1, height=0.8, spot=None, radius=0.1, bodies=(
     orientation = Orientation.from_roll_pitch(height, roll, pitch, yaw=0.7)
     if spot is None:
         spot = orientation.rotation[:2, 0] * (height - radius) / max(-orientation.rotation[2, 0], 0.05)
-    design = draw_design(np.random.default_rng(3), BallRanges())
+    design = draw_design(np.random.default_rng(3), DesignRanges())
     made = Scene(
         lens=lens,
         size=SIZE,
@@ -48,7 +48,7 @@ def scene(lens, pitch=0.6, roll=0.1, height=0.8, spot=None, radius=0.1, bodies=(
         other_label="environment",
         names=tuple(each.name for each in bodies),
         counts=tuple(len(each.vertices) for each in bodies),
-        mesh=joined(bodies),
+        mesh=join_bodies(bodies),
         ground_albedo=(0.3, 0.3, 0.3),
         sensor=Sensor(),
         seed=5,
@@ -169,7 +169,7 @@ def test_shadows_are_dark_under_the_ball_and_away_from_the_sun(tracer, environme
 
 def test_a_white_ball_under_an_even_sky_is_about_as_bright_as_the_sky(tracer):
     even = Environment("even", np.ones((64, 128, 3), dtype=np.float32), None)
-    white = draw_design(np.random.default_rng(0), BallRanges(kinds=("plain",), white=1.0, bright=1.0, worn=0.0))
+    white = draw_design(np.random.default_rng(0), DesignRanges(kinds=("plain",), white=1.0, bright=1.0, worn=0.0))
     made = scene(LENSES["rectilinear"], pitch=0.9)
     made = replace(made, ball=replace(made.ball, design=white), ground_albedo=(0.9, 0.9, 0.9))
     picture = render(made, even, tracer, GroundRanges())

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vm_synth.bodies.catalog import LABELS
+from vm_synth.bodies.solids import LABELS
 from vm_synth.scene.camera import CameraRanges
 from vm_synth.scene.configuration import SceneConfiguration, TargetRanges, ThingRanges
 from vm_synth.scene.draw_scene import draw_scene
