@@ -85,8 +85,8 @@ def test_far_below_zero_no_layer_makes_numbers_that_slow_a_processor_down(layout
     made = [node.output[0] for node in model.graph.node if node.op_type in ("MatMul", "Exp", "Add")]
     model.graph.output.extend(onnx.ValueInfoProto(name=name) for name in made)
     laid = choose_layout(build_mesh(Sphere(0.1), 0.5, 4.0, 10.0, mesh), facts)
-    points, shown = laid.points(), np.ones(len(laid.slots), dtype=bool)
-    laid.colors(points)[:] = np.random.default_rng(1).random((len(shown), 3))
+    points, shown = laid.new_points(), np.ones(len(laid.slots), dtype=bool)
+    laid.colors_of(points)[:] = np.random.default_rng(1).random((len(shown), 3))
     session = onnxruntime.InferenceSession(model.SerializeToString())
     for name, values in zip(made, session.run(made, laid.feeds(points, shown)), strict=True):
         sizes = np.abs(values[values != 0])

@@ -107,8 +107,8 @@ def test_onnx_runtime_gives_the_same_answers_on_real_meshes(
     content = export.onnx_model(made, facts)
     session = Session(ModelFile("model", content, facts, ""))
     layout = choose_layout(part, facts)
-    given_points = layout.points()
-    layout.colors(given_points)[:] = colors[layout.slots]
+    given_points = layout.new_points()
+    layout.colors_of(given_points)[:] = colors[layout.slots]
     answers = session.run(layout, given_points, layout.slots < len(part))[layout.places]
     np.testing.assert_allclose(answers, expected, atol=1e-4)
 

@@ -96,8 +96,8 @@ def classify(
     """Sample the image at projected points, and let the network classify them. See `observe`."""
     layout = view.layout
     shown = projected.only(layout.original)
-    points = layout.points()
-    colors = layout.colors(points)
+    points = layout.new_points()
+    colors = layout.colors_of(points)
     sample(image, projected.pixels, settings.format, settings.sampling, colors, view.levels)
     normalize_colors(colors, manifest.colors, shown.on_screen)
     watch.lap("sample")

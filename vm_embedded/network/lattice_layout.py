@@ -39,15 +39,15 @@ class LatticeLayout(Layout):
         beside = np.asarray(members, dtype=np.int32)[:, None] + shifts
         return np.where(self.original[beside], beside, np.int32(len(self)))
 
-    def points(self) -> Singles:
+    def new_points(self) -> Singles:
         return np.empty((3, len(self)), dtype=np.float32)
 
-    def colors(self, points: Singles) -> Singles:
+    def colors_of(self, points: Singles) -> Singles:
         return points.T
 
     def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
         np.copyto(points, OFF_SCREEN, where=~on_screen)
         return {"points": points, "shown": on_screen.reshape(self._shape)}
 
-    def answers(self, output: Singles) -> Singles:
+    def probabilities(self, output: Singles) -> Singles:
         return output.T

@@ -49,20 +49,20 @@ class Layout(ABC):
         return self.slots.nbytes + self.places.nbytes + self.original.nbytes + self.rays.nbytes
 
     @abstractmethod
-    def points(self) -> Singles:
-        """A new array for the network's input `points`, not yet filled."""
+    def new_points(self) -> Singles:
+        """A new array for the network's input `points`; write the colors into its view `colors_of`."""
 
     @abstractmethod
-    def colors(self, points: Singles) -> Singles:
-        """View (m, 3) of the slots' colors in such an array; fill it in place."""
+    def colors_of(self, points: Singles) -> Singles:
+        """View (m, 3) of the slots' colors in an array of `new_points`."""
 
     @abstractmethod
     def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
-        """The network's inputs, from the filled array `points` and a mask (m,) of the slots on screen.
+        """The network's inputs, from the colored array `points` and a mask (m,) of the slots on screen.
 
         Fills in the off-screen point's color, OFF_SCREEN, in place.
         """
 
     @abstractmethod
-    def answers(self, output: Singles) -> Singles:
+    def probabilities(self, output: Singles) -> Singles:
         """Probabilities (m, C) of the slots from the network's output; valid only on screen."""

@@ -31,10 +31,10 @@ class PlainLayout(Layout):
     def nbytes(self) -> int:
         return super().nbytes + self._neighbors.nbytes
 
-    def points(self) -> Singles:
+    def new_points(self) -> Singles:
         return np.empty((len(self) + 1, 3), dtype=np.float32)
 
-    def colors(self, points: Singles) -> Singles:
+    def colors_of(self, points: Singles) -> Singles:
         return points[:-1]
 
     def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
@@ -44,5 +44,5 @@ class PlainLayout(Layout):
         instead = np.arange(missing + 1, dtype=np.int32)[:, None] if self._edge == "same" else missing
         return {"points": points, "neighbors": np.where(shown, neighbors, instead)}
 
-    def answers(self, output: Singles) -> Singles:
+    def probabilities(self, output: Singles) -> Singles:
         return output[:-1]

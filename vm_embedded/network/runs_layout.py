@@ -81,10 +81,10 @@ class RunsLayout(Layout):
     def nbytes(self) -> int:
         return super().nbytes + self.columns.nbytes
 
-    def points(self) -> Singles:
+    def new_points(self) -> Singles:
         return np.empty((3, len(self)), dtype=np.float32)
 
-    def colors(self, points: Singles) -> Singles:
+    def colors_of(self, points: Singles) -> Singles:
         return points.T
 
     def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
@@ -94,7 +94,7 @@ class RunsLayout(Layout):
         np.copyto(columns, GAP + self._first_columns, where=off_screen)
         return {"points": points, "columns": columns}
 
-    def answers(self, output: Singles) -> Singles:
+    def probabilities(self, output: Singles) -> Singles:
         return output.T
 
 

@@ -38,15 +38,15 @@ class Session:
 
     def run(self, layout: Layout, points: Singles, on_screen: Mask) -> Singles:
         """Probabilities (m, C) of a layout's slots, from its colored `points` and the slots (m,) on screen."""
-        return layout.answers(self.onnx.run(layout.feeds(points, on_screen)))
+        return layout.probabilities(self.onnx.run(layout.feeds(points, on_screen)))
 
     def answer(self, test: SelfTest) -> Singles:
         """Probabilities (n, C) of an example's points."""
         mesh = Mesh(np.zeros((len(test.points) - 1, 3)), test.neighbors, test.cells)
         # In an example a missing neighbor is always the off-screen point, also for networks with another edge policy.
         layout = choose_layout(mesh, replace(self.model.manifest, edge="hard"))
-        points = layout.points()
-        layout.colors(points)[:] = test.points[layout.slots]
+        points = layout.new_points()
+        layout.colors_of(points)[:] = test.points[layout.slots]
         return self.run(layout, points, layout.slots < len(mesh))[layout.places]
 
     def _check(self, test: SelfTest) -> None:

@@ -177,7 +177,7 @@ class TorchNetwork:
         feeds = layout.feeds(points, on_screen)
         with torch.inference_mode():
             output = self._network(torch.from_numpy(feeds["points"]), torch.from_numpy(feeds["neighbors"]))
-        return layout.answers(output.numpy())
+        return layout.probabilities(output.numpy())
 
 
 def _orientation(picture: Picture) -> Orientation:

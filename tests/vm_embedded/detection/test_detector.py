@@ -268,7 +268,7 @@ def small_mesh():
 def test_neighbors_out_of_range_are_an_error_and_not_a_crash(models, layout):
     session = Detector.from_file(models[layout]).session
     broken = Broken(small_mesh(), "hard") if layout == "plain" else BrokenRuns(small_mesh(), MESH_MODELS["ring6"].runs)
-    points = broken.points()
+    points = broken.new_points()
     points[:] = 0.0
     with pytest.raises(ModelError, match="can't run"):
         session.run(broken, points, broken.slots < 4)
@@ -283,8 +283,8 @@ def test_the_edge_policy_same_links_missing_neighbors_to_the_point_itself(models
 
     def answers(session, mesh, shown=(True, True, True, True)):
         layout = choose_layout(mesh, session.model.manifest)
-        points = layout.points()
-        layout.colors(points)[:] = colors
+        points = layout.new_points()
+        layout.colors_of(points)[:] = colors
         return session.run(layout, points, np.array(shown))
 
     np.testing.assert_array_equal(answers(same, mesh), answers(hard, alone))

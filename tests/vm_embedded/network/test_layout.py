@@ -134,9 +134,9 @@ def tamed(network, logits):
 def answers(session, mesh, colors, on_screen):
     """Probabilities (m, C) of all slots, and their layout. What is off screen gets no color at all."""
     layout = choose_layout(mesh, session.model.manifest)
-    points = layout.points()
+    points = layout.new_points()
     shown = np.append(on_screen, False)[layout.slots]
-    layout.colors(points)[:] = np.where(shown[:, None], np.vstack([colors, np.zeros((1, 3))])[layout.slots], np.nan)
+    layout.colors_of(points)[:] = np.where(shown[:, None], np.vstack([colors, np.zeros((1, 3))])[layout.slots], np.nan)
     return session.run(layout, points, shown), layout
 
 
@@ -239,10 +239,10 @@ def test_a_layout_is_used_for_one_frame_after_the_other(data, model, seed):
     for layout in layouts_of(mesh):
         session = session_of(network, model, layout)
         arranged = choose_layout(mesh, session.model.manifest)
-        points = arranged.points()
+        points = arranged.new_points()
         for each, on_screen in zip(colors, shown, strict=True):
             fresh, _ = answers(session, mesh, each, on_screen)
-            layout_colors = arranged.colors(points)
+            layout_colors = arranged.colors_of(points)
             layout_colors[:] = np.vstack([each, np.full((1, 3), 7.0)])[arranged.slots]
             again = session.run(arranged, points, np.append(on_screen, False)[arranged.slots])
             where = arranged.places[on_screen]
@@ -320,13 +320,13 @@ def test_what_feeds_take_is_what_they_leave_but_for_colors_off_screen(model):
         arranged = choose_layout(WHOLE[model], manifest_of(model, layout))
         m = len(arranged.slots)
         on_screen = np.append(random.random(len(WHOLE[model])) < 0.7, False)[arranged.slots]
-        points = arranged.points()
+        points = arranged.new_points()
         assert (points.dtype, points.flags.c_contiguous) == (np.float32, True)
         colors = random.random((m, 3)).astype(np.float32)
-        arranged.colors(points)[:] = colors
+        arranged.colors_of(points)[:] = colors
         feeds = arranged.feeds(points, on_screen)
         assert feeds["points"] is points
-        np.testing.assert_array_equal(arranged.colors(points)[on_screen], colors[on_screen])
+        np.testing.assert_array_equal(arranged.colors_of(points)[on_screen], colors[on_screen])
         if layout == "plain":
             assert set(feeds) == {"points", "neighbors"}
             assert feeds["neighbors"].dtype == np.int32
@@ -334,7 +334,7 @@ def test_what_feeds_take_is_what_they_leave_but_for_colors_off_screen(model):
             assert 0 <= feeds["neighbors"].min() <= feeds["neighbors"].max() <= m
             np.testing.assert_array_equal(points[-1], [-1.0] * 3)
             continue
-        np.testing.assert_array_equal(arranged.colors(points)[~on_screen], -1.0)
+        np.testing.assert_array_equal(arranged.colors_of(points)[~on_screen], -1.0)
         if layout == "lattice":
             assert set(feeds) == {"points", "shown"}
             np.testing.assert_array_equal(feeds["shown"].reshape(-1), on_screen)

@@ -115,7 +115,7 @@ class ByColor:
     """A network that knows how pictures are drawn: orange balls, green fields, white lines."""
 
     def run(self, layout, points, on_screen):
-        red, green, blue = layout.colors(points).T
+        red, green, blue = layout.colors_of(points).T
         answers = np.select([red > 1.4 * blue, green > 1.4 * red, red + green + blue > 1.6], [0, 2, 1], 3)
         return np.eye(4, dtype=np.float32)[answers]
 
