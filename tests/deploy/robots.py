@@ -95,7 +95,7 @@ def _running(root, log):
     try:
         deadline = time.monotonic() + 30.0
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        while not (leaders := children.read_text().split()):
+        while not (leaders := [each for each in children.read_text().split() if _is_systemd(each)]):
             if process.poll() is not None or time.monotonic() > deadline:
                 pytest.skip(f"systemd-nspawn does not run here: {log.read_text()[-500:]}")
             time.sleep(0.05)
@@ -105,3 +105,11 @@ def _running(root, log):
             os.kill(int(each), signal.SIGKILL)
         process.kill()
         process.wait()
+
+
+def _is_systemd(pid):
+    """Whether a child of systemd-nspawn is the robot's systemd, not the helper that prepares its root."""
+    try:
+        return Path(f"/proc/{pid}/comm").read_text().strip() == "systemd"
+    except OSError:
+        return False

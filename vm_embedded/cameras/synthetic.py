@@ -26,7 +26,7 @@ RATE = 30.0
 RADIUS = 0.095
 """Radius of the ball [m]."""
 
-_FOCAL_LENGTH = 0.7  # in widths of the picture
+_FOCAL_LENGTH = 0.7  # in widths of the image
 _LINES, _LINE, _STRIPE = 3.0, 0.08, 1.4  # [m] distance between lines, width of a line and of a stripe in the grass
 _HORIZON = -0.03  # z of the rays at which the field ends
 _NOISE = 3.0  # standard deviation, in gray values
@@ -90,9 +90,8 @@ class SyntheticCamera:
         self._period = 1.0 / (settings.fps or RATE)
         self._due = time.monotonic()
         self._random = np.random.default_rng(0)
-        self._noise = self._random.normal(0.0, _NOISE, (self.size[1] + _SPARE, self.size[0] + _SPARE, 3)).astype(
-            np.float32
-        )
+        noise_shape = (self.size[1] + _SPARE, self.size[0] + _SPARE, 3)
+        self._noise = self._random.normal(0.0, _NOISE, noise_shape).astype(np.float32)
 
     def read(self) -> Shot:
         """Return the next shot when it is due."""

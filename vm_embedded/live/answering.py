@@ -61,13 +61,13 @@ class Answerer:
             return None
         except (VisualMeshError, cv2.error, ValueError) as error:
             self._counters.outcomes.failed += 1
-            self._health.trouble(time.monotonic(), one_line(error))
+            self._health.add_trouble(time.monotonic(), one_line(error))
             return None
         if self._is_late(shot):
             return None
         now = time.monotonic()
-        self._health.answer(now, now - shot.arrived)
-        self._counters.answered(detections, time.perf_counter() - started, now - shot.captured)
+        self._health.add_answer(now, now - shot.arrived)
+        self._counters.add_answer(detections, time.perf_counter() - started, now - shot.captured)
         return Answer(shot, lens, orientation, detections, now)
 
     def _is_late(self, shot: Shot) -> bool:
@@ -76,7 +76,7 @@ class Answerer:
         late = age > 1e-3 * limit
         if late:
             self._counters.outcomes.late += 1
-            self._health.trouble(time.monotonic(), f"frame is {1e3 * age:.0f} ms old, allowed are {limit:g} ms")
+            self._health.add_trouble(time.monotonic(), f"frame is {1e3 * age:.0f} ms old, allowed are {limit:g} ms")
         return late
 
     def _lens(self, shot: Shot) -> Lens:

@@ -54,7 +54,7 @@ class Counters:
         self._stages: dict[str, Histogram] = {}
         self._started = time.monotonic()
 
-    def answered(self, detections: Detections, duration: float, age: float) -> None:
+    def add_answer(self, detections: Detections, duration: float, age: float) -> None:
         """Count an answered frame: how long the answer took, and how old the frame was at its end [s]."""
         self.outcomes.frames += 1
         self.outcomes.detections += len(detections)

@@ -194,18 +194,18 @@ class Daemon:
         self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._toml)
 
     def _report_bad_pose(self, reason: str) -> None:
-        self.health.trouble(time.monotonic(), reason)
+        self.health.add_trouble(time.monotonic(), reason)
 
     def _update_state(self) -> None:
         """Determine the state; if it has changed, log and send it."""
         now = time.monotonic()
         lost = self.grabber.supervise(now)
         if self.outputs.failure:
-            self.health.trouble(now, f"messages are lost: {self.outputs.failure}")
+            self.health.add_trouble(now, f"messages are lost: {self.outputs.failure}")
         rejected = self.grabber.counts.rejected
         if rejected != self._rejected:
             self._rejected = rejected
-            self.health.trouble(now, self.grabber.trouble)
+            self.health.add_trouble(now, self.grabber.trouble)
         state, reason = self.health.state(now, lost, self.grabber.trouble)
         if state != self.state:
             level = "info" if state in ("ok", "starting", "stopping") else "warning"

@@ -35,11 +35,11 @@ class Health:
         self._troubles: deque[tuple[float, str]] = deque(maxlen=32)
         self._latencies: deque[float] = deque(maxlen=_TIMED)
 
-    def trouble(self, now: float, reason: str) -> None:
+    def add_trouble(self, now: float, reason: str) -> None:
         """Note that something is wrong with a frame, a pose or an output."""
         self._troubles.append((now, reason))
 
-    def answer(self, now: float, latency: float) -> None:
+    def add_answer(self, now: float, latency: float) -> None:
         """Note that a frame was answered, `latency` after its arrival [s]."""
         self.answered = now
         self._latencies.append(latency)

@@ -11,7 +11,7 @@ from vm_embedded.live.health import Health
 def answered(health, latencies, now=100.0):
     """State after frames that took so long, one each 30th of a second."""
     for number, latency in enumerate(latencies):
-        health.answer(now - (len(latencies) - 1 - number) / 30.0, latency)
+        health.add_answer(now - (len(latencies) - 1 - number) / 30.0, latency)
     return health.state(now, False, "")
 
 
