@@ -1,4 +1,4 @@
-"""What all tests share: the rules for random inputs, and the path of the reference data."""
+"""Shared by all tests: the settings for random inputs, and the folder of the reference data."""
 
 import os
 from pathlib import Path
@@ -16,8 +16,8 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 
 @pytest.fixture(scope="session")
 def shared():
-    """Folder of the reference data: $VM_SHARED, or `shared` beside the checkout."""
+    """The folder of the reference data: $VM_SHARED, or `shared` beside the checkout."""
     path = Path(os.environ.get("VM_SHARED") or CHECKOUT.parent / "shared")
     if not path.is_dir():
-        pytest.skip(f"needs the reference data, which is not at {path}; set VM_SHARED to its folder")
+        pytest.skip(f"needs the reference data, but there is no folder {path}; set VM_SHARED to its folder")
     return path

@@ -77,6 +77,15 @@ def test_the_python_of_the_readme_works(monkeypatch, capsys):
     assert capsys.readouterr().out.startswith("ball 0.")
 
 
+def test_the_python_of_the_page_of_meshes_works(monkeypatch, capsys):
+    programs = re.findall(r"^```python\n(.*?)^```", (DOCS / "meshes.md").read_text(), re.MULTILINE | re.DOTALL)
+    assert len(programs) == 2
+    monkeypatch.chdir(TOP)
+    for program in programs:
+        exec(program, {})
+    assert "ball head ground [" in capsys.readouterr().out
+
+
 def test_the_design_has_a_line_for_each_room():
     design = (DOCS / "design.md").read_text()
     parts = dict(re.findall(r"^\*\*(vm_\w+)\*\*(.*?)(?=^\*\*vm_|^## )", design, re.MULTILINE | re.DOTALL))

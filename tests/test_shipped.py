@@ -1,4 +1,4 @@
-"""The networks of the package: there, described, and good for what their pages say."""
+"""The networks in the package load, have a model card, and find balls."""
 
 import json
 import re
@@ -27,9 +27,9 @@ def detect(*arguments):
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_a_network_runs_and_its_card_is_of_it(name):
+def test_a_network_runs_and_matches_its_card(name):
     path = model_path(name)
-    detector = Detector.from_file(name)  # answers its self-test, or this raises
+    detector = Detector.from_file(name)  # raises if the self-test fails
     assert detector.manifest.any_radius
     assert [each.name for each in detector.manifest.classes] == ["ball", "other"]
     assert path.stat().st_size < 200_000
@@ -62,7 +62,7 @@ def test_the_mesh_follows_the_ball():
 
 
 def in_the_demo(*arguments):
-    """Numbers of balls, of those found, and of false ones."""
+    """Numbers of balls in the demo, of those found, and of false detections."""
     lines = detect("--camera", DEMO, *arguments)
     found = false = 0
     for line in lines:
