@@ -15,17 +15,17 @@ from .stream_options import add_stream
 DEVICES = ("auto", "cpu", "cuda")
 
 _EPILOG = """\
-other commands, each with a --help of its own:
-  vm-train resume RUN          go on with a training that was stopped
-  vm-train check DATA          what the pictures hold, and which are at fault
-  vm-train preview DATA        a sheet of augmented pictures with the mesh on them
+other commands (add --help for their options):
+  vm-train resume RUN          continue a training that was stopped
+  vm-train check DATA          count what the pictures show, and list the damaged ones
+  vm-train preview DATA        draw augmented pictures with the points of the mesh
   vm-train rate DATA           find a learning rate
-  vm-train config              all entries of train.toml with their meanings, units, limits and defaults
-  vm-train import FILES OUT    TFRecord files of the reference implementation as a folder of pictures
-  vm-train shards DATA OUT     a folder of pictures as tar files, for sets that outgrow a disk
+  vm-train config              print a train.toml with all entries and their defaults
+  vm-train import FILES OUT    convert TFRecord files of the reference implementation to pictures
+  vm-train shards DATA OUT     pack pictures into tar files
 
-With several GPUs, or machines: torchrun --nproc-per-node=N -m vm_train DATA -o RUN
-Exit status: 0 done, 1 not (the reason is on standard error), 2 wrong usage, 130 stopped.
+On several GPUs or machines: torchrun --nproc-per-node=N -m vm_train DATA -o RUN
+Exit status: 0 success, 1 failure (standard error tells why), 2 wrong usage, 130 stopped.
 """
 
 
@@ -33,44 +33,47 @@ def parser() -> argparse.ArgumentParser:
     """The options of vm-train DATA."""
     made = argparse.ArgumentParser(
         prog="vm-train",
-        description="Train a network on a folder of pictures with masks, lenses and poses. All pictures are checked "
-        "before it begins. It can be stopped or killed at any time: vm-train resume goes on, and the network is the "
-        "same as without the stop.",
+        description="Train a network on a folder of pictures with masks, lenses and poses. It first checks all "
+        "pictures. You can stop or kill it at any time: vm-train resume continues, and the final network is the same "
+        "as without the stop.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     _add_data(made)
-    made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="folder of the training; new")
+    made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
     _add_configuration(made)
     made.add_argument(
         "--first",
         type=Path,
         metavar="MODEL",
-        help="checkpoint (.pt) of a small network that looks first: the new one learns from, and is asked about, only "
-        "what [second_look] says, and the model file holds both",
+        help="checkpoint (.pt) of a small trained network that looks first and passes on promising points, as set in "
+        "[second_look]; the new network learns and runs on these points only; the model file holds both",
     )
     made.add_argument(
         "--teacher",
         type=Path,
         metavar="MODEL",
-        help="checkpoint (.pt) of a larger network: the new one learns its answers, too, as training.distillation says",
+        help="checkpoint (.pt) of a larger trained network; the new one also learns its probabilities; see "
+        "training.distillation",
     )
-    made.add_argument("--strict", action="store_true", help="don't begin if any picture is at fault; default: skip it")
+    made.add_argument("--strict", action="store_true", help="fail if a picture is damaged; default: skip it")
     add_stream(made)
     lists = made.add_argument_group(
-        "lists of pictures", "A number or image name on each line; default: chosen as [data] of train.toml says."
+        "lists of pictures", "Text files with a picture number or image name on each line; default: split by [data]."
     )
     for part in ("training", "validation", "test"):
-        lists.add_argument(f"--{part}", type=Path, metavar="FILE", help=f"pictures for {part}")
+        lists.add_argument(f"--{part}", type=Path, metavar="FILE", help=f"list of pictures for {part}")
     kept = made.add_mutually_exclusive_group()
     kept.add_argument(
         "--unpacked",
         type=Path,
         metavar="DIR",
-        help="where decoded pictures are kept (1.3 MB for 640 x 512 px), so that each is decoded once; trainings may "
-        "share it; default RUN/unpacked, which is removed at the end",
+        help="folder to cache decoded pictures in (1.3 MB for 640 x 512 px); several trainings can share it; default "
+        "RUN/unpacked, which is removed at the end",
     )
-    kept.add_argument("--no-unpacked", action="store_true", help="decode pictures each time; for slow or small disks")
+    kept.add_argument(
+        "--no-unpacked", action="store_true", help="do not cache decoded pictures; for slow or small disks"
+    )
     _add_hardware(made)
     return made
 
@@ -79,10 +82,10 @@ def resume_parser() -> argparse.ArgumentParser:
     """The options of vm-train resume."""
     made = argparse.ArgumentParser(
         prog="vm-train resume",
-        description="Go on with a training that was stopped or killed, from its last state.",
+        description="Continue a training that was stopped or killed, from its last state.",
     )
     made.add_argument("run", type=Path, metavar="RUN", help="folder of the training")
-    made.add_argument("--data", type=Path, metavar="DATA", help="where the pictures are now, if they were moved")
+    made.add_argument("--data", type=Path, metavar="DATA", help="new place of the pictures, if they were moved")
     _add_hardware(made)
     return made
 
@@ -91,16 +94,20 @@ def preview_parser() -> argparse.ArgumentParser:
     """The options of vm-train preview."""
     made = argparse.ArgumentParser(
         prog="vm-train preview",
-        description="Draw a sheet: pictures with the points of the mesh in the colors of their classes, as they are "
-        "and augmented, and below what each kind of augmentation does by itself.",
+        description="Draw pictures with the points of the mesh in the colors of their classes, without and with "
+        "augmentation. The rows below show each kind of augmentation alone.",
     )
     _add_data(made)
     _add_configuration(made)
-    made.add_argument("--count", type=at_least(1), default=4, metavar="N", help="pictures; default 4")
-    made.add_argument("--versions", type=at_least(1), default=5, metavar="N", help="versions of each; default 5")
-    made.add_argument("--seed", type=int, default=0, metavar="S", help="same seed, same sheet; default 0")
-    made.add_argument("--width", type=at_least(1), default=320, metavar="PX", help="width of each; default 320")
-    made.add_argument("-o", "--output", type=Path, default=Path("preview.jpg"), metavar="FILE", help="a .jpg or .png")
+    made.add_argument("--count", type=at_least(1), default=4, metavar="N", help="number of pictures; default 4")
+    made.add_argument(
+        "--versions", type=at_least(1), default=5, metavar="N", help="augmented versions of each picture; default 5"
+    )
+    made.add_argument("--seed", type=int, default=0, metavar="S", help="random seed; default 0")
+    made.add_argument("--width", type=at_least(1), default=320, metavar="PX", help="width of each picture; default 320")
+    made.add_argument(
+        "-o", "--output", type=Path, default=Path("preview.jpg"), metavar="FILE", help="file to write, .jpg or .png"
+    )
     return made
 
 
@@ -108,26 +115,26 @@ def rate_parser() -> argparse.ArgumentParser:
     """The options of vm-train rate."""
     made = argparse.ArgumentParser(
         prog="vm-train rate",
-        description="Train for some steps with a rate that rises until the loss does too, and say which one suits.",
+        description="Train for some steps with a rising learning rate until the loss rises, and propose a rate.",
     )
     _add_data(made)
     _add_configuration(made)
-    made.add_argument("--steps", type=at_least(20), default=200, metavar="N", help="steps of the search; default 200")
-    made.add_argument("--plot", type=Path, metavar="FILE", help="loss over rate; a .png or .svg")
+    made.add_argument("--steps", type=at_least(20), default=200, metavar="N", help="number of steps; default 200")
+    made.add_argument("--plot", type=Path, metavar="FILE", help="plot of the loss over the rate, .png or .svg")
     _add_hardware(made)
     return made
 
 
 def config_parser() -> argparse.ArgumentParser:
-    """The options of vm-train config: none."""
+    """The parser of vm-train config, which has no options."""
     return argparse.ArgumentParser(
         prog="vm-train config",
-        description="Write a train.toml with all entries, their meanings, units, limits and defaults.",
+        description="Print a train.toml with all entries, their meanings, units, limits and defaults.",
     )
 
 
 def parsers() -> dict[str, argparse.ArgumentParser]:
-    """All parsers, by what is typed."""
+    """All parsers, by command."""
     made = (
         parser(),
         resume_parser(),
@@ -146,23 +153,27 @@ def _add_data(made: argparse.ArgumentParser) -> None:
 
 
 def _add_configuration(made: argparse.ArgumentParser) -> None:
-    made.add_argument("--config", type=Path, metavar="FILE", help="train.toml; what it leaves out keeps its default")
+    made.add_argument(
+        "--config", type=Path, metavar="FILE", help="configuration, train.toml; missing entries have their defaults"
+    )
     made.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="SECTION.ENTRY=VALUE",
-        help="override an entry of the configuration, as in --set training.epochs=5; give it once for each",
+        help="override an entry of the configuration, for example training.epochs=5; repeat it for each entry",
     )
 
 
 def _add_hardware(made: argparse.ArgumentParser) -> None:
     group = made.add_argument_group("hardware")
-    group.add_argument("--device", choices=DEVICES, default="auto", help="default a GPU, if there is one")
-    group.add_argument("--workers", type=at_least(0), metavar="N", help="processes that read; default half the cores")
+    group.add_argument("--device", choices=DEVICES, default="auto", help="default: a GPU if there is one, else the CPU")
+    group.add_argument(
+        "--workers", type=at_least(0), metavar="N", help="processes that read pictures; default half the cores"
+    )
     group.add_argument(
         "--threads",
         type=at_least(1),
         metavar="N",
-        help="threads that compute; default 1; with more a resumed training is not the same to the last digit",
+        help="threads that compute; default 1; with more, results differ in the last digits from run to run",
     )

@@ -1,4 +1,4 @@
-"""The options of vm-train that say which shards it streams."""
+"""The options of vm-train to stream training pictures from shards."""
 
 from __future__ import annotations
 
@@ -24,51 +24,53 @@ def add_stream(made: argparse.ArgumentParser) -> None:
     """Add --stream and --epoch-pictures."""
     group = made.add_argument_group(
         "streaming",
-        "Training pictures from shards elsewhere, of which nothing is kept; all pictures of DATA are for validation.",
+        "Read training pictures from shards and store nothing; all pictures of DATA are for validation.",
     )
     group.add_argument(
         "--stream",
         nargs="+",
         default=[],
         metavar="SHARD",
-        help="tar files, http addresses or pipe:command, as in 'https://example.org/pictures-{000000..000099}.tar'",
+        help="tar files, http addresses or pipe:COMMAND; ranges such as {000000..000099} stand for all their numbers",
     )
     group.add_argument(
         "--epoch-pictures",
         type=int,
         metavar="N",
-        help="pictures in an epoch of the stream, which begins anew with each, in another order",
+        help="pictures in an epoch; each epoch begins the stream again, in another order",
     )
 
 
 def stream_source(
     options: argparse.Namespace, configuration: TrainConfiguration, here: Hardware
 ) -> StreamSource | None:
-    """Where training pictures are streamed from, if they are. Raises InputError for options that don't fit."""
+    """Where to stream training pictures from, or None. Raises InputError if the options contradict each other."""
     from ..graphs.streamed import StreamSource
 
     if not options.stream:
         if options.epoch_pictures is not None:
-            raise InputError("--epoch-pictures is of a stream: --stream says of which one")
+            raise InputError("--epoch-pictures needs --stream, the shards to read")
         return None
     if options.epoch_pictures is None:
-        raise InputError("--stream needs --epoch-pictures: how long a stream is shows only at its end")
+        raise InputError("--stream needs --epoch-pictures, because the length of a stream is unknown")
     if options.epoch_pictures < 1:
         raise InputError(f"--epoch-pictures must be at least 1, not {options.epoch_pictures}")
     if options.training or options.validation or options.test:
-        raise InputError("--stream takes no lists: all pictures of DATA are for validation")
+        raise InputError("--stream can't be combined with lists: all pictures of DATA are for validation")
     if configuration.mesh.radius_of == "scene":
-        raise InputError("mesh.radius_of = 'scene' needs sceneX.json, which shards don't have")
+        raise InputError(
+            "mesh.radius_of = 'scene' needs sceneX.json, which shards don't hold: use a folder of pictures"
+        )
     shards = shard_names(options.stream)
     workers = min(here.workers, len(shards) // here.size)
     return StreamSource(shards, options.epoch_pictures, here.size, workers, options.strict)
 
 
 def shard_names(patterns: Sequence[str]) -> tuple[str, ...]:
-    """All shards of patterns with ranges such as pictures-{000000..000099}.tar: http and https addresses, "pipe:" and a
-    command of the shell, or files, which become absolute.
+    """The shards of patterns with ranges such as pictures-{000000..000099}.tar; paths of files become absolute.
 
-    Raises InputError for a range that is none, a file that is not there, and a shard that is named twice.
+    A shard is an http or https address, "pipe:" and a shell command, or a file. Raises InputError for a range that ends
+    before it begins, a missing file, and a shard that is named twice.
     """
     found: dict[str, None] = {}
     for name in (each for pattern in patterns for each in _expanded(pattern)):
@@ -80,8 +82,8 @@ def shard_names(patterns: Sequence[str]) -> tuple[str, ...]:
 
 
 def _expanded(pattern: str) -> list[str]:
-    """A pattern with each number of each of its ranges."""
-    texts = _RANGE.split(pattern)  # what is between ranges, and the first and last number of each
+    """All names that a pattern stands for."""
+    texts = _RANGE.split(pattern)  # text, first and last number of a range, text, ...
     ranges = [_numbers(first, last) for first, last in zip(texts[1::3], texts[2::3], strict=True)]
     return [
         texts[0] + "".join(number + text for number, text in zip(numbers, texts[3::3], strict=True))
@@ -97,7 +99,7 @@ def _numbers(first: str, last: str) -> list[str]:
 
 def _file(name: str) -> str:
     if name == "-":
-        raise InputError("standard input can't be streamed again in each epoch: name files, addresses or pipe:command")
+        raise InputError("standard input can't be read again in each epoch: give files, addresses or pipe:COMMAND")
     if not Path(name).is_file():
-        raise InputError(f"there is no shard {name!r}")
+        raise InputError(f"shard {name!r} does not exist")
     return str(Path(name).resolve())

@@ -16,7 +16,6 @@ from tests.vm_train.drawn import CLASSES, draw_set
 from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError
 from vm_export.checkpoint import Checkpoint
-from vm_train.cli.stream_options import shard_names
 from vm_train.cli.train import main
 from vm_train.data.pictures import find_pictures
 from vm_train.data.split import Split
@@ -231,40 +230,6 @@ def test_shards_without_a_picture_are_named(place, tmp_path):
         pass
     with pytest.raises(InputError, match=r"no complete picture in .*empty\.tar"):
         begun(place, tmp_path / "run", [tmp_path / "empty.tar"])
-
-
-def test_ranges_stand_for_all_their_numbers(tmp_path, monkeypatch):
-    assert shard_names(["http://a/{08..10}-{1..2}.tar", "pipe:awk '{print}' b"]) == (
-        *(f"http://a/{first}-{second}.tar" for first in ("08", "09", "10") for second in (1, 2)),
-        "pipe:awk '{print}' b",
-    )
-    (tmp_path / "1.tar").touch()
-    monkeypatch.chdir(tmp_path)
-    assert shard_names(["{1..1}.tar"]) == (str(tmp_path / "1.tar"),)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--stream", "http://a/{3..1}.tar", "--epoch-pictures", "9"], "the range {3..1} ends before it begins"),
-        (["--stream", "nowhere.tar", "--epoch-pictures", "9"], "there is no shard 'nowhere.tar'"),
-        (["--stream", "", "--epoch-pictures", "9"], "there is no shard ''"),
-        (["--stream", "-", "--epoch-pictures", "9"], "standard input can't be streamed"),
-        (["--stream", "http://a/1.tar", "http://a/1.tar", "--epoch-pictures", "9"], "named twice"),
-        (["--stream", "http://a/1.tar"], "--stream needs --epoch-pictures"),
-        (["--stream", "http://a/1.tar", "--epoch-pictures", "0"], "at least 1, not 0"),
-        (["--epoch-pictures", "9"], "--stream says of which one"),
-        (["--stream", "http://a/1.tar", "--epoch-pictures", "9", "--test", "a.txt"], "takes no lists"),
-        (["--stream", "http://a/1.tar", "--epoch-pictures", "9", "--set", "mesh.radius_of=scene"], "sceneX.json"),
-        (["--stream", "http://127.0.0.1:9/1.tar", "--epoch-pictures", "9"], "http://127.0.0.1:9/1.tar: can't be read"),
-    ],
-)
-def test_wrong_options_end_in_one_line(arguments, said, place, tmp_path, capsys):
-    command = [str(place / "data"), "-o", str(tmp_path / "run"), "--config", str(place / "train.toml"), *arguments]
-    assert main([*command, "--workers", "0"]) == 1
-    error = capsys.readouterr().err
-    assert said in error.splitlines()[-1]
-    assert not (tmp_path / "run" / "run.json").exists()
 
 
 def test_there_are_no_more_readers_than_shards():
