@@ -1,4 +1,4 @@
-"""Puts the pictures that `make demo` wrote together as docs/demo.jpg, the README's picture."""
+"""Joins the pictures of `make demo` to docs/demo.jpg, the picture of the README."""
 
 from pathlib import Path
 
