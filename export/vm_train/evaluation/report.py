@@ -79,9 +79,8 @@ def page(scores: Scores, plots: Mapping[str, bytes], strips: Mapping[str, Sequen
 
 def _ignored(by_overlap: Scores) -> str:
     return (
-        f"{by_overlap['ignored']} objects are ignored: less than {100.0 * by_overlap['min_visible']:g} % of them is "
-        f"visible, or their radius is below {by_overlap['min_radius']:g} px. An ignored object counts neither as "
-        "missed nor, if it is found, as false."
+        f"Ignored objects: {by_overlap['ignored']}. Less than {100.0 * by_overlap['min_visible']:g} % of them is visible, "
+        f"or their radius is below {by_overlap['min_radius']:g} px. They count neither as missed nor, if found, as false."
     )
 
 
