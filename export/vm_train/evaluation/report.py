@@ -78,9 +78,10 @@ def page(scores: Scores, plots: Mapping[str, bytes], strips: Mapping[str, Sequen
 
 
 def _ignored(by_overlap: Scores) -> str:
+    visible, radius = 100.0 * by_overlap["min_visible"], by_overlap["min_radius"]
     return (
-        f"Ignored objects: {by_overlap['ignored']}. Less than {100.0 * by_overlap['min_visible']:g} % of them is visible, "
-        f"or their radius is below {by_overlap['min_radius']:g} px. They count neither as missed nor, if found, as false."
+        f"Ignored objects: {by_overlap['ignored']}. Less than {visible:g} % of them is visible, or their radius is "
+        f"below {radius:g} px. They count neither as missed nor, if found, as false."
     )
 
 
