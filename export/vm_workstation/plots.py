@@ -1,4 +1,4 @@
-"""Figures of matplotlib as files; the same figure gives the same file."""
+"""Writes matplotlib figures to files. The same figure gives the same file."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".png", ".svg")
 
-_DOTS = 110  # for each inch of a .png
+_DPI = 110  # of a .png
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure [inch]. Raises InputError if matplotlib is missing."""
+    """An empty figure of this size [inch]. Raises InputError if matplotlib is missing."""
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
@@ -26,17 +26,17 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def check_figure_path(path: Path) -> None:
-    """Raise InputError unless a figure's file is a .png or .svg."""
+    """Raise InputError unless the file is a .png or .svg."""
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"can't plot to {path}: its suffix must be {' or '.join(SUFFIXES)}")
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure to a .png or .svg. Raises InputError for another suffix or if it can't be written."""
+    """Write a figure to a .png or .svg. Raises InputError for another suffix or if the file can't be written."""
     import matplotlib
 
     check_figure_path(path)
     kind = path.suffix[1:].lower()
-    # Neither date nor random names, so that the same figure gives the same file.
+    # No date and no random names: the same figure gives the same file.
     with matplotlib.rc_context({"svg.hashsalt": "vm_train"}), atomic_write(path) as part:
-        figure.savefig(part, dpi=_DOTS, format=kind, metadata={"Date": None} if kind == "svg" else None)
+        figure.savefig(part, dpi=_DPI, format=kind, metadata={"Date": None} if kind == "svg" else None)

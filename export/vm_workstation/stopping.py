@@ -1,4 +1,4 @@
-"""How a program is stopped."""
+"""Stops programs cleanly."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """SIGTERM interrupts like Ctrl-C, so that schedulers can end a run at any time."""
+    """SIGTERM raises KeyboardInterrupt like Ctrl-C, so schedulers can end a run at any time."""
 
     def interrupt(number: int, frame: object) -> None:
         raise KeyboardInterrupt

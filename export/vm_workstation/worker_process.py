@@ -1,4 +1,4 @@
-"""What a worker process of the workstation's programs does first."""
+"""Signals and threads of worker processes."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from vm_embedded.errors import VisualMeshError
 
 
 @contextmanager
-def shielded() -> Iterator[None]:
-    """Ctrl-C waits, and never reaches processes that are started meanwhile: they leave it to their parent."""
+def interrupts_blocked() -> Iterator[None]:
+    """Block Ctrl-C: it waits until the end, and processes started meanwhile inherit the block."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -27,9 +27,9 @@ def shielded() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def begin() -> None:
-    """Leave signals to the parent, keep to one core, and end with the parent, however it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+def start_worker() -> None:
+    """Prepare a worker process: leave signals to the parent, use one core, and end when the parent ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; the parent handles it
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     cv2.setNumThreads(1)
     Thread(target=_end_with_parent, daemon=True).start()
@@ -37,24 +37,26 @@ def begin() -> None:
 
 @contextmanager
 def worker_pool(
-    count: int, start: Callable[..., None] = begin, arguments: tuple[Any, ...] = ()
+    count: int, start: Callable[..., None] = start_worker, arguments: tuple[Any, ...] = ()
 ) -> Iterator[ProcessPoolExecutor]:
-    """A pool of so many worker processes; at the end it cancels the work that has not begun.
+    """A pool of `count` worker processes. At the end it cancels work that has not started.
 
-    start: the function that each process calls first, with these arguments; it must call `begin`. Raises
-    VisualMeshError if a worker was killed.
+    start: the function that each process calls first, with these arguments; it must call `start_worker`.
+    Raises VisualMeshError if a worker is killed.
     """
     pool = ProcessPoolExecutor(count, get_context("spawn"), start, arguments)
     try:
         yield pool
     except BrokenProcessPool as error:
-        raise VisualMeshError("a worker was killed (out of memory?)") from error
+        raise VisualMeshError(
+            "a worker process was killed (out of memory?): repeat the command with fewer --workers"
+        ) from error
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _end_with_parent() -> None:
-    """End this process when the one that started it is killed, which else it would outlive."""
+    """End this process when its parent ends, even if the parent is killed."""
     parent = parent_process()
     if parent is not None:
         parent.join()

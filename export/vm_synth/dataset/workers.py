@@ -5,17 +5,14 @@ from __future__ import annotations
 import os
 import resource
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from itertools import islice
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
-from vm_embedded.errors import VisualMeshError
-from vm_workstation.worker_process import begin, shielded
+from vm_workstation.worker_process import interrupts_blocked, start_worker, worker_pool
 
 from ..render.picture import render
 from ..render.tracer import Tracer
@@ -24,10 +21,6 @@ from ..scene.draw_scene import draw_scene
 from ..scene.environment import Environment
 from ..scene.scene import Scene
 from .picture_writer import write_picture
-
-
-class WorkerLost(VisualMeshError):
-    """A worker process ended early."""
 
 
 @dataclass(frozen=True)
@@ -59,30 +52,21 @@ def scene_of(job: Job, index: int) -> tuple[Scene, Environment]:
 def render_all(job: Job, indices: Sequence[int], workers: int, report: Callable[[FinishedPicture], None]) -> None:
     """Render the pictures in this many processes and report each.
 
-    An interrupt waits for the pictures in progress. Raises WorkerLost if a worker ends early, and errors of workers.
+    An interrupt waits for the pictures in progress. Raises VisualMeshError if a worker is killed, and errors of
+    workers.
     """
     _limit_threads()
-    with ProcessPoolExecutor(
-        min(workers, max(len(indices), 1)), mp_context=get_context("spawn"), initializer=_start, initargs=(job,)
-    ) as pool:
+    with worker_pool(min(workers, max(len(indices), 1)), _start, (job,)) as pool:
         waiting = iter(indices)
-        with shielded():
+        with interrupts_blocked():
             running: set[Future[FinishedPicture]] = {
                 pool.submit(_render_one, index) for index in islice(waiting, 2 * workers)
             }
-        try:
-            while running:
-                finished, running = wait(running, return_when=FIRST_COMPLETED)
-                for each in finished:
-                    report(each.result())
-                running |= {pool.submit(_render_one, index) for index in islice(waiting, len(finished))}
-        except BrokenProcessPool as error:
-            raise WorkerLost(
-                "a worker process was killed (out of memory?); finished pictures are kept: "
-                "repeat the command, perhaps with fewer --workers"
-            ) from error
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+        while running:
+            finished, running = wait(running, return_when=FIRST_COMPLETED)
+            for each in finished:
+                report(each.result())
+            running |= {pool.submit(_render_one, index) for index in islice(waiting, len(finished))}
 
 
 def _limit_threads() -> None:
@@ -96,7 +80,7 @@ _worker: tuple[Job, Tracer] | None = None
 
 def _start(job: Job) -> None:
     global _worker
-    begin()
+    start_worker()
     _worker = (job, Tracer())
 
 

@@ -1,4 +1,4 @@
-"""Cameras to draw: lens, height and attitude."""
+"""The camera of a scene: lens, height and orientation."""
 
 from __future__ import annotations
 
@@ -19,42 +19,42 @@ from vm_workstation.ranges import range_of, some_of, uniform
 
 @dataclass(frozen=True)
 class CameraRanges:
-    """Section [camera]."""
+    """Section [camera]: lenses and poses of cameras."""
 
     picture_width: int = number(640, "width of pictures", "px", (64, 8192))
     picture_height: int = number(512, "height of pictures", "px", (64, 8192))
-    projections: tuple[str, ...] = some_of(tuple(PROJECTIONS), "lenses to draw")
+    projections: tuple[str, ...] = some_of(tuple(PROJECTIONS), "kinds of lenses")
     rectilinear_view: tuple[float, float] = range_of(
-        50.0, 110.0, "angle from the left to the right edge, rectilinear", "deg", (5.0, 150.0)
+        50.0, 110.0, "horizontal field of view of rectilinear lenses", "deg", (5.0, 150.0)
     )
     fisheye_view: tuple[float, float] = range_of(
-        80.0, 185.0, "angle from the left to the right edge, equisolid and equidistant", "deg", (5.0, 300.0)
+        80.0, 185.0, "horizontal field of view of fisheyes: equisolid and equidistant lenses", "deg", (5.0, 300.0)
     )
-    image_circle: float = share(0.2, "fisheyes whose image is a circle with black around it")
+    image_circle: float = share(0.2, "share of fisheyes with a circular image on black")
     circle: tuple[float, float] = range_of(
-        0.5, 1.15, "diameter of that circle, in widths of the picture", "", (0.1, 2.0)
+        0.5, 1.15, "diameter of that circle, relative to the picture's width", "", (0.1, 2.0)
     )
     off_center: tuple[float, float] = range_of(
-        -0.02, 0.02, "optical center off the picture's, in widths", "", (-0.3, 0.3)
+        -0.02, 0.02, "offset of the optical center, relative to the picture's width", "", (-0.3, 0.3)
     )
     distortion: tuple[float, float] = range_of(
-        -0.04, 0.04, "k0 f^2, the first distortion coefficient times the focal length squared", "", (-0.2, 0.2)
+        -0.04, 0.04, "first distortion coefficient times the squared focal length: k0 f^2", "", (-0.2, 0.2)
     )
-    distorted: float = share(0.5, "lenses with distortion")
-    height: tuple[float, float] = range_of(0.3, 1.6, "height over the plane", "m", (0.05, 20.0))
+    distorted: float = share(0.5, "share of lenses with distortion")
+    height: tuple[float, float] = range_of(0.3, 1.6, "height above the plane", "m", (0.05, 20.0))
     pitch: tuple[float, float] = range_of(
         -5.0, 50.0, "angle of the optical axis below the horizon", "deg", (-45.0, 90.0)
     )
-    steep: float = share(0.2, "pictures that look down steeply")
-    steep_pitch: tuple[float, float] = range_of(40.0, 90.0, "their pitch", "deg", (-45.0, 90.0))
-    roll: tuple[float, float] = range_of(-10.0, 10.0, "lean to the right", "deg", (-180.0, 180.0))
-    tumbled: float = share(0.04, "pictures with any roll")
+    steep: float = share(0.2, "share of cameras that look down steeply")
+    steep_pitch: tuple[float, float] = range_of(40.0, 90.0, "pitch of these cameras", "deg", (-45.0, 90.0))
+    roll: tuple[float, float] = range_of(-10.0, 10.0, "roll; positive leans to the right", "deg", (-180.0, 180.0))
+    tumbled: float = share(0.04, "share of cameras with any roll")
 
     lens: Mapping[str, Any] = field(
         default_factory=dict,
         metadata={
-            "help": "one lens for all pictures instead of those drawn: a table with projection, focal_length [px], fov "
-            "[rad] and where they matter center, distortion and size, as in vm.toml"
+            "help": "one lens for all pictures instead of drawn lenses: a table with projection, focal_length [px], "
+            "fov [rad] and, if needed, center, distortion and size, as in vm.toml"
         },
     )
 
@@ -70,7 +70,7 @@ class CameraRanges:
 
 
 def draw_lens(random: np.random.Generator, ranges: CameraRanges) -> RadialLens:
-    """A lens for pictures of the configured size."""
+    """Draw a lens for pictures of the configured size."""
     if ranges.lens:
         return lens_from_table(ranges.lens).for_image(ranges.size)
     projection = PROJECTIONS[str(random.choice(ranges.projections))]
@@ -89,7 +89,7 @@ def draw_lens(random: np.random.Generator, ranges: CameraRanges) -> RadialLens:
         rim = min(diameter * width / 2.0 / focal_length, float(unit.radius(math.pi)))
         fov = 2.0 * float(unit.angle(rim))
     else:
-        # As far as the corners, and the picture's center may be off the lens's.
+        # The field of view reaches the corners, also with an offset of the optical center.
         corner = math.hypot(width, height) / width * 1.1
         reach = float(unit.angle(min(corner * width / 2.0 / focal_length, float(unit.radius(math.radians(170.0))))))
         fov = 2.0 * reach
@@ -98,7 +98,7 @@ def draw_lens(random: np.random.Generator, ranges: CameraRanges) -> RadialLens:
 
 
 def draw_orientation(random: np.random.Generator, ranges: CameraRanges) -> Orientation:
-    """A height and an attitude, with any heading."""
+    """Draw height, roll and pitch, with any heading."""
     pitch = uniform(random, ranges.steep_pitch if random.random() < ranges.steep else ranges.pitch)
     roll = random.uniform(-180.0, 180.0) if random.random() < ranges.tumbled else uniform(random, ranges.roll)
     return Orientation.from_roll_pitch(

@@ -1,4 +1,4 @@
-"""scene.toml: all ranges that pictures are drawn from, a section for each part of the scene."""
+"""scene.toml: the ranges from which scenes are drawn, one section for each part of a scene."""
 
 from __future__ import annotations
 
@@ -16,18 +16,20 @@ from .maps import MapRanges
 from .sensor import SensorRanges
 
 CLASSES = ("ball", "goal", "line", "field", "environment", "robot")
-"""What pixels count as, by position."""
+"""The classes of pixels; masks during rendering hold positions in this tuple."""
 
 
 @dataclass(frozen=True)
 class GroundRanges:
-    """Section [ground]."""
+    """Section [ground]: the ground below the ball."""
 
-    photographed: float = share(0.5, "pictures on the real floor of the map, where it has a flat one; else on a field")
+    photographed: float = share(
+        0.5, "share of pictures on the floor of the map, if it has a flat one; the others show a field"
+    )
     detail: tuple[float, float] = range_of(
         0.02,
         0.12,
-        "strength of the grain that a photographed floor gets, as maps are coarser than pictures",
+        "strength of noise on a photographed floor; it replaces the detail that maps lack",
         "",
         (0, 1),
     )
@@ -39,22 +41,26 @@ class GroundRanges:
 
 @dataclass(frozen=True)
 class TargetRanges:
-    """Section [ball]: where the ball is."""
+    """Section [ball]: size and place of the ball, and balls of wrong size or height."""
 
     radius: tuple[float, float] = range_of(0.05, 0.12, "radius of the ball", "m", (0.005, 1.0))
     distance: tuple[float, float] = range_of(
-        0.0, 10.0, "distance on the plane, drawn so that the size in the picture is uniform", "m", (0.0, 100.0)
+        0.0, 10.0, "distance on the plane; sizes in the picture are uniformly distributed", "m", (0.0, 100.0)
     )
-    even: float = share(0.0, "pictures for which the distance itself is uniform: more far balls")
-    missing: float = share(0.1, "pictures without a ball")
-    cut: float = share(0.15, "pictures whose border may cut the ball")
-    hidden: float = share(0.2, "pictures with something between ball and camera, beside it or before it")
-    off_plane: float = share(0.08, "pictures with a ball on a pedestal or in the air")
-    off_plane_height: tuple[float, float] = range_of(0.1, 1.2, "its height over the plane", "m", (0.01, 5.0))
-    off_plane_label: str = one_of(CLASSES, "environment", "what such a ball counts as")
-    wrong_size: float = share(0.25, "pictures with a ball of another size, which counts as environment")
-    smaller: tuple[float, float] = range_of(0.25, 0.6, "its radius, if smaller, in radii of the ball", "", (0.01, 1.0))
-    larger: tuple[float, float] = range_of(1.7, 3.0, "its radius, if larger, in radii of the ball", "", (1.0, 20.0))
+    even: float = share(0.0, "share of pictures with uniformly distributed distance instead: more far balls")
+    missing: float = share(0.1, "share of pictures without a ball")
+    cut: float = share(0.15, "share of pictures whose border may cut the ball")
+    hidden: float = share(0.2, "share of pictures with an object close to the line from camera to ball")
+    off_plane: float = share(0.08, "share of pictures with another ball on a pedestal or in the air")
+    off_plane_height: tuple[float, float] = range_of(0.1, 1.2, "height of that ball above the plane", "m", (0.01, 5.0))
+    off_plane_label: str = one_of(CLASSES, "environment", "class of that ball")
+    wrong_size: float = share(0.25, "share of pictures with another ball of wrong size, which has class environment")
+    smaller: tuple[float, float] = range_of(
+        0.25, 0.6, "radius of a smaller ball, relative to the right one", "", (0.01, 1.0)
+    )
+    larger: tuple[float, float] = range_of(
+        1.7, 3.0, "radius of a larger ball, relative to the right one", "", (1.0, 20.0)
+    )
 
     def __post_init__(self) -> None:
         check_entries(self)
@@ -62,15 +68,17 @@ class TargetRanges:
 
 @dataclass(frozen=True)
 class ThingRanges:
-    """Section [things]: how many things stand around."""
+    """Section [things]: numbers of objects around the ball."""
 
-    robots: tuple[float, float] = range_of(0, 3, "robots", "", (0, 20))
-    clutter: tuple[float, float] = range_of(0, 4, "things of 5 to 50 cm", "", (0, 50))
-    round_things: tuple[float, float] = range_of(0, 2, "round things that are no ball", "", (0, 50))
-    furniture: tuple[float, float] = range_of(0, 1, "tables, chairs, poles and boards", "", (0, 20))
-    people: tuple[float, float] = range_of(0, 1, "people and legs", "", (0, 20))
-    carrier: float = share(0.35, "pictures that show who or what carries the camera, or holds something before it")
-    distance: tuple[float, float] = range_of(0.25, 9.0, "distance from the camera on the plane", "m", (0.13, 100.0))
+    robots: tuple[float, float] = range_of(0, 3, "number of robots", "", (0, 20))
+    clutter: tuple[float, float] = range_of(0, 4, "number of small objects", "", (0, 50))
+    round_things: tuple[float, float] = range_of(0, 2, "number of round objects that are not the ball", "", (0, 50))
+    furniture: tuple[float, float] = range_of(0, 1, "number of tables, chairs, poles and boards", "", (0, 20))
+    people: tuple[float, float] = range_of(0, 1, "number of people, or only their legs", "", (0, 20))
+    carrier: float = share(0.35, "share of pictures with the carrier of the camera: a tripod, hands, a robot's body")
+    distance: tuple[float, float] = range_of(
+        0.25, 9.0, "distance of objects from the camera on the plane", "m", (0.13, 100.0)
+    )
 
     def __post_init__(self) -> None:
         check_entries(self)
@@ -78,7 +86,7 @@ class ThingRanges:
 
 @dataclass(frozen=True)
 class SceneConfiguration:
-    """All sections."""
+    """All sections of scene.toml."""
 
     maps: MapRanges = dataclasses.field(default_factory=MapRanges)
     camera: CameraRanges = dataclasses.field(default_factory=CameraRanges)

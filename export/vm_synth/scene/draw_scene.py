@@ -1,4 +1,4 @@
-"""Scenes drawn from the configuration's ranges."""
+"""Draws a scene from the ranges of the configuration."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from .camera import draw_lens, draw_orientation
 from .configuration import SceneConfiguration
 from .environment import Environment
 from .field import Field, draw_field
-from .placement import NEAREST, TRIES, Things, in_picture, pierces, placed
+from .placement import ATTEMPTS, NEAREST, Placement, draw_ball_at, in_picture, intersects_ball
 from .scene import Scene
 from .sensor import draw_sensor
 
 
 def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environment: Environment) -> Scene:
-    """A scene under an environment map."""
+    """Draw a scene under an environment map."""
     lens = draw_lens(random, ranges.camera)
-    catcher = environment.floor is not None and random.random() < ranges.ground.photographed
+    photographed = environment.floor is not None and random.random() < ranges.ground.photographed
     radius = uniform(random, ranges.ball.radius)
     missing = random.random() < ranges.ball.missing
-    orientation, spot = _view(random, ranges, lens, radius, environment.floor if catcher else None)
-    field = None if catcher else _field_around(random, ranges, np.zeros(2) if spot is None else spot, radius)
+    orientation, spot = _draw_camera_and_spot(random, ranges, lens, radius, environment.floor if photographed else None)
+    field = None if photographed else _draw_field_around(random, ranges, np.zeros(2) if spot is None else spot, radius)
 
-    ball = None if missing or spot is None else placed(random, ranges, np.array([*spot, radius]), radius)
-    things = Things(random, ranges, lens, orientation, field, environment.floor if catcher else None)
+    ball = None if missing or spot is None else draw_ball_at(random, ranges, np.array([*spot, radius]), radius)
+    placement = Placement(random, ranges, lens, orientation, field, environment.floor if photographed else None)
     if ball is not None:
-        things.keep_clear(ball.center[:2], radius)
+        placement.keep_clear(ball.center[:2], radius)
         if random.random() < ranges.ball.hidden:
-            things.add_between(ball.center[:2], radius)
-    other, label = things.other_ball(radius)
+            placement.add_between(ball.center[:2], radius)
+    other, label = placement.draw_other_ball(radius)
     if field is not None and random.random() < ranges.field.goals:
-        things.add_goals(field)
-    things.add_all(radius)
-    bodies = [each for each in things.bodies if not (pierces(each, ball) or pierces(each, other))]
+        placement.add_goals(field)
+    placement.add_all(radius)
+    bodies = [each for each in placement.bodies if not (intersects_ball(each, ball) or intersects_ball(each, other))]
     return Scene(
         lens=lens,
         size=ranges.camera.size,
@@ -59,17 +59,20 @@ def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environm
     )
 
 
-def _view(
+def _draw_camera_and_spot(
     random: np.random.Generator, ranges: SceneConfiguration, lens: RadialLens, radius: float, floor: float | None
 ) -> tuple[Orientation, Floats | None]:
-    """A camera and a place (2,) for a ball that it sees, the ball's angular size or its distance being uniform; None
-    if many cameras saw none."""
-    for _ in range(TRIES):
+    """Draw a camera and a point (2,) [m] where it sees a ball; None in place of the point if many attempts fail.
+
+    The ball's angular size, or its distance, has a uniform distribution. floor: angle below the horizon where a
+    photographed floor begins [rad], or None.
+    """
+    for _ in range(ATTEMPTS):
         orientation = draw_orientation(random, ranges.camera)
         low, high = ranges.ball.distance
         if floor is not None:
             high = min(high, max(orientation.height - radius, 0.0) / math.tan(floor))
-        rise = max(orientation.height - radius, radius)  # a camera below the ball's top still sees it
+        rise = max(orientation.height - radius, radius)  # a camera below the top of the ball sees it, too
         largest, smallest = (
             math.asin(radius / max(math.hypot(d, rise), 1.01 * radius)) for d in (min(low, high), high)
         )
@@ -91,9 +94,9 @@ def _view(
     return orientation, None
 
 
-def _field_around(random: np.random.Generator, ranges: SceneConfiguration, spot: Floats, radius: float) -> Field:
-    """A field under the camera, and under the ball's place if it is large enough."""
-    for _ in range(TRIES):
+def _draw_field_around(random: np.random.Generator, ranges: SceneConfiguration, spot: Floats, radius: float) -> Field:
+    """Draw a field below the camera, with the spot (2,) [m] of the ball on its carpet if possible."""
+    for _ in range(ATTEMPTS):
         field = draw_field(random, ranges.field)
         if field.on_carpet(spot, 2.0 * radius):
             break

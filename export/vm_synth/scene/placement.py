@@ -1,4 +1,4 @@
-"""Where things stand: in the picture, on the ground, and not in each other's way."""
+"""Places the objects of a scene: visible, on the ground and apart from each other."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from .configuration import SceneConfiguration
 from .field import Field
 from .scene import PlacedBall
 
-TRIES = 60
-NEAREST = 0.12  # [m] between the camera's foot and things of the scene
+ATTEMPTS = 60
+NEAREST = 0.12  # [m], smallest distance on the plane between camera and objects
 
 
 def in_picture(lens: RadialLens, size: Size, rays: Floats, margin: float) -> Mask:
-    """Which rays (n, 3) of the camera are in the picture or at most an angle `margin` [rad] beyond its edge."""
+    """Which rays (n, 3) of the camera hit the picture, or miss it by at most an angle `margin` [rad]."""
     pixels = lens.project(rays, size)
     center = np.array(size) / 2.0
     with np.errstate(invalid="ignore"):
-        # The scale of the picture there, from a ray beside each.
+        # The local scale of the picture [px/rad], from a second ray close to each.
         beside = rays + 1e-3 * np.cross(rays, [0.3, 0.5, 0.8])
         beside /= np.linalg.norm(beside, axis=1, keepdims=True)
         scale = np.linalg.norm(lens.project(beside, size) - pixels, axis=1)
@@ -39,14 +39,15 @@ def in_picture(lens: RadialLens, size: Size, rays: Floats, margin: float) -> Mas
     return np.asarray(inside & lens.sees(rays))
 
 
-def placed(random: np.random.Generator, ranges: SceneConfiguration, center: Floats, radius: float) -> PlacedBall:
+def draw_ball_at(random: np.random.Generator, ranges: SceneConfiguration, center: Floats, radius: float) -> PlacedBall:
+    """Draw a ball with any design and attitude around a center (3,) [m]."""
     attitude, _ = np.linalg.qr(random.normal(size=(3, 3)))
     attitude[:, 0] *= np.sign(np.linalg.det(attitude))
     return PlacedBall(center, radius, attitude, draw_design(random, ranges.ball_design))
 
 
-class Things:
-    """The things of a scene while it is drawn."""
+class Placement:
+    """Draws the objects of one scene and finds free places for them."""
 
     def __init__(
         self,
@@ -69,11 +70,11 @@ class Things:
         self._taken: list[tuple[Floats, float]] = [(np.zeros(2), NEAREST)]
 
     def keep_clear(self, spot: Floats, radius: float) -> None:
-        """Nothing may stand within a radius [m] of a place (2,)."""
+        """Reserve the area within a radius [m] of a spot (2,) [m]."""
         self._taken.append((spot, radius))
 
     def add_all(self, ball_radius: float) -> None:
-        """Draw and place as many of each kind as configured."""
+        """Draw and place the configured numbers of all kinds of objects."""
         random, things, bodies = self._random, self._ranges.things, self._ranges.bodies
         for _ in range(self._count(things.robots)):
             self._add(draw_robot(random, bodies))
@@ -91,7 +92,7 @@ class Things:
                 self.bodies.append(carrier.moved(self._orientation.yaw, (0.0, 0.0, 0.0)))
 
     def add_goals(self, field: Field) -> None:
-        """Two goals, where their field has them."""
+        """Place two goals at the ends of their field."""
         ranges = self._ranges.field
         width, height = uniform(self._random, ranges.goal_width), uniform(self._random, ranges.goal_height)
         for side in (-1.0, 1.0):
@@ -103,7 +104,7 @@ class Things:
                 self.keep_clear(place, 0.6 * width)
 
     def add_between(self, spot: Floats, radius: float) -> None:
-        """A thing between the camera and the place (2,) of the ball, a little to its side."""
+        """Place an object between the camera and the spot (2,) [m] of the ball, slightly to its side."""
         random = self._random
         draw = (draw_robot, draw_clutter, draw_person, draw_furniture)[int(random.choice(4, p=[0.35, 0.4, 0.15, 0.1]))]
         bodies = draw(random, self._ranges.bodies)
@@ -117,8 +118,8 @@ class Things:
         aside = random.uniform(-1.0, 1.0) * (half + 0.8 * radius * along / distance)
         self._put(bodies, along * ahead + aside * np.array([-ahead[1], ahead[0]]), half)
 
-    def other_ball(self, radius: float) -> tuple[PlacedBall | None, str]:
-        """A ball of another size on the plane, or one of the same size off it, and its label."""
+    def draw_other_ball(self, radius: float) -> tuple[PlacedBall | None, str]:
+        """Draw a ball of the same size above the plane, one of wrong size on it, or None, and its class."""
         random, ranges = self._random, self._ranges.ball
         kind = random.random()
         if kind < ranges.off_plane:
@@ -130,14 +131,16 @@ class Things:
             if random.random() < 0.8:
                 self._put(stand, spot, _reach(stand))
             self.keep_clear(spot, _reach(stand))
-            return placed(random, self._ranges, np.array([*spot, height + radius]), radius), ranges.off_plane_label
+            return draw_ball_at(
+                random, self._ranges, np.array([*spot, height + radius]), radius
+            ), ranges.off_plane_label
         if kind < ranges.off_plane + ranges.wrong_size:
             factor = uniform(random, ranges.larger if random.random() < 0.5 else ranges.smaller)
             spot = self._free(factor * radius)
             if spot is not None:
                 self.keep_clear(spot, factor * radius)
                 center = np.array([*spot, factor * radius])
-                return placed(random, self._ranges, center, factor * radius), "environment"
+                return draw_ball_at(random, self._ranges, center, factor * radius), "environment"
         return None, "environment"
 
     def _count(self, span: Range) -> int:
@@ -155,12 +158,12 @@ class Things:
         self.keep_clear(spot, half)
 
     def _free(self, half: float) -> Floats | None:
-        """A place (2,) in the picture with so much room [m] around it, or None."""
+        """A visible spot (2,) [m] with this free radius [m] around it, or None."""
         random = self._random
-        nearest = max(self._ranges.things.distance[0], NEAREST + 2.0 * half)  # else it fills the picture
+        nearest = max(self._ranges.things.distance[0], NEAREST + 2.0 * half)  # a closer object would fill the picture
         if nearest >= self._farthest:
             return None
-        for _ in range(TRIES):
+        for _ in range(ATTEMPTS):
             distance = log_uniform(random, (nearest, self._farthest))
             heading = random.uniform(-math.pi, math.pi)
             spot = distance * np.array([math.cos(heading), math.sin(heading)])
@@ -174,8 +177,8 @@ class Things:
         return None
 
 
-def pierces(body: Body, ball: PlacedBall | None) -> bool:
-    """Whether the surface of a body passes through a ball; touching it, as what it lies on does, is not enough."""
+def intersects_ball(body: Body, ball: PlacedBall | None) -> bool:
+    """Whether the surface of a body passes through a ball. Touching it does not count."""
     if ball is None:
         return False
     inner = 0.98 * ball.radius
@@ -186,7 +189,7 @@ def pierces(body: Body, ball: PlacedBall | None) -> bool:
     share = -(corners * edges).sum(axis=-1) / np.maximum((edges**2).sum(axis=-1), 1e-18)
     if np.linalg.norm(corners + np.clip(share, 0.0, 1.0)[..., None] * edges, axis=-1).min() < inner:
         return True
-    # No edge does: a face may, where the foot of the perpendicular from the ball's center is within it.
+    # No edge does. A face does if it contains the foot of the perpendicular from the ball's center.
     normal = np.cross(edges[:, 0], edges[:, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-18)
     foot = (corners[:, 0] * normal).sum(axis=-1, keepdims=True) * normal
@@ -195,5 +198,5 @@ def pierces(body: Body, ball: PlacedBall | None) -> bool:
 
 
 def _reach(bodies: list[Body]) -> float:
-    """Largest horizontal distance [m] of bodies' vertices from the vertical through the origin."""
+    """Largest horizontal distance of the bodies' vertices from the origin [m]."""
     return max(float(np.hypot(each.vertices[:, 0], each.vertices[:, 1]).max()) for each in bodies)

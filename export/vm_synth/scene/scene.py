@@ -1,6 +1,6 @@
-"""What a picture shows: camera, ground, ball and all things around.
+"""A scene: camera, ground, ball and all objects around it.
 
-World frame: the plane is z = 0, z up, the camera stands over the origin.
+World frame: z up [m], the plane is z = 0, the camera is above the origin.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .sensor import Sensor
 
 @dataclass(frozen=True)
 class PlacedBall:
-    """A sphere: center (3,) and radius [m], attitude (3, 3), looks."""
+    """A ball in a scene: center (3,) and radius [m], rotation (3, 3) and design."""
 
     center: Floats
     radius: float
@@ -34,11 +34,10 @@ class PlacedBall:
 class Scene:
     """Everything that one picture shows.
 
-    field: the soccer field, or None where the ball lies on the floor of the photograph. ball: the one to be found,
-    or None where there is none of the radius that balls have here.
-    other: a ball that is not, because it is of another size or off the plane; other_label says what it counts as.
-    mesh: all other things, by names, each of so many vertices as counts says. ground_albedo (3,) is what the ground
-    throws back at them. seed: of the paths of light.
+    size: of the picture (w, h) [px]. field: the soccer field, or None for the floor of the photograph. ball_radius: the
+    right radius of balls [m]. ball: the ball to detect, or None. other: a ball of wrong size or above the plane, or
+    None; other_label is its class. mesh: all other objects; names and counts hold the name and the number of vertices
+    of each. ground_albedo: linear RGB, for light that the ground reflects. seed: of the ray tracer.
     """
 
     lens: RadialLens
@@ -58,5 +57,5 @@ class Scene:
 
     @property
     def camera(self) -> Floats:
-        """Where the camera is (3,) [m]."""
+        """Position (3,) of the camera [m]."""
         return np.array([0.0, 0.0, self.orientation.height])

@@ -15,7 +15,7 @@ from vm_embedded.geometry.calibrated_lenses import CalibratedLens
 from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.radial_lenses import RadialLens
-from vm_workstation.worker_process import shielded, worker_pool
+from vm_workstation.worker_process import interrupts_blocked, worker_pool
 
 from .classes import Classes, Labels
 from .picture_files import PictureFault, PictureFiles
@@ -135,7 +135,7 @@ def _found(
         return
     chunks = -(-len(pictures) // _CHUNK)
     with worker_pool(min(workers, chunks)) as pool:
-        with shielded():
+        with interrupts_blocked():
             results = pool.map(inspected, pictures, chunksize=_CHUNK)
         yield from results
 

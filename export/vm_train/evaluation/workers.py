@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vm_embedded.detection.settings import Settings
-from vm_workstation.worker_process import begin, shielded, worker_pool
+from vm_workstation.worker_process import interrupts_blocked, start_worker, worker_pool
 
 from ..data.classes import Classes
 from ..data.picture_files import PictureFiles
@@ -60,7 +60,7 @@ def _parts(job: Job, subject: Subject, chunks: Sequence[Sequence[PictureFiles]],
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
     with worker_pool(min(workers, len(chunks)), _start, (job,)) as pool:
-        with shielded():
+        with interrupts_blocked():
             results = pool.map(_evaluate_chunk, chunks)
         yield from results
 
@@ -71,7 +71,7 @@ _worker: tuple[Job, Subject] | None = None
 
 def _start(job: Job) -> None:
     global _worker
-    begin()
+    start_worker()
     _worker = (job, job.subject())
 
 

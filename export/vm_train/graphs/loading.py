@@ -8,7 +8,7 @@ import numpy as np
 from torch.utils.data import DataLoader, Dataset
 
 from vm_embedded.errors import InputError, VisualMeshError
-from vm_workstation.worker_process import begin, shielded
+from vm_workstation.worker_process import interrupts_blocked, start_worker
 
 from ..data.decoded_cache import DecodedCache, read_through_cache
 from ..data.picture_files import PictureFiles
@@ -76,7 +76,7 @@ def load_batches(
         multiprocessing_context="spawn" if workers else None,
     )
     try:
-        with shielded():
+        with interrupts_blocked():
             loaded = iter(loader)
         for found in loaded:
             if isinstance(found, VisualMeshError):
@@ -111,4 +111,4 @@ def _unchanged(found: list[LabeledGraph] | VisualMeshError) -> list[LabeledGraph
 
 
 def _start_worker(worker: int) -> None:
-    begin()
+    start_worker()
