@@ -140,6 +140,5 @@ def read_configuration(path: str | Path) -> Configuration:
 
 def with_overrides(configuration: Configuration, sections: Mapping[str, Mapping[str, Any]]) -> Configuration:
     """The configuration with the given entries of the given sections replaced. Raises InputError."""
-
     changed = {name: replace(getattr(configuration, name), **entries) for name, entries in sections.items()}
     return replace(configuration, **changed)
