@@ -58,8 +58,7 @@ class Pose:
 class Plane:
     """All points p [m] of the world with normal . p = offset. Objects lie on the side that the normal points to.
 
-    name: of the plane, which sightings on it carry. The normal and the offset are scaled so that the normal has length
-    1.
+    name: for sightings on the plane. The normal is scaled to length 1, and the offset by the same factor.
 
     Raises GeometryError for a normal of length 0 and for numbers that are not finite.
     """
@@ -92,7 +91,7 @@ class Plane:
     def spotlight(cls, name: str, target: Sequence[float], camera: Sequence[float]) -> Plane:
         """The plane through the point `target` that faces a camera at the point `camera` [m].
 
-        The camera looks straight down on such a plane, and the middle of the mesh is on the target.
+        The target is the camera's foot point on this plane, so it is in the middle of the mesh.
 
         Raises GeometryError if both are the same point.
         """

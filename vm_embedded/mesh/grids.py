@@ -45,8 +45,8 @@ class Grid(MeshModel):
     """A lattice of one of KINDS, row by row: all points that links connect to the point below the camera.
 
     A point has the column n and the row m, and its neighbors are `steps` away. With four or eight neighbors u = n / k
-    and v = m / k. With six neighbors every other row is half a step off: u = (n + m / 2) / k and v = sqrt(3) / 2 m /
-    k.
+    and v = m / k. With six neighbors each row is shifted by half a step, and rows are closer than columns:
+    u = (n + m / 2) / k and v = sqrt(3) / 2 m / k.
     """
 
     steps: tuple[tuple[int, int], ...]
@@ -61,6 +61,7 @@ class Grid(MeshModel):
         shape.spacing(height)  # raises GeometryError for a height without a mesh
         x, y = self._quarter(shape, height, intersections, max_distance)
         rows, halves = (size - 1 for size in x.shape)
+        # half counts half steps along a row: 2 n, or 2 n + m with six neighbors.
         m, half = (axis.astype(np.int32) for axis in np.mgrid[-rows : rows + 1, -halves : halves + 1])
         shown = np.isfinite(x[np.abs(m), np.abs(half)])
         m, half = m[shown], half[shown]
@@ -105,9 +106,9 @@ Coordinate = Callable[[Floats, Floats | float], Floats]
 def _coordinate(shape: Shape, height: float) -> Coordinate:
     """A function that gives the coordinate (n,) [m] n objects out, in the slice at a distance (n,) [m].
 
-    A slice is a plane through the camera that is parallel to the coordinate's axis. Its distance from the camera's foot
-    point is measured at the height of the object's center. In a slice at the distance d the camera's height over that
-    plane, g, becomes sqrt(g^2 + d^2).
+    A slice is a plane through the camera. At the height of the object's center it contains a line that is parallel to
+    the coordinate's axis, at the slice's distance d from the point below the camera. The camera is sqrt(g^2 + d^2) away
+    from this line, and in the slice this takes the place of its height g.
     """
     c = shape.center_height
     g = height - c
@@ -171,12 +172,13 @@ def _border(kind: str, shape: Shape, height: float, max_distance: float) -> Floa
     angle = np.linspace(0.0, np.pi / 2.0, 721)
     x, y = max_distance * np.cos(angle), max_distance * np.sin(angle)
 
-    def counted(along: Floats, other: Floats | float) -> Floats:
-        slant = np.hypot(height - c, other)
-        return np.asarray(shape.n(np.arctan2(along, slant), slant + c))
+    def objects_out(coordinate: Floats, distance: Floats | float) -> Floats:
+        """The inverse of `_coordinate`."""
+        slant = np.hypot(height - c, distance)
+        return np.asarray(shape.n(np.arctan2(coordinate, slant), slant + c))
 
-    u = counted(x, y if kind == "nm" else 0.0)
-    v = counted(y, 0.0 if kind == "xy" else x)
+    u = objects_out(x, y if kind == "nm" else 0.0)
+    v = objects_out(y, 0.0 if kind == "xy" else x)
     return np.stack([u, v], axis=1)
 
 

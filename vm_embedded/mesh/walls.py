@@ -42,19 +42,19 @@ class Walls(MeshModel):
         counts = wall_counts(shape, intersections, max_distance)
         up = (np.arange(rows) + 0.5) / rows * tall - height  # height of the rows above the camera [m]
 
-        pieces, links, first = [], [], 0
+        rays, walls, first = [], [], 0
         for distance, count in zip(distances.tolist(), counts.tolist(), strict=True):
             row, place = (axis.reshape(-1) for axis in np.mgrid[:rows, :count].astype(np.int32))
-            pieces.append(rays_from_polar(np.arctan2(distance, -up[row]), 2.0 * np.pi * (place + 0.5 * row) / count))
-            links.append((row, place, count, first))
+            rays.append(rays_from_polar(np.arctan2(distance, -up[row]), 2.0 * np.pi * (place + 0.5 * row) / count))
+            walls.append((row, place, count, first))
             first += rows * count
         neighbors = np.full((first + 1, self.neighbors), first, dtype=np.int32)
-        for row, place, count, start in links:
+        for row, place, count, start in walls:
             for column, (right, above) in enumerate(Grid("xy", 6).steps):
                 to_row, to_place = row + above, (place + right) % count
                 there = (to_row >= 0) & (to_row < rows)
                 neighbors[start : start + len(row), column] = np.where(there, start + to_row * count + to_place, first)
-        return Mesh(frozen(np.asfortranarray(np.concatenate(pieces))), frozen(neighbors))
+        return Mesh(frozen(np.asfortranarray(np.concatenate(rays))), frozen(neighbors))
 
     def mesh_height(self, shape: Shape, height: float, intersections: float, tolerance: float) -> float:
         """The mesh height [m] from an arithmetic series: rows are object_height / k apart and move with the camera."""
@@ -80,10 +80,10 @@ def _checked(shape: Shape, height: float) -> Cylinder:
 def wall_distances(shape: Shape, intersections: float, max_distance: float) -> Floats:
     """Distances (m,) of the walls [m], the nearest first.
 
-    An object at the distance d fills the angle 2 a(d) = 2 asin(r / d), and k a(d) / a(w) points of the wall at w. So a
-    wall serves objects with a(d) from 1 - 1 / k to 1 + 1 / k times a(w), and the next wall begins where it ends.
-    Rounding a row up to whole points makes objects wider by up to a(d) / pi points. The upper end is lower by that
-    much.
+    An object at the distance d fills the angle 2 a(d) = 2 asin(r / d), and k a(d) / a(w) points of the wall at w. A
+    wall is for objects with a(d) from 1 - 1 / k to 1 + 1 / k times a(w), which have k - 1 to k + 1 points. The next
+    wall begins where it ends. Rounding a row up to whole points makes objects wider by up to a(d) / pi points, so the
+    upper end is lower by that much.
 
     Raises GeometryError for fewer than 2 intersections, and for a radius or a maximum distance that leaves no room for
     a wall at NEAREST.

@@ -24,8 +24,8 @@ Point 1 is in slot 4. Its first group, 0 1 2, has its middle in slot 4, and its 
 takes m - 1 = 22 columns of the table, and the sum around slot s is in column s + 1 of its group. So the columns of
 point 1 are 4 + 1 = 5 and 22 + 8 + 1 = 31.
 
-Copies and gaps look up the same sums as their originals and the off-screen point. So they have the right values in all
-layers, without masks or special cases.
+A copy looks up the same sums as its original, and a gap the same sums as the off-screen point. So both keep the right
+values in all layers, without masks or special cases.
 """
 
 from __future__ import annotations
@@ -153,25 +153,26 @@ def _found_in_runs(
 def _in_runs(left: Indices, right: Indices) -> _Positions:
     """The points in runs (n in gaps), from their left and right neighbors (n,): three gaps, then runs with a gap each.
 
-    A *piece* is a sequence of points i, i + 1, ... that are also neighbors. numpy finds all pieces at once, and a loop
-    joins only pieces to runs. A ring that the view cuts in two has two pieces.
+    A *piece* is a sequence of points i, i + 1, ... each linked to the next. numpy finds all pieces at once, and a loop
+    only joins pieces to runs. A ring that the view cuts in two has two pieces.
     """
     n = len(left)
     points = np.arange(n)
+    # A piece starts at i unless i - 1 and i are each other's right and left neighbors.
     starts = np.flatnonzero(np.append(True, (right[:-1] != points[1:]) | (left[1:] != points[:-1]))[:n])
     ends = np.append(starts[1:], n)[: len(starts)] - 1
-    piece = np.full(n + 1, -1)  # that begins with a point, or -1
-    piece[starts] = np.arange(len(starts))
-    follower = piece[right[ends]]
-    follower[left[starts[follower]] != ends] = -1  # right of a piece's end, but not linked back to it
+    piece_at = np.full(n + 1, -1)  # the piece that starts with a point
+    piece_at[starts] = np.arange(len(starts))
+    follower = piece_at[right[ends]]
+    follower[left[starts[follower]] != ends] = -1  # it starts with the right point, but is not linked back
 
     order, ends_run = _chained(follower)
     lengths = (ends - starts + 1)[order]
-    slot = _GAPS_BEFORE + np.cumsum(np.append(0, lengths + ends_run))  # where each piece begins
-    slots = np.full(slot[-1], n)
-    within = points - np.repeat(np.cumsum(lengths) - lengths, lengths)
-    slots[np.repeat(slot[:-1], lengths) + within] = np.repeat(starts[order], lengths) + within
-    return slots
+    first_slot = _GAPS_BEFORE + np.cumsum(np.append(0, lengths + ends_run))  # of each piece, and of the end
+    runs = np.full(first_slot[-1], n)
+    within = points - np.repeat(np.cumsum(lengths) - lengths, lengths)  # place of a point in its piece
+    runs[np.repeat(first_slot[:-1], lengths) + within] = np.repeat(starts[order], lengths) + within
+    return runs
 
 
 def _chained(follower: _Positions) -> tuple[npt.NDArray[np.intp], Mask]:
