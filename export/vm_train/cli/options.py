@@ -58,22 +58,8 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--strict", action="store_true", help="fail if a picture is damaged; default: skip it")
     add_stream(made)
-    lists = made.add_argument_group(
-        "lists of pictures", "Text files with a picture number or image name on each line; default: split by [data]."
-    )
-    for part in ("training", "validation", "test"):
-        lists.add_argument(f"--{part}", type=Path, metavar="FILE", help=f"list of pictures for {part}")
-    kept = made.add_mutually_exclusive_group()
-    kept.add_argument(
-        "--unpacked",
-        type=Path,
-        metavar="DIR",
-        help="folder to cache decoded pictures in (1.3 MB for 640 x 512 px); several trainings can share it; default "
-        "RUN/unpacked, which is removed at the end",
-    )
-    kept.add_argument(
-        "--no-unpacked", action="store_true", help="do not cache decoded pictures; for slow or small disks"
-    )
+    _add_lists(made)
+    _add_cache(made)
     _add_hardware(made)
     return made
 
@@ -162,6 +148,28 @@ def _add_configuration(made: argparse.ArgumentParser) -> None:
         default=[],
         metavar="SECTION.ENTRY=VALUE",
         help="override an entry of the configuration, for example training.epochs=5; repeat it for each entry",
+    )
+
+
+def _add_lists(made: argparse.ArgumentParser) -> None:
+    lists = made.add_argument_group(
+        "lists of pictures", "Text files with a picture number or image name on each line; default: split by [data]."
+    )
+    for part in ("training", "validation", "test"):
+        lists.add_argument(f"--{part}", type=Path, metavar="FILE", help=f"list of pictures for {part}")
+
+
+def _add_cache(made: argparse.ArgumentParser) -> None:
+    group = made.add_mutually_exclusive_group()
+    group.add_argument(
+        "--unpacked",
+        type=Path,
+        metavar="DIR",
+        help="folder to cache decoded pictures in (1.3 MB for 640 x 512 px); several trainings can share it; default "
+        "RUN/unpacked, which is removed at the end",
+    )
+    group.add_argument(
+        "--no-unpacked", action="store_true", help="do not cache decoded pictures; for slow or small disks"
     )
 
 

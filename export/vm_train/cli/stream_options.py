@@ -42,7 +42,7 @@ def add_stream(made: argparse.ArgumentParser) -> None:
 
 
 def stream_source(
-    options: argparse.Namespace, configuration: TrainConfiguration, here: Hardware
+    options: argparse.Namespace, configuration: TrainConfiguration, hardware: Hardware
 ) -> StreamSource | None:
     """Where to stream training pictures from, or None. Raises InputError if the options contradict each other."""
     from ..graphs.streamed import StreamSource
@@ -62,8 +62,8 @@ def stream_source(
             "mesh.radius_of = 'scene' needs sceneX.json, which shards don't hold: use a folder of pictures"
         )
     shards = shard_names(options.stream)
-    workers = min(here.workers, len(shards) // here.size)
-    return StreamSource(shards, options.epoch_pictures, here.size, workers, options.strict)
+    workers = min(hardware.workers, len(shards) // hardware.size)
+    return StreamSource(shards, options.epoch_pictures, hardware.size, workers, options.strict)
 
 
 def shard_names(patterns: Sequence[str]) -> tuple[str, ...]:

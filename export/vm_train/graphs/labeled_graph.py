@@ -115,7 +115,7 @@ def _equal_hexagonal_mesh(lens: Lens, size: Size, manifest: Manifest, height: fl
 
 
 def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> LabeledGraph:
-    """What a network with this manifest sees of a picture. Raises GeometryError or InputError as seen_points does."""
+    """The graph of a picture for a network with this manifest. Raises GeometryError or InputError as seen_points."""
     height, width = picture.labels.shape
     shown = seen_points(picture.lens, (width, height), manifest, grid)
     points = np.full((len(shown) + 1, 3), OFF_SCREEN, dtype=np.float32)

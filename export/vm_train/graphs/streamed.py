@@ -71,6 +71,7 @@ def assign_lanes(batches: Iterable[Batch], seed: tuple[int, ...], source: Stream
             continue
         items = []
         for position, item in enumerate(batch.items):
+            # The loader deals batches to its workers in turn, and Batch.part deals items to the processes.
             lane = index % max(source.workers, 1) * source.processes + position % source.processes
             place = places[batch.epoch, lane]
             items.append(StreamedItem(item.position, item.seed, (*seed, 4, batch.epoch), lane, place))
@@ -102,6 +103,7 @@ class StreamedGraphs(Dataset[LabeledGraph]):
             return empty_graph(recipe.manifest.neighbors)
 
     def _raw(self, item: StreamedItem) -> RawPicture:
+        """Read on in the item's lane. Begins the lane again for another epoch, or a place that is passed already."""
         lane = self._lanes.get(item.lane)
         if lane is None or lane.order != item.order or lane.done > item.place:
             pictures = _pictures(self._source, item.order, item.lane, self._skip)

@@ -125,9 +125,9 @@ def test_the_networks_of_the_visual_mesh_take_it():
 
 
 def test_no_points_no_picture_and_a_blind_lens_are_refused():
-    with pytest.raises(InputError, match="0 points"):
+    with pytest.raises(InputError, match="mesh of 0 points does not fit"):
         hexagonal_mesh(SIZE, 0)
     with pytest.raises(InputError, match="1 x 480"):
         hexagonal_mesh((1, 480), 100)
-    with pytest.raises(InputError, match="sees nothing"):
+    with pytest.raises(InputError, match="sees no part of"):
         visible_hexagonal_mesh(Rectilinear(focal_length=400.0, fov=0.1, center=(2000.0, 0.0)), SIZE, 100)
