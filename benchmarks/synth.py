@@ -23,7 +23,7 @@ SUMMARY = re.compile(r"(\d+) pictures in (\d+) s, (\d+) per hour; at most (\d+) 
 
 
 def rendered(hdri: Path, count: int, workers: int) -> dict[str, int]:
-    """Pictures, seconds, pictures an hour and MiB of the largest worker."""
+    """Pictures, seconds, pictures per hour and MiB of the largest worker."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "vm_synth", folder, "--count", str(count), "--workers", str(workers)]
         command += ["--hdri", str(hdri), "--seed", "2", "--config", str(CONFIG)]
@@ -43,7 +43,7 @@ def main() -> None:
     rows = [
         f"| {workers} | {run['pictures']} | {run['an_hour']} | {run['mib_a_worker']} |" for workers, run in runs.items()
     ]
-    heads = "| workers | pictures | pictures an hour | MiB a worker, at most |\n| ---: | ---: | ---: | ---: |\n"
+    heads = "| workers | pictures | pictures per hour | MiB per worker, at most |\n| ---: | ---: | ---: | ---: |\n"
     table = heads + "\n".join(rows) + "\n"
     before, after = PAGE.read_text().split("<!-- throughput -->\n")
     PAGE.write_text(before + "<!-- throughput -->\n" + table + after[after.index("<!-- end -->") :])

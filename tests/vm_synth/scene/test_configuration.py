@@ -146,8 +146,8 @@ def test_lengths_and_angles_have_a_unit():
 
 def test_the_unit_and_the_limits_are_documented():
     lines = to_commented_toml(DEFAULT).split("\n")
-    assert lines[lines.index("height = [0.3, 1.6]") - 1] == "# height over the plane [m]; 0.05 to 20"
-    assert lines[lines.index("missing = 0.1") - 1] == "# pictures without a ball; 0 to 1"
+    assert lines[lines.index("height = [0.3, 1.6]") - 1] == "# height above the plane [m]; 0.05 to 20"
+    assert lines[lines.index("missing = 0.1") - 1] == "# share of pictures without a ball; 0 to 1"
     assert lines[lines.index('off_plane_label = "environment"') - 1].endswith(f"; allowed: {', '.join(CLASSES)}")
 
 
