@@ -84,13 +84,13 @@ def _checked(split: Split, count: int, remedy: str) -> Split:
     return split
 
 
-def save(path: Path, split: Split) -> None:
+def write_split(path: Path, split: Split) -> None:
     """Write pictures.json. Raises InputError if it can't be written."""
     with atomic_write(path) as part:
         part.write_text(json.dumps(asdict(split), indent=1) + "\n", encoding="utf-8")
 
 
-def load(path: Path) -> Split:
+def read_split(path: Path) -> Split:
     """Read pictures.json. Raises InputError naming the file and its fault."""
     try:
         table = json.loads(path.read_text(encoding="utf-8"))

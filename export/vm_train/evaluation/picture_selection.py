@@ -10,7 +10,7 @@ from vm_embedded.errors import InputError
 from ..data.picture_files import PictureFiles
 from ..data.picture_lists import check_known, read_list
 from ..data.pictures import find_pictures
-from ..data.split import load
+from ..data.split import read_split
 
 
 def select_pictures(folders: Sequence[Path], chosen: Path | None, part: str | None) -> list[PictureFiles]:
@@ -28,7 +28,7 @@ def select_pictures(folders: Sequence[Path], chosen: Path | None, part: str | No
         return found
     known = {files.number for files in found}
     if is_split:
-        wanted = getattr(load(chosen), part)
+        wanted = getattr(read_split(chosen), part)
         for number in wanted:
             check_known(number, known, str(chosen))
     else:

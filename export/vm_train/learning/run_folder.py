@@ -27,7 +27,7 @@ from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_embedded.files import atomic_write
 
-from ..data.split import load, save
+from ..data.split import read_split, write_split
 from ..graphs.frozen_network import FirstLook, FrozenNetwork
 from ..graphs.loading import PictureGraphs
 from ..graphs.streamed import StreamedGraphs, StreamSource
@@ -146,7 +146,7 @@ def begin_run(
             "object (a camera below the top of a sphere or cylinder sees no point of its mesh)"
         )
     run = TrainingRun(folder, data, configuration, counts, first_look, frozen_teacher)
-    save(folder / "pictures.json", data.split)
+    write_split(folder / "pictures.json", data.split)
     for name, path in ((_FIRST, first), (_TEACHER, teacher)):
         if path is not None:
             with atomic_write(folder / name) as part:
@@ -175,7 +175,7 @@ def read_run(folder: Path) -> TrainingRun:
     configuration = read_sections(TrainConfiguration, folder / "train.toml")
     first = None if first_sha256 is None else _load_first(folder / _FIRST, configuration)
     teacher = None if teacher_sha256 is None else _load_teacher(folder / _TEACHER, configuration)
-    split = load(folder / "pictures.json")
+    split = read_split(folder / "pictures.json")
     data = TrainingData(pictures, split, None if unpacked is None else folder / unpacked, source)
     run = TrainingRun(folder, data, configuration, counts, first, teacher)
     for name, network, before in ((_FIRST, first, first_sha256), (_TEACHER, teacher, teacher_sha256)):

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
-from vm_train.data.split import Split, load, save, split_by_lists, split_by_seed
+from vm_train.data.split import Split, read_split, split_by_lists, split_by_seed, write_split
 
 NUMBERS = tuple(f"{index:07d}" for index in range(1000))
 
@@ -96,8 +96,8 @@ def test_faults_of_lists_are_named(tmp_path):
 
 def test_a_split_is_written_and_read_back(tmp_path):
     split = split_by_seed(NUMBERS, 0.1, 0.1, 7)
-    save(tmp_path / "pictures.json", split)
-    assert load(tmp_path / "pictures.json") == split
+    write_split(tmp_path / "pictures.json", split)
+    assert read_split(tmp_path / "pictures.json") == split
 
 
 @pytest.mark.parametrize(
@@ -116,6 +116,6 @@ def test_a_split_is_written_and_read_back(tmp_path):
 def test_damaged_files_are_named(text, tmp_path):
     (tmp_path / "pictures.json").write_text(text)
     with pytest.raises(InputError, match=r"pictures\.json"):
-        load(tmp_path / "pictures.json")
+        read_split(tmp_path / "pictures.json")
     with pytest.raises(InputError, match="can't read"):
-        load(tmp_path / "nowhere.json")
+        read_split(tmp_path / "nowhere.json")

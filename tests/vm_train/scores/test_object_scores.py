@@ -1,4 +1,4 @@
-"""Scores of objects against their definitions, on squares whose overlaps are exact, and outlines against formulas."""
+"""Scores of objects against their definitions, on squares whose overlaps are exact."""
 
 import json
 import math
@@ -10,22 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.arrays import Floats
 from vm_embedded.errors import InputError
 from vm_train.scores.object_scores import ObjectScores
-from vm_train.scores.overlaps import TrueObject, coverage
+from vm_train.scores.overlaps import TrueObject
 
-from .test_overlaps import circle
+from .test_overlaps import FoundObject
 
 WIDTH, HEIGHT = 48, 32
 EDGES = np.array([0.0, 2.0, 4.0])
-
-
-@dataclass(frozen=True, eq=False)
-class FoundObject:
-    confidence: float
-    outline: Floats
-    position: Floats
 
 
 @dataclass(frozen=True)
@@ -287,44 +279,3 @@ def test_rules_that_make_no_sense_are_refused():
         ObjectScores().ranking(0.6)
     with pytest.raises(InputError, match="do not add up"):
         ObjectScores() + ObjectScores(min_radius=2.0)
-
-
-def disk_overlap(a, b, away):
-    """Intersection over union of two disks of radii a and b whose centers are `away` apart."""
-    if away >= a + b:
-        return 0.0
-    if away <= abs(a - b):
-        return min(a, b) ** 2 / max(a, b) ** 2
-    first = math.acos((away**2 + a**2 - b**2) / (2.0 * away * a))
-    second = math.acos((away**2 + b**2 - a**2) / (2.0 * away * b))
-    kite = math.sqrt((a + b - away) * (away + a - b) * (away + b - a) * (away + a + b)) / 2.0
-    common = a**2 * first + b**2 * second - kite
-    return common / (math.pi * (a**2 + b**2) - common)
-
-
-def shown(outline, size, kind):
-    """A mask (h, w) of what the outline covers, by pixel centers or by shares."""
-    mask = np.zeros(size[::-1])
-    window, share = coverage(outline, size)
-    mask[window] = share
-    return mask >= 0.5 if kind is bool else mask.astype(kind)
-
-
-@given(
-    st.floats(10.0, 60.0), st.floats(0.7, 1.4), st.floats(0.0, 2.2), st.floats(0.0, 6.3), st.sampled_from([bool, float])
-)
-def test_overlaps_of_disks_are_those_of_the_formula(radius, ratio, away, turn, kind):
-    size = (400, 400)
-    other = max(radius * ratio, 10.0)
-    away *= radius
-    x, y = 200.3 + away * math.cos(turn), 199.6 + away * math.sin(turn)
-    truth = TrueObject(shown(circle(200.3, 199.6, radius), size, kind), np.zeros(3), radius)
-    # Found at thresholds below the true overlap and not above it.
-    expected = disk_overlap(radius, other, away)
-    below, above = expected - 0.02, expected + 0.02
-    scores = ObjectScores(overlaps=[each for each in (below, above) if 0.0 < each <= 1.0] or [1.0])
-    scores.add([truth], [FoundObject(1.0, circle(x, y, other), np.zeros(3))])
-    if below > 0.0:
-        assert scores.ranking(below).at().hits == 1
-    if above <= 1.0:
-        assert scores.ranking(above).at().hits == 0

@@ -1,16 +1,26 @@
-"""The share of pixels inside outlines, against formulas."""
+"""The share of pixels inside outlines, and overlaps of disks, against formulas."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_train.scores.overlaps import coverage
+from vm_embedded.arrays import Floats
+from vm_train.scores.object_scores import ObjectScores
+from vm_train.scores.overlaps import TrueObject, coverage
 
 SQUARE = np.array([(5.0, 5.0), (13.0, 5.0), (13.0, 13.0), (5.0, 13.0)]) - 0.5
 """Around 8 x 8 pixels."""
+
+
+@dataclass(frozen=True, eq=False)
+class FoundObject:
+    confidence: float
+    outline: Floats
+    position: Floats
 
 
 def circle(x, y, radius, corners=256):
@@ -49,3 +59,44 @@ def test_outlines_of_less_than_three_corners_cover_nothing(corners):
 
 def test_a_corner_that_the_lens_does_not_see_is_left_out():
     assert coverage(np.insert(SQUARE, 1, math.nan, axis=0), (60, 40))[1].sum() == pytest.approx(64.0)
+
+
+def disk_overlap(a, b, away):
+    """Intersection over union of two disks of radii a and b whose centers are `away` apart."""
+    if away >= a + b:
+        return 0.0
+    if away <= abs(a - b):
+        return min(a, b) ** 2 / max(a, b) ** 2
+    first = math.acos((away**2 + a**2 - b**2) / (2.0 * away * a))
+    second = math.acos((away**2 + b**2 - a**2) / (2.0 * away * b))
+    kite = math.sqrt((a + b - away) * (away + a - b) * (away + b - a) * (away + a + b)) / 2.0
+    common = a**2 * first + b**2 * second - kite
+    return common / (math.pi * (a**2 + b**2) - common)
+
+
+def shown(outline, size, kind):
+    """A mask (h, w) of what the outline covers, by pixel centers or by shares."""
+    mask = np.zeros(size[::-1])
+    window, share = coverage(outline, size)
+    mask[window] = share
+    return mask >= 0.5 if kind is bool else mask.astype(kind)
+
+
+@given(
+    st.floats(10.0, 60.0), st.floats(0.7, 1.4), st.floats(0.0, 2.2), st.floats(0.0, 6.3), st.sampled_from([bool, float])
+)
+def test_overlaps_of_disks_are_those_of_the_formula(radius, ratio, away, turn, kind):
+    size = (400, 400)
+    other = max(radius * ratio, 10.0)
+    away *= radius
+    x, y = 200.3 + away * math.cos(turn), 199.6 + away * math.sin(turn)
+    truth = TrueObject(shown(circle(200.3, 199.6, radius), size, kind), np.zeros(3), radius)
+    # Found at thresholds below the true overlap and not above it.
+    expected = disk_overlap(radius, other, away)
+    below, above = expected - 0.02, expected + 0.02
+    scores = ObjectScores(overlaps=[each for each in (below, above) if 0.0 < each <= 1.0] or [1.0])
+    scores.add([truth], [FoundObject(1.0, circle(x, y, other), np.zeros(3))])
+    if below > 0.0:
+        assert scores.ranking(below).at().hits == 1
+    if above <= 1.0:
+        assert scores.ranking(above).at().hits == 0
