@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.vm_embedded.live.running import arguments, running
-from tests.vm_embedded.poses.test_buffer import quaternion
+from tests.vm_embedded.poses.test_parsing import quaternion
 from vm_embedded.cameras.synthetic import Motion
 from vm_embedded.live.control import ask
 
