@@ -22,8 +22,8 @@ class Settings:
     sampling: str = one_of(SAMPLINGS, "exact", "how to read colors between pixels")
     height_tolerance: float = number(
         0.5,
-        "height change that needs a new mesh, as a change in the number of rings across an object; with 0 each frame "
-        "gets a mesh at its own height and heading, as in the reference, which is slower",
+        "largest change of the number of rings across an object before another height gets its own mesh; 0: every "
+        "frame gets a mesh at its own height and heading, as in the reference, which is slower",
         "rings",
         (0.0, 2.0),
     )
@@ -43,10 +43,10 @@ class Settings:
         (0.1, 1e4),
     )
     threshold: float = share(0.5, "probability above which a point counts for a class")
-    min_inside: float = share(0.85, "smallest mean probability inside an object's outline")
-    max_around: float = share(0.25, "largest mean probability in the band around an object")
-    max_widths: float = number(2.0, "largest width of a cluster that can be one object", "object widths", (1.0, 100.0))
-    min_visible: float = share(0.25, "smallest share of an object's points on screen")
+    min_inside: float = share(0.85, "lowest mean probability inside the outline of an accepted object")
+    max_around: float = share(0.25, "highest mean probability in the band around an accepted object")
+    max_widths: float = number(2.0, "largest width of a cluster that may be one object", "object widths", (1.0, 100.0))
+    min_visible: float = share(0.25, "lowest share of an object's points that must be on screen")
 
     def __post_init__(self) -> None:
         check_entries(self)
