@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import sys
 from collections.abc import Sequence
@@ -19,6 +18,7 @@ from vm_workstation.stopping import stoppable
 from .evaluate_options import parser as parser
 from .evaluate_options import parsers as parsers
 from .evaluate_options import points_parser
+from .evaluate_points import run_points
 
 if TYPE_CHECKING:
     from ..evaluation.answers import Subject
@@ -33,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with stoppable():
             if given[:1] == ["points"]:
-                return _points(points_parser().parse_args(given[1:]))
+                return run_points(points_parser().parse_args(given[1:]))
             return _evaluate(parser().parse_args(given))
     except ImportError as error:
         missing = error.name or str(error)
@@ -154,34 +154,6 @@ def _notes(options: argparse.Namespace, settings: Settings, subject: Subject, re
     if options.radius_of == "scene":
         notes.append("Mesh and fit use the radius of each picture's ball.")
     return notes
-
-
-def _points(options: argparse.Namespace) -> int:
-    from vm_embedded.files import check_writable
-    from vm_embedded.geometry.orientation import Orientation
-    from vm_embedded.geometry.sphere import Sphere
-    from vm_workstation.plots import check_figure_path, save_figure
-
-    from ..evaluation.points_on_ball import PAPER_CAMERA, PosedCamera
-    from ..evaluation.points_on_ball_plot import points_figure
-    from ..evaluation.points_over_distance import DISTANCES, points_over_distance
-
-    check_figure_path(options.output)
-    check_writable(options.output)
-    pose = Orientation.from_roll_pitch(options.height, pitch=math.radians(options.pitch))
-    camera = PosedCamera(pose, PAPER_CAMERA.lens, PAPER_CAMERA.size)
-    ball = Sphere(options.radius)
-    curves = points_over_distance(camera, ball, options.intersections, DISTANCES[::2], options.equal_at, options.early)
-    title = (
-        f"camera {options.height:g} m high, {options.pitch:g} degrees down, "
-        f"{camera.size[0]} x {camera.size[1]} px; ball of radius {options.radius:g} m"
-    )
-    save_figure(points_figure(curves, title), options.output)
-    for curve in curves:
-        shown = ", ".join(f"{curve.at(each)[0]:.1f} at {each:g} m" for each in (1.0, 2.0, 5.0, 10.0))
-        print(f"{curve.mesh:9s}  k = {curve.intersections:g}, {curve.count} points on screen; on the ball: {shown}")
-    print(f"{options.output}: written")
-    return EXIT_OK
 
 
 if __name__ == "__main__":

@@ -108,9 +108,9 @@ def inspect_pictures(
     report: is called after each picture. objects: classes whose distances to measure. Raises VisualMeshError for an
     unknown class and if a worker was killed.
     """
-    positions = [_position(name, classes) for name in objects]
+    numbers = [_class_number(name, classes) for name in objects]
     good, facts, faults = [], [], []
-    for files, found in zip(pictures, _found(pictures, classes, positions, workers), strict=True):
+    for files, found in zip(pictures, _results(pictures, classes, numbers, workers), strict=True):
         if isinstance(found, FaultyPicture):
             faults.append(found)
         else:
@@ -120,33 +120,33 @@ def inspect_pictures(
     return Inspection(classes.names, tuple(good), tuple(facts), tuple(faults))
 
 
-def _position(name: str, classes: Classes) -> int:
+def _class_number(name: str, classes: Classes) -> int:
     if name not in classes.names:
         raise VisualMeshError(unknown("class", name, classes.names))
     return classes.names.index(name)
 
 
-def _found(
+def _results(
     pictures: Sequence[PictureFiles], classes: Classes, objects: Sequence[int], workers: int
 ) -> Iterator[PictureFacts | FaultyPicture]:
-    inspected = partial(_inspected, classes=classes, objects=objects)
+    inspect_one = partial(_inspect_one, classes=classes, objects=objects)
     if workers < 2 or len(pictures) <= _CHUNK:
-        yield from map(inspected, pictures)
+        yield from map(inspect_one, pictures)
         return
     chunks = -(-len(pictures) // _CHUNK)
     with worker_pool(min(workers, chunks)) as pool:
         with interrupts_blocked():
-            results = pool.map(inspected, pictures, chunksize=_CHUNK)
+            results = pool.map(inspect_one, pictures, chunksize=_CHUNK)
         yield from results
 
 
-def _inspected(files: PictureFiles, classes: Classes, objects: Sequence[int]) -> PictureFacts | FaultyPicture:
+def _inspect_one(files: PictureFiles, classes: Classes, objects: Sequence[int]) -> PictureFacts | FaultyPicture:
     try:
         picture = read_picture(files, classes)
     except PictureFault as error:
         return FaultyPicture(files.number, error.kind, " ".join(str(error).split()))
     orientation, (height, width) = picture.lens.orientation, picture.labels.shape
-    assert orientation is not None  # read_picture has seen to it
+    assert orientation is not None  # read_picture checks this
     pixels = [int(np.count_nonzero(picture.labels == index)) for index in range(len(classes.names))]
     distances = [_distances(picture.labels == index, picture.lens) for index in objects if pixels[index]]
     return PictureFacts(
