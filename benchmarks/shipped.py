@@ -23,7 +23,7 @@ from vm_train.evaluation.evaluation import Evaluation, Rules
 from vm_train.evaluation.workers import Job, evaluate
 from vm_train.evaluation.worst_errors import WorstError
 from vm_train.evaluation.worst_pictures import draw_error
-from vm_train.learning.configuration import ClassTable
+from vm_train.learning.class_table import ClassTable
 from vm_train.scores.object_scores import ObjectScores
 
 HERE = Path(__file__).parent

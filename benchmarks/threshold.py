@@ -24,7 +24,7 @@ from vm_train.data.pictures import read_picture
 from vm_train.evaluation.answers import Exact, load_subject
 from vm_train.evaluation.object_truth import read_scene, true_objects
 from vm_train.evaluation.picture_selection import select_pictures
-from vm_train.learning.configuration import ClassTable
+from vm_train.learning.class_table import ClassTable
 from vm_train.scores.object_scores import ObjectScores
 from vm_train.scores.overlaps import TrueObject
 
