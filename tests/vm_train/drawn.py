@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vm_embedded.geometry.lens_files import lens_text
+from vm_embedded.geometry.lens_files import format_lens_file
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Rectilinear
 
@@ -37,7 +37,7 @@ def draw_set(folder: Path, count: int, seed: int = 0, size: tuple[int, int] = SI
         number = f"{index:04d}"
         cv2.imwrite(str(folder / f"image{number}.jpg"), image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 92])
         cv2.imwrite(str(folder / f"mask{number}.png"), mask[..., [2, 1, 0, 3]])
-        (folder / f"lens{number}.yaml").write_text(lens_text(lens, orientation))
+        (folder / f"lens{number}.yaml").write_text(format_lens_file(lens, orientation))
         truth = None
         if ball is not None:
             truth = {

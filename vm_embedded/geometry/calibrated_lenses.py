@@ -76,7 +76,7 @@ class BrownLens(CalibratedLens):
         super().__post_init__()
         if len(self.coefficients) not in (0, 4, 5, 8):
             raise InputError(
-                f"a plumb_bob or rational lens has 0, 4, 5 or 8 coefficients, not {len(self.coefficients)}"
+                f"a plumb_bob or rational lens needs 0, 4, 5 or 8 coefficients, not {len(self.coefficients)}"
             )
         if self.fov >= math.pi:
             raise InputError(f"fov of a rectilinear lens must be below pi rad, not {self.fov}")
@@ -88,6 +88,7 @@ class BrownLens(CalibratedLens):
         return math.atan(_growing_until(lambda r: r * self._radial(r * r), tangent))
 
     def _radial(self, square: Floats) -> Floats:
+        """Distorted radius over undistorted radius (n,), without the tangential part, from the squared radius (n,)."""
         k1, k2, _, _, k3, k4, k5, k6 = (*self.coefficients, *(0.0,) * (8 - len(self.coefficients)))
         numerator = 1.0 + square * (k1 + square * (k2 + square * k3))
         return numerator / (1.0 + square * (k4 + square * (k5 + square * k6)))
@@ -138,7 +139,7 @@ class FisheyeLens(CalibratedLens):
     def __post_init__(self) -> None:
         super().__post_init__()
         if len(self.coefficients) not in (0, 4):
-            raise InputError(f"a fisheye lens has 0 or 4 coefficients, not {len(self.coefficients)}")
+            raise InputError(f"a fisheye lens needs 0 or 4 coefficients, not {len(self.coefficients)}")
 
     @cached_property
     def limit(self) -> float:

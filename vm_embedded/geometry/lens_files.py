@@ -65,7 +65,7 @@ def read_lens_file(path: str | Path) -> LensFile:
         raise InputError(f"lens file {path}: {error}") from error
 
 
-def lens_text(lens: Lens, orientation: Orientation) -> str:
+def format_lens_file(lens: Lens, orientation: Orientation) -> str:
     """The text of a lens file with this lens and orientation; reading it gives exactly the same numbers.
 
     Radial lenses use the reference's format, calibrated ones a calibration with an additional Hoc. Raises InputError

@@ -14,7 +14,7 @@ SHAPES: dict[str, type[Shape]] = {"circle": Circle, "sphere": Sphere, "cylinder"
 def make_shape(name: str, radius: float, object_height: float = 0.0) -> Shape:
     """The shape of this name (one of SHAPES, in either case) and radius [m].
 
-    object_height: height of a cylinder [m]; 0 for all other shapes, which have none.
+    object_height: height of a cylinder [m]; 0 for all other shapes.
 
     Raises InputError for an unknown name or for a height of another shape than a cylinder, and GeometryError for a
     length that is not a positive number.

@@ -22,7 +22,7 @@ from ..cameras.camera import Shot
 from ..config.entries import check_entries, number, text_line
 from ..errors import InputError
 from ..geometry.lens import Lens
-from ..geometry.lens_files import lens_text
+from ..geometry.lens_files import format_lens_file
 from ..geometry.orientation import Orientation
 from .messages import Message, to_json_line
 
@@ -160,7 +160,7 @@ def _write_moment(folder: Path, index: int, moment: Moment) -> int:
     else:
         content, suffix = encoded, "jpg"
     (folder / f"image{index:07d}.{suffix}").write_bytes(content)
-    (folder / f"lens{index:07d}.yaml").write_text(lens_text(moment.lens, moment.orientation), encoding="utf-8")
+    (folder / f"lens{index:07d}.yaml").write_text(format_lens_file(moment.lens, moment.orientation), encoding="utf-8")
     return len(content)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from vm_embedded.arrays import Image
 from vm_embedded.files import atomic_write
-from vm_embedded.geometry.lens_files import lens_text
+from vm_embedded.geometry.lens_files import format_lens_file
 from vm_workstation.sphere_outline import polygon_area, sphere_outline
 
 from ..render.image_processing import encode_jpeg, process_image
@@ -30,7 +30,7 @@ def write_picture(folder: Path, index: int, map_name: str, scene: Scene, picture
         "image": encode_jpeg(image, scene.sensor),
         "mask": _png(mask_colors(picture)),
         "coverage": _png(np.rint(picture.coverage * 255.0).astype(np.uint8)),
-        "lens": lens_text(replace(scene.lens, size=None), scene.orientation).encode(),
+        "lens": format_lens_file(replace(scene.lens, size=None), scene.orientation).encode(),
         "scene": (json.dumps(scene_description(index, map_name, scene, picture), allow_nan=False) + "\n").encode(),
     }
     for part, content in contents.items():

@@ -10,7 +10,7 @@ import numpy as np
 
 from vm_embedded.arrays import Image
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.lens_files import lens_text
+from vm_embedded.geometry.lens_files import format_lens_file
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import projection_named
 
@@ -154,4 +154,4 @@ class _Features:
             distortion=(k0 / scale**2, k1 / scale**4),
         )
         hoc = np.array(self.floats("Hoc", 16)).reshape(4, 4)
-        return lens_text(replace(lens, size=None), Orientation.from_hoc(hoc))
+        return format_lens_file(replace(lens, size=None), Orientation.from_hoc(hoc))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from tests.manifests import ball_manifest
 from vm_embedded import Orientation
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.lens_files import lens_text
+from vm_embedded.geometry.lens_files import format_lens_file
 from vm_embedded.geometry.radial_lenses import Equisolid
 from vm_train.data.classes import UNLABELED, Classes
 from vm_train.data.picture_files import PictureFault
@@ -39,7 +39,7 @@ def write_pictures(folder, numbers=NUMBERS):
         mask[110:] = 0
         cv2.imwrite(str(folder / f"mask{number}.png"), mask)
         cv2.imwrite(str(folder / f"image{number}.jpg"), mask[..., :3])
-        (folder / f"lens{number}.yaml").write_text(lens_text(LENS, LOOKING_DOWN))
+        (folder / f"lens{number}.yaml").write_text(format_lens_file(LENS, LOOKING_DOWN))
 
 
 def cut(path, share=0.6):
@@ -104,7 +104,7 @@ FAULTS = {
     "lens of another camera": (
         "lens",
         "lens0000001.yaml: lens is for 640 x 100 px",
-        lambda f: lens_file(f, lens_text(LENS, LOOKING_DOWN) + "size: [640, 100]\n"),
+        lambda f: lens_file(f, format_lens_file(LENS, LOOKING_DOWN) + "size: [640, 100]\n"),
     ),
     "lens no text": (
         "lens",
