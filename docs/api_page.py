@@ -220,6 +220,8 @@ def _markdown(docstring: str | None, parameters: Iterable[str] = ()) -> str:
         if block.startswith("    "):
             shown.append(_code(textwrap.dedent(block)))
             continue
+        block = re.sub(r"(?m)^(?!- )(.*)\n(?=- )", r"\1\n\n", block)  # Markdown needs empty lines around a list
+        block = re.sub(r"(?m)^(- .*)\n(?!- |  )", r"\1\n\n", block)
         found, rest = _labeled(block, parameters)
         shown += ["\n".join(f"- `{name}`: {text}." for name, text in found.items())] if found else []
         shown += [rest] if rest else []

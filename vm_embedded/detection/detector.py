@@ -45,11 +45,10 @@ class Detector:
         return cls(read_model(model_path(path)), settings)
 
     def detect(self, image: Image, orientation: Orientation, lens: Lens, explain: bool = False) -> Detections:
-        """Find objects in an image.
+        """Find objects in an image. A camera that sees no part of the plane gives no points and no detections.
 
         image: uint8 (height, width[, channels]) in the pixel format of the settings. orientation: of the camera at the
-        time of the image. explain: also return the rejected candidates. A camera that sees no part of the plane gives
-        no points and no detections.
+        time of the image. explain: also return the rejected candidates.
 
         Raises InputError for an image or lens that doesn't fit, GeometryError for a camera too low for the object.
         """
