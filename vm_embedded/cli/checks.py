@@ -150,12 +150,12 @@ def check_cameras(configuration: Configuration, root: Path) -> Iterator[Finding]
     except VisualMeshError as error:
         yield Finding("camera", BAD, str(error), "vm-detect --help lists the allowed cameras")
         return
-    moving = device is not None and "by-" not in str(device)
+    may_change = device is not None and "by-" not in str(device)
     yield Finding(
         "camera",
-        WARNING if moving else GOOD,
-        f"{source}{': the number may change when cameras are plugged in again' if moving else ''}",
-        "use a path in /dev/v4l/by-id/" if moving else "",
+        WARNING if may_change else GOOD,
+        f"{source}{': the number may change when cameras are plugged in again' if may_change else ''}",
+        "ls -l /dev/v4l/by-id/ and use one of these paths" if may_change else "",
     )
 
 
@@ -184,7 +184,7 @@ def pixel_formats(node: Path) -> list[str]:
             reply = fcntl.ioctl(descriptor, _VIDIOC_ENUM_FMT, request)
             found.append(struct.unpack(_V4L2_FMTDESC, reply)[4].to_bytes(4, "little").decode("ascii", "replace"))
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTTY):
+        if error.errno not in (errno.EINVAL, errno.ENOTTY):  # these end the list
             raise
         return found
     finally:
@@ -206,7 +206,10 @@ def check_lens(configuration: Configuration) -> Finding:
         lens.lens.for_image((camera.width, camera.height))
     except VisualMeshError as error:
         return Finding(
-            "lens", BAD, str(error), "calibrate at the camera's size, or configure the camera for the size of the lens"
+            "lens",
+            BAD,
+            str(error),
+            "calibrate at the camera's size, or set [camera] width and height to the lens size",
         )
     return Finding("lens", GOOD, f"for {lens.lens.size[0]} x {lens.lens.size[1]} px; fits the camera")
 

@@ -1,1 +1,1 @@
-"""TOML sections that check themselves, and a strict YAML reader."""
+"""Configurations in TOML: entries, sections and units; and a strict YAML reader."""

@@ -34,9 +34,9 @@ def read_sections(
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{where}: {error}") from error
     for name, entries in (overrides or {}).items():
-        table[name] = {**_section(name, table.get(name, {})), **entries}
+        table[name] = {**_checked_section(name, table.get(name, {})), **entries}
     try:
-        read: Configuration = _configuration(kind, table)
+        read: Configuration = _build(kind, table)
         return read
     except _Fault as fault:
         line = _line_number(text, fault.section, fault.entry)
@@ -101,20 +101,21 @@ def _read_text(path: Path) -> str:
         raise InputError(f"configuration {path}: {error}") from error
 
 
-def _section(name: str, value: Any) -> Mapping[str, Any]:
+def _checked_section(name: str, value: Any) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
         raise InputError(f"{name} must be a section, [{name}], not {value!r}")
     return value
 
 
-def _configuration(kind: Any, table: Mapping[str, Any]) -> Any:
+def _build(kind: Any, table: Mapping[str, Any]) -> Any:
+    """A configuration from the tables of a file. Raises _Fault."""
     known = {each.name: each for each in fields(kind)}
     sections = {}
     for name, value in table.items():
         if name not in known:
             raise _Fault(name, None, unknown("section" if isinstance(value, Mapping) else "key", name, known))
         try:
-            sections[name] = _read(name, known[name], value)
+            sections[name] = _read_value(name, known[name], value)
         except _Fault:
             raise
         except EntryError as error:
@@ -124,12 +125,13 @@ def _configuration(kind: Any, table: Mapping[str, Any]) -> Any:
     return kind(**sections)
 
 
-def _read(name: str, section: Field[Any], value: Any) -> Any:
+def _read_value(name: str, section: Field[Any], value: Any) -> Any:
+    """A top-level value: by its own `read`, or as a section. Raises InputError."""
     if "read" in section.metadata:
         return section.metadata["read"](value)
     kind: Any = section.default_factory
     known = [each.name for each in fields(kind)]
-    for key in _section(name, value):
+    for key in _checked_section(name, value):
         if key not in known:
             raise _Fault(name, key, unknown(f"entry in [{name}]", key, known))
     return kind(**value)

@@ -269,7 +269,7 @@ class Daemon:
         except VisualMeshError as error:
             self._log("reload refused", "error", reason=str(error))
             return
-        self.recorder.forget()
+        self.recorder.clear()
         kept = {name: getattr(before, name) for name in _NEEDS_RESTART}
         waiting = [name for name, section in kept.items() if section != getattr(configuration, name)]
         if wanted.format != before.detector.format:

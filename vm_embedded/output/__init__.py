@@ -1,1 +1,1 @@
-"""Where detections go: messages, files, sockets, overlays and recordings."""
+"""Output of detections: messages, channels, result files, overlays and recordings."""
