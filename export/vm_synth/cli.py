@@ -1,4 +1,7 @@
-"""vm-synth: renders training pictures, previews them and checks them."""
+"""vm-synth: renders training pictures, previews them and checks them.
+
+The module is long because it holds the options and the steps of all four commands.
+"""
 
 from __future__ import annotations
 

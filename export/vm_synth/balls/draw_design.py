@@ -56,7 +56,7 @@ def draw_design(random: np.random.Generator, ranges: DesignRanges) -> BallDesign
     else:
         base = _gray(random, 0.05, 0.2) if random.random() < ranges.dark else _saturated(random, ranges.hues)
     if random.random() < ranges.black:
-        # On a black base the ink is white, so that the pattern shows.
+        # On a black base the ink is white: black ink would be invisible.
         ink = _gray(random, 0.04, 0.15) if max(base) > 0.06 else _gray(random, 0.85, 0.98)
     else:
         ink = _saturated(random, ranges.hues) if random.random() < 0.8 else _gray(random, 0.2, 0.45)

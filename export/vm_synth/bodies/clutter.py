@@ -22,7 +22,7 @@ def carton(random: np.random.Generator, size: float) -> list[Body]:
         parts.append(box(x * 0.5, y * 1.006, z * 0.4).shifted((0.0, 0.0, z * 0.15)).painted(common(random)))
     if random.uniform() < 0.4:
         parts.append(box(0.12, y * 1.004, z * 1.004).painted(wood(random)))
-    return _thing(parts, size, "box")
+    return _to_body(parts, size, "box")
 
 
 def can(random: np.random.Generator, size: float) -> list[Body]:
@@ -39,7 +39,7 @@ def can(random: np.random.Generator, size: float) -> list[Body]:
         parts = [cylinder(radius, 1.0, 20).painted(common(random))]
     else:
         parts = [_cup(radius * 0.8, radius, 1.0).painted(common(random)).stained(random, 0.2, 0.4)]
-    return _thing(_tipped(random, parts, 0.3), size, "can")
+    return _to_body(_tipped(random, parts, 0.3), size, "can")
 
 
 def bottle(random: np.random.Generator, size: float) -> list[Body]:
@@ -61,7 +61,7 @@ def bottle(random: np.random.Generator, size: float) -> list[Body]:
         lathe([(r * 1.01, 0.2), (r * 1.01, 0.5)], 18).painted(common(random)),
         cylinder(0.06, 0.09, 12).shifted((0.0, 0.0, 0.955)).painted(common(random)),
     ]
-    return _thing(_tipped(random, parts, 0.4), size, "bottle")
+    return _to_body(_tipped(random, parts, 0.4), size, "bottle")
 
 
 def cone(random: np.random.Generator, size: float) -> list[Body]:
@@ -75,7 +75,7 @@ def cone(random: np.random.Generator, size: float) -> list[Body]:
     for low in (0.3, 0.6)[: int(random.integers(0, 3))]:
         a, b = (1.02 * (foot + (tip - foot) * z) for z in (low, low + 0.18))
         parts.append(lathe([(a, low), (b, low + 0.18)], 20).painted(band))
-    return _thing(parts, size, "cone")
+    return _to_body(parts, size, "cone")
 
 
 def bucket(random: np.random.Generator, size: float) -> list[Body]:
@@ -87,7 +87,7 @@ def bucket(random: np.random.Generator, size: float) -> list[Body]:
     arch = np.stack([drop * np.sin(angle) * top * 1.6, np.cos(angle) * top, 0.95 - 0.15 * np.sin(angle)], axis=1)
     arch[:, 0] = np.clip(arch[:, 0], -top * 1.1, top * 1.1)
     parts.append(cord(arch, 0.015).painted(metal(random)))
-    return _thing(parts, size, "bucket")
+    return _to_body(parts, size, "bucket")
 
 
 def bag(random: np.random.Generator, size: float) -> list[Body]:
@@ -103,7 +103,7 @@ def bag(random: np.random.Generator, size: float) -> list[Body]:
     for side in (-0.2, 0.2):
         loop = np.stack([np.full(8, 0.0), side + 0.12 * np.cos(angle), z / 2.0 + 0.15 * np.sin(angle)], axis=1)
         parts.append(cord(loop, 0.015).painted(trim))
-    return _thing(parts, size, "bag")
+    return _to_body(parts, size, "bag")
 
 
 def tool(random: np.random.Generator, size: float) -> list[Body]:
@@ -121,7 +121,7 @@ def tool(random: np.random.Generator, size: float) -> list[Body]:
         else:
             part = cylinder(random.uniform(0.05, 0.25), random.uniform(0.05, 0.4), 14)
         parts.append(part.turned(rotation(*random.uniform(0.0, 6.3, 3))).shifted(place).painted(common(random)))
-    return _thing(parts, size, "tool")
+    return _to_body(parts, size, "tool")
 
 
 def paper(random: np.random.Generator, size: float) -> list[Body]:
@@ -136,7 +136,7 @@ def paper(random: np.random.Generator, size: float) -> list[Body]:
     for _ in range(int(random.integers(0, 4))):
         print_ = box(*_two(random, 0.05, 0.3), 0.004).shifted((*random.uniform(-0.15, 0.15, 2), 0.002))
         parts.append(print_.painted((black, vivid, gray)[random.integers(3)](random)))
-    return _thing(parts, size, "paper")
+    return _to_body(parts, size, "paper")
 
 
 def tape(random: np.random.Generator, size: float) -> list[Body]:
@@ -148,7 +148,7 @@ def tape(random: np.random.Generator, size: float) -> list[Body]:
     if kind > 0:
         turned = box(width, random.uniform(0.5, 1.0), 0.003).shifted((0.0, 0.0, 0.002))
         parts.append(turned if kind == 1 else turned.shifted((0.5 - width / 2.0, -turned.low[1], 0.0)))
-    return _thing([each.painted(paint) for each in parts], size, "tape")
+    return _to_body([each.painted(paint) for each in parts], size, "tape")
 
 
 def cable(random: np.random.Generator, size: float) -> list[Body]:
@@ -159,7 +159,7 @@ def cable(random: np.random.Generator, size: float) -> list[Body]:
         for _ in "xy"
     ]
     points = np.stack([t + waver[0], waver[1], np.full_like(t, thickness)], axis=1)
-    return _thing(
+    return _to_body(
         [cord(points, thickness).painted((black, black, gray, white, vivid)[random.integers(5)](random))], size, "cable"
     )
 
@@ -170,7 +170,7 @@ def table(random: np.random.Generator, size: float) -> list[Body]:
     top = box(x, y, 0.03).shifted((0.0, 0.0, z)).painted((wood, white, gray)[random.integers(3)](random))
     leg = metal(random)
     feet = [(a * (x / 2.0 - 0.04), b * (y / 2.0 - 0.04)) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
-    return _thing([top, *(rod((*at, 0.0), (*at, z), 0.02).painted(leg) for at in feet)], size, "table")
+    return _to_body([top, *(rod((*at, 0.0), (*at, z), 0.02).painted(leg) for at in feet)], size, "table")
 
 
 def chair(random: np.random.Generator, size: float) -> list[Body]:
@@ -183,7 +183,7 @@ def chair(random: np.random.Generator, size: float) -> list[Body]:
     for a, b in ((a, b) for a in (-1.0, 1.0) for b in (-1.0, 1.0)):
         parts.append(rod((a * 0.24, b * 0.23, 0.0), (a * 0.2, b * 0.2, 0.46), 0.013).painted(leg))
     parts += [rod((-0.2, b * 0.2, 0.44), (-0.23, b * 0.2, 0.9), 0.013).painted(leg) for b in (-1.0, 1.0)]
-    return _thing(parts, size, "chair")
+    return _to_body(parts, size, "chair")
 
 
 def pole(random: np.random.Generator, size: float) -> list[Body]:
@@ -198,7 +198,7 @@ def pole(random: np.random.Generator, size: float) -> list[Body]:
         parts.append(rung.painted(second if k % 2 else paint))
     if random.uniform() < 0.3:
         parts.append(box(0.005, 0.3, 0.2).shifted((0.0, 0.15, 0.9)).painted(team(random)))
-    return _thing(parts, size, "pole")
+    return _to_body(parts, size, "pole")
 
 
 def board(random: np.random.Generator, size: float) -> list[Body]:
@@ -214,7 +214,7 @@ def board(random: np.random.Generator, size: float) -> list[Body]:
             else cylinder(z / 2.0, 0.001, 20).turned(rotation(pitch=np.pi / 2.0))
         )
         parts.append(field.shifted(place).painted((white, common, vivid)[random.integers(3)](random)))
-    return _thing(parts, size, "board")
+    return _to_body(parts, size, "board")
 
 
 def pedestal(random: np.random.Generator, height: float, width: float) -> list[Body]:
@@ -263,7 +263,8 @@ FURNITURE: dict[str, DrawBody] = {"table": table, "chair": chair, "pole": pole, 
 """Large objects by name."""
 
 
-def _thing(parts: Iterable[Solid], size: float, name: str) -> list[Body]:
+def _to_body(parts: Iterable[Solid], size: float, name: str) -> list[Body]:
+    """A body of class environment on the plane, scaled to this size [m]."""
     return [sized(standing(parts, "environment", name), size)]
 
 

@@ -1,4 +1,7 @@
-"""Robots on the field. They face +x with their hips or base above the origin."""
+"""Robots on the field. They face +x with their hips or base above the origin.
+
+The module is long because the humanoids share all their parts: legs, trunk, arms and heads.
+"""
 
 from __future__ import annotations
 

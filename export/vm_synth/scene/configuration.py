@@ -41,25 +41,31 @@ class GroundRanges:
 
 @dataclass(frozen=True)
 class TargetRanges:
-    """Section [ball]: size and place of the ball, and balls of wrong size or height."""
+    """Section [ball]: size and place of the ball, and balls of the wrong size or height."""
 
     radius: tuple[float, float] = range_of(0.05, 0.12, "radius of the ball", "m", (0.005, 1.0))
     distance: tuple[float, float] = range_of(
-        0.0, 10.0, "distance on the plane; sizes in the picture are uniformly distributed", "m", (0.0, 100.0)
+        0.0,
+        10.0,
+        "distance of the ball on the plane; its size in the picture is uniformly distributed",
+        "m",
+        (0.0, 100.0),
     )
-    even: float = share(0.0, "share of pictures with uniformly distributed distance instead: more far balls")
+    even: float = share(
+        0.0, "share of pictures whose ball distance is uniformly distributed instead, for more far balls"
+    )
     missing: float = share(0.1, "share of pictures without a ball")
     cut: float = share(0.15, "share of pictures whose border may cut the ball")
     hidden: float = share(0.2, "share of pictures with an object close to the line from camera to ball")
     off_plane: float = share(0.08, "share of pictures with another ball on a pedestal or in the air")
     off_plane_height: tuple[float, float] = range_of(0.1, 1.2, "height of that ball above the plane", "m", (0.01, 5.0))
     off_plane_label: str = one_of(CLASSES, "environment", "class of that ball")
-    wrong_size: float = share(0.25, "share of pictures with another ball of wrong size, which has class environment")
+    wrong_size: float = share(0.25, "share of pictures with another ball of the wrong size, of class environment")
     smaller: tuple[float, float] = range_of(
-        0.25, 0.6, "radius of a smaller ball, relative to the right one", "", (0.01, 1.0)
+        0.25, 0.6, "radius of such a ball if it is smaller, relative to the ball", "", (0.01, 1.0)
     )
     larger: tuple[float, float] = range_of(
-        1.7, 3.0, "radius of a larger ball, relative to the right one", "", (1.0, 20.0)
+        1.7, 3.0, "radius of such a ball if it is larger, relative to the ball", "", (1.0, 20.0)
     )
 
     def __post_init__(self) -> None:

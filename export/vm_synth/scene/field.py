@@ -19,7 +19,7 @@ TURFS = ("blades", "felt", "natural")
 class FieldRanges:
     """Section [field]: soccer fields."""
 
-    length: tuple[float, float] = range_of(5.0, 14.0, "length of a field; 9 in the paper", "m", (1.0, 120.0))
+    length: tuple[float, float] = range_of(5.0, 14.0, "length of a field; the authors' is 9 x 6 m", "m", (1.0, 120.0))
     proportion: tuple[float, float] = range_of(0.6, 0.75, "width of a field as a share of its length", "", (0.3, 1.0))
     line_width: tuple[float, float] = range_of(0.045, 0.085, "width of lines", "m", (0.01, 0.5))
     border: tuple[float, float] = range_of(0.3, 2.0, "width of the carpet outside of the outer lines", "m", (0.0, 20.0))
@@ -28,7 +28,7 @@ class FieldRanges:
     hue: tuple[float, float] = range_of(60.0, 165.0, "hue of the grass; 120 is green", "deg", (0.0, 360.0))
     saturation: tuple[float, float] = range_of(0.5, 1.0, "saturation of the grass, in linear light", "", (0.0, 1.0))
     albedo: tuple[float, float] = range_of(0.05, 0.3, "albedo of the grass", "", (0.01, 0.95))
-    odd_colors: float = share(0.08, "share of fields of any color")
+    odd_colors: float = share(0.08, "share of fields with grass of any color")
     texture: tuple[float, float] = range_of(0.4, 1.3, "contrast of grass blades and patches", "", (0.0, 2.0))
     stripes: float = share(0.2, "share of fields with mowing stripes")
     paint: tuple[float, float] = range_of(0.45, 0.9, "albedo of lines", "", (0.1, 1.0))

@@ -119,7 +119,7 @@ class Placement:
         self._put(bodies, along * ahead + aside * np.array([-ahead[1], ahead[0]]), half)
 
     def draw_other_ball(self, radius: float) -> tuple[PlacedBall | None, str]:
-        """Draw a ball of the same size above the plane, one of wrong size on it, or None, and its class."""
+        """Draw a ball of the same size above the plane, one of the wrong size on it, or None, and its class."""
         random, ranges = self._random, self._ranges.ball
         kind = random.random()
         if kind < ranges.off_plane:

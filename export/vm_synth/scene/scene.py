@@ -35,7 +35,7 @@ class Scene:
     """Everything that one picture shows.
 
     size: of the picture (w, h) [px]. field: the soccer field, or None for the floor of the photograph. ball_radius: the
-    right radius of balls [m]. ball: the ball to detect, or None. other: a ball of wrong size or above the plane, or
+    right radius of balls [m]. ball: the ball to detect, or None. other: a ball of the wrong size or above the plane, or
     None; other_label is its class. mesh: all other objects; names and counts hold the name and the number of vertices
     of each. ground_albedo: linear RGB, for light that the ground reflects. seed: of the ray tracer.
     """

@@ -108,7 +108,7 @@ class Sensor:
 
 def draw_sensor(random: np.random.Generator, ranges: SensorRanges) -> Sensor:
     """Draw the sensor of one picture."""
-    # All values are drawn, used or not, so that changing a share does not change the values that follow.
+    # All values are drawn, used or not: changing a share does not change the values that follow.
     cast = random.random() < ranges.cast_share
     defocused, moved = random.random() < ranges.defocus_share, random.random() < ranges.motion_share
     mosaic, again = random.random() < ranges.mosaic_share, random.random() < ranges.again_share
