@@ -87,7 +87,7 @@ class MeshCache:
             layout=points.layout,
             levels=points.levels,
             shape=self.manifest.object_shape,
-            rings=self.manifest.rings(height, orientation.height),
+            rings=self.manifest.rings_across(height, orientation.height),
             height=orientation.height,
             rotation=rotation,
             heading=heading,

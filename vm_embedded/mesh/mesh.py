@@ -120,7 +120,9 @@ class MeshModel(ABC):
         step = 2.0 * math.log1p(tolerance / intersections)
         return shape.height_of(math.exp(step * round(math.log(spacing) / step)))
 
-    def rings(self, made_for: Shape, mesh_height: float, intersections: float, seen: Shape, height: float) -> float:
+    def rings_across(
+        self, made_for: Shape, mesh_height: float, intersections: float, seen: Shape, height: float
+    ) -> float:
         """Number of rings that cross the object `seen` from a height [m].
 
         The rings belong to a mesh built for the shape `made_for`, `mesh_height` [m] and k = `intersections`.

@@ -135,8 +135,8 @@ def _beside(counts: Indices, start: Indices) -> tuple[_Ring, _Ring, _Ring]:
     """
     counts_around, start_around = np.pad(counts, 1, constant_values=1), np.pad(start, (1, 0))
 
-    def rings(step: int) -> _Ring:
+    def ring_of_points(step: int) -> _Ring:
         shifted = slice(step, step + len(counts))
         return _Ring(np.repeat(start_around[shifted], counts), np.repeat(counts_around[shifted], counts))
 
-    return rings(0), rings(1), rings(2)
+    return ring_of_points(0), ring_of_points(1), ring_of_points(2)

@@ -61,7 +61,9 @@ class Walls(MeshModel):
         step = 2.0 * tolerance * _checked(shape, height).object_height / intersections
         return height if step == 0.0 else max(round(height / step) * step, 0.5 * step)
 
-    def rings(self, made_for: Shape, mesh_height: float, intersections: float, seen: Shape, height: float) -> float:
+    def rings_across(
+        self, made_for: Shape, mesh_height: float, intersections: float, seen: Shape, height: float
+    ) -> float:
         """Always k, because an object is sampled where it stands."""
         return intersections
 

@@ -186,9 +186,9 @@ class Manifest:
         """The shape of the real object."""
         return make_shape(self.shape, self.object_radius, self.object_height)
 
-    def rings(self, mesh_height: float, height: float) -> float:
+    def rings_across(self, mesh_height: float, height: float) -> float:
         """Rings that cross the real object seen from a camera height [m], in a mesh made for `mesh_height` [m]."""
-        return self.model.rings(self.mesh_shape, mesh_height, self.intersections, self.object_shape, height)
+        return self.model.rings_across(self.mesh_shape, mesh_height, self.intersections, self.object_shape, height)
 
     def as_json(self) -> str:
         """The manifest as the model file holds it."""

@@ -128,7 +128,7 @@ def _view(picture: Picture, layout: Layout, manifest: Manifest, grid: Grid) -> P
         layout=layout,
         levels=levels_for(picture, layout.rays, manifest, grid),
         shape=manifest.object_shape,
-        rings=manifest.rings(orientation.height, orientation.height),
+        rings=manifest.rings_across(orientation.height, orientation.height),
         height=orientation.height,
         rotation=orientation.level,
         heading=rotation_z(orientation.yaw),

@@ -199,7 +199,7 @@ def test_heights_below_at_and_above_the_top_have_the_same_graph(height):
     mesh, usual = (build_mesh(GOAL_POST, each, 4.0, FAR, "wall6") for each in (height, 1.2))
     np.testing.assert_array_equal(mesh.neighbors, usual.neighbors)
     assert np.isfinite(mesh.rays).all()
-    assert mesh_model("wall6").rings(GOAL_POST, height, 4.0, GOAL_POST, height) == 4.0
+    assert mesh_model("wall6").rings_across(GOAL_POST, height, 4.0, GOAL_POST, height) == 4.0
 
 
 @pytest.mark.parametrize("shape", [Sphere(0.1), Circle(0.1)])
