@@ -25,13 +25,14 @@ def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environm
     """Draw a scene under an environment map."""
     lens = draw_lens(random, ranges.camera)
     photographed = environment.floor is not None and random.random() < ranges.ground.photographed
+    floor = environment.floor if photographed else None
     radius = uniform(random, ranges.ball.radius)
     missing = random.random() < ranges.ball.missing
-    orientation, spot = _draw_camera_and_spot(random, ranges, lens, radius, environment.floor if photographed else None)
+    orientation, spot = _draw_camera_and_spot(random, ranges, lens, radius, floor)
     field = None if photographed else _draw_field_around(random, ranges, np.zeros(2) if spot is None else spot, radius)
 
     ball = None if missing or spot is None else draw_ball_at(random, ranges, np.array([*spot, radius]), radius)
-    placement = Placement(random, ranges, lens, orientation, field, environment.floor if photographed else None)
+    placement = Placement(random, ranges, lens, orientation, field, floor)
     if ball is not None:
         placement.keep_clear(ball.center[:2], radius)
         if random.random() < ranges.ball.hidden:
