@@ -33,10 +33,10 @@ class Augmentation:
     factors: up to 1 + the entry, and as often down to 1 / (1 + the entry). Raises InputError.
     """
 
-    height: float = number(0.02, "usual error of the camera's height, as a share of the height", "", (0.0, 0.5))
-    tilt: float = number(1.0, "usual error of the camera's roll and pitch", "deg", (0.0, 20.0))
-    focal_length: float = number(0.01, "usual error of the focal length, as a share of it", "", (0.0, 0.2))
-    center: float = number(0.005, "usual error of the optical center, in image widths", "", (0.0, 0.1))
+    height: float = number(0.02, "standard deviation of the camera height, as a share of it", "", (0.0, 0.5))
+    tilt: float = number(1.0, "standard deviation of the camera's roll and pitch", "deg", (0.0, 20.0))
+    focal_length: float = number(0.01, "standard deviation of the focal length, as a share of it", "", (0.0, 0.2))
+    center: float = number(0.005, "standard deviation of the optical center, in image widths", "", (0.0, 0.1))
     brightness: float = number(0.2, "colors get brighter or darker by up to this share", "", (0.0, 4.0))
     contrast: float = number(0.15, "contrast gets higher or lower by up to this share", "", (0.0, 4.0))
     saturation: float = number(0.25, "colors get stronger or paler by up to this share", "", (0.0, 4.0))

@@ -52,13 +52,13 @@ class Recipe:
     selection: str = one_of(
         RULES,
         "balanced",
-        "points that give gradients; all: every labeled point; weighed: every labeled point, weighted by class; "
-        "balanced: as many points of each class as the rarest object has; hard: balanced, and by the errors of earlier "
-        "networks",
+        "points that give gradients; all: every labeled point; weighed: all, but frequent classes count less; "
+        "balanced: as many points of each class as the rarest object has; hard: balanced, preferring points that "
+        "earlier networks got wrong",
     )
     balance: float = number(
         1.0,
-        "for selection weighed: from 0, all points have the same weight, to 1, all classes do",
+        "for selection weighed: how much rare classes are favored; 0: all points count the same; 1: all classes do",
         "",
         (0.0, 1.0),
     )
@@ -80,7 +80,7 @@ class Recipe:
         0, "epochs without a better validation score after which a round ends; 0: never ends early", "", (0, 1e6)
     )
     precision: str = one_of(
-        PRECISIONS, "full", "mixed: compute in bfloat16 where that is safe, which is faster on a GPU"
+        PRECISIONS, "full", "arithmetic; mixed: bfloat16 where that is safe, which is faster on a GPU"
     )
     seed: int = number(0, "seed of weights, order, point selection and augmentation", "", (0, 2**31))
 

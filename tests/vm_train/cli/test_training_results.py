@@ -58,7 +58,7 @@ def test_a_hexagonal_network_trains_and_is_not_exported(data, configuration, tmp
     run(data, "-o", folder, "--config", configuration, *hexagonal)
     assert Checkpoint.load(folder / "model.pt").grid.equal_at == 1.5
     done = run_module("vm_export.cli", folder / "model.pt", code=1)
-    assert "hexagonal mesh" in done.stderr
+    assert "was trained on a hexagonal grid; the runtime has only the Visual Mesh" in done.stderr
     assert not Path(folder / "model.onnx").exists()
 
 
