@@ -82,15 +82,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.to_yaml and options.layout:
         raise InputError("--layout is for ONNX files; leave it out with --to-yaml")
     checkpoint = _load(options.model, _overrides(options))
-    if checkpoint.grid.kind != "visual":
-        raise InputError(
-            f"{options.model} was trained on a {checkpoint.grid.kind} grid; the runtime has only the Visual Mesh"
-        )
-    manifest = checkpoint.manifest
-    classes = ", ".join(f"{each.name} ({each.kind})" for each in manifest.classes)
-    print(f"{options.model}: {_layers(checkpoint)}, {manifest.mesh}, {manifest.shape}")
-    print(f"  radius {manifest.radius:g} m, {manifest.intersections:g} intersections, to {manifest.max_distance:g} m")
-    print(f"  object radius {manifest.object_radius:g} m, edge {manifest.edge}, classes: {classes}")
+    print(f"{options.model}: {_description(checkpoint)}")
     if options.to_yaml:
         write_reference(checkpoint, output)
         print(f"{output}: written in the format of the reference implementation")
@@ -104,6 +96,17 @@ def _run(options: argparse.Namespace) -> int:
         size = path.stat().st_size / 1000
         print(f"{path}: layout {layout}, {size:.1f} kB, largest difference to torch {difference:.1e}")
     return EXIT_OK
+
+
+def _description(checkpoint: Checkpoint) -> str:
+    """The layers of a network and the main entries of its manifest, in three lines."""
+    manifest = checkpoint.manifest
+    classes = ", ".join(f"{each.name} ({each.kind})" for each in manifest.classes)
+    return (
+        f"{_layers(checkpoint)}, {manifest.mesh}, {manifest.shape}\n"
+        f"  radius {manifest.radius:g} m, {manifest.intersections:g} intersections, to {manifest.max_distance:g} m\n"
+        f"  object radius {manifest.object_radius:g} m, edge {manifest.edge}, classes: {classes}"
+    )
 
 
 def _layers(checkpoint: Checkpoint) -> str:
@@ -133,14 +136,18 @@ def _overrides(options: argparse.Namespace) -> Overrides:
 
 
 def _load(path: Path, overrides: Overrides) -> Checkpoint:
+    """Read a network and replace entries of its manifest. Raises InputError or ModelError."""
     from .checkpoint import Checkpoint
     from .reference import read_reference
 
     if path.suffix.lower() in (".yaml", ".yml"):
         return read_reference(path, overrides)
-    if path.suffix.lower() == ".pt":
-        return overrides.apply_to(Checkpoint.load(path))
-    raise InputError(f"{path} must be a checkpoint (.pt) or a network of the reference implementation (.yaml)")
+    if path.suffix.lower() != ".pt":
+        raise InputError(f"{path} must be a checkpoint (.pt) or a network of the reference implementation (.yaml)")
+    checkpoint = overrides.apply_to(Checkpoint.load(path))
+    if checkpoint.grid.kind != "visual":
+        raise InputError(f"{path} was trained on a {checkpoint.grid.kind} grid; the runtime has only the Visual Mesh")
+    return checkpoint
 
 
 if __name__ == "__main__":

@@ -78,7 +78,7 @@ def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) 
         operations=network.operations,
         provenance=provenance,
     )
-    manifest = replace(manifest, self_test=_example(network, manifest, points=12, seed=0))
+    manifest = replace(manifest, self_test=random_example(network, manifest, points=12, seed=0))
     content = onnx_model(network, manifest)
     difference = largest_difference(content, network, manifest)
     if not difference <= LARGEST_DIFFERENCE:
@@ -96,12 +96,12 @@ def largest_difference(content: bytes, network: Network | SecondLook, manifest: 
     session = Session(ModelFile(Path("the new model"), content, replace(manifest, self_test=None), ""))
     worst = 0.0
     for seed, points in enumerate(_CHECKED_POINTS):
-        test = _example(network, manifest, points, seed)
+        test = random_example(network, manifest, points, seed)
         worst = max(worst, float(np.abs(session.answer(test) - test.probabilities[:-1]).max()))
     return worst
 
 
-def _example(network: Network | SecondLook, manifest: Manifest, points: int, seed: int) -> SelfTest:
+def random_example(network: Network | SecondLook, manifest: Manifest, points: int, seed: int) -> SelfTest:
     """A random graph of `points` points with random colors, rounded as in the manifest, and torch's probabilities.
 
     For layout lattice the graph is a random part of a square grid.

@@ -1,0 +1,1 @@
+"""The program vm-mesh, which draws and measures meshes."""

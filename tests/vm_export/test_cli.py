@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.vm_export.test_export import checkpoint, manifest
-from tests.vm_export.test_reference_format import reference_file
+from tests.vm_export.checkpoints import checkpoint, manifest
+from tests.vm_export.test_reference import reference_file
 from vm_embedded.network.manifest import EDGES, ObjectClass
 from vm_embedded.network.model_file import read_model
 from vm_embedded.network.session import Session
@@ -56,7 +56,7 @@ def test_command_writes_the_fastest_layout_and_the_portable_one_beside_it(tmp_pa
     both = [read_model(tmp_path / name) for name in ("model.onnx", "model.plain.onnx")]
     assert [each.manifest.layout for each in both] == ["runs", "plain"]
     assert replace(both[0].manifest, layout="plain").as_json() == both[1].manifest.as_json()
-    test = export._example(made.network, made.manifest, 300, 1)
+    test = export.random_example(made.network, made.manifest, 300, 1)
     for each in both:
         answer = Session(each).answer(test)
         np.testing.assert_allclose(answer, test.probabilities[:-1], atol=1e-5)

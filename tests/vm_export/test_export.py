@@ -10,33 +10,22 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.manifests import ball_manifest
-from vm_embedded.errors import InputError, ModelError
+from tests.vm_export.checkpoints import checkpoint, manifest
+from vm_embedded.errors import ModelError
 from vm_embedded.geometry.sphere import Sphere
-from vm_embedded.mesh.models import MESH_MODELS, build_mesh
+from vm_embedded.mesh.models import build_mesh
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.manifest import LAYOUTS
 from vm_embedded.network.model_file import read_model
 from vm_export import export
 from vm_export.checkpoint import Checkpoint
-from vm_export.neighborhood import Neighborhood
-from vm_export.network import GraphConvolution, Network
+from vm_export.network import Network
 from vm_export.network_shape import ACTIVATIONS, HEADS, Layer, NetworkShape
 
 MESHES = {"plain": "ring6", "runs": "ring6", "lattice": "xmgrid6"}
 """A mesh for each layout."""
 
 in_all_layouts = pytest.mark.parametrize("layout", LAYOUTS)
-
-
-def manifest(classes=("ball", "environment"), mesh="ring6", **changes):
-    return ball_manifest(*classes, mesh=mesh, radius=0.095, object_radius=0.075, **{"max_distance": 10.0} | changes)
-
-
-def checkpoint(seed=0, shape=None, mesh="ring6"):
-    torch.manual_seed(seed)
-    shape = shape or NetworkShape.uniform(3, 4, 2, neighbors=MESH_MODELS[mesh].neighbors)
-    return Checkpoint(Network(shape).eval(), manifest([f"class{i}" for i in range(shape.classes)], mesh))
 
 
 layers = st.lists(
@@ -91,17 +80,6 @@ def test_far_below_zero_no_layer_makes_numbers_that_slow_a_processor_down(layout
     for name, values in zip(made, session.run(made, laid.feeds(points, shown)), strict=True):
         sizes = np.abs(values[values != 0])
         assert not (sizes < np.finfo(np.float32).tiny).any(), name
-
-
-def test_graph_convolution_is_the_matrix_product_of_the_convention():
-    torch.manual_seed(1)
-    layer = GraphConvolution(inputs=2, outputs=3, neighbors=4)
-    x, neighbors = torch.randn(6, 2), torch.randint(0, 6, (6, 4))
-    expected = np.empty((6, 3))
-    for i in range(6):
-        row = np.concatenate([x[i].numpy(), *(x[j].numpy() for j in neighbors[i])])
-        expected[i] = row @ layer.linear.weight.detach().numpy().T + layer.linear.bias.detach().numpy()
-    np.testing.assert_allclose(layer(x, Neighborhood(neighbors)).detach().numpy(), expected, atol=1e-5)
 
 
 DOMAINS = {"plain": {""}, "runs": {"", "ai.onnx.ml"}, "lattice": {""}}
@@ -173,31 +151,3 @@ def test_the_number_of_points_is_dynamic():
         neighbors = np.full((points + 1, 6), points, dtype=np.int32)
         (answer,) = session.run(None, {"points": colors, "neighbors": neighbors})
         assert answer.shape == (points + 1, 2)
-
-
-def test_checkpoints_are_plain_values_and_read_back(tmp_path):
-    made = checkpoint(7)
-    made.save(tmp_path / "model.pt")
-    torch.load(tmp_path / "model.pt", weights_only=True)
-    read = Checkpoint.load(tmp_path / "model.pt")
-    assert read.network.shape == made.network.shape
-    assert read.manifest.as_json() == made.manifest.as_json()
-    for name, value in made.network.state_dict().items():
-        assert torch.equal(read.network.state_dict()[name], value)
-
-
-@pytest.mark.parametrize("content", [b"", b"nothing", b"PK\x03\x04 broken"])
-def test_broken_checkpoints_are_refused(tmp_path, content):
-    (tmp_path / "model.pt").write_bytes(content)
-    with pytest.raises(InputError, match="checkpoint"):
-        Checkpoint.load(tmp_path / "model.pt")
-
-
-def test_foreign_and_mismatched_checkpoints_are_refused(tmp_path):
-    torch.save({"weights": torch.zeros(3)}, tmp_path / "foreign.pt")
-    with pytest.raises(InputError, match="format"):
-        Checkpoint.load(tmp_path / "foreign.pt")
-    with pytest.raises(InputError, match="can't read"):
-        Checkpoint.load(tmp_path / "missing.pt")
-    with pytest.raises(ModelError, match="outputs"):
-        Checkpoint(checkpoint().network, manifest(("ball", "line", "field")))

@@ -7,7 +7,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.vm_export.test_export import checkpoint, manifest
+from tests.vm_export.checkpoints import checkpoint, manifest
 from vm_embedded.errors import InputError
 from vm_export import export
 from vm_export.checkpoint import Checkpoint
@@ -31,7 +31,7 @@ def test_reference_files_survive_a_round_trip(tmp_path):
     assert len(stored["network"][0][0]["weights"]) == 4 * 7
     read = read_reference(tmp_path / "model.yaml", Overrides(object_radius=0.075))
     assert read.manifest.classes == made.manifest.classes
-    test = export._example(made.network, made.manifest, 50, 0)
+    test = export.random_example(made.network, made.manifest, 50, 0)
     with torch.inference_mode():
         again = read.network(torch.from_numpy(test.points), torch.from_numpy(test.neighbors))
     np.testing.assert_allclose(again.numpy(), test.probabilities, atol=1e-5)

@@ -9,7 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.vm_export.test_export import manifest
+from tests.vm_export.checkpoints import manifest
 from vm_embedded.errors import InputError, ModelError
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import choose_layout
