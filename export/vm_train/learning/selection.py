@@ -4,8 +4,8 @@ The paper balances the classes by selecting equally many points of each. Its sec
 the errors of the networks before. Weighting instead takes all points and has the same mean gradient with less noise;
 docs/results.md compares them.
 
-Each point is selected with a chance of its own, by a random number. So the classes are balanced over the whole set and
-not within each batch, where the rarest class may have a single point or none.
+A random number decides whether a point is selected. So the classes are balanced over the whole set and not within each
+batch, where the rarest class may have a single point or none.
 """
 
 from __future__ import annotations
