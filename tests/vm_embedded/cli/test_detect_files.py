@@ -176,7 +176,7 @@ def test_an_unreadable_video_is_named(tmp_path, content):
 @pytest.mark.parametrize(
     ("text", "parts"),
     [
-        ("", ("not a table",)),
+        ("", ("expected a table of keys and values",)),
         ("projection: FISH\nfocal_length: 300\nfov: 2\n", ("FISH", "equidistant")),
         ("projection: EQUISOLID\nfocal_lenght: 300\nfov: 2\n", ("focal_lenght", "focal_length")),
         ("projection: EQUISOLID\nfocal_length: -3\nfov: 2\n", ("focal length", "-3")),
