@@ -52,13 +52,13 @@ class Recipe:
     selection: str = one_of(
         RULES,
         "balanced",
-        "points that give gradients; all: every labeled point; weighed: all, but frequent classes count less; "
+        "points that give gradients; all: every labeled point; weighted: all, but frequent classes count less; "
         "balanced: as many points of each class as the rarest object has; hard: balanced, preferring points that "
         "earlier networks got wrong",
     )
     balance: float = number(
         1.0,
-        "for selection weighed: how much rare classes are favored; 0: all points count the same; 1: all classes do",
+        "for selection weighted: how much rare classes are favored; 0: all points count the same; 1: all classes do",
         "",
         (0.0, 1.0),
     )

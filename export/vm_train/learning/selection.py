@@ -17,8 +17,8 @@ from vm_embedded.arrays import Floats, Mask, Singles
 
 from ..data.classes import Labels
 
-RULES = ("all", "weighed", "balanced", "hard")
-"""all: every labeled point. weighed: every labeled point; those of frequent classes count less. balanced: of each class
+RULES = ("all", "weighted", "balanced", "hard")
+"""all: every labeled point. weighted: every labeled point; those of frequent classes count less. balanced: of each class
 as many points as the rarest object has. hard: the same, and within a class by the errors of earlier networks."""
 
 FLOOR = 0.05
@@ -32,7 +32,7 @@ def selection_shares(rule: str, counts: npt.NDArray[np.int64], objects: Mask) ->
     points of each class are selected. All points of a still rarer class are selected: it must not limit the others.
     """
     occurring = counts[objects & (counts > 0)] if (objects & (counts > 0)).any() else counts[counts > 0]
-    if rule in ("all", "weighed") or not len(occurring):
+    if rule in ("all", "weighted") or not len(occurring):
         return np.ones(len(counts))
     # Section "Training": "selecting an equal number of points from each class".
     return np.asarray(occurring.min() / np.maximum(counts, 1)).clip(max=1.0)
@@ -41,10 +41,10 @@ def selection_shares(rule: str, counts: npt.NDArray[np.int64], objects: Mask) ->
 def class_weights(rule: str, counts: npt.NDArray[np.int64], balance: float) -> Floats:
     """Weight (C,) of a selected point of each class, from the numbers (C,) of points in the set, not all 0.
 
-    With rule "weighed", proportional to number ** -balance and 1 in the mean over all points: at balance 1 all classes
+    With rule "weighted", proportional to number ** -balance and 1 in the mean over all points: at balance 1 all classes
     count the same. With every other rule 1.
     """
-    if rule != "weighed":
+    if rule != "weighted":
         return np.ones(len(counts))
     weights = np.maximum(counts, 1).astype(np.float64) ** -balance
     return np.asarray(weights * counts.sum() / (weights @ counts))

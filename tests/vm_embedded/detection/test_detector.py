@@ -163,7 +163,7 @@ def test_class_points_are_those_above_the_threshold(detector):
         found.points_of("fields")
 
 
-def test_grey_and_flipped_channels_are_read_as_said(detector):
+def test_gray_and_flipped_channels_are_read_as_said(detector):
     image, orientation, lens = frame()
     reference = detector.detect(image, orientation, lens)
     rgb = Detector.from_file(MODEL, Settings(format="rgb")).detect(image[:, :, ::-1], orientation, lens)

@@ -61,7 +61,7 @@ def test_exact_sampling_is_bilinear_to_the_last_digits(shape, format, count, see
 
 
 @given(shapes, seeds)
-def test_exact_sampling_of_grey_is_bilinear_and_the_same_in_all_colors(shape, seed):
+def test_exact_sampling_of_gray_is_bilinear_and_the_same_in_all_colors(shape, seed):
     random = np.random.default_rng(seed)
     image = noise(random, *shape, 1)
     pixels = pixels_in(random, 20, *shape)
@@ -81,7 +81,7 @@ def test_whole_pixels_are_read_as_they_are(sampling, shape, seed):
 
 
 @given(shapes, st.sampled_from(["rgb", "gray"]), st.integers(0, 600), seeds)
-def test_fast_sampling_is_off_by_a_grey_level_and_a_32nd_pixel_at_most(shape, format, count, seed):
+def test_fast_sampling_is_off_by_a_gray_level_and_a_32nd_pixel_at_most(shape, format, count, seed):
     random = np.random.default_rng(seed)
     image = noise(random, *shape, 3 if format == "rgb" else 1)
     pixels = pixels_in(random, count, *shape)
@@ -121,7 +121,7 @@ def test_all_color_formats_of_one_scene_give_the_same_colors(sampling, shape, se
 
 @pytest.mark.parametrize("sampling", SAMPLINGS)
 @given(shapes, seeds)
-def test_a_grey_scene_looks_grey_in_every_format(sampling, shape, seed):
+def test_a_gray_scene_looks_gray_in_every_format(sampling, shape, seed):
     random = np.random.default_rng(seed)
     gray = noise(random, *shape, 1)
     pixels = pixels_in(random, 20, *shape)

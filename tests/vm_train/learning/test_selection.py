@@ -85,7 +85,7 @@ def test_errors_are_one_minus_the_probability_of_the_truth():
 
 @given(counts.filter(np.any), st.floats(0.0, 1.0))
 def test_weights_balance_classes_and_are_one_in_the_mean(counts, balance):
-    weights = class_weights("weighed", counts, balance)
+    weights = class_weights("weighted", counts, balance)
     assert (class_weights("balanced", counts, balance) == 1.0).all()
     assert weights @ counts == pytest.approx(counts.sum())
     occurring = counts > 0
