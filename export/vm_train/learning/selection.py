@@ -18,8 +18,8 @@ from vm_embedded.arrays import Floats, Mask, Singles
 from ..data.classes import Labels
 
 RULES = ("all", "weighted", "balanced", "hard")
-"""all: every labeled point. weighted: every labeled point; those of frequent classes count less. balanced: of each class
-as many points as the rarest object has. hard: the same, and within a class by the errors of earlier networks."""
+"""all: every labeled point. weighted: every labeled point, but those of frequent classes count less. balanced: as many
+points of each class as the rarest object has. hard: balanced, and points with large errors of earlier networks first."""
 
 FLOOR = 0.05
 """Weight of a point that no network was wrong about: the paper's "5 % baseline probability"."""
