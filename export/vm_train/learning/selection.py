@@ -19,7 +19,8 @@ from ..data.classes import Labels
 
 RULES = ("all", "weighted", "balanced", "hard")
 """all: every labeled point. weighted: every labeled point, but those of frequent classes count less. balanced: as many
-points of each class as the rarest object has. hard: balanced, and points with large errors of earlier networks first."""
+points of each class as the rarest object has. hard: balanced, and first the points with large errors of earlier
+networks."""
 
 FLOOR = 0.05
 """Weight of a point that no network was wrong about: the paper's "5 % baseline probability"."""
