@@ -85,7 +85,16 @@ def test_damaged_and_stale_views_are_made_again(folder, tmp_path, damage):
     assert path.stat().st_size > 1000
 
 
-def test_other_meshes_have_other_views(folder, tmp_path):
-    graphs_of(folder, tmp_path / "kept", count=1)[Item(0, (1,))]
-    graphs_of(folder, tmp_path / "kept", count=1, radius=0.05)[Item(0, (1,))]
+BALL = {"shape": "sphere", "radius": 0.1}
+CYLINDER = {"shape": "cylinder", "radius": 0.1, "object_height": 0.3}
+
+
+@pytest.mark.parametrize(
+    ("mesh", "other"),
+    [(BALL, {**BALL, "radius": 0.05}), (BALL, CYLINDER), (CYLINDER, {**CYLINDER, "object_height": 0.1})],
+    ids=["radius", "shape", "height"],
+)
+def test_other_meshes_have_other_views(folder, tmp_path, mesh, other):
+    made = [graphs_of(folder, tmp_path / "kept", count=1, **each)[Item(0, (1,))] for each in (mesh, other)]
+    assert len(made[0]) != len(made[1])
     assert len(list((tmp_path / "kept").iterdir())) == 2
