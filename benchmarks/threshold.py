@@ -21,7 +21,7 @@ from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import GeometryError
 from vm_train.data.pictures import read_picture
-from vm_train.evaluation.answers import Exact, load_subject
+from vm_train.evaluation.answers import ExactSubject, load_subject
 from vm_train.evaluation.object_truth import read_scene, true_objects
 from vm_train.evaluation.picture_selection import select_pictures
 from vm_train.learning.class_table import ClassTable
@@ -31,7 +31,9 @@ from vm_train.scores.overlaps import TrueObject
 THRESHOLDS, INSIDES, AROUNDS = (0.5, 0.6, 0.7, 0.8, 0.9), (0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95), (0.25, 0.4)
 
 
-def observed(subject: Exact, data: Path, numbers: Path, part: str) -> Iterator[tuple[list[TrueObject], Observation]]:
+def observed(
+    subject: ExactSubject, data: Path, numbers: Path, part: str
+) -> Iterator[tuple[list[TrueObject], Observation]]:
     """True balls and classified points of each picture in one part of a training."""
     table = tomllib.loads((NETWORKS / "ball-5x4.toml").read_text())["classes"]
     classes = ClassTable.from_table(table).mask_classes()
@@ -63,7 +65,7 @@ def main() -> None:
     parser.add_argument("--part", default="validation", choices=("training", "validation", "test"))
     options = parser.parse_args()
     subject = load_subject(options.run / "model.pt", Settings())
-    assert isinstance(subject, Exact)
+    assert isinstance(subject, ExactSubject)
     pictures = list(observed(subject, options.data, options.run / "pictures.json", options.part))
     rows = []
     for threshold, inside, around in product(THRESHOLDS, INSIDES, AROUNDS):

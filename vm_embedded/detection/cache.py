@@ -64,7 +64,7 @@ class MeshCache:
 
     @property
     def hit_rate(self) -> float:
-        """Share of look-ups that found prepared points; 0 before the first."""
+        """Share of look-ups that found prepared points, or meshes if the height tolerance is 0; 0 before the first."""
         return self.hits / max(self.hits + self.misses, 1)
 
     def view(self, orientation: Orientation, lens: Lens, size: Size) -> PreparedView:
@@ -109,18 +109,20 @@ class MeshCache:
 
         Two turns together turn by at most the sum of their angles. From the bucket's middle that is half a step of
         pitch and half a step of roll; from the middles of its quarters it is half as much. The quarters together
-        select fewer points that no orientation needs.
+        leave fewer superfluous points. The whole bucket goes first, because it leaves them less to test.
         """
         mesh = self._look_up(height, lambda: self._build(height), counted=False)
-        steps = self.settings.pitch_step, self.settings.roll_step
+        pitch_step, roll_step = self.settings.pitch_step, self.settings.roll_step
 
-        def possible(mesh: Mesh, pitch: float, roll: float, share: float) -> Mask:
-            middle = Orientation.from_roll_pitch(height, roll * steps[1], pitch * steps[0])
-            return may_be_on_screen(mesh, middle.rotation, lens, size, share * sum(steps) + _ROUNDING)
+        def possible(part: Mesh, up: float, lean: float, share: float) -> Mask:
+            """The points for the bucket's part with this middle and share of its steps."""
+            middle = Orientation.from_roll_pitch(height, (roll + lean) * roll_step, (pitch + up) * pitch_step)
+            slack = share * (pitch_step + roll_step) + _ROUNDING
+            return may_be_on_screen(part, middle.rotation, lens, size, slack)
 
-        mesh = mesh.part(np.flatnonzero(possible(mesh, pitch, roll, 0.5)))
-        quarters = [possible(mesh, pitch + up, roll + lean, 0.25) for up in (-0.25, 0.25) for lean in (-0.25, 0.25)]
-        return self._prepared(mesh.part(np.flatnonzero(np.any(quarters, axis=0))), height, lens)
+        part = mesh.part(np.flatnonzero(possible(mesh, 0.0, 0.0, 0.5)))
+        quarters = [possible(part, up, lean, 0.25) for up in (-0.25, 0.25) for lean in (-0.25, 0.25)]
+        return self._prepared(part.part(np.flatnonzero(np.any(quarters, axis=0))), height, lens)
 
     def _prepared(self, mesh: Mesh, height: float, lens: Lens) -> PreparedPoints:
         layout = choose_layout(mesh, self.manifest)

@@ -19,7 +19,7 @@ from .projection import along
 from .settings import Settings
 
 _MOST_CLUSTERS = 100
-"""Clusters that are looked at, largest first: a frame of noise must not cost a second."""
+"""Largest number of candidates of a class: a frame of noise must not cost a second."""
 
 _MOST_LOG_ODDS = 4.0
 """Limit of a point's log-odds: no single point may outvote its neighbors."""
@@ -45,12 +45,13 @@ class Candidate:
 def propose(observation: Observation, class_name: str, probabilities: Singles, settings: Settings) -> list[Candidate]:
     """Candidates of one class from the slots' probabilities (m,), largest cluster first.
 
-    Clusters of a size that no object has carry their reason already.
+    A cluster with the wrong size for its place is a candidate with a reason.
     """
     likely = _on_screen(observation, probabilities > settings.threshold)
-    graph = observation.layout
+    if not len(likely):
+        return []
     candidates = []
-    for cluster in clusters(graph, likely)[:_MOST_CLUSTERS] if len(likely) else ():
+    for cluster in clusters(observation.layout, likely)[:_MOST_CLUSTERS]:
         center = _middle(observation, cluster)
         near = _around(observation, cluster, center)
         p = probabilities[near].astype(np.float64)
@@ -81,6 +82,7 @@ def _around(observation: Observation, cluster: Members, center: Floats) -> Membe
     rays, radius = observation.layout.rays, observation.view.shape.radius
     distance = float(np.linalg.norm(center))
     cosines = along(rays, center / distance)
+    # Between unit vectors at an angle a, the chord is as long as sqrt(2 - 2 cos a).
     chord = math.sqrt(2.0 * max(1.0 - float(cosines[cluster].min()), 0.0)) + 3.0 * radius / distance
     return _on_screen(observation, cosines > 1.0 - 0.5 * min(chord, 2.0) ** 2)
 

@@ -15,7 +15,7 @@ _GRID = np.stack(np.meshgrid(np.linspace(-1.0, 1.0, 5), np.linspace(-1.0, 1.0, 5
 """Places of one round of the search for a center, in units of the round's reach."""
 
 _REACHES = (1.0, 0.3, 0.1)
-"""Reach of each round, in object radii; upwards and downwards in half heights of an object taller than wide."""
+"""Reach of each round, in object radii; along the vertical in half heights if the object is taller than wide."""
 
 _SCALES = np.geomspace(0.6, 1.8, 15)
 """Apparent sizes to try, as shares of the expected one."""
@@ -33,6 +33,7 @@ def fit(view: PreparedView, candidate: Candidate) -> Candidate:
     for reach in _REACHES:
         distance = float(np.linalg.norm(center))
         axis = center / distance
+        # The height of the center is half the height of a cylinder.
         across, up = view.shape.radius, max(view.shape.radius, view.shape.center_height)
         tried = axis + reach / distance * ((_GRID * (across, up)) @ tangents(axis))
         centers = view.shape.center_along(tried, view.height)

@@ -13,7 +13,10 @@ from .prepared_view import PreparedView
 from .settings import Settings
 
 _FARTHEST = 1e5
-"""Distance of objects on the horizon, in camera heights."""
+"""Farther objects count as on the horizon, in camera heights."""
+
+_INSIDE_ENDS, _BAND_BEGINS, _BAND_ENDS = -0.25, 0.75, 2.25
+"""Distances from the outline, in ring spacings: where the inside ends, and where the band around begins and ends."""
 
 
 def judge(view: PreparedView, candidate: Candidate, accepted: Sequence[Candidate], settings: Settings) -> Candidate:
@@ -25,9 +28,9 @@ def judge(view: PreparedView, candidate: Candidate, accepted: Sequence[Candidate
 def _misfit(view: PreparedView, candidate: Candidate, settings: Settings) -> str | None:
     """Why the points do not look like an object at the center, or None.
 
-    Points within a ring spacing of the outline say little: their pixels show both sides, and a ring that grazes the
-    object shows some of it. So the inside ends a quarter of a spacing before the outline. The band around begins three
-    quarters beyond it and is 1.5 spacings wide.
+    A zone one ring spacing wide around the outline is ignored, because pixels there show both sides. It reaches from a
+    quarter of a spacing inside to three quarters outside, because a ring that grazes the object shows some of it. The
+    band that must be empty is the next 1.5 spacings.
 
     Less than one object from the nadir the mesh is singular, and up to twice as many points see an object (the paper's
     second limitation, section "Discussion and Conclusion"). It may seem to cover twice its area there, so the band is
@@ -41,13 +44,14 @@ def _misfit(view: PreparedView, candidate: Candidate, settings: Settings) -> str
     visible = int((offset < 1.0).sum())
     if visible < settings.min_visible * whole:
         return f"{visible} of its points on screen, where a whole object has about {whole:.0f}"
-    inside = p[offset < 1.0 - 0.25 * view.spacing]
+    inside = p[offset < 1.0 + _INSIDE_ENDS * view.spacing]
     if len(inside) == 0 or inside.mean() < settings.min_inside:
         share = inside.mean() if len(inside) else 0.0
         return f"mean probability inside its outline is {share:.2f}, below {settings.min_inside:g}"
     inclination = math.atan2(math.hypot(center[0], center[1]), -center[2])
     apparent = offset / (math.sqrt(2.0) if view.shape.n(inclination, view.height) < 1.0 else 1.0)
-    around = p[(apparent > 1.0 + 0.75 * view.spacing) & (apparent < 1.0 + 2.25 * view.spacing)]
+    first, last = 1.0 + _BAND_BEGINS * view.spacing, 1.0 + _BAND_ENDS * view.spacing
+    around = p[(apparent > first) & (apparent < last)]
     if len(around) and around.mean() > settings.max_around:
         return f"mean probability around its outline is {around.mean():.2f}, above {settings.max_around:g}"
     return None

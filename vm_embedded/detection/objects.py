@@ -33,7 +33,10 @@ def locate(
         for candidate in propose(observation, object_class.name, probabilities, settings):
             if candidate.reason is None:
                 candidate = judge(view, fit(view, candidate), accepted, settings)
-            (accepted if candidate.reason is None else rejected).append(candidate)
+            if candidate.reason is None:
+                accepted.append(candidate)
+            else:
+                rejected.append(candidate)
         found += accepted
     objects = [_describe(observation, each) for each in found]
     reasons = [_describe(observation, each) for each in rejected] if explain else []

@@ -31,8 +31,9 @@ class Network(Protocol):
 class Observation:
     """A frame's n points on screen with their probabilities, before objects are located among them.
 
-    view: what the frame was projected with. manifest: of the network. projected: the slots of the layout, m in all.
-    slot_probabilities (m, C): the network's output; it has no meaning off screen. timing_ms: milliseconds by stage.
+    view: the mesh points and the camera. manifest: of the network. projected: the m slots of the layout; copies and gaps
+    count as off screen. slot_probabilities (m, C): the network's output; it has no meaning off screen. timing_ms:
+    milliseconds by stage.
     """
 
     view: PreparedView
@@ -95,9 +96,10 @@ def classify(
 ) -> Observation:
     """Sample the image at projected points, and let the network classify them. See `observe`."""
     layout = view.layout
+    # The network needs the colors of copies, too. They must not count twice in the mean color, nor in an object.
     shown = projected.only(layout.original)
     points = layout.new_points()
-    colors = layout.colors_of(points)
+    colors = layout.colors_of(points)  # a view: writing to it fills `points`
     sample(image, projected.pixels, settings.format, settings.sampling, colors, view.levels)
     normalize_colors(colors, manifest.colors, shown.on_screen)
     watch.lap("sample")

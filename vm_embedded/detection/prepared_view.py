@@ -16,7 +16,7 @@ from .projection import to_camera
 class PreparedView:
     """The mesh points that can be on screen, the camera that sees them, and the object that is sought among them.
 
-    layout: the points in the network's order. levels: the picture of the pyramid that each point is sampled from, or
+    layout: the points in the network's order. levels: the picture of footprint.py that each point is sampled from, or
     None without footprints. shape: of the real object. rings: number of mesh rings that cross it. height: of the
     camera over the observation plane [m]. rotation (3, 3): camera to mesh frame, in which objects are sought.
     heading (3, 3): mesh frame to the frame's observation plane, a turn around the vertical. lens, size [px]: of the

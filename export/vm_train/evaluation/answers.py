@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class PictureAnswer:
     """The answer to a picture: pixels (n, 2), distances (n,) on the plane [m] and probabilities (n, C) of its points,
     and the objects found, most confident first."""
 
@@ -59,7 +59,7 @@ class Subject(Protocol):
     @property
     def sha256(self) -> str: ...
 
-    def answer(self, picture: Picture, radius: float | None = None) -> Answer:
+    def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         """Its answer to a picture. radius [m]: of the objects, for mesh and fit, if not the manifest's.
 
         Raises GeometryError if the camera is too low for a mesh, and InputError for a lens that does not fit.
@@ -67,7 +67,7 @@ class Subject(Protocol):
 
 
 @dataclass(eq=False)
-class Exact:
+class ExactSubject:
     """A network at the points of each picture's own mesh."""
 
     manifest: Manifest
@@ -76,7 +76,7 @@ class Exact:
     settings: Settings
     network: Network
 
-    def answer(self, picture: Picture, radius: float | None = None) -> Answer:
+    def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         observation = self.observe(picture, radius)
         found: tuple[Detection, ...] = ()
         if self.grid.kind == VISUAL.kind:
@@ -91,14 +91,14 @@ class Exact:
         height, width = picture.labels.shape
         shown = seen_points(picture.lens, (width, height), manifest, self.grid)
         layout = choose_layout(shown.graph, manifest)
-        pixels = np.append(shown.pixels, np.full((1, 2), np.nan), axis=0)[layout.slots]
+        pixels = np.append(shown.pixels, np.full((1, 2), np.nan), axis=0)[layout.slots]  # NaN in gaps
         projected = Projection(layout, pixels, layout.slots < len(shown))
         view = _view(picture, layout, manifest, self.grid)
         return classify(picture.image, view, projected, manifest, self.network, self.settings, Stopwatch())
 
 
 @dataclass(eq=False)
-class Robot:
+class RobotSubject:
     """A detector as it runs on a robot, with its shared meshes."""
 
     detector: Detector
@@ -109,15 +109,15 @@ class Robot:
     def manifest(self) -> Manifest:
         return self.detector.manifest
 
-    def answer(self, picture: Picture, radius: float | None = None) -> Answer:
+    def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         assert radius is None  # a robot's network is for balls of one size
         seen = self.detector.detect(picture.image, _orientation(picture), picture.lens.lens)
         return _answer(seen.observation, seen.objects)
 
 
-def _answer(observation: Observation, found: tuple[Detection, ...]) -> Answer:
+def _answer(observation: Observation, found: tuple[Detection, ...]) -> PictureAnswer:
     distances = plane_distances(observation.rays, observation.view.height)
-    return Answer(observation.pixels, distances, observation.probabilities, found)
+    return PictureAnswer(observation.pixels, distances, observation.probabilities, found)
 
 
 def _view(picture: Picture, layout: Layout, manifest: Manifest, grid: Grid) -> PreparedView:
@@ -146,9 +146,9 @@ def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subj
     if kind == ".onnx":
         model = read_model(path)
         if as_robot:
-            return Robot(Detector(model, settings), model.sha256)
+            return RobotSubject(Detector(model, settings), model.sha256)
         session = Session(model, settings.threads, settings.spinning)
-        return Exact(model.manifest, VISUAL, model.sha256, settings, session)
+        return ExactSubject(model.manifest, VISUAL, model.sha256, settings, session)
     if kind != ".pt":
         raise InputError(f"{path}: a model must be a checkpoint (.pt) or a model file (.onnx), not {path.suffix!r}")
     if as_robot:
@@ -158,7 +158,7 @@ def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subj
     checkpoint = Checkpoint.load(path)
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     manifest = replace(checkpoint.manifest, layout="plain")
-    return Exact(manifest, checkpoint.grid, digest, settings, TorchNetwork(checkpoint))
+    return ExactSubject(manifest, checkpoint.grid, digest, settings, TorchNetwork(checkpoint))
 
 
 class TorchNetwork:

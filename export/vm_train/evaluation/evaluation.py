@@ -18,7 +18,7 @@ from ..data.picture_files import PictureFault, PictureFiles
 from ..data.pictures import Picture, read_picture
 from ..scores.object_scores import ObjectScores
 from ..scores.point_scores import PointScores
-from .answers import Answer, Subject
+from .answers import PictureAnswer, Subject
 from .object_truth import SceneTruth, read_scene, true_objects
 from .worst_errors import WorstErrors, worst_errors_of
 
@@ -83,7 +83,7 @@ class Evaluation:
         )
 
     def count(
-        self, files: PictureFiles, picture: Picture, scene: SceneTruth | None, answer: Answer, manifest: Manifest
+        self, files: PictureFiles, picture: Picture, scene: SceneTruth | None, answer: PictureAnswer, manifest: Manifest
     ) -> None:
         """Add a network's answer on a picture. Raises ModelError for probabilities outside 0 to 1."""
         x, y = np.rint(answer.pixels).astype(np.intp).T

@@ -79,7 +79,7 @@ def test_a_robot_gives_its_network_what_a_training_does(gain):
     """All points of a picture at its own pose, in a picture half as bright too."""
     from vm_export.grid import VISUAL
     from vm_train.data.pictures import Picture
-    from vm_train.evaluation.answers import Exact
+    from vm_train.evaluation.answers import ExactSubject
 
     model = read_model(DRAWN / "ball.onnx")
     model = replace(model, manifest=replace(model.manifest, colors="relative", self_test=None))
@@ -90,7 +90,7 @@ def test_a_robot_gives_its_network_what_a_training_does(gain):
     detector = Detector(model, Settings(height_tolerance=0.0))
     robot = detector.detect(image, lens.orientation, lens.lens)
     labels = np.zeros(image.shape[:2], dtype=np.int8)
-    training = Exact(model.manifest, VISUAL, "", Settings(), detector.session)
+    training = ExactSubject(model.manifest, VISUAL, "", Settings(), detector.session)
     answer = training.answer(Picture(image, labels, lens))
     assert len(answer.pixels) == len(robot.pixels) > 500
     ours, theirs = (

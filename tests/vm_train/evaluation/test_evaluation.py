@@ -16,7 +16,7 @@ from vm_export.checkpoint import Checkpoint
 from vm_export.export import export
 from vm_export.grid import Grid
 from vm_train.data.pictures import Picture, find_pictures, read_picture
-from vm_train.evaluation.answers import Exact, load_subject
+from vm_train.evaluation.answers import ExactSubject, load_subject
 from vm_train.evaluation.evaluation import Evaluation, Rules, evaluate_pictures
 from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
 from vm_train.evaluation.object_truth import SceneBall, SceneTruth
@@ -130,7 +130,7 @@ class Always:
         return np.tile(self.answer, (len(layout), 1))
 
 
-KNOWING = Exact(MANIFEST, Grid(), "", SETTINGS, ByColor())
+KNOWING = ExactSubject(MANIFEST, Grid(), "", SETTINGS, ByColor())
 
 
 def test_a_network_that_sees_colors_is_nearly_perfect_on_drawn_balls(files):
@@ -145,7 +145,7 @@ def test_a_network_that_sees_colors_is_nearly_perfect_on_drawn_balls(files):
 def test_a_hexagonal_network_has_scores_of_points_only(files):
     checkpoint = Checkpoint.load(CHECKPOINT)
     network = load_subject(CHECKPOINT, SETTINGS).network
-    subject = Exact(checkpoint.manifest, Grid("hexagonal"), "", SETTINGS, network)
+    subject = ExactSubject(checkpoint.manifest, Grid("hexagonal"), "", SETTINGS, network)
     result = evaluate_pictures(subject, files[:2], CLASSES, Rules())
     assert result.objects == {}
     assert result.points.confusion().sum() > 100
