@@ -39,7 +39,9 @@ def parser() -> argparse.ArgumentParser:
         "--to-yaml", action="store_true", help="write the format of the reference implementation instead"
     )
     facts = parser.add_argument_group("entries that the file lacks, or that you want to replace")
-    facts.add_argument("--intersections", type=float, metavar="K", help="rings of the mesh across an object")
+    facts.add_argument(
+        "--intersections", type=float, metavar="K", help="rings of points across an object (the paper's k)"
+    )
     facts.add_argument("--radius", type=float, metavar="M", help="radius of the object that the mesh is built for [m]")
     facts.add_argument("--object-radius", type=float, metavar="M", help="radius of the real object [m]")
     facts.add_argument("--max-distance", type=float, metavar="M", help="reach of the mesh [m]")

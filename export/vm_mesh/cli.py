@@ -97,7 +97,7 @@ def _parser(command: str, description: str) -> argparse.ArgumentParser:
         help="height of the camera [m]; default " + ("1" if command == "quality" else "that in the lens file, or 1"),
     )
     plan.add_argument(
-        "--intersections", type=float, metavar="K", help="points in a row across an object (k); default 4"
+        "--intersections", type=float, metavar="K", help="rings of points across an object (the paper's k); default 4"
     )
     plan.add_argument(
         "--max-distance",

@@ -43,7 +43,8 @@ other commands, each with its own --help:
   vm-synth check OUT      describe the set in tables and plots; find missing and damaged files
   vm-synth config         print all entries of scene.toml with meaning, unit, limits and default
 
-To continue a stopped run, repeat the command. Shards can write to one folder, or to several whose files you join.
+To continue a stopped run, repeat the command. Shards can write to one
+folder, or to several folders; then copy all files into one.
 """
 
 
@@ -70,13 +71,15 @@ def parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="SECTION.ENTRY=VALUE",
-        help=f"override one configuration entry, for example {_EXAMPLE}; may be repeated",
+        help=f"override one entry of the configuration, for example {_EXAMPLE}; repeatable",
     )
     made.add_argument(
         "--workers", type=at_least(0), metavar="W", help="worker processes, one core each; default: all cores"
     )
     made.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="render only part I of N")
-    made.add_argument("--held-out", action="store_true", help="use only the maps that are held out for testing")
+    made.add_argument(
+        "--held-out", action="store_true", help="render with only the maps of [maps] held_out; default: with all others"
+    )
     return made
 
 

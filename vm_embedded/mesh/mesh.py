@@ -93,7 +93,7 @@ class MeshModel(ABC):
     def build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         """The mesh for objects of this shape, seen from a height [m], out to `max_distance` [m].
 
-        intersections: the paper's k, the number of rings that cross an object and of points in a row across it.
+        intersections: rings of points across an object (the paper's k), and points of a ring across it.
 
         Raises GeometryError for a shape, a height, a number of intersections or a distance that this model cannot
         build.

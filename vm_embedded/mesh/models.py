@@ -29,7 +29,7 @@ def mesh_model(name: str) -> MeshModel:
 def build_mesh(shape: Shape, height: float, intersections: float, max_distance: float, model: str = "ring6") -> Mesh:
     """The mesh for objects of this shape, seen from a height [m], out to `max_distance` [m].
 
-    intersections: the paper's k, the number of points in a row across an object. model: one of MESH_MODELS.
+    intersections: rings of points across an object (the paper's k). model: one of MESH_MODELS.
 
     Raises InputError for an unknown model, and GeometryError for arguments that the model cannot build a mesh from.
     """

@@ -64,12 +64,12 @@ class Manifest:
 
     shape: of the object, one of SHAPES. radius: of the object that the mesh is made for [m]. object_radius: of the real
     object [m]. object_height: of a cylinder [m], else 0. any_radius: the network was trained on objects of many radii,
-    so the mesh is made for the real one's. intersections: rings across an object of `radius`, the paper's k. mesh: one
-    of MESH_MODELS. max_distance: of the mesh [m]. edge: one of EDGES. classes: in the order of the network's outputs.
-    layout: one of LAYOUTS; runs and lattice need edge hard. operations: multiplications and additions for each point.
-    channels, scale: a point's input is its color in this order of channels, times scale. sampling: one of
-    POINT_SAMPLINGS. colors: one of POINT_COLORS. provenance: origin of the file, for people. Raises ModelError for
-    unknown values.
+    so the mesh is made for the real one's. intersections: rings of points across an object of `radius` (the paper's
+    k). mesh: one of MESH_MODELS. max_distance: of the mesh [m]. edge: one of EDGES. classes: in the order of the
+    network's outputs. layout: one of LAYOUTS; runs and lattice need edge hard. operations: multiplications and
+    additions for each point. channels, scale: a point's input is its color in this order of channels, times scale.
+    sampling: one of POINT_SAMPLINGS. colors: one of POINT_COLORS. provenance: origin of the file, for people. Raises
+    ModelError for unknown values.
     """
 
     shape: str

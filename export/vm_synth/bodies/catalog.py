@@ -43,7 +43,7 @@ class BodyRanges:
         0.02, 0.25, "radius of round objects that are not the ball", "m", (0.005, 2.0)
     )
     distractor_kinds: tuple[str, ...] = some_of(tuple(DISTRACTORS), "kinds of round objects that are not the ball")
-    distractor_gap: float = share(0.3, "least relative difference between the radius of a white sphere and the ball's")
+    distractor_gap: float = share(0.3, "radius of white spheres differs from the ball's by at least this share")
     carrier_kinds: tuple[str, ...] = some_of(tuple(CARRIERS), "kinds of carriers of the camera")
 
     def __post_init__(self) -> None:

@@ -48,7 +48,7 @@ class CameraRanges:
     steep: float = share(0.2, "share of cameras that look down steeply")
     steep_pitch: tuple[float, float] = range_of(40.0, 90.0, "pitch of these cameras", "deg", (-45.0, 90.0))
     roll: tuple[float, float] = range_of(-10.0, 10.0, "roll; positive leans to the right", "deg", (-180.0, 180.0))
-    tumbled: float = share(0.04, "share of cameras with any roll")
+    tumbled: float = share(0.04, "share of cameras with a random roll from -180 to 180 deg")
 
     lens: Mapping[str, Any] = field(
         default_factory=dict,

@@ -29,7 +29,7 @@ class GroundRanges:
     detail: tuple[float, float] = range_of(
         0.02,
         0.12,
-        "strength of noise on a photographed floor; it replaces the detail that maps lack",
+        "noise added to a photographed floor, because maps are too coarse",
         "",
         (0, 1),
     )
@@ -56,7 +56,7 @@ class TargetRanges:
     )
     missing: float = share(0.1, "share of pictures without a ball")
     cut: float = share(0.15, "share of pictures whose border may cut the ball")
-    hidden: float = share(0.2, "share of pictures with an object close to the line from camera to ball")
+    hidden: float = share(0.2, "share of pictures with an object that may hide the ball")
     off_plane: float = share(0.08, "share of pictures with another ball on a pedestal or in the air")
     off_plane_height: tuple[float, float] = range_of(0.1, 1.2, "height of that ball above the plane", "m", (0.01, 5.0))
     off_plane_label: str = one_of(CLASSES, "environment", "class of that ball")

@@ -45,14 +45,16 @@ def check_parser() -> argparse.ArgumentParser:
     """The options of vm-train check DATA."""
     made = argparse.ArgumentParser(
         prog="vm-train check",
-        description="Read all pictures of a folder, or of the shards in it. Print tables of their contents, and name "
-        "the pictures that can't be used. Exit status: 0 if all can be used, 1 otherwise.",
+        description="Read all pictures of a folder, or of the shards in it. Print tables of their contents, and list "
+        "the unusable pictures. Exit status: 0 if all can be used, 1 otherwise.",
     )
     made.add_argument("data", type=Path, metavar="DATA", help="folder of imageX.jpg or .png, maskX.png, lensX.yaml")
-    made.add_argument("--config", type=Path, metavar="FILE", help="train.toml with the classes; default vm-synth's")
-    made.add_argument("--workers", type=at_least(1), metavar="N", help="reading processes; default all cores")
-    made.add_argument("--json", type=Path, metavar="FILE", help="file for all results, with every fault")
-    made.add_argument("--strict", action="store_true", help="exit with 1 also if a class is in no picture")
+    made.add_argument(
+        "--config", type=Path, metavar="FILE", help="train.toml with the classes; default: those of vm-synth"
+    )
+    made.add_argument("--workers", type=at_least(1), metavar="N", help="reading processes; default: all cores")
+    made.add_argument("--json", type=Path, metavar="FILE", help="write all results and all faults to this file")
+    made.add_argument("--strict", action="store_true", help="also exit with 1 if a class appears in no picture")
     return made
 
 

@@ -44,7 +44,7 @@ def parser() -> argparse.ArgumentParser:
         action="store_true",
         help="run the detector as on a robot, with meshes shared between similar poses; only for .onnx",
     )
-    group.add_argument("--workers", type=at_least(1), metavar="N", help="processes, one core each; default all cores")
+    group.add_argument("--workers", type=at_least(1), metavar="N", help="processes, one core each; default: all cores")
     group.add_argument(
         "--config", type=Path, metavar="FILE", help="vm.toml with detector settings; the options below override them"
     )
@@ -58,8 +58,8 @@ def _add_pictures(made: argparse.ArgumentParser) -> None:
         "--list",
         type=Path,
         metavar="FILE",
-        help="evaluate only the pictures in this text file, one number or image name per line, or in the pictures.json "
-        "of a training",
+        help="evaluate only these pictures: a text file with one number or image name per line, or the pictures.json of "
+        "a training",
     )
     group.add_argument("--part", choices=("test", "validation", "training"), help="part of pictures.json; default test")
     group.add_argument(
@@ -68,15 +68,15 @@ def _add_pictures(made: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="CLASS=R,G,B",
-        help="assign one more mask color to a class; repeat it for each color. The other colors come from the "
-        "train.toml next to the checkpoint, or else from vm-synth",
+        help="assign one more mask color to a class; repeatable. The other colors come from the train.toml next to the "
+        "checkpoint, or else from vm-synth",
     )
     group.add_argument(
         "--radius-of",
         choices=("all", "scene"),
         default="all",
-        help="radius of mesh and fit. all: the network's; scene: that of each picture's ball, from the sceneX.json of "
-        "vm-synth; default all",
+        help="radius for mesh and fit. all: the network's radius for all pictures; scene: the radius of each picture's "
+        "ball (sceneX.json of vm-synth); default all",
     )
     group.add_argument(
         "--min-radius", type=_length, default=2.0, metavar="PX", help="ignore smaller true objects [px]; default 2"
@@ -89,7 +89,7 @@ def points_parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="vm-evaluate points",
         description="Draw the number of mesh points on a ball over its distance, for the Visual Mesh and for a "
-        "hexagonal mesh of the same size. The camera is like that of the paper: 1280 x 1024 px, equisolid, f = 420 px.",
+        "hexagonal mesh. The camera is like that of the paper: 1280 x 1024 px, equisolid, f = 420 px.",
     )
     made.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="figure to write, .png or .svg")
     made.add_argument(
@@ -97,7 +97,7 @@ def points_parser() -> argparse.ArgumentParser:
         type=_numbers,
         default=(3.0, 4.0, 5.0),
         metavar="K,...",
-        help="intersections of the Visual Mesh, a curve for each; default 3,4,5",
+        help="rings of points across a ball, one curve for each K; default 3,4,5",
     )
     made.add_argument("--radius", type=_length, default=0.075, metavar="M", help="ball radius [m]; default 0.075")
     made.add_argument("--height", type=_length, default=0.9, metavar="M", help="camera height [m]; default 0.9")
@@ -108,11 +108,13 @@ def points_parser() -> argparse.ArgumentParser:
         "--equal-at",
         type=_length,
         metavar="M",
-        help="give both meshes the same number of points on a ball at this distance [m]; default: the same number on "
-        "screen",
+        help="both meshes have the same number of points on a ball at this distance [m]; default: the same number in "
+        "the whole picture",
     )
     made.add_argument(
-        "--early", action="store_true", help="also draw rings with the widths of an early version of the reference"
+        "--early",
+        action="store_true",
+        help="also draw the Visual Mesh with the ring widths of an early version of the reference",
     )
     return made
 

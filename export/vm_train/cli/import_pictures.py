@@ -34,13 +34,13 @@ def import_parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="OURS=THEIRS",
-        help=f"the files' name of a feature, for example lens/fov=camera/field_of_view; ours are {', '.join(KEYS)}; "
-        "repeat it for each feature",
+        help="read our feature OURS from the file's feature THEIRS, for example lens/fov=camera/field_of_view; "
+        f"repeatable; OURS is one of {', '.join(KEYS)}",
     )
     made.add_argument(
         "--normalized",
         action="store_true",
-        help="the files give lens/focal_length, lens/centre and lens/k for an image of width 1; default: in pixels",
+        help="the files give lens/focal_length, lens/centre and lens/k for images of width 1; default: in pixels",
     )
     made.add_argument("--strict", action="store_true", help="stop at the first record without a usable picture")
     return made

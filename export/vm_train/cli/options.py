@@ -46,14 +46,14 @@ def parser() -> argparse.ArgumentParser:
         "--first",
         type=Path,
         metavar="MODEL",
-        help="checkpoint (.pt) of a small trained network that looks first and passes on promising points, as set in "
-        "[second_look]; the new network learns and runs on these points only; the model file holds both",
+        help="checkpoint (.pt) of a small network. It selects points; the new network trains and runs only on these. "
+        "See [second_look]. The model file contains both networks",
     )
     made.add_argument(
         "--teacher",
         type=Path,
         metavar="MODEL",
-        help="checkpoint (.pt) of a larger trained network; the new one also learns its probabilities; see "
+        help="checkpoint (.pt) of a larger network. The new network also learns from its probabilities. See "
         "training.distillation",
     )
     made.add_argument("--strict", action="store_true", help="fail if a picture is damaged; default: skip it")
@@ -71,7 +71,7 @@ def resume_parser() -> argparse.ArgumentParser:
         description="Continue a training that was stopped or killed, from its last state.",
     )
     made.add_argument("run", type=Path, metavar="RUN", help="folder of the training")
-    made.add_argument("--data", type=Path, metavar="DATA", help="new place of the pictures, if they were moved")
+    made.add_argument("--data", type=Path, metavar="DATA", help="new folder of the pictures, if they were moved")
     _add_hardware(made)
     return made
 
@@ -140,7 +140,7 @@ def _add_data(made: argparse.ArgumentParser) -> None:
 
 def _add_configuration(made: argparse.ArgumentParser) -> None:
     made.add_argument(
-        "--config", type=Path, metavar="FILE", help="configuration, train.toml; missing entries have their defaults"
+        "--config", type=Path, metavar="FILE", help="configuration, train.toml; missing entries keep their defaults"
     )
     made.add_argument(
         "--set",
@@ -165,8 +165,8 @@ def _add_cache(made: argparse.ArgumentParser) -> None:
         "--unpacked",
         type=Path,
         metavar="DIR",
-        help="folder to cache decoded pictures in (1.3 MB for 640 x 512 px); several trainings can share it; default "
-        "RUN/unpacked, which is removed at the end",
+        help="cache folder for decoded pictures (1.3 MB per picture of 640 x 512 px); several trainings can share it; "
+        "default RUN/unpacked, which is removed at the end",
     )
     group.add_argument(
         "--no-unpacked", action="store_true", help="do not cache decoded pictures; for slow or small disks"
@@ -177,11 +177,11 @@ def _add_hardware(made: argparse.ArgumentParser) -> None:
     group = made.add_argument_group("hardware")
     group.add_argument("--device", choices=DEVICES, default="auto", help="default: a GPU if there is one, else the CPU")
     group.add_argument(
-        "--workers", type=at_least(0), metavar="N", help="processes that read pictures; default half the cores"
+        "--workers", type=at_least(0), metavar="N", help="processes that read pictures; default: half of the cores"
     )
     group.add_argument(
         "--threads",
         type=at_least(1),
         metavar="N",
-        help="threads that compute; default 1; with more, results differ in the last digits from run to run",
+        help="computing threads; default 1; with more, the last digits of results differ from run to run",
     )

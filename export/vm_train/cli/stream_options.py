@@ -24,20 +24,20 @@ def add_stream(made: argparse.ArgumentParser) -> None:
     """Add --stream and --epoch-pictures."""
     group = made.add_argument_group(
         "streaming",
-        "Read training pictures from shards and store nothing; all pictures of DATA are for validation.",
+        "Read the training pictures from shards, without storing them; use all pictures of DATA for validation.",
     )
     group.add_argument(
         "--stream",
         nargs="+",
         default=[],
         metavar="SHARD",
-        help="tar files, http addresses or pipe:COMMAND; ranges such as {000000..000099} stand for all their numbers",
+        help="tar files, http addresses or pipe:COMMAND; {000000..000099} stands for 100 shards with these numbers",
     )
     group.add_argument(
         "--epoch-pictures",
         type=int,
         metavar="N",
-        help="pictures in an epoch; each epoch begins the stream again, in another order",
+        help="pictures per epoch; every epoch restarts the stream with the shards in another order",
     )
 
 

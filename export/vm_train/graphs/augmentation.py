@@ -33,15 +33,17 @@ class Augmentation:
     factors: up to 1 + the entry, and as often down to 1 / (1 + the entry). Raises InputError.
     """
 
-    height: float = number(0.02, "standard deviation of the camera height, as a share of it", "", (0.0, 0.5))
+    height: float = number(0.02, "standard deviation of the camera height, relative to the height", "", (0.0, 0.5))
     tilt: float = number(1.0, "standard deviation of the camera's roll and pitch", "deg", (0.0, 20.0))
-    focal_length: float = number(0.01, "standard deviation of the focal length, as a share of it", "", (0.0, 0.2))
+    focal_length: float = number(
+        0.01, "standard deviation of the focal length, relative to the focal length", "", (0.0, 0.2)
+    )
     center: float = number(0.005, "standard deviation of the optical center, in image widths", "", (0.0, 0.1))
-    brightness: float = number(0.2, "colors get brighter or darker by up to this share", "", (0.0, 4.0))
-    contrast: float = number(0.15, "contrast gets higher or lower by up to this share", "", (0.0, 4.0))
-    saturation: float = number(0.25, "colors get stronger or paler by up to this share", "", (0.0, 4.0))
-    hue: float = number(6.0, "hues turn by up to this angle, in both directions", "deg", (0.0, 180.0))
-    gamma: float = number(0.15, "exponent of the colors is up to this share above or below 1", "", (0.0, 4.0))
+    brightness: float = number(0.2, "brightness changes by up to this share, in both directions", "", (0.0, 4.0))
+    contrast: float = number(0.15, "contrast changes by up to this share, in both directions", "", (0.0, 4.0))
+    saturation: float = number(0.25, "saturation changes by up to this share, in both directions", "", (0.0, 4.0))
+    hue: float = number(6.0, "hue changes by up to this angle, in both directions", "deg", (0.0, 180.0))
+    gamma: float = number(0.15, "gamma exponent is drawn from 1 / (1 + value) to 1 + value", "", (0.0, 4.0))
     noise: float = number(0.03, "largest standard deviation of the noise, as a share of white", "", (0.0, 1.0))
     blur_share: float = share(0.15, "share of the pictures that are blurred")
     blur: tuple[float, float] = range_of(0.4, 1.2, "range of the blur's standard deviation", "px", (0.1, 20.0))

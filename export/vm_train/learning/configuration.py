@@ -22,9 +22,9 @@ from .recipe import Recipe
 class DataSettings:
     """Section [data]: the split of the pictures, if vm-train gets no lists."""
 
-    validation: float = share(0.1, "share of the pictures that choose the best network")
-    test: float = share(0.1, "share of the pictures that are kept for vm-evaluate")
-    split_seed: int = number(0, "seed that decides which pictures these are", "", (0, 2**31))
+    validation: float = share(0.1, "share of pictures for validation; the best epoch is chosen with them")
+    test: float = share(0.1, "share of pictures for the test with vm-evaluate; the training never sees them")
+    split_seed: int = number(0, "seed of the split", "", (0, 2**31))
 
     def __post_init__(self) -> None:
         check_entries(self)
@@ -40,10 +40,10 @@ class MeshSettings:
     radius_of: str = one_of(
         ("all", "scene"),
         "all",
-        "radius of the mesh; all: `radius` for every picture; scene: the radius of each picture's own ball, from the "
-        "sceneX.json of vm-synth, so one network suits balls of any size",
+        "radius of the mesh; all: `radius` for every picture; scene: the radius of each picture's ball, from the "
+        "sceneX.json of vm-synth; the network then suits balls of any size",
     )
-    intersections: float = number(4.0, "rings of points that cross an object (the paper's k)", "", (0.1, 100.0))
+    intersections: float = number(4.0, "rings of points across an object (the paper's k)", "", (0.1, 100.0))
     model: str = one_of(tuple(MESH_MODELS), "ring6", "arrangement of points and neighbors (docs/meshes.md)")
     sampling: str = one_of(
         POINT_SAMPLINGS,
@@ -53,8 +53,8 @@ class MeshSettings:
     colors: str = one_of(
         POINT_COLORS,
         "absolute",
-        "colors that the network gets; absolute: as sampled; relative: minus the mean of the picture's points, over "
-        "their standard deviation",
+        "colors that the network gets; absolute: as sampled; relative: mean of the picture's points subtracted, then "
+        "divided by their standard deviation",
     )
     max_distance: float = number(10.0, "how far the mesh reaches", "m", (0.1, 1e4))
     grid: str = one_of(
@@ -62,7 +62,7 @@ class MeshSettings:
     )
     equal_at: float = number(
         0.0,
-        "distance at which a hexagonal grid has as many points on an object as the Visual Mesh; 0: as many in all",
+        "distance at which both grids have the same number of points on an object; 0: both have the same total number",
         "m",
         (0.0, 1e3),
     )
@@ -92,11 +92,11 @@ class SecondLookSettings:
 
     above: float = number(
         0.05,
-        "a point gets a second look if the first network gives an object more than this probability",
+        "a point gets a second look if the first network's probability of an object is above this value",
         "",
         (0.0, 0.999),
     )
-    rings: int = number(4, "points up to this many steps around such points get a second look, too", "", (0, 100))
+    rings: int = number(4, "points up to this many steps away from such a point also get a second look", "", (0, 100))
 
     def __post_init__(self) -> None:
         check_entries(self)

@@ -23,16 +23,16 @@ class Recipe:
     batch: int = number(8, "pictures in a step, over all processes", "", (1, 1e5))
     window: float = number(
         1.0,
-        "train on random windows with this share of a picture's width and height; most windows show an object if the "
-        "picture does; 1: train on whole pictures",
+        "train on random windows with this share of the picture's width and height; in pictures with objects, most "
+        "windows show one; 1: train on whole pictures",
         "",
         (0.05, 1.0),
     )
     mirrored: float = number(0.0, "share of the training examples that are mirror images", "", (0.0, 1.0))
     views: int = number(
         0,
-        "versions of each picture to cache on disk, each with its own camera error and sharpness; faster; 0: no cache, "
-        "a new version each time",
+        "number of augmented versions of each picture to cache on disk (camera pose, lens and sharpness differ); makes "
+        "epochs faster; 0: no cache",
         "",
         (0, 1e4),
     )
@@ -43,22 +43,24 @@ class Recipe:
         "optimizer; sgd has momentum; muon suits short trainings, with a rate of 0.007 to 0.02",
     )
     schedule: str = one_of(
-        SCHEDULES, "one_cycle", "learning rate over time; one_cycle: rises once and falls; constant: stays the same"
+        SCHEDULES,
+        "one_cycle",
+        "learning rate over time; one_cycle: it rises once, then falls; constant: it stays the same",
     )
     decay: float = number(1e-4, "weight decay", "", (0.0, 1.0))
     clip: float = number(1.0, "largest norm of a step's gradient; 0: no limit", "", (0.0, 1e9))
-    loss: str = one_of(LOSSES, "cross_entropy", "loss of a point; focal: confident points count less")
+    loss: str = one_of(LOSSES, "cross_entropy", "loss of a point; focal: confident points have less weight")
     gamma: float = number(2.0, "exponent of the focal loss", "", (0.0, 20.0))
     selection: str = one_of(
         RULES,
         "balanced",
-        "points that give gradients; all: every labeled point; weighted: all, but frequent classes count less; "
-        "balanced: as many points of each class as the rarest object has; hard: balanced, preferring points that "
-        "earlier networks got wrong",
+        "points that give gradients; all: every labeled point; weighted: every labeled point, with less weight for "
+        "frequent classes; balanced: the same number of each class, namely that of the rarest class of kind object; "
+        "hard: balanced, preferring points with large errors in earlier rounds",
     )
     balance: float = number(
         1.0,
-        "for selection weighted: how much rare classes are favored; 0: all points count the same; 1: all classes do",
+        "for selection weighted: 0: all points have equal weight; 1: all classes have equal total weight",
         "",
         (0.0, 1.0),
     )
@@ -66,22 +68,23 @@ class Recipe:
         0.0, "share of a point's target that comes from its neighbors' labels; softens outlines", "", (0.0, 1.0)
     )
     distillation: float = number(
-        0.5, "share of the target that comes from the network of vm-train --teacher", "", (0.0, 1.0)
+        0.5,
+        "share of the target that comes from the network of vm-train --teacher; no effect without it",
+        "",
+        (0.0, 1.0),
     )
     averaging: float = number(
         0.0,
-        "decay of a moving average of the weights; the averaged network is validated and saved; 0.999 averages about "
-        "the last thousand steps; 0: no average",
+        "decay of the weights' moving average, which is then validated and saved; 0.999: over about the last thousand "
+        "steps; 0: no average",
         "",
         (0.0, 0.999999),
     )
     rounds: int = number(3, "for selection hard: networks to train one after the other", "", (2, 10))
     patience: int = number(
-        0, "epochs without a better validation score after which a round ends; 0: never ends early", "", (0, 1e6)
+        0, "a round ends after this many epochs without a better validation score; 0: it never ends early", "", (0, 1e6)
     )
-    precision: str = one_of(
-        PRECISIONS, "full", "arithmetic; mixed: bfloat16 where that is safe, which is faster on a GPU"
-    )
+    precision: str = one_of(PRECISIONS, "full", "arithmetic; mixed: bfloat16 where that is safe; faster on a GPU")
     seed: int = number(0, "seed of weights, order, point selection and augmentation", "", (0, 2**31))
 
     def __post_init__(self) -> None:
