@@ -58,8 +58,8 @@ def _add_pictures(made: argparse.ArgumentParser) -> None:
         "--list",
         type=Path,
         metavar="FILE",
-        help="evaluate only these pictures: a text file with one number or image name per line, or the pictures.json of "
-        "a training",
+        help="evaluate only these pictures: a text file with one number or image name per line, or the pictures.json "
+        "of a training",
     )
     group.add_argument("--part", choices=("test", "validation", "training"), help="part of pictures.json; default test")
     group.add_argument(
