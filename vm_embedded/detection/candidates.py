@@ -92,7 +92,7 @@ def _wrong_size(
 ) -> str | None:
     """Why a cluster around `center` has too few points or a too large graph diameter for an object, or None.
 
-    So the scale helps to identify objects, as in the paper's fig:ball_detection_images_3.
+    It rejects things of the wrong size, as in the paper's fig:ball_detection_images_3.
     """
     view = observation.view
     rays = view.layout.rays

@@ -45,7 +45,8 @@ def fit(view: PreparedView, candidate: Candidate) -> Candidate:
 def best_scale(view: PreparedView, candidate: Candidate, offset: Floats) -> float:
     """The apparent size that fits best at the candidate's bearing, as a share of the one that the plane predicts.
 
-    The paper uses the scale to reject false objects (fig:ball_detection_images_3).
+    The paper identifies objects by their scale (fig:ball_detection_images_3). This one rejects nothing: detections only
+    report it, as `distances_agree`.
 
     offset (p,): of the candidate's points from its center, as `Shape.offset` gives it.
     """

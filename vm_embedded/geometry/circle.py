@@ -12,7 +12,7 @@ from .shape import Shape, all_between
 
 
 class Circle(Shape):
-    """A flat disk on the plane (paper: fig:circle_phi, fig:circle_theta).
+    """A flat disk on the plane (paper: fig:circle_phi).
 
     Its recursion eqn:circle_phi1 adds the same length 2 r / h to tan(phi) for each object. So the closed form is
     phi(n) = atan(n s) with the spacing s = 2 r / h.
@@ -25,7 +25,7 @@ class Circle(Shape):
     def spacing(self, height: Number) -> Number:
         if not all_between(height, 0.0, math.inf):
             raise GeometryError(f"camera height must be above 0 m for a circle, not {height} m")
-        return 2.0 * self.radius / height
+        return 2.0 * self.radius / height  # the term that eqn:circle_phi1 adds
 
     def height_of(self, spacing: float) -> float:
         return 2.0 * self.radius / spacing
@@ -37,7 +37,8 @@ class Circle(Shape):
         return np.tan(phi) / self.spacing(height)
 
     def theta(self, n: Number, height: Number) -> Number:
-        # eqn:circle_dtheta with the paper's h. The reference takes h - r, which has no real answer just above n = 0.5.
+        # eqn:circle_dtheta, fig:circle_theta, with the paper's h. The reference takes h - r, which has no real answer
+        # just above n = 0.5.
         return self._theta(n, height * np.tan(self.phi(n, height)))
 
     def offset(self, rays: Floats, centers: Floats, height: float) -> Floats:

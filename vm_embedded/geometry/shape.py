@@ -1,8 +1,7 @@
 """The base class of the target object's shapes: how densely to sample an object, seen from a height.
 
 `n` counts objects from straight below the camera outwards: n = 0 is the nadir, and an object that lies between
-phi(n) and phi(n + 1) fills that gap exactly. `phi` is the paper's inclination from straight below, `theta` its angle
-around the vertical (section "Visual Mesh Geometry", fig:geometry).
+phi(n) and phi(n + 1) fills that gap exactly. The paper's section "Visual Mesh Geometry" defines phi and theta.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ class Shape(ABC):
 
     @abstractmethod
     def phi(self, n: Number, height: Number) -> Number:
-        """Inclination [rad] from straight below, n objects out."""
+        """Inclination [rad] from straight below, n objects out; the paper's phi in fig:geometry."""
 
     @abstractmethod
     def n(self, phi: Number, height: Number) -> Number:
@@ -54,7 +53,7 @@ class Shape(ABC):
 
     @abstractmethod
     def theta(self, n: Number, height: Number) -> Number:
-        """Angular width [rad] of an object around the vertical, n objects out; the paper's Delta theta.
+        """Angular width [rad] of an object around the vertical, n objects out; Delta theta in the paper's fig:geometry.
 
         Up to n = 0.5 the object covers the nadir. There the width is 2 pi / (1 + 2 n), as in the reference: the whole
         circle at the nadir and pi at n = 0.5.

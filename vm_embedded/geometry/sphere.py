@@ -15,8 +15,7 @@ class Sphere(Shape):
     """A ball on the plane (paper: fig:sphere_phi).
 
     The closed form of its recursion eqn:sphere_phi_1 is phi(n) = atan(sinh(n s)) with the spacing
-    s = -ln(1 - 2 r / h). It also holds between whole numbers n, so k rings across a ball need no smaller spheres
-    (paper: fig:multi_sphere_intersections).
+    s = -ln(1 - 2 r / h). It also holds between whole numbers n, so k rings across a ball need no smaller spheres.
     """
 
     @property
@@ -28,13 +27,15 @@ class Sphere(Shape):
             raise GeometryError(
                 f"camera height must be above the ball's diameter, {2.0 * self.radius:g} m, not {height} m"
             )
-        return -np.log1p(-2.0 * self.radius / height)
+        return -np.log1p(-2.0 * self.radius / height)  # what eqn:sphere_phi_1 adds to asinh(tan(phi))
 
     def height_of(self, spacing: float) -> float:
         return 2.0 * self.radius / -math.expm1(-spacing)
 
     def phi(self, n: Number, height: Number) -> Number:
-        return np.arctan(np.sinh(n * self.spacing(height)))  # eqn:sphere_phi_1, applied n times
+        # eqn:sphere_phi_1, applied n times. Fractions of n replace the paper's smaller spheres
+        # (fig:multi_sphere_intersections).
+        return np.arctan(np.sinh(n * self.spacing(height)))
 
     def n(self, phi: Number, height: Number) -> Number:
         return np.arcsinh(np.tan(phi)) / self.spacing(height)

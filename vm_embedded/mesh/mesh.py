@@ -125,7 +125,8 @@ class MeshModel(ABC):
     ) -> float:
         """Number of rings that cross the object `seen` from a height [m].
 
-        The rings belong to a mesh built for the shape `made_for`, `mesh_height` [m] and k = `intersections`.
+        It is the same at every distance (paper: fig:mesh_projection). The rings belong to a mesh built for the shape
+        `made_for`, `mesh_height` [m] and k = `intersections`.
         """
         return intersections * float(seen.spacing(height) / made_for.spacing(mesh_height))
 

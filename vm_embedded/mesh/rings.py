@@ -1,6 +1,6 @@
 """The paper's mesh: concentric rings around the point below the camera, with 4, 6 or 8 neighbors for each point.
 
-The paper's section "Graph Structure of the Mesh" and its fig:mesh_projection describe model ring6.
+The paper's section "Graph Structure of the Mesh" describes model ring6.
 """
 
 from __future__ import annotations
@@ -34,6 +34,8 @@ _CEIL_EPSILON = 1e-9
 class Rings(MeshModel):
     """Ring i is at phi(i / k) and has ceil(2 pi k / theta(i / k)) points. Ring 0 is the nadir, a single point.
 
+    With six neighbors these are the paper's rings (fig:mesh_projection).
+
     The order of the neighbors is that of the reference: left, then around the point by way of the top.
     """
 
@@ -52,6 +54,8 @@ class Rings(MeshModel):
 def inclinations(shape: Shape, height: float, intersections: float, max_distance: float) -> Floats:
     """The paper's phi_n (rings,) [rad] of all rings, the nadir first, with k = `intersections` rings across an object.
 
+    fig:geometry shows them for k = 1.
+
     The last ring is the last one closer than `max_distance` [m]. Raises GeometryError for a height that is too low for
     the shape, and for too many rings.
     """
@@ -64,7 +68,10 @@ def inclinations(shape: Shape, height: float, intersections: float, max_distance
 
 
 def ring_counts(shape: Shape, height: float, intersections: float, rings: int) -> Indices:
-    """Number of points in each ring (rings,). Points are the paper's Delta theta / k apart, or slightly less."""
+    """Number of points in each ring (rings,). Points are the paper's Delta theta / k apart, or slightly less.
+
+    fig:geometry and fig:circle_theta show Delta theta.
+    """
     theta = shape.theta(np.arange(1, rings) / intersections, height)
     counts = np.ceil(2.0 * np.pi * intersections / theta - _CEIL_EPSILON)
     check_size(float(counts.sum()))

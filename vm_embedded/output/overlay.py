@@ -1,4 +1,4 @@
-"""Drawing mesh points and detections into images, as in the paper's fig:ball_detection_images."""
+"""Drawing mesh points and detections into images."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ _AREAS = ((255, 255, 255), (190, 255, 170), (230, 160, 230), (220, 220, 120))
 
 def draw_overlay(image: Image, detections: Detections) -> Image:
     """A copy of a BGR, BGRA or gray image with mesh points in the color of their class, and objects with outline,
-    confidence and distance."""
+    confidence and distance.
+
+    The paper's fig:ball_detection_images has such pictures; there, the colors are confidences.
+    """
     colors = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image[:, :, :3]
     canvas = np.array(colors, dtype=np.uint8, order="C")
     scale = max(max(canvas.shape[:2]) / 1280.0, 0.8)

@@ -60,7 +60,7 @@ def object_curves(objects: Objects) -> Figure:
 def objects_over_distance(objects: Objects) -> Figure:
     """Recall, precision, average precision and the number of true objects over distance.
 
-    The paper's fig:pr_map; its fig:ball_detection_images_2 shows a ball far away.
+    Average precision is as in the paper's fig:pr_map. Its fig:ball_detection_images_2 shows a ball far away.
     """
     figure = new_figure(11.0, 6.4)
     panels: Sequence[Axes] = list(figure.subplots(2, 2, sharex=True).flat)

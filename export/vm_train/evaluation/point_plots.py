@@ -1,4 +1,4 @@
-"""Plots of the scores of points: curves, scores over distance, and the confusion of classes (paper: fig:plots)."""
+"""Plots of the scores of points: curves, scores over distance, and the confusion of classes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figure of points on a ball over its distance: the paper's `ball_distance_graph`."""
+"""The figure of points on a ball over its distance."""
 
 from __future__ import annotations
 
@@ -30,7 +30,10 @@ _NAMES = {"visual": "Visual Mesh", "hexagonal": "hexagonal mesh", "early": "Visu
 
 
 def points_figure(curves: Sequence[Curve], title: str = "") -> Figure:
-    """Points on the ball on the left, rings or rows across it on the right. Raises InputError without matplotlib."""
+    """Points on the ball on the left, rings or rows across it on the right.
+
+    The left half is the paper's fig:ball_distance_graph. Raises InputError without matplotlib.
+    """
     figure = new_figure(11.0, 5.4)
     from matplotlib.lines import Line2D
 

@@ -1,4 +1,4 @@
-"""Points of both meshes on a ball, over its distance: the curves of the paper's figure fig:ball_distance_graph."""
+"""Points of both meshes on a ball, over its distance."""
 
 from __future__ import annotations
 
@@ -63,9 +63,9 @@ def points_over_distance(
 ) -> list[Curve]:
     """Curves of the Visual Mesh and of the hexagonal mesh for each of the intersections; early: also of EarlySphere.
 
-    The hexagonal mesh has as many points on screen as the Visual Mesh or, with `equal_at` [m], as many points on a ball
-    at that distance. Raises GeometryError if the camera is too low for the ball, and InputError if the camera sees no
-    point of the mesh, or no ball at `equal_at`.
+    The paper's fig:ball_distance_graph has such curves. The hexagonal mesh has as many points on screen as the Visual
+    Mesh or, with `equal_at` [m], as many points on a ball at that distance. Raises GeometryError if the camera is too
+    low for the ball, and InputError if the camera sees no point of the mesh, or no ball at `equal_at`.
     """
     camera = PosedCamera(camera.orientation, camera.lens.for_image(camera.size), camera.size)
     seen = [(distance, BEARINGS[shown_whole(camera, ball, distance, BEARINGS)]) for distance in distances.tolist()]

@@ -59,8 +59,9 @@ class PrecisionRecall:
     def average_precision(self) -> float:
         """Area under the curve by the rule of Pascal VOC since 2010; NaN if there is nothing to find.
 
-        The precision at a recall is the highest at this recall or above, so the curve falls in steps, and the area is
-        the sum over all steps. COCO averages the same steps at 101 recalls.
+        The paper's fig:pr_map shows it over distance. The precision at a recall is the highest at this recall or above,
+        so the curve falls in steps, and the area is the sum over all steps. COCO averages the same steps at 101
+        recalls.
         """
         if self.positives == 0:
             return math.nan

@@ -70,7 +70,10 @@ class ObjectRanking:
 
     @cached_property
     def precision_recall(self) -> PrecisionRecall:
-        """The curve over all confidences. If there are true objects and none is found, its average precision is 0."""
+        """The curve over all confidences (paper: fig:pr_curve).
+
+        If there are true objects and none is found, its average precision is 0.
+        """
         order = np.argsort(-self.confidence)
         ranked, hits = self.confidence[order], np.cumsum(self.right[order], dtype=np.int64)
         # Equal confidences count together, so the curve does not depend on the order of the pictures.

@@ -112,6 +112,7 @@ class PointRanking:
 
     @cached_property
     def precision_recall(self) -> PrecisionRecall:
+        """The curve over all probabilities (paper: fig:pr_curve)."""
         thresholds, hits, false = self._steps
         return PrecisionRecall(thresholds, hits / (hits + false), shares(hits, self.positives), self.positives)
 
