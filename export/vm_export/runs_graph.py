@@ -15,7 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.mesh.mesh import SELF, Runs
+from vm_embedded.mesh.mesh import SELF, Groups
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
 from .column_layers import write_layers
@@ -29,7 +29,7 @@ def runs_model(network: Network, manifest: Manifest) -> bytes:
     Inputs: points (3, m) float32 and columns (G, m) int64, as RunsLayout gives them. Output: probabilities (C, m)
     float32.
     """
-    graph, groups = OnnxGraph(), manifest.model.runs
+    graph, groups = OnnxGraph(), manifest.model.groups
 
     def convolve(name: str, x: str, kernel: Floats) -> str:
         return convolve_along_runs(graph, name, x, kernel, groups)
@@ -41,14 +41,14 @@ def runs_model(network: Network, manifest: Manifest) -> bytes:
 def finished_runs_model(graph: OnnxGraph, classes: int, manifest: Manifest) -> bytes:
     """The bytes of a model whose graph has the inputs and the output of layout runs."""
     return graph.model(
-        {"points": (FLOAT, [3, "slots"]), "columns": (INT64, [len(manifest.model.runs), "slots"])},
+        {"points": (FLOAT, [3, "slots"]), "columns": (INT64, [len(manifest.model.groups), "slots"])},
         {"probabilities": (FLOAT, [classes, "slots"])},
         {METADATA_KEY: manifest.as_json()},
         "Visual Mesh network, laid out in runs. The slots and their columns are prepared by vm_embedded.",
     )
 
 
-def convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, groups: Runs) -> str:
+def convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, groups: Groups) -> str:
     """Write a convolution over the graph; return the name of its sums (outputs, m), from x (inputs, m)."""
     outputs, _, inputs = kernel.shape
     # All windows of three columns, without a copy of each. A row of `thrice` holds a channel of x twice, and a third
@@ -73,7 +73,7 @@ def convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, gro
     return graph.node("ReduceSum", [grouped, graph.constant("second", [1])], f"{name}.summed", keepdims=0)
 
 
-def kernel_places(groups: Runs) -> Iterator[tuple[int, int, int]]:
+def kernel_places(groups: Groups) -> Iterator[tuple[int, int, int]]:
     """Each place of a kernel (the point itself is 0), its group, and its distance from the middle of the group."""
     for number, group in enumerate(groups):
         for shift, neighbor in enumerate(group, start=-(len(group) // 3)):

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.mesh.mesh import Runs
+from vm_embedded.mesh.mesh import Groups
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.runs_layout import GAP
 
@@ -28,7 +28,7 @@ from .second_look import Gate, SecondLook
 
 def second_look_model(network: SecondLook, manifest: Manifest) -> bytes:
     """The bytes of an ONNX model in layout runs, with inputs and output as `runs_model` gives them."""
-    graph, groups = OnnxGraph(), manifest.model.runs
+    graph, groups = OnnxGraph(), manifest.model.groups
 
     def convolve(name: str, x: str, kernel: Floats) -> str:
         return convolve_along_runs(graph, name, x, kernel, groups)
@@ -95,7 +95,7 @@ def _write_positions(graph: OnnxGraph, selected: str, slots: str) -> str:
     return graph.node("ScatterElements", [zeros, *rows], "look.position", axis=1)
 
 
-def _write_receptive_fields(graph: OnnxGraph, selected: str, slots: str, positions: str, groups: Runs) -> str:
+def _write_receptive_fields(graph: OnnxGraph, selected: str, slots: str, positions: str, groups: Groups) -> str:
     """Write where in the small mesh its points find themselves and their neighbors: positions (places * k,).
 
     All points' positions for the first place of a kernel come first, then those for the second place, and so on.

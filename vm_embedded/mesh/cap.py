@@ -31,7 +31,7 @@ class Cap(MeshModel):
     """
 
     neighbors = 6
-    runs = Rings(6).runs
+    groups = Rings(6).groups
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         phi = inclinations(shape, height, intersections, max_distance)

@@ -1,11 +1,20 @@
 """Meshes on a lattice: every neighbor is a fixed step away, and there are no rings to close. They are the reference's.
 
-A lattice counts objects along two axes of the plane, u and v, in steps of 1 / k. Let c be the height of the object's
-center and g = h - c. In the plane at the height c a point has the coordinates
+The camera is at the height h over the plane and the object's center at the height c; g = h - c. phi(n, h) is the
+inclination n objects out, seen from the height h (`Shape.phi`). The points have coordinates x and y at the height c.
 
-- XY: x = g tan(phi(u)) and y = g tan(phi(v));
-- XM: x as in XY, and y = h' tan(phi(v, h' + c)) with h' = sqrt(g^2 + x^2), the camera's distance in the slice at x;
-- NM: y as in XM, and x = h'' tan(phi(u, h'' + c)) with h'' = sqrt(g^2 + y^2). These two equations are solved together.
+A *slice* is a plane through the camera that meets the height c in a line parallel to an axis. With the line at the
+distance d from the point below the camera, the camera is slant = sqrt(g^2 + d^2) away from the line. In the slice this
+takes the place of g. So n objects out, a point of the line has
+
+    coordinate(n, d) = slant tan(phi(n, slant + c)).
+
+A lattice counts objects, u along x and v along y, in steps of 1 / k. In the reference's names, X and Y are coordinates
+in the slice with d = 0, straight below the camera. N and M are coordinates in the slice with d = the other coordinate:
+
+- XY: x = coordinate(u, 0) and y = coordinate(v, 0);
+- XM: x = coordinate(u, 0) and y = coordinate(v, x);
+- NM: x = coordinate(u, y) and y = coordinate(v, x), two equations that are solved together.
 """
 
 from __future__ import annotations
@@ -19,18 +28,15 @@ import numpy.typing as npt
 
 from ..arrays import Floats, Indices, Mask, frozen
 from ..geometry.shape import Shape
-from .mesh import SELF, Mesh, MeshModel, check_size
+from .mesh import SELF, Groups, Mesh, MeshModel, check_size
 
 _STEPS = {
     4: ((-1, 0), (0, 1), (1, 0), (0, -1)),
     6: ((-1, 0), (-1, 1), (0, 1), (1, 0), (1, -1), (0, -1)),
     8: ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1)),
 }
-_RUNS = {
-    4: ((0, SELF, 2), (1,), (3,)),
-    6: ((0, SELF, 3), (1, 2), (5, 4)),
-    8: ((0, SELF, 4), (1, 2, 3), (7, 6, 5)),
-}
+"""(columns, rows) to each neighbor, by the number of neighbors. Clockwise, with rows drawn upwards."""
+
 _ROW = math.sqrt(0.75)
 """Distance between the rows of a six-neighbor lattice [steps]."""
 
@@ -39,6 +45,9 @@ _TURNS, _HALVINGS, _SETTLED = 30, 60, 1e-12
 do not settle (as with thin cylinders), and the relative change at which a point has settled."""
 
 KINDS = ("xy", "xm", "nm")
+
+_Coordinate = Callable[[Floats, Floats | float], Floats]
+"""(n objects out (m,), distance d of the slice (m,) or a number [m]) -> coordinate (m,) [m]."""
 
 
 class Grid(MeshModel):
@@ -54,15 +63,15 @@ class Grid(MeshModel):
     def __init__(self, kind: str, neighbors: int) -> None:
         self.kind = kind
         self.neighbors = neighbors
-        self.runs = _RUNS[neighbors]
         self.steps = _STEPS[neighbors]
+        self.groups = _row_groups(self.steps)
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         shape.spacing(height)  # raises GeometryError for a height without a mesh
         x, y = self._quarter(shape, height, intersections, max_distance)
-        rows, halves = (size - 1 for size in x.shape)
+        last_row, last_half = (size - 1 for size in x.shape)
         # half counts half steps along a row: 2 n, or 2 n + m with six neighbors.
-        m, half = (axis.astype(np.int32) for axis in np.mgrid[-rows : rows + 1, -halves : halves + 1])
+        m, half = (each.astype(np.int32) for each in np.mgrid[-last_row : last_row + 1, -last_half : last_half + 1])
         shown = np.isfinite(x[np.abs(m), np.abs(half)])
         m, half = m[shown], half[shown]
         n = (half - m) // 2 if self.neighbors == 6 else half // 2
@@ -80,16 +89,18 @@ class Grid(MeshModel):
     def _quarter(self, shape: Shape, height: float, intersections: float, max_distance: float) -> tuple[Floats, Floats]:
         """x and y [m] in the quarter of the lattice with x >= 0 and y >= 0; the other quarters are its mirror images.
 
-        Both are (rows, half columns), and NaN where the lattice has no point. Raises GeometryError for too many points.
+        Both are (rows, half steps), and NaN where the lattice has no point. Raises GeometryError for too many points.
         """
         six = self.neighbors == 6
-        row = _ROW if six else 1.0
-        border = _border(self.kind, shape, height, max_distance) * intersections
-        across, along = border.max(axis=0).tolist()
-        check_size(across * along)
-        halves, rows = (math.floor(each) + 2 for each in border.max(axis=0) * (2.0, 1.0 / row))
+        row_step = _ROW if six else 1.0
+        border = _border(self.kind, shape, height, max_distance) * intersections  # [steps]
+        u_most, v_most = border.max(axis=0).tolist()
+        check_size(u_most * v_most)
+        # From 0 to one beyond the border.
+        rows = math.floor(v_most / row_step) + 2
+        halves = math.floor(u_most / 0.5) + 2
         m, half = (axis.reshape(-1) for axis in np.mgrid[:rows, :halves].astype(np.int32))
-        steps = np.stack([0.5 * half, row * m], axis=1)
+        steps = np.stack([0.5 * half, row_step * m], axis=1)
         tried = np.flatnonzero(((half - m if six else half) % 2 == 0) & _within(steps, border))
         u, v = (steps[tried] / intersections).T
         x, y = _positions(self.kind, u, v, shape, height)
@@ -99,17 +110,14 @@ class Grid(MeshModel):
         return found[0].reshape(rows, halves), found[1].reshape(rows, halves)
 
 
-Coordinate = Callable[[Floats, Floats | float], Floats]
-"""(n objects out, distance of the slice [m]) -> coordinate [m]; see `_coordinate`."""
+def _row_groups(steps: tuple[tuple[int, int], ...]) -> Groups:
+    """`MeshModel.groups` of a lattice: the neighbors in a point's own row, the row above and the row below."""
+    place = {(0, 0): SELF} | {step: number for number, step in enumerate(steps)}
+    return tuple(tuple(place[step] for step in sorted(place) if step[1] == row) for row in (0, 1, -1))
 
 
-def _coordinate(shape: Shape, height: float) -> Coordinate:
-    """A function that gives the coordinate (n,) [m] n objects out, in the slice at a distance (n,) [m].
-
-    A slice is a plane through the camera. At the height of the object's center it contains a line that is parallel to
-    the coordinate's axis, at the slice's distance d from the point below the camera. The camera is sqrt(g^2 + d^2) away
-    from this line, and in the slice this takes the place of its height g.
-    """
+def _coordinate(shape: Shape, height: float) -> _Coordinate:
+    """The module's function coordinate(n, d), for a shape seen from a height [m]."""
     c = shape.center_height
     g = height - c
 
@@ -130,12 +138,13 @@ def _positions(kind: str, u: Floats, v: Floats, shape: Shape, height: float) -> 
     if kind == "xm":
         return x, y
     unsettled = _solve_in_turns(coordinate, u, v, x, y, height - shape.center_height)
-    x[unsettled], y[unsettled] = _solve_by_halving(coordinate, u[unsettled], v[unsettled])
+    if len(unsettled):
+        x[unsettled], y[unsettled] = _solve_by_halving(coordinate, u[unsettled], v[unsettled])
     return x, y
 
 
 def _solve_in_turns(
-    coordinate: Coordinate, u: Floats, v: Floats, x: Floats, y: Floats, g: float
+    coordinate: _Coordinate, u: Floats, v: Floats, x: Floats, y: Floats, g: float
 ) -> npt.NDArray[np.intp]:
     """Solves the equations of NM for x and y (n,) in place: computes each from the other until both settle.
 
@@ -152,13 +161,13 @@ def _solve_in_turns(
     return moving
 
 
-def _solve_by_halving(coordinate: Coordinate, u: Floats, v: Floats) -> tuple[Floats, Floats]:
+def _solve_by_halving(coordinate: _Coordinate, u: Floats, v: Floats) -> tuple[Floats, Floats]:
     """x and y (n,) of NM, by halving the interval that holds x. Slow, but it always settles.
 
     A coordinate shrinks as its slice moves away. So x is between 0 and its value in the slice below the camera.
     """
     low, high = np.zeros(len(u)), coordinate(u, 0.0)
-    for _ in range(_HALVINGS if len(u) else 0):
+    for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         too_large = coordinate(u, coordinate(v, middle)) < middle
         low, high = np.where(too_large, low, middle), np.where(too_large, middle, high)
@@ -172,10 +181,10 @@ def _border(kind: str, shape: Shape, height: float, max_distance: float) -> Floa
     angle = np.linspace(0.0, np.pi / 2.0, 721)
     x, y = max_distance * np.cos(angle), max_distance * np.sin(angle)
 
-    def objects_out(coordinate: Floats, distance: Floats | float) -> Floats:
-        """The inverse of `_coordinate`."""
+    def objects_out(place: Floats, distance: Floats | float) -> Floats:
+        """The n of coordinate(n, distance) = place."""
         slant = np.hypot(height - c, distance)
-        return np.asarray(shape.n(np.arctan2(coordinate, slant), slant + c))
+        return np.asarray(shape.n(np.arctan2(place, slant), slant + c))
 
     u = objects_out(x, y if kind == "nm" else 0.0)
     v = objects_out(y, 0.0 if kind == "xy" else x)

@@ -19,10 +19,11 @@ from ..errors import GeometryError
 from ..geometry.shape import Shape
 
 SELF = -1
-"""Stands for the point itself in `Runs`, where a neighbor is named by its position among the point's neighbors."""
+"""Stands for the point itself in `Groups`, where a neighbor is named by its position among the point's neighbors."""
 
-Runs = tuple[tuple[int, ...], ...]
-"""Groups of one to three neighbors that follow each other in memory. Each neighbor, and SELF, is in one group."""
+Groups = tuple[tuple[int, ...], ...]
+"""Groups of one to three neighbors, each from left to right, that layout runs puts side by side in memory. Each
+neighbor, and SELF, is in exactly one group. (left, SELF, right) comes first."""
 
 MOST_POINTS = 8_000_000
 """Largest number of points in a mesh: more than the pixels of a camera, and more than OpenCV samples at once."""
@@ -82,12 +83,12 @@ class Mesh:
 class MeshModel(ABC):
     """A way to place points and to link them.
 
-    neighbors: the number N of neighbors of a point. A network's weights depend on their order. runs: the neighbors that
-    follow each other in memory. steps: (columns, rows) to each neighbor if the points lie on a lattice, else None.
+    neighbors: the number N of neighbors of a point. A network's weights depend on their order. groups: the neighbors
+    that follow each other in memory. steps: (columns, rows) to each neighbor if the points lie on a lattice, else None.
     """
 
     neighbors: int
-    runs: Runs
+    groups: Groups
     steps: tuple[tuple[int, int], ...] | None = None
 
     def build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:

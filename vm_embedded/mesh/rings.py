@@ -21,11 +21,12 @@ _NEIGHBORS = {
 }
 """Neighbors in their order. Left and right are in the same ring, top is in the next ring outwards, bottom inwards."""
 
-_RUNS = {
-    4: ((0, SELF, 2), (1,), (3,)),
-    6: ((0, SELF, 3), (1, 2), (5, 4)),
-    8: ((0, SELF, 4), (1, 3), (2,), (7, 5), (6,)),
+_GROUPS = {
+    4: (("left", "itself", "right"), ("top",), ("bottom",)),
+    6: (("left", "itself", "right"), ("top left", "top right"), ("bottom left", "bottom right")),
+    8: (("left", "itself", "right"), ("top left", "top right"), ("top",), ("bottom left", "bottom right"), ("bottom",)),
 }
+"""`MeshModel.groups` by name. With eight neighbors, top is top left or top right again, so it has its own group."""
 
 # Float noise must not change the number of points in a ring. No exact value is this close above a whole number.
 _CEIL_EPSILON = 1e-9
@@ -41,7 +42,8 @@ class Rings(MeshModel):
 
     def __init__(self, neighbors: int) -> None:
         self.neighbors = neighbors
-        self.runs = _RUNS[neighbors]
+        place = {"itself": SELF} | {name: number for number, name in enumerate(_NEIGHBORS[neighbors])}
+        self.groups = tuple(tuple(place[name] for name in group) for group in _GROUPS[neighbors])
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         phi = inclinations(shape, height, intersections, max_distance)
@@ -59,11 +61,11 @@ def inclinations(shape: Shape, height: float, intersections: float, max_distance
     The last ring is the last one closer than `max_distance` [m]. Raises GeometryError for a height that is too low for
     the shape, and for too many rings.
     """
-    shape.spacing(height)
-    last = float(shape.n(math.atan(max_distance / height), height)) * intersections
-    check_size(last)
-    # The last digit of `last` may be too small, so take one more ring; the comparison below decides.
-    phi = shape.phi(np.arange(1, math.floor(last) + 2) / intersections, height)
+    shape.spacing(height)  # raises GeometryError for a height that is too low
+    rings_out = float(shape.n(math.atan(max_distance / height), height)) * intersections
+    check_size(rings_out)
+    # The last digit of `rings_out` may be too small, so take one more ring; the comparison below decides.
+    phi = shape.phi(np.arange(1, math.floor(rings_out) + 2) / intersections, height)
     return np.append(0.0, phi[height * np.tan(phi) < max_distance])
 
 
@@ -102,8 +104,9 @@ def ring_neighbors(counts: Indices, start: Indices, place: Indices, width: int, 
     """Neighbors (n + 1, width) of points in rings (paper: section "Graph Structure of the Mesh").
 
     counts: (rings,) number of points in each ring. start, place: from `ring_places`. width: 4, 6 or 8 neighbors.
-    nudge: added to all places before they are compared between rings. With it, float noise does not decide where the
-    size of one ring is a multiple of the next one's.
+    nudge: a shift of all places before rings are compared. Where the sizes of two rings have a common divisor, a point
+    may be at exactly the same fraction of the circle as a point of the other ring, and float noise would choose its
+    neighbors.
 
     A point is linked to the two adjacent points of its ring, and to the points of the next rings at the same fraction
     of the circle: the nearest two of them, the nearest one, or all three. The nadir's neighbors are spread evenly over
@@ -130,8 +133,10 @@ def ring_neighbors(counts: Indices, start: Indices, place: Indices, width: int, 
     neighbors = np.empty((missing + 1, width), dtype=np.int32)
     for column, name in enumerate(_NEIGHBORS[width]):
         neighbors[:missing, column] = find[name]()
-    neighbors[0] = 1 + (np.arange(width) * counts[1]) // width if len(counts) > 1 else missing
     neighbors[missing] = missing
+    neighbors[0] = missing
+    if len(counts) > 1:  # the nadir's neighbors, spread over ring 1, whose first point is 1
+        neighbors[0] = 1 + (np.arange(width) * counts[1]) // width
     return neighbors
 
 

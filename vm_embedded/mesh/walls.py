@@ -33,7 +33,7 @@ class Walls(MeshModel):
     """
 
     neighbors = 6
-    runs = Grid("xy", 6).runs
+    groups = Grid("xy", 6).groups
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         tall = _checked(shape, height).object_height

@@ -13,7 +13,7 @@ from .runs_layout import RunsLayout
 def choose_layout(mesh: Mesh, manifest: Manifest) -> Layout:
     """The mesh in the layout that the manifest's network takes."""
     if manifest.layout == "runs":
-        return RunsLayout(mesh, manifest.model.runs)
+        return RunsLayout(mesh, manifest.model.groups)
     if manifest.layout == "lattice":
         assert manifest.model.steps is not None  # Manifest accepts this layout only for lattices.
         return LatticeLayout(mesh, manifest.model.steps)

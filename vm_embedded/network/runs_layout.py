@@ -5,8 +5,8 @@ The words that this file uses:
 - A *slot* is one of the m places in the network's input `points` (3, m). It holds a point, a copy of a point, or
   nothing. An empty slot is a *gap* and has the off-screen point's value in every layer.
 - A *run* is a sequence of slots in which each point is followed by its right neighbor. A gap follows the last one.
-- A *group* is up to three neighbors of a point that should follow each other in a run (MeshModel.runs). The groups of
-  ring6 are left, the point itself and right; top left and top right; bottom left and bottom right.
+- A *group* is up to three neighbors of a point that should follow each other in a run (MeshModel.groups). The groups
+  of ring6 are left, the point itself and right; top left and top right; bottom left and bottom right.
 - The *middle* of a group is the second slot of a group of three, and the first slot of a shorter group.
 - A *column* is a position in a layer's table (vm_export/runs_graph.py). The table holds, for each group and each slot,
   a sum over the window of three slots around it. So a point looks up one value for each group, not for each neighbor.
@@ -34,7 +34,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Indices, Mask, Singles, frozen
-from ..mesh.mesh import SELF, Mesh, Runs
+from ..mesh.mesh import SELF, Groups, Mesh
 from .layout import OFF_SCREEN, Feeds, Layout
 
 GAP = 1
@@ -54,7 +54,7 @@ class RunsLayout(Layout):
     columns: (G, m) positions in a layer's table of G (m - 1) sums.
     """
 
-    def __init__(self, mesh: Mesh, groups: Runs) -> None:
+    def __init__(self, mesh: Mesh, groups: Groups) -> None:
         self._groups = groups
         slots, places, middles = _arranged(mesh.neighbors, self._groups)
         count = len(slots)
@@ -104,7 +104,7 @@ def _offsets(group: tuple[int, ...]) -> range:
     return range(first, first + len(group))
 
 
-def _arranged(neighbors: Indices, groups: Runs) -> tuple[_Positions, _Positions, _Positions]:
+def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Positions, _Positions]:
     """Arranges a mesh's points in slots, from their neighbors (n + 1, N).
 
     Returns the point in each slot (m,), n in gaps; the slot of each point (n,); and for each group and slot the slot in

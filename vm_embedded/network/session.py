@@ -71,7 +71,7 @@ def _interface(manifest: Manifest) -> Interface:
     if manifest.layout == "plain":
         interface["neighbors"] = ("tensor(int32)", [manifest.neighbors])
     elif manifest.layout == "runs":
-        interface["columns"] = ("tensor(int64)", [len(manifest.model.runs)])
+        interface["columns"] = ("tensor(int64)", [len(manifest.model.groups)])
     else:
         interface["shown"] = ("tensor(bool)", [])
     return interface

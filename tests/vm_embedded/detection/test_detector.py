@@ -267,7 +267,9 @@ def small_mesh():
 @in_both_layouts
 def test_neighbors_out_of_range_are_an_error_and_not_a_crash(models, layout):
     session = Detector.from_file(models[layout]).session
-    broken = Broken(small_mesh(), "hard") if layout == "plain" else BrokenRuns(small_mesh(), MESH_MODELS["ring6"].runs)
+    broken = (
+        Broken(small_mesh(), "hard") if layout == "plain" else BrokenRuns(small_mesh(), MESH_MODELS["ring6"].groups)
+    )
     points = broken.new_points()
     points[:] = 0.0
     with pytest.raises(ModelError, match="can't run"):

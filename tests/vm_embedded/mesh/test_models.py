@@ -90,10 +90,10 @@ def test_left_and_right_in_a_ring_are_mutual(model, height, k, max_distance):
 
 
 @every_model
-def test_runs_name_every_neighbor_and_the_point_itself_once(model):
-    runs = mesh_model(model).runs
-    assert sorted(each for run in runs for each in run) == list(range(-1, mesh_model(model).neighbors))
-    assert max(len(run) for run in runs) <= 3
+def test_groups_name_every_neighbor_and_the_point_itself_once(model):
+    groups = mesh_model(model).groups
+    assert sorted(each for group in groups for each in group) == list(range(-1, mesh_model(model).neighbors))
+    assert max(len(group) for group in groups) <= 3
 
 
 @pytest.mark.parametrize(

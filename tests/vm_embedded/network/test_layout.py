@@ -306,10 +306,10 @@ def test_plain_is_the_mesh_as_it_is(model):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_every_neighbor_and_the_point_itself_are_in_exactly_one_group(model):
-    together = sorted(each for group in MESH_MODELS[model].runs for each in group)
+    together = sorted(each for group in MESH_MODELS[model].groups for each in group)
     assert together == [SELF, *range(MESH_MODELS[model].neighbors)]
-    assert MESH_MODELS[model].runs[0][1] == SELF
-    assert all(1 <= len(group) <= 3 for group in MESH_MODELS[model].runs)
+    assert MESH_MODELS[model].groups[0][1] == SELF
+    assert all(1 <= len(group) <= 3 for group in MESH_MODELS[model].groups)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -341,5 +341,5 @@ def test_what_feeds_take_is_what_they_leave_but_for_colors_off_screen(model):
         else:
             assert set(feeds) == {"points", "columns"}
             assert feeds["columns"].dtype == np.int64
-            assert feeds["columns"].shape == (len(MESH_MODELS[model].runs), m)
-            assert 0 <= feeds["columns"].min() <= feeds["columns"].max() < len(MESH_MODELS[model].runs) * (m - 1)
+            assert feeds["columns"].shape == (len(MESH_MODELS[model].groups), m)
+            assert 0 <= feeds["columns"].min() <= feeds["columns"].max() < len(MESH_MODELS[model].groups) * (m - 1)

@@ -33,7 +33,7 @@ def test_the_example_in_the_docstring():
 
 
 def assert_laws_of_runs(mesh, model):
-    n, groups = len(mesh), MESH_MODELS[model].runs
+    n, groups = len(mesh), MESH_MODELS[model].groups
     layout = RunsLayout(mesh, groups)
     slots, places, m = layout.slots, layout.places, len(layout.slots)
 
