@@ -25,6 +25,14 @@ def is_live(source: str) -> bool:
     return prefix in ("synthetic", "fault", "gstreamer") or "://" in source or (node is not None and not node.is_file())
 
 
+def brings_lens_and_pose(source: str) -> bool:
+    """Whether the camera of a live source needs no configured lens and pose: its shots bring them.
+
+    A fault script also counts, whichever camera it adds faults to.
+    """
+    return source.partition(":")[0] in ("synthetic", "fault")
+
+
 def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
     """Return a function that opens the configured camera; it may be called again and again.
 

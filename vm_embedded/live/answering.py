@@ -48,7 +48,7 @@ class Answerer:
 
     async def answer(self, shot: Shot) -> Answer | None:
         """Detect the objects in a shot; None if it is too old, has no pose, or the detection fails."""
-        if self._is_late(shot):
+        if self._refuse_late(shot):
             return None
         try:
             lens, orientation = self._lens(shot), await self._orientation(shot)
@@ -60,24 +60,25 @@ class Answerer:
             self._health.pose_trouble = str(error)
             return None
         except (VisualMeshError, cv2.error, ValueError) as error:
+            # NumPy raises ValueError for arrays that do not fit. No frame may end the daemon.
             self._counters.outcomes.failed += 1
             self._health.add_trouble(time.monotonic(), one_line(error))
             return None
-        if self._is_late(shot):
+        if self._refuse_late(shot):
             return None
         now = time.monotonic()
         self._health.add_answer(now, now - shot.arrived)
         self._counters.add_answer(detections, time.perf_counter() - started, now - shot.captured)
         return Answer(shot, lens, orientation, detections, now)
 
-    def _is_late(self, shot: Shot) -> bool:
-        """Whether a shot is too old to be reported; if so, count it."""
+    def _refuse_late(self, shot: Shot) -> bool:
+        """Count and report a shot that is too old. Return whether it is."""
         age, limit = time.monotonic() - shot.captured, self.configuration.camera.max_age_ms
-        late = age > 1e-3 * limit
-        if late:
-            self._counters.outcomes.late += 1
-            self._health.add_trouble(time.monotonic(), f"frame is {1e3 * age:.0f} ms old, allowed are {limit:g} ms")
-        return late
+        if age <= 1e-3 * limit:
+            return False
+        self._counters.outcomes.late += 1
+        self._health.add_trouble(time.monotonic(), f"frame is {1e3 * age:.0f} ms old, allowed are {limit:g} ms")
+        return True
 
     def _lens(self, shot: Shot) -> Lens:
         """The shot's own lens, or the configured one. Raises InputError."""
@@ -100,7 +101,10 @@ class Answerer:
             return fixed
         poses, arrived = self._poses.poses, self._poses.arrived
         deadline = time.monotonic() + 1e-3 * settings.wait_ms
-        while settings.interpolate and poses.newest < shot.captured and (left := deadline - time.monotonic()) > 0.0:
+        while settings.interpolate and poses.newest < shot.captured:
+            left = deadline - time.monotonic()
+            if left <= 0.0:
+                break
             arrived.clear()
             try:
                 await asyncio.wait_for(arrived.wait(), left)

@@ -14,6 +14,7 @@ from typing import Any
 from ..cameras.camera import CameraSettings
 from ..config.entries import check_entries, entry, number, text_line
 from ..config.sections import read_sections
+from ..config.toml_writer import to_commented_toml
 from ..config.units import angle, length
 from ..detection.settings import Settings
 from ..errors import InputError, VisualMeshError
@@ -142,3 +143,9 @@ def with_overrides(configuration: Configuration, sections: Mapping[str, Mapping[
     """The configuration with the given entries of the given sections replaced. Raises InputError."""
     changed = {name: replace(getattr(configuration, name), **entries) for name, entries in sections.items()}
     return replace(configuration, **changed)
+
+
+def recording_toml(configuration: Configuration) -> str:
+    """The vm.toml of a recording: the network's full path and its settings. Raises InputError for an unknown name."""
+    path = Path(model_path(configuration.model)).resolve()
+    return to_commented_toml(Configuration(model=str(path), detector=configuration.detector))

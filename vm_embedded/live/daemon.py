@@ -16,22 +16,19 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
 from ..cameras.camera import without_password
 from ..cameras.grabber import MOST_HANGING, Grabber
 from ..cameras.open_camera import camera_opener
-from ..config.toml_writer import to_commented_toml
 from ..errors import InputError, VisualMeshError
-from ..network.bundled import model_path
 from ..output.channels import Channels
 from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
 from ..poses.stream import PoseStream
 from .answering import Answer, Answerer
-from .configuration import Configuration
+from .configuration import Configuration, recording_toml
 from .control import REFUSED, ControlServer, default_socket_path
 from .counters import Counters
 from .health import Health
@@ -39,6 +36,7 @@ from .http_server import HttpServer, Response
 from .load_detector import load_checked_detector
 from .log import EventLog
 from .prometheus import resident_bytes
+from .reloading import read_again
 from .status_page import StatusPage
 from .systemd import SystemdNotifier
 
@@ -53,9 +51,6 @@ _SWITCH_INTERVAL = 0.0005
 
 _HEARTBEAT = 1.0
 """Longest pause between two messages [s]."""
-
-_NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder")
-"""Sections that a reload does not change."""
 
 _CLOCK_JUMP = 0.5
 """Change of the wall clock relative to the monotonic clock that is logged [s]."""
@@ -87,18 +82,19 @@ class Daemon:
         self.last: Message | None = None
         self.counters = Counters()
         self.state, self.reason = "", ""
-        self.health = Health(1e-3 * camera.lost_ms, 1e-3 * status.budget_ms or math.inf)
+        self.health = Health(1e-3 * camera.lost_ms, (1e-3 * status.budget_ms) or math.inf)
         self._rejected = 0  # frames of the camera that were rejected
         self._sent = 0.0  # when the last message was sent
         self._fed = 0.0  # when the watchdog was last notified
         self._stops = 0  # how often a signal has asked to stop
         self._notifier = SystemdNotifier()
-        self._fatal: str | None = None
+        self._hung = False  # whether so many reads of the camera hang that only a new process helps
         self._wakeup = asyncio.Event()
-        self.grabber = Grabber(camera_opener(camera, configuration.detector.format != "bgr"), camera, self._wake)
+        opener = camera_opener(camera, raw=configuration.detector.format != "bgr")
+        self.grabber = Grabber(opener, camera, self._wake)
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
         self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health)
-        self._toml = _recording_toml(configuration)
+        self._recording_toml = recording_toml(configuration)
         self.outputs = Channels(configuration.output)
         self.page = StatusPage(status.picture_fps, self._status)
         commands = {"status": lambda: json.dumps(self._status(), allow_nan=False)}
@@ -131,21 +127,28 @@ class Daemon:
         self._notifier.send(READY=1)
         camera = without_password(self.configuration.camera.source)
         self._log("ready", model=self.configuration.model, camera=camera)
-        wall = time.time() - time.monotonic()
-        while not self._stops and not self._finished():
+        clock_offset = time.time() - time.monotonic()
+        while not (self._stops or self._hung or self._camera_ended()):
             await self._step()
-            drift = time.time() - time.monotonic() - wall
+            drift = time.time() - time.monotonic() - clock_offset
             if abs(drift) > _CLOCK_JUMP:
                 self._log("clock jumped", "warning", seconds=round(drift, 3))
-                wall += drift
+                clock_offset += drift
         self.health.stopping = True
         self._update_state()
         self._notifier.send(STOPPING=1)
         await self._close()
-        frames = self.counters.outcomes.frames
-        reason = self._fatal or ("signal" if self._stops else "the camera has ended")
-        self._log("stopped", frames=frames, reason=reason)
-        return EXIT_HUNG if self._fatal else EXIT_OK if frames or self._stops else EXIT_FAILED
+        status, reason = self._exit_status()
+        self._log("stopped", frames=self.counters.outcomes.frames, reason=reason)
+        return status
+
+    def _exit_status(self) -> tuple[int, str]:
+        """The exit status, and the reason why the daemon stops."""
+        if self._hung:
+            return EXIT_HUNG, f"{MOST_HANGING} reads of the camera hang"
+        if self._stops:
+            return EXIT_OK, "signal"
+        return EXIT_OK if self.counters.outcomes.frames else EXIT_FAILED, "the camera has ended"
 
     def _http_servers(self) -> Iterator[HttpServer]:
         status = self.configuration.status
@@ -156,11 +159,9 @@ class Daemon:
         if status.metrics:
             yield HttpServer(status.metrics, metrics)
 
-    def _finished(self) -> bool:
-        """Whether the camera has ended, or so many reads hang that only a new process helps."""
-        if self.grabber.hanging >= MOST_HANGING:
-            self._fatal = f"{MOST_HANGING} reads of the camera hang"
-        return self._fatal is not None or (self.grabber.ended and not self.grabber.has_shot)
+    def _camera_ended(self) -> bool:
+        """Whether the camera has ended and its last shot was taken."""
+        return self.grabber.ended and not self.grabber.has_shot
 
     async def _step(self) -> None:
         """Wait for a shot or for one tick, and do all that is due."""
@@ -176,6 +177,8 @@ class Daemon:
                 self._report(answer)
         if time.monotonic() - self._sent > _HEARTBEAT:
             self._send(state_message(self.state, self.reason))
+        # A signal during this step goes first: it ends the daemon with EXIT_OK.
+        self._hung = not self._stops and self.grabber.hanging >= MOST_HANGING
 
     def _feed_watchdog(self) -> None:
         """Notify systemd's watchdog that the loop runs, four times per period."""
@@ -191,7 +194,7 @@ class Daemon:
         self.last = live_message(self.counters.outcomes.frames, self.state, shot, detections, answer.time)
         self._send(self.last)
         self.page.show(shot.image, detections)
-        self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._toml)
+        self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._recording_toml)
 
     def _report_bad_pose(self, reason: str) -> None:
         self.health.add_trouble(time.monotonic(), reason)
@@ -207,13 +210,13 @@ class Daemon:
             self._rejected = rejected
             self.health.add_trouble(now, self.grabber.trouble)
         state, reason = self.health.state(now, lost, self.grabber.trouble)
+        self.reason = reason
         if state != self.state:
             level = "info" if state in ("ok", "starting", "stopping") else "warning"
             self._log("state", level, state=state, was=self.state, reason=reason)
-            self.state, self.reason = state, reason
+            self.state = state
             self._send(state_message(state, reason))
             self._notifier.send(STATUS=f"{state}{': ' if reason else ''}{reason}")
-        self.reason = reason
 
     def _send(self, message: Message) -> None:
         self._sent = time.monotonic()
@@ -244,7 +247,7 @@ class Daemon:
     def record(self) -> str:
         """Start to write a recording of the last seconds; return where it goes, or REFUSED and the reason."""
         try:
-            result = self.recorder.record(self._toml)
+            result = self.recorder.record(self._recording_toml)
         except InputError as error:
             self._log("not recorded", "warning", reason=str(error))
             return f"{REFUSED}{error}"
@@ -258,30 +261,20 @@ class Daemon:
 
     def reload(self) -> None:
         """Read the configuration and the model again. If anything is wrong, nothing changes."""
-        before = self.configuration
         try:
-            configuration = self._configure()
-            wanted = configuration.detector
-            # The open camera delivers its frames in the format of the start.
-            configuration = replace(configuration, detector=replace(wanted, format=before.detector.format))
-            detector = load_checked_detector(configuration)
-            toml = _recording_toml(configuration)
+            new = read_again(self._configure, self.configuration)
         except VisualMeshError as error:
             self._log("reload refused", "error", reason=str(error))
             return
         self.recorder.clear()
-        kept = {name: getattr(before, name) for name in _NEEDS_RESTART}
-        waiting = [name for name, section in kept.items() if section != getattr(configuration, name)]
-        if wanted.format != before.detector.format:
-            waiting.append("detector.format")
-        self.answerer.configuration, self.answerer.detector = replace(configuration, **kept), detector
-        self._toml = toml
-        self._log("reloaded", model=configuration.model, needs_restart=waiting)
+        self.answerer.configuration, self.answerer.detector = new.configuration, new.detector
+        self._recording_toml = new.recording_toml
+        self._log("reloaded", model=new.configuration.model, needs_restart=new.needs_restart)
 
     def _stop(self) -> None:
         self._stops += 1
         if self._stops > 1:
-            os._exit(EXIT_FAILED)
+            os._exit(EXIT_FAILED)  # the second signal ends the process at once
         self._wakeup.set()
 
     async def _close(self) -> None:
@@ -290,10 +283,3 @@ class Daemon:
         self.recorder.close(0.3)
         self.grabber.stop(0.3)
         self._notifier.close()
-
-
-def _recording_toml(configuration: Configuration) -> str:
-    """The vm.toml of a recording, which names the network and its settings."""
-    path = Path(model_path(configuration.model)).resolve()
-    replayed = Configuration(model=str(path), detector=configuration.detector)
-    return to_commented_toml(replayed)

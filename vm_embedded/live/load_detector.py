@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..cameras.camera import without_password
-from ..cameras.open_camera import camera_opener, is_live
+from ..cameras.open_camera import brings_lens_and_pose, camera_opener, is_live
 from ..detection.detector import Detector
 from ..errors import InputError
 from .configuration import Configuration
@@ -15,14 +15,15 @@ def load_checked_detector(configuration: Configuration) -> Detector:
     Raises VisualMeshError for the first thing that is missing or invalid.
     """
     detector = Detector.from_file(configuration.model, configuration.detector)
-    camera, fixed = configuration.camera.source, configuration.orientation.orientation()
+    camera = configuration.camera.source
+    orientation = configuration.orientation.orientation()  # raises InputError for angles without a height
     if is_live(camera):
-        camera_opener(configuration.camera, configuration.detector.format != "bgr")
+        camera_opener(configuration.camera, raw=configuration.detector.format != "bgr")  # only for its checks
     if configuration.recorder.trigger_class:
         detector.manifest.column(configuration.recorder.trigger_class)
-    if is_live(camera) and camera.partition(":")[0] not in ("synthetic", "fault"):
+    if is_live(camera) and not brings_lens_and_pose(camera):
         if configuration.lens is None:
             raise InputError(f"camera {without_password(camera)} needs a lens: give --lens")
-        if configuration.pose.source == "fixed" and fixed is None:
+        if configuration.pose.source == "fixed" and orientation is None:
             raise InputError(f"camera {without_password(camera)} needs poses: give --height or --pose-source")
     return detector

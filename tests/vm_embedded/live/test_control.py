@@ -19,7 +19,8 @@ def test_a_socket_that_was_left_behind_is_replaced_and_one_in_use_is_not(tmp_pat
         )
         assert other.returncode == 78
         assert "another process" in other.stderr
-        assert json.loads(ask(tmp_path / "control", "status"))["state"] == "ok"
+        # On a busy machine, late frames make it degraded for a moment.
+        found.wait(lambda: json.loads(ask(tmp_path / "control", "status"))["state"] == "ok")
         found.stop()
 
 

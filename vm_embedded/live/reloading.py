@@ -1,0 +1,41 @@
+"""Read the configuration and the network again while the daemon runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from ..detection.detector import Detector
+from .configuration import Configuration, recording_toml
+from .load_detector import load_checked_detector
+
+_NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder")
+"""Sections that a reload does not change."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reloaded:
+    """The parts of a daemon that a reload replaces.
+
+    recording_toml: the vm.toml of recordings. needs_restart: names of the changed sections and entries that only a
+    restart applies; the configuration has their old values.
+    """
+
+    configuration: Configuration
+    detector: Detector
+    recording_toml: str
+    needs_restart: list[str]
+
+
+def read_again(configure: Callable[[], Configuration], running: Configuration) -> Reloaded:
+    """Read the configuration and load its network. running: the current configuration. Raises VisualMeshError."""
+    wanted = configure()
+    # The open camera delivers its frames in the format of the start.
+    detector_settings = replace(wanted.detector, format=running.detector.format)
+    configuration = replace(wanted, detector=detector_settings)
+    detector = load_checked_detector(configuration)
+    kept = {name: getattr(running, name) for name in _NEEDS_RESTART}
+    needs_restart = [name for name, section in kept.items() if section != getattr(wanted, name)]
+    if wanted.detector.format != running.detector.format:
+        needs_restart.append("detector.format")
+    return Reloaded(replace(configuration, **kept), detector, recording_toml(configuration), needs_restart)
