@@ -75,7 +75,7 @@ def whole_calls(found: dict[str, Any]) -> str:
         ]
         for name, row in found["whole_calls"].items()
     ]
-    heads = ["network, sampling", "points", "session", "whole call", "p99", "whole / session", "p99 / p50"]
+    heads = ["network, sampling", "points", "session", "whole call", "p99", "whole call / session", "p99 / median"]
     return table(heads, rows)
 
 
@@ -107,7 +107,7 @@ def peers(found: dict[str, Any]) -> str:
         [name, ms(row["p50"]), ms(row["p99"]), f"{row['p50'] / base['p50']:.1f}", ms(row["first"])]
         for name, row in sorted(calls.items(), key=lambda item: item[1]["p50"])
     ]
-    return table(["detector", "whole call", "p99", "times 5x4 exact", "after another's call"], rows)
+    return table(["detector", "whole call", "p99", "relative to 5x4 exact", "first call (cold CPU cache)"], rows)
 
 
 def growth(found: dict[str, Any]) -> str:
@@ -136,7 +136,7 @@ def walks(found: dict[str, Any]) -> str:
         ]
         colds.append([name, *cold])
     heads = ["mesh of", "height [m]", "hits after the first swing", "cache [MiB]"]
-    return table(heads, rows) + "\n\n" + table(["mesh of", "cold bucket", "p99", "with a new mesh", "p99"], colds)
+    return table(heads, rows) + "\n\n" + table(["mesh of", "cold call", "p99", "cold call with a new mesh", "p99"], colds)
 
 
 def soak(found: dict[str, Any]) -> str:
@@ -145,7 +145,7 @@ def soak(found: dict[str, Any]) -> str:
         ["frames", *(f"{mark['frames']:,}" for mark in row["marks"])],
         [["RSS [MiB]", *(f"{mark['rss_mib']:.1f}" for mark in row["marks"])]],
     )
-    return f"{marks}\n\nGrowth since a tenth of the run: {100 * row['growth_since_a_tenth']:.2f} %."
+    return f"{marks}\n\nMemory growth after the first 10 % of the run: {100 * row['growth_since_a_tenth']:.2f} %."
 
 
 TABLES = {
