@@ -136,7 +136,8 @@ def walks(found: dict[str, Any]) -> str:
         ]
         colds.append([name, *cold])
     heads = ["mesh of", "height [m]", "hits after the first swing", "cache [MiB]"]
-    return table(heads, rows) + "\n\n" + table(["mesh of", "cold call", "p99", "cold call with a new mesh", "p99"], colds)
+    cold_heads = ["mesh of", "cold call", "p99", "cold call with a new mesh", "p99"]
+    return table(heads, rows) + "\n\n" + table(cold_heads, colds)
 
 
 def soak(found: dict[str, Any]) -> str:
