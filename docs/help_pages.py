@@ -1,6 +1,6 @@
 """Writes the pages that are made from the programs, so that both stay the same:
 
-- docs/command-line.md from the parsers,
+- docs/command-line.md from the parsers and from the usage texts of the robot's scripts,
 - docs/vm.toml, scene.toml and train.toml from the entries of configurations,
 - docs/api.md from the docstrings (api_page.py).
 
@@ -10,22 +10,24 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 
 import api_page
 
 from vm_embedded.cli import bench, detect, doctor
 from vm_embedded.config.toml_writer import to_commented_toml
-from vm_embedded.live.configuration import Configuration
+from vm_embedded.live import configuration as detection
 from vm_export import cli as export
 from vm_mesh import cli as mesh
 from vm_synth import cli as synth
-from vm_synth.scene.configuration import SceneConfiguration
+from vm_synth.scene import configuration as scene
 from vm_train.cli import evaluate
 from vm_train.cli import options as train
-from vm_train.learning.configuration import TrainConfiguration
+from vm_train.learning import configuration as training
 
 DOCS = Path(__file__).parent
+SCRIPTS = DOCS.parent / "deploy" / "robot"
 
 
 def pages() -> dict[Path, str]:
@@ -33,9 +35,9 @@ def pages() -> dict[Path, str]:
     return {
         DOCS / "command-line.md": command_line(),
         DOCS / "api.md": api_page.page(),
-        DOCS / "vm.toml": to_commented_toml(Configuration()),
-        DOCS / "scene.toml": to_commented_toml(SceneConfiguration()),
-        DOCS / "train.toml": to_commented_toml(TrainConfiguration()),
+        DOCS / "vm.toml": to_commented_toml(detection.Configuration(), detection.HEADER),
+        DOCS / "scene.toml": to_commented_toml(scene.SceneConfiguration(), scene.HEADER),
+        DOCS / "train.toml": to_commented_toml(training.TrainConfiguration(), training.HEADER),
     }
 
 
@@ -59,7 +61,18 @@ def command_line() -> str:
                 parts.append(f"**{title}**{note}\n\n| option | meaning |\n| --- | --- |\n" + "\n".join(rows) + "\n")
         if parser.epilog:
             parts.append(f"{parser.epilog}\n")
+    parts.append("## Scripts on the robot\n\n[On a robot](../deploy/README.md) describes when to use them.\n")
+    parts += [f"```text\n{_usage(SCRIPTS / name)}\n```\n" for name in ("install.sh", "vm-deploy", "uninstall.sh")]
     return "\n".join(parts)
+
+
+def _usage(script: Path) -> str:
+    """The usage text of a shell script, from its function `usage`."""
+    text = script.read_text()
+    found = re.search(r"^usage\(\) \{\n    cat <<END\n(.*?)\nEND$", text, re.MULTILINE | re.DOTALL)
+    prefix = re.search(r"^PREFIX=(/.*)$", text, re.MULTILINE)
+    assert found is not None, f"{script.name} has no usage text"
+    return found[1].replace("$PREFIX", prefix[1]) if prefix else found[1]
 
 
 def _row(action: argparse.Action) -> str:

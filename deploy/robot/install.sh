@@ -20,10 +20,10 @@ usage: install.sh [--prefix DIR] [--systemd | --no-systemd] [--dry-run]
 
   --prefix DIR   folder of the releases; default $PREFIX
   --systemd      install it as a service; the default, unless the last installation used --no-systemd
-  --no-systemd   install only the program; you start and restart it
+  --no-systemd   install only the program; you must start and restart it
   --dry-run      check everything, change nothing
 
-Exit status: 0 the release is in use; 1 it failed, and the release before stays in use; 2 wrong usage.
+Exit status: 0 the release is in use; 1 it failed, and the previous release stays in use; 2 wrong usage.
 END
 }
 

@@ -15,7 +15,7 @@ usage() {
     cat <<END
 usage: uninstall.sh [--prefix DIR] [--purge]
 
-  --prefix DIR  folder of the releases; default: that of this file, or /opt/vm-embedded
+  --prefix DIR  folder of the releases; default: the installation that contains this script, or /opt/vm-embedded
   --purge       also remove the configuration
 END
 }

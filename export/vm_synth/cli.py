@@ -29,7 +29,7 @@ from .dataset.plots import load_matplotlib, plot
 from .dataset.report import as_json, problems, tables
 from .dataset.workers import FinishedPicture, Job, render_all
 from .render.mitsuba import find_llvm, load_mitsuba
-from .scene.configuration import SceneConfiguration
+from .scene.configuration import HEADER, SceneConfiguration
 from .scene.environment import Environment
 from .scene.maps import find_maps, missing_held_out
 
@@ -267,5 +267,5 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _config(options: argparse.Namespace) -> int:
-    print(to_commented_toml(SceneConfiguration()), end="")
+    print(to_commented_toml(SceneConfiguration(), HEADER), end="")
     return EXIT_OK

@@ -64,14 +64,14 @@ class CameraSettings:
         "camera number, /dev/videoN or /dev/v4l/by-id/...; http, https or rtsp address; gstreamer:PIPELINE; video file "
         "or folder of images, played at their frame rate; synthetic; fault:SCRIPT",
     )
-    pixel_format: str = text_line("", "FOURCC to request from a device, such as MJPG or YUYV; empty keeps its own")
-    width: int = number(0, "width to request from a device; 0 keeps its own", "px", (0, 20000))
-    height: int = number(0, "height to request from a device; 0 keeps its own", "px", (0, 20000))
+    pixel_format: str = text_line("", "FOURCC to request from a device, such as MJPG or YUYV; empty: the device's own")
+    width: int = number(0, "width to request from a device; 0: the device's own", "px", (0, 20000))
+    height: int = number(0, "height to request from a device; 0: the device's own", "px", (0, 20000))
     fps: float = number(
-        0.0, "frame rate to request from a device, or to play files at; 0 keeps their own", "1/s", (0, 1000)
+        0.0, "frame rate to request from a device, or to play files at; 0: the device's or file's own", "1/s", (0, 1000)
     )
-    exposure_ms: float = number(0.0, "exposure time of a device; 0 is automatic", "ms", (0, 1000))
-    gain: float = number(-1.0, "gain of a device, in its own units; -1 keeps its own", "", (-1, 100000))
+    exposure_ms: float = number(0.0, "exposure time of a device; 0: automatic", "ms", (0, 1000))
+    gain: float = number(-1.0, "gain of a device, in its own units; -1: the device decides", "", (-1, 100000))
     latency_ms: float = number(
         0.0, "time from exposure to arrival, for cameras that report no capture time", "ms", (0, 1000)
     )

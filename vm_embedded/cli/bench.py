@@ -39,8 +39,8 @@ def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="vm-bench",
         description="Measure the detector on this machine while a robot walks: the whole call and its stages, with one "
-        "thread and with more, with a warm and a cold cache. Compare the network's time with the least time that its "
-        "operations can take.",
+        "thread and with more, with a warm and a cold cache. Compare the network's time with the theoretical minimum "
+        "for its operations.",
         epilog="Exit status: 0 success, 1 failure (the reason is on standard error), 2 wrong usage, 130 interrupted. "
         + ANGLES,
     )

@@ -16,7 +16,7 @@ import cv2
 from ..cameras.open_camera import is_live
 from ..config.toml_writer import to_commented_toml
 from ..errors import InputError, VisualMeshError
-from ..live.configuration import Configuration
+from ..live.configuration import HEADER, Configuration
 from ..live.control import REFUSED, ask, default_socket_path
 from ..live.daemon import EXIT_CONFIGURATION, Daemon
 from ..live.load_detector import load_checked_detector
@@ -35,9 +35,11 @@ def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="vm-detect",
         description="Find objects in images, videos or live cameras, and print one line of JSON for each frame.",
-        epilog="Exit status: 0 at least one frame of a file was processed (others are reported on standard error), or "
-        "a live detector was stopped; 1 no frame was processed, or a running detector is not in state ok; 2 wrong "
-        "usage; 75 the camera hangs; 78 the configuration of a live detector is unusable; 130 interrupted. " + ANGLES,
+        epilog="Exit status for files: 0, at least one frame was processed; 1, no frame was processed. For a live "
+        "camera: 0, a signal stopped it, or the played file has ended; 1, the played file has ended and no frame could "
+        "be processed; 75, reads of the camera hang, and a restart may help; 78, the configuration can't be used, and "
+        "a restart would fail again. For --status: 0, the state is ok; 1, the state is not ok, or nothing answers. "
+        "Always: 2, the options can't be parsed; 130, interrupted. " + ANGLES,
     )
     parser.add_argument(
         "--camera",
@@ -115,7 +117,7 @@ def _run(options: argparse.Namespace) -> int:
             raise
         return _report_bad_configuration(error)
     if options.print_config:
-        print(to_commented_toml(given), end="")
+        print(to_commented_toml(given, HEADER), end="")
         return EXIT_OK
     if options.ask:
         return _ask(given, options.ask)

@@ -35,7 +35,10 @@ class Run:
     points: Floats
 
     def as_dict(self, floor_ns: float | None) -> dict[str, Any]:
-        """The run as plain numbers for JSON. floor_ns: least time of the network per point [ns]; None if unknown."""
+        """The run as plain numbers for JSON.
+
+        floor_ns: theoretical minimum time of the network per point [ns]; None if unknown.
+        """
         settings, cache = self.detector.settings, self.detector.cache
         points = float(np.median(self.points))
         infer = float(np.median(self.stages["infer"]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import Field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +70,7 @@ def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, skip:
         if each.name in skip:
             continue
         unit = f" [{each.metadata['unit']}]" if each.metadata["unit"] else ""
-        help = f"{each.metadata['help']}{unit}; default {_default(each.default)}".replace("%", "%%")
+        help = f"{each.metadata['help']}{unit}{_default(each)}".replace("%", "%%")
         option = "--" + (prefix + each.name).replace("_", "-")
         if "allowed" in each.metadata:
             group.add_argument(option, choices=each.metadata["allowed"], help=help)
@@ -81,13 +81,16 @@ def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, skip:
             group.add_argument(option, type=kind, metavar={str: "TEXT", int: "N", float: "X"}[kind], help=help)
 
 
-def _default(value: Any) -> str:
-    """A default as the help shows it. None: the model decides."""
+def _default(entry: Field[Any]) -> str:
+    """A default as the help shows it. None: the model decides. Some help texts already say what an empty text means."""
+    value = entry.default
+    if value == "":
+        return "" if "empty" in entry.metadata["help"] else "; default none"
     if value is None:
-        return "the model's"
+        return "; default the model's"
     if isinstance(value, bool):
-        return "on" if value else "off"
-    return "none" if value == "" else str(value)
+        return "; default on" if value else "; default off"
+    return f"; default {value}"
 
 
 def read_options(options: argparse.Namespace) -> Configuration:

@@ -8,9 +8,12 @@ from dataclasses import Field, fields
 from typing import Any
 
 
-def to_commented_toml(configuration: Any) -> str:
-    """A TOML file with every entry of a configuration, its meaning, unit and limits; `read_sections` reads it back."""
-    blocks = []
+def to_commented_toml(configuration: Any, header: str = "") -> str:
+    """A TOML file with every entry of a configuration, its meaning, unit and limits; `read_sections` reads it back.
+
+    header: comment at the top, without the signs of a comment.
+    """
+    blocks = ["\n".join(f"# {line}" for line in header.splitlines())] if header else []
     for each in fields(configuration):
         value = getattr(configuration, each.name)
         if "read" in each.metadata:

@@ -17,14 +17,17 @@ from .observation import Observation
 class Detection:
     """One object on the observation plane, or, with a `reason`, a rejected candidate.
 
-    Its frame has the origin on the plane below the camera, z up, and the heading of the frame's orientation.
+    The coordinates are in the plane's frame: the origin is on the plane below the camera, z points up, and the x axis
+    has the yaw of the orientation.
 
-    class_name: name of its class. confidence: mean probability inside its outline. center (2,), radius [px]: of the
-    disk with the centroid and the area of its outline. outline (m, 2) [px]: the part that the lens sees. bearing (3,):
-    unit vector from the camera to its center. position (3,): its center [m]. distance: from the camera to its center
-    [m], where its bearing meets the plane. angular_radius [rad]: of the size that fits the points best.
-    distance_by_angle [m]: follows from that size alone. distances_agree: whether the two distances differ by less than
-    the mesh can resolve. points: number of mesh points inside its outline. reason: why it was rejected, or None.
+    class_name: name of its class. confidence: mean probability of the points inside its outline, 0 to 1.
+    center (2,) [px]: of the disk with the centroid and the area of its outline. radius [px]: of the same disk.
+    outline (m, 2) [px]: the part that the lens sees. bearing (3,): unit vector from the camera to its center.
+    position (3,) [m]: its center. distance [m]: from the camera to its center; it follows from the bearing and the
+    plane. angular_radius [rad]: angle from its center to its outline, for the size that fits the points best.
+    distance_by_angle [m]: distance that follows from `angular_radius` and the real radius. distances_agree: whether the
+    two distances differ by less than the mesh can resolve. points: number of mesh points inside its outline. reason:
+    why it was rejected, or None.
     """
 
     class_name: str
@@ -63,7 +66,11 @@ class Detection:
 
 @dataclass(frozen=True, eq=False)
 class ClassPoints:
-    """The m points of a class: bearings (m, 3) in the observation plane's frame, pixels (m, 2), probabilities (m,)."""
+    """The m points of a class.
+
+    class_name: name of the class. bearings (m, 3): unit vectors from the camera, in the plane's frame. pixels (m, 2)
+    [px]: where the points are in the image. probabilities (m,): of the class, above the threshold.
+    """
 
     class_name: str
     bearings: Floats
@@ -78,8 +85,9 @@ class ClassPoints:
 class Detections:
     """The objects of a frame, most confident first, and the n mesh points on screen behind them.
 
-    rejected: candidates that are not objects, with reasons, if asked for. observation: the points. threshold: a point
-    counts for a class above this probability. timing_ms: milliseconds of each stage.
+    objects: the accepted objects. rejected: the rejected candidates, each with its reason; empty unless `explain` was
+    set. observation: the points. threshold: a point belongs to a class if its probability is above this. timing_ms:
+    time of each stage [ms].
     """
 
     objects: tuple[Detection, ...]

@@ -18,7 +18,10 @@ from .detector import Detector
 
 @dataclass(frozen=True, eq=False)
 class CameraView:
-    """A camera's picture, uint8 in the detector's pixel format, its lens, and the pose of the camera in the world."""
+    """A camera's picture, its lens and its pose.
+
+    image: uint8, in the detector's pixel format. lens: of the camera. pose: of the camera in the world frame.
+    """
 
     image: Image
     lens: Lens
@@ -29,7 +32,8 @@ class CameraView:
 class Sighting:
     """An object in the world frame.
 
-    camera, plane: names of the camera and the plane of its most confident detection. position (3,): its center [m].
+    camera: name of the camera with the most confident detection. plane: name of the plane of that detection.
+    detection: the most confident detection, in that plane's frame. position (3,) [m]: center of the object.
     direction (3,): unit vector from that camera. also: further detections of the same object, most confident first.
     """
 

@@ -31,9 +31,9 @@ class Network(Protocol):
 class Observation:
     """A frame's n points on screen with their probabilities, before objects are located among them.
 
-    view: the mesh points and the camera. manifest: of the network. projected: the m slots of the layout, copies and
-    gaps as off screen. slot_probabilities (m, C): the network's output; it has no meaning off screen. timing_ms:
-    milliseconds by stage.
+    view: mesh points, lens and orientation of the frame. manifest: of the network. projected: pixels of the layout's m
+    slots, the places in the network's input; copies and gaps count as off screen. slot_probabilities (m, C): the
+    network's output; it has no meaning for slots off screen. timing_ms: time of each stage [ms].
     """
 
     view: PreparedView

@@ -22,13 +22,13 @@ class Settings:
     sampling: str = one_of(SAMPLINGS, "exact", "how to read colors between pixels")
     height_tolerance: float = number(
         0.5,
-        "largest change of the number of rings across an object before another height gets its own mesh; 0: every "
-        "frame gets a mesh at its own height and heading, as in the reference, which is slower",
+        "a new camera height gets its own mesh if the number of rings across an object changes by more than this; "
+        "0: each frame gets a mesh for its own height and heading, which is slower (as in the reference)",
         "rings",
         (0.0, 2.0),
     )
-    pitch_step: float = number(0.05, "range of pitch that shares prepared points", "rad", (1e-3, 1.0))
-    roll_step: float = number(0.05, "range of roll that shares prepared points", "rad", (1e-3, 1.0))
+    pitch_step: float = number(0.05, "width of the pitch interval that shares one cache entry", "rad", (1e-3, 1.0))
+    roll_step: float = number(0.05, "width of the roll interval that shares one cache entry", "rad", (1e-3, 1.0))
     cache_mib: float = number(64.0, "memory for meshes and prepared points", "MiB", (0.0, 65536.0))
     object_radius: float | None = number(
         None,
@@ -38,15 +38,18 @@ class Settings:
     )
     max_distance: float | None = number(
         None,
-        "reach of the mesh, if it differs from the model's; choose it a little farther than the farthest object",
+        "distance up to which the mesh has points, if it differs from the model's; choose a little more than the "
+        "distance of your farthest object",
         "m",
         (0.1, 1e4),
     )
-    threshold: float = share(0.5, "probability above which a point counts for a class")
-    min_inside: float = share(0.85, "lowest mean probability inside the outline of an accepted object")
-    max_around: float = share(0.25, "highest mean probability in the band around an accepted object")
-    max_widths: float = number(2.0, "largest width of a cluster that may be one object", "object widths", (1.0, 100.0))
-    min_visible: float = share(0.25, "lowest share of an object's points that must be on screen")
+    threshold: float = share(0.5, "a point belongs to a class if its probability is above this")
+    min_inside: float = share(0.85, "lowest mean probability inside the outline; below it, the object is rejected")
+    max_around: float = share(
+        0.25, "highest mean probability just outside the outline; above it, the object is rejected"
+    )
+    max_widths: float = number(2.0, "reject clusters wider than this", "object widths", (1.0, 100.0))
+    min_visible: float = share(0.25, "reject objects with a smaller share of their points on screen")
 
     def __post_init__(self) -> None:
         check_entries(self)

@@ -27,8 +27,8 @@ Size = tuple[int, int]
 class Lens(ABC):
     """Maps rays to pixels and back.
 
-    fov: full angle [rad] that the lens covers. size: the image size [px] that the lens's numbers are for, or None if
-    they hold unchanged for every image.
+    fov [rad]: full angle that the lens covers. size [px]: width and height of the image for which the lens was
+    calibrated, or None if its numbers hold unchanged for every image.
 
     Raises InputError for an angle outside of (0, 2 pi] and for an image smaller than 2 x 2 px.
     """

@@ -31,7 +31,10 @@ _BROWN, _FISHEYE = ("plumb_bob", "rational_polynomial"), ("equidistant", "fishey
 
 @dataclass(frozen=True)
 class LensFile:
-    """A lens, and the camera's orientation if the file has one."""
+    """The contents of a lens file.
+
+    lens: the lens. orientation: of the camera, or None if the file has no `Hoc`.
+    """
 
     lens: Lens
     orientation: Orientation | None

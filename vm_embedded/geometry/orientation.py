@@ -30,7 +30,9 @@ def rotation_z(angle: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """Height of the camera over the plane [m] and rotation (3, 3) from camera to observation-plane frame.
+    """Height and rotation of a camera over the observation plane.
+
+    height [m]: of the camera over the plane. rotation (3, 3): from the camera's frame to the plane's frame.
 
     Raises GeometryError if the height is not a finite number above 0 or the matrix is not a rotation.
     """

@@ -58,7 +58,8 @@ class Pose:
 class Plane:
     """All points p [m] of the world with normal . p = offset. Objects lie on the side that the normal points to.
 
-    name: for sightings on the plane. The normal is scaled to length 1, and the offset by the same factor.
+    name: identifies the plane in sightings. normal: of any length; it is scaled to length 1. offset [m]: distance from
+    the world's origin along the normal; it is scaled like the normal.
 
     Raises GeometryError for a normal of length 0 and for numbers that are not finite.
     """

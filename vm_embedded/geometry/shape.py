@@ -20,6 +20,7 @@ from ..errors import GeometryError
 class Shape(ABC):
     """An object of radius `radius` [m] that lies on the observation plane.
 
+    `n` is a distance on the plane, counted in objects that lie in a row: n = 0 is straight below the camera.
     All methods take the camera's height over the plane [m]. `spacing` and the methods that use it raise GeometryError
     for a camera that is too low for the shape.
     """
@@ -45,15 +46,17 @@ class Shape(ABC):
 
     @abstractmethod
     def phi(self, n: Number, height: Number) -> Number:
-        """Inclination [rad] from straight below, n objects out; the paper's phi in fig:geometry."""
+        """Angle [rad] from straight down to the ray, at the distance of n objects; the paper's phi in fig:geometry."""
 
     @abstractmethod
     def n(self, phi: Number, height: Number) -> Number:
-        """Number of objects between straight below and the inclination phi [rad]; inverse of `phi`."""
+        """Number of objects between the nadir and the angle phi [rad]; inverse of `phi`."""
 
     @abstractmethod
     def theta(self, n: Number, height: Number) -> Number:
-        """Angular width [rad] of an object around the vertical, n objects out; Delta theta in the paper's fig:geometry.
+        """Angle around the vertical [rad] that an object covers, at the distance of n objects.
+
+        It is Delta theta in the paper's fig:geometry.
 
         Up to n = 0.5 the object covers the nadir. There the width is 2 pi / (1 + 2 n), as in the reference: the whole
         circle at the nadir and pi at n = 0.5.
@@ -72,15 +75,15 @@ class Shape(ABC):
         """Unit rays (count, 3) around the outline of the object at `center` (3,) [m], relative to the camera."""
 
     def center_along(self, rays: Floats, height: float) -> Floats:
-        """Centers (n, 3) [m], relative to the camera, of the objects on the plane that rays (n, 3) point at.
+        """Centers (n, 3) [m], relative to the camera, of objects on the plane in the directions of rays (n, 3).
 
-        For a ray on or above the horizon the center is a million heights away.
+        For a ray on or above the horizon, the center is a million camera heights away.
         """
         depth = np.maximum(-rays[:, 2:], 1e-6)
         return np.asarray(rays * ((height - self.center_height) / depth))
 
     def intersection_ratio(self, height: float, mesh_height: float) -> float:
-        """How many rings cross an object seen from `height`, relative to the height that the mesh was made for."""
+        """Number of rings that cross an object seen from `height`, divided by the number seen from `mesh_height`."""
         return float(self.spacing(height) / self.spacing(mesh_height))
 
     def _theta(self, n: Number, distance: Number) -> Number:

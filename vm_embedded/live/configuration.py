@@ -28,6 +28,11 @@ from ..poses.settings import PoseSettings
 from ..sockets import checked_address
 from .deploy_settings import DeploySettings
 
+HEADER = """Configuration of vm-detect. `vm-detect --print-config` prints this file.
+Keep only the entries that you change: missing entries have their defaults.
+Each comment gives the meaning of the next entry, its unit in brackets, and its limits."""
+"""First comment of a vm.toml that is printed."""
+
 
 @dataclass(frozen=True)
 class FixedPose:
@@ -64,8 +69,7 @@ class StatusSettings:
     )
     budget_ms: float = number(
         0.0,
-        "longest time from a frame's arrival to its message; above it, at the median of fifteen frames, the state is "
-        "degraded; 0: no limit",
+        "the state is degraded if the median latency of fifteen frames (arrival to message) exceeds this; 0: no limit",
         "ms",
         (0, 10000),
     )

@@ -41,8 +41,8 @@ class DeploySettings:
     signer: str = entry(
         check_signer,
         "",
-        "Ed25519 public key, from ssh-keygen's .pub file, that must have signed models for vm-deploy model; empty "
-        "accepts unsigned models",
+        "Ed25519 public key, from ssh-keygen's .pub file; vm-deploy model accepts only models signed with its private "
+        "key; empty: it accepts unsigned models",
     )
 
     def __post_init__(self) -> None:

@@ -25,7 +25,7 @@ Message = dict[str, Any]
 def frame_fields(detections: Detections, emit_points: Sequence[str] = (), explain: bool = False) -> Message:
     """The result of a frame: number of mesh points, detections, and time of each stage [ms].
 
-    emit_points: classes whose points are listed with bearings [rad] and probabilities.
+    emit_points: classes whose points are listed, with bearings (unit vectors in the plane's frame) and probabilities.
     explain: list rejected clusters too.
     """
     fields: Message = {"points": len(detections.pixels), "detections": [each.as_dict() for each in detections]}

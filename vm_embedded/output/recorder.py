@@ -34,7 +34,7 @@ CONFIGURATION, MESSAGES = "vm.toml", "recording.jsonl"
 class RecorderSettings:
     """Section [recorder]: where recordings go, their limits, and the class that triggers one."""
 
-    folder: str = text_line("", "folder for recordings; each gets a subfolder; empty disables recording")
+    folder: str = text_line("", "folder for recordings; each gets a subfolder; empty: no recordings")
     seconds: float = number(5.0, "length of a recording", "s", (0.1, 600))
     memory_mib: float = number(256.0, "memory for recent frames; a full memory shortens recordings", "MiB", (1, 65536))
     disk_mib: float = number(1024.0, "disk space for all recordings; the oldest are deleted", "MiB", (1, 1e6))

@@ -29,8 +29,7 @@ class PoseSettings:
     source: str = entry(
         _checked_source,
         "fixed",
-        "fixed: the pose in [orientation]; or JSON lines from stdin, from unix:PATH, a socket to create, or from "
-        "udp:ADDRESS:PORT",
+        "fixed: the pose in [orientation]; stdin, udp:ADDRESS:PORT or unix:PATH (creates the socket): lines of JSON",
     )
     clock: str = one_of(
         CLOCKS,
@@ -44,10 +43,12 @@ class PoseSettings:
         "and x right",
     )
     latency_ms: float = number(0.0, "time to subtract from t", "ms", (-1000, 1000))
-    wait_ms: float = number(40.0, "longest time that a frame waits for a pose at least as new", "ms", (0, 1000))
+    wait_ms: float = number(40.0, "longest time to wait for a pose that is not older than the frame", "ms", (0, 1000))
     interpolate: bool = switch(True, "interpolate between the poses before and after the frame; else use the newest")
     extrapolate_ms: float = number(5.0, "longest time to extrapolate beyond the newest pose", "ms", (0, 100))
-    max_age_ms: float = number(100.0, "how much older than the frame the newest pose may be", "ms", (1, 10000))
+    max_age_ms: float = number(
+        100.0, "a frame is not processed if the newest pose is older than the frame by more than this", "ms", (1, 10000)
+    )
     max_climb: float = number(5.0, "fastest change of the height; a faster pose is rejected", "m/s", (0.01, 1000))
     max_turn: float = number(
         30.0, "fastest turn of the gravity direction; a faster pose is rejected", "rad/s", (0.1, 1000)

@@ -19,6 +19,13 @@ CLASSES = ("ball", "goal", "line", "field", "environment", "robot")
 """The classes of pixels; masks during rendering hold positions in this tuple."""
 
 
+HEADER = """Configuration of vm-synth. `vm-synth config` prints this file.
+Keep only the entries that you change: missing entries have their defaults.
+Each comment gives the meaning of the next entry, its unit in brackets, and its limits.
+An entry [low, high] is a range: each picture gets a random value between the two."""
+"""First comment of a scene.toml that is printed."""
+
+
 @dataclass(frozen=True)
 class GroundRanges:
     """Section [ground]: the ground below the ball."""

@@ -14,7 +14,7 @@ from vm_embedded.files import check_writable
 from vm_workstation.stopping import stoppable
 
 from ..data.pictures import find_pictures
-from ..learning.configuration import TrainConfiguration
+from ..learning.configuration import HEADER, TrainConfiguration
 from .check import run_check
 from .import_pictures import run_import
 from .options import parsers
@@ -122,7 +122,7 @@ def _rate(options: argparse.Namespace) -> int:
 
 
 def _config(options: argparse.Namespace) -> int:
-    print(to_commented_toml(TrainConfiguration()), end="")
+    print(to_commented_toml(TrainConfiguration(), HEADER), end="")
     return EXIT_OK
 
 
