@@ -147,7 +147,7 @@ def _load(path: Path, overrides: Overrides) -> Checkpoint:
     if path.suffix.lower() != ".pt":
         raise InputError(f"{path} must be a checkpoint (.pt) or a network of the reference implementation (.yaml)")
     checkpoint = overrides.apply_to(Checkpoint.load(path))
-    if checkpoint.grid.kind != "visual":
+    if not checkpoint.grid.is_visual:
         raise InputError(f"{path} was trained on a {checkpoint.grid.kind} grid; the runtime has only the Visual Mesh")
     return checkpoint
 

@@ -28,5 +28,10 @@ class Grid:
         if not 0.0 <= self.equal_at < math.inf:
             raise InputError(f"equal_at must be a finite distance of at least 0 m, not {self.equal_at!r}")
 
+    @property
+    def is_visual(self) -> bool:
+        """Whether the points are those of the Visual Mesh. Only then the network finds objects and runs on a robot."""
+        return self.kind == "visual"
+
 
 VISUAL = Grid()

@@ -141,7 +141,7 @@ def _about(options: argparse.Namespace, settings: Settings, subject: Subject, co
 def _notes(options: argparse.Namespace, settings: Settings, subject: Subject, result: Evaluation) -> list[str]:
     """Remarks that help to understand the scores."""
     notes = []
-    if subject.grid.kind != "visual":
+    if not subject.grid.is_visual:
         notes.append(f"A network of a {subject.grid.kind} grid has scores of points only; objects need a Visual Mesh.")
     radius = settings.object_radius or subject.manifest.object_radius
     if options.radius_of == "all" and any(abs(each - radius) > 0.02 * radius for each in result.radii):

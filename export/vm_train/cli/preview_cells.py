@@ -18,7 +18,7 @@ from vm_workstation.contact_sheet import GAP, INK, LINE, PAPER, draw_legend, sca
 
 from ..data.classes import Color
 from ..data.pictures import Picture
-from ..graphs.labeled_graph import seen_points
+from ..graphs.seen_points import seen_points
 
 CIRCLES = (1.0, 2.0, 4.0, 8.0)
 """Radii of circles around the camera's foot [m]."""

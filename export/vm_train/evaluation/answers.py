@@ -32,7 +32,8 @@ from vm_embedded.network.session import Session
 from vm_export.grid import VISUAL, Grid
 
 from ..data.pictures import Picture
-from ..graphs.labeled_graph import levels_for, plane_distances, seen_points
+from ..graphs.labeled_graph import levels_for, plane_distances
+from ..graphs.seen_points import seen_points
 
 if TYPE_CHECKING:
     from vm_export.checkpoint import Checkpoint
@@ -79,7 +80,7 @@ class ExactSubject:
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         observation = self.observe(picture, radius)
         found: tuple[Detection, ...] = ()
-        if self.grid.kind == VISUAL.kind:
+        if self.grid.is_visual:
             found, _ = locate(observation, self.settings)
         return _answer(observation, found)
 

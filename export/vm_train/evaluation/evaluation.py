@@ -67,7 +67,7 @@ class Evaluation:
     def empty(cls, subject: Subject, rules: Rules) -> Evaluation:
         """The result for no pictures. It has scores of objects only for a Visual Mesh: the fit works on its rings."""
         classes = subject.manifest.classes
-        objects = [each.name for each in classes if each.kind == "object" and subject.grid.kind == "visual"]
+        objects = [each.name for each in classes if each.kind == "object" and subject.grid.is_visual]
         scores = {name: ObjectScores(min_radius=rules.min_radius) for name in objects}
         return cls(PointScores([each.name for each in classes]), scores)
 

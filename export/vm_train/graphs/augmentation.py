@@ -54,23 +54,6 @@ class Augmentation:
         check_entries(self)
 
 
-NO_AUGMENTATION = Augmentation(
-    height=0.0,
-    tilt=0.0,
-    focal_length=0.0,
-    center=0.0,
-    brightness=0.0,
-    contrast=0.0,
-    saturation=0.0,
-    hue=0.0,
-    gamma=0.0,
-    noise=0.0,
-    blur_share=0.0,
-    jpeg_share=0.0,
-)
-"""All entries are off."""
-
-
 @dataclass(frozen=True)
 class Tone:
     """A change of colors, with the names of Augmentation. The defaults change nothing.

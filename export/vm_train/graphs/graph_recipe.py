@@ -1,8 +1,8 @@
 """How a picture becomes a labeled graph: as it is for the validation, augmented for the training.
 
 Augmentation has two steps. A view is the graph of the whole picture for one draw of camera error and sharpness;
-graph_cache keeps some views of each picture on disk. A look is one training example: a view with another tone, cut to a
-window, perhaps mirrored.
+graph_cache keeps some views of each picture on disk. An example is a view with another tone, cut to a window, perhaps
+mirrored.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class GraphRecipe:
     """Everything besides the picture that decides its graph.
 
     own_radius: build the mesh for the radius of each picture's own ball, from its sceneX.json. window: share of width
-    and height that looks are cut to. mirrored: share of looks that are mirror images. first: network that selects the
-    points of each graph; None keeps all points.
+    and height that examples are cut to. mirrored: share of examples that are mirror images. first: network that selects
+    the points of each graph; None keeps all points.
     """
 
     classes: Classes
@@ -53,21 +53,22 @@ class GraphRecipe:
         if seed is None:
             return self._select(self._whole_graph(picture, manifest))
         random = np.random.default_rng(seed)
-        return self.draw_look(self.draw_view(picture, manifest, random), random)
+        return self.draw_example(self.draw_view(picture, manifest, random), random)
 
     def draw_view(self, picture: Picture, manifest: Manifest, random: np.random.Generator) -> LabeledGraph:
         """The whole graph of a picture with random camera error and blur, in absolute colors. Raises InputError."""
         changed = perturb_sharpness(perturb_camera(picture, self.augmentation, random), self.augmentation, random)
+        # absolute: the tone is drawn later, before colors are normalized
         return self._whole_graph(changed, replace(manifest, colors="absolute"))
 
-    def draw_look(self, view: LabeledGraph, random: np.random.Generator) -> LabeledGraph:
-        """A random window of a view with random tone, reduced to the points that the first network selects."""
+    def draw_example(self, view: LabeledGraph, random: np.random.Generator) -> LabeledGraph:
+        """A random window of a view in a random tone, perhaps mirrored: the points that the first network selects."""
         objects = [at for at, each in enumerate(self.manifest.classes) if each.kind == "object"]
         colors = perturb_colors(view.points[:-1], self.augmentation, random)
         normalize_colors(colors, self.manifest.colors)
         colored = replace(view, points=np.concatenate([colors, view.points[-1:]]))
         seen = random_window(colored, self.window, objects, random)
-        if self.mirrored and random.random() < self.mirrored:  # at 0, draw no number: old seeds keep their meaning
+        if random.random() < self.mirrored:
             seen = mirror_image(seen, self.manifest.model)
         return self._select(seen)
 

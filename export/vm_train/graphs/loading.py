@@ -43,17 +43,17 @@ class PictureGraphs(Dataset[LabeledGraph]):
         if self.views is None or item.seed is None:
             return self.recipe.make_graph(self._picture(files), self.recipe.manifest_for(files), item.seed)
         random = np.random.default_rng(item.seed)
-        number = int(random.integers(self.views.count))
-        return self.recipe.draw_look(self._view(files, number, self.views), random)
+        view = int(random.integers(self.views.count))
+        return self.recipe.draw_example(self._view(files, view, self.views), random)
 
-    def _view(self, files: PictureFiles, number: int, views: GraphCache) -> LabeledGraph:
+    def _view(self, files: PictureFiles, view: int, views: GraphCache) -> LabeledGraph:
         """One of a picture's views from the cache; it is made and stored there if it is missing."""
-        view = views.get(files, number)
-        if view is None:
+        graph = views.get(files, view)
+        if graph is None:
             manifest = self.recipe.manifest_for(files)
-            view = self.recipe.draw_view(self._picture(files), manifest, views.random(files, number))
-            views.put(files, number, view)
-        return view
+            graph = self.recipe.draw_view(self._picture(files), manifest, views.random(files, view))
+            views.put(files, view, graph)
+        return graph
 
     def _picture(self, files: PictureFiles) -> Picture:
         return read_through_cache(files, self.recipe.classes, self.decoded)

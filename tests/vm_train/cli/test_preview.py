@@ -15,8 +15,10 @@ from vm_export.grid import Grid
 from vm_train.cli.preview import sheet
 from vm_train.cli.preview_cells import middle, point_colors
 from vm_train.data.pictures import Picture
-from vm_train.graphs.augmentation import NO_AUGMENTATION, Augmentation
+from vm_train.graphs.augmentation import Augmentation
 from vm_workstation.contact_sheet import GAP, write_sheet
+
+from ..no_augmentation import NO_AUGMENTATION
 
 MANIFEST = ball_manifest("ball", "environment", "field", max_distance=6.0)
 GRID = Grid()

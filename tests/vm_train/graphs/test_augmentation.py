@@ -17,7 +17,6 @@ from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from vm_train.data.pictures import Picture
 from vm_train.graphs.augmentation import (
-    NO_AUGMENTATION,
     Augmentation,
     Tone,
     apply_tone,
@@ -27,6 +26,8 @@ from vm_train.graphs.augmentation import (
     soften,
     with_camera_error,
 )
+
+from ..no_augmentation import NO_AUGMENTATION
 
 SIZE = (96, 64)
 LENSES = [

@@ -1,4 +1,4 @@
-"""Graphs of pictures: the points that a network gets."""
+"""The points that a network gets of a picture."""
 
 import math
 from dataclasses import replace
@@ -14,7 +14,7 @@ from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from vm_embedded.mesh.models import build_mesh
-from vm_train.graphs.labeled_graph import seen_points
+from vm_train.graphs.seen_points import seen_points
 
 MANIFEST = ball_manifest("ball", "other", intersections=2.0, max_distance=6.0)
 SIZE = (160, 120)
