@@ -21,8 +21,8 @@ GROUPS = {
     "activation": ("base", "elu", "relu"),
     "width": ("width 2", "base", "width 8", "width 16"),
     "rings across a ball": ("k = 3", "base", "k = 5", "k = 6"),
-    "what a point gives": ("base", "absolute colors", "bilinear points", "mesh to 10 m"),
-    "points that give gradients": (
+    "point features": ("base", "absolute colors", "bilinear points", "mesh to 10 m"),
+    "point selection": (
         "base", "balance 0.15", "balance 0.7", "all points", "focal loss", "balanced selection", "hard-example rounds",
     ),
     "classes": ("base", "six classes"),
@@ -35,8 +35,8 @@ BASE = {
     "activation": "selu",
     "width": "width 4",
     "rings across a ball": "k = 4",
-    "what a point gives": "relative colors, footprints, to 14 m",
-    "points that give gradients": "weighted, balance 0.3",
+    "point features": "relative colors, footprints, to 14 m",
+    "point selection": "weighted, balance 0.3",
     "classes": "ball and other",
     "augmentation": "all augmentation",
 }
@@ -91,7 +91,7 @@ def transfer(results: dict[str, Any], kinds: tuple[str, ...]) -> str:
         objects = [shown(values(results[name], "iou_0.5", "average_precision", test=kind)) for kind in kinds]
         label = "all, 2000 pictures" if name == "base" else f"{name.removeprefix('learned ')}, 800 pictures"
         rows.append([label, *(f"{points}; {balls}" for points, balls in zip(cells, objects, strict=True))])
-    return table(["learned from", *(f"tested on {kind}" for kind in kinds)], rows)
+    return table(["trained on", *(f"tested on {kind}" for kind in kinds)], rows)
 
 
 def plot(results: dict[str, Any]) -> None:

@@ -42,7 +42,7 @@ def networks(found: dict[str, Any], each_set: str) -> str:
             ]
         )
     heads = ["network", "AP50, 0.5 to 6 m", "6 to 10 m", "AP75, 0.5 to 6 m", "6 to 10 m"]
-    heads += ["found [%], 0.5 to 6 m", "6 to 10 m", "false per picture", "distance error [%]"]
+    heads += ["recall [%], 0.5 to 6 m", "6 to 10 m", "false per picture", "distance error [%]"]
     return table(heads, rows)
 
 
@@ -100,7 +100,7 @@ def by_distance(scores: dict[str, Any]) -> str:
                 number(scores["used 0.5"][meters]["distance_error"], 2, 100.0),
             ]
         )
-    return table(["distance", "balls", "AP50", "AP75", "found [%]", "distance error [%]"], rows)
+    return table(["distance", "balls", "AP50", "AP75", "recall [%]", "distance error [%]"], rows)
 
 
 def plot(found: dict[str, Any]) -> None:
@@ -139,11 +139,11 @@ def card(found: dict[str, Any], name: str) -> str:
     configuration = tomllib.loads((NETWORKS / f"{name}.toml").read_text())
     depth, width = (configuration["network"][each] for each in ("depth", "width"))
     activation = configuration["network"]["activation"].upper()
-    again = " It looks again at the points that `ball-5x4` does not take for lawn."
-    first = again if "second_look" in configuration else ""
+    other = " It runs only on points that `ball-5x4` does not classify as background."
+    first = other if "second_look" in configuration else ""
     scores, clutter = (found["networks"][name][each] for each in SETS)
     ranges = table(
-        ["distance", "balls", "AP50", "AP75", "found [%]"],
+        ["distance", "balls", "AP50", "AP75", "recall [%]"],
         [
             [
                 each,
@@ -167,13 +167,13 @@ reaches to {manifest.max_distance:g} m. It suits balls of any radius (`--object-
 {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: ball, other.
 
 - **Training data:** {made["training_pictures"]} rendered pictures under 30 panoramas (`export/vm_synth/soccer.toml`,
-  seed 1). {made["validation_pictures"]} other pictures selected epoch {made["epoch"]} of {made["epochs"]}.
+  seed 1). Validation on {made["validation_pictures"]} other pictures chose epoch {made["epoch"]} of {made["epochs"]}.
   Seed {made["seed"]}, configuration `export/networks/{name}.toml`.
-- **To make it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
+- **To train it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
   {model.sha256}.
 
-On {scores["pictures"]} rendered pictures of fields under six panoramas that it has not seen, {size} px, with balls of
-0.05 to 0.12 m radius:
+The test has {scores["pictures"]} rendered pictures of fields under six panoramas that no training uses, {size} px, with
+balls of 0.05 to 0.12 m radius:
 
 {ranges}
 
