@@ -35,16 +35,16 @@ HEIGHT, SIZE = 0.8, (1280, 1024)
 def main() -> None:
     os.sched_setaffinity(0, [max(os.sched_getaffinity(0))])
     lens, pose = Equisolid(focal_length=420.0, fov=2.6), Orientation.from_roll_pitch(HEIGHT, pitch=0.5)
-    print("network  mesh     layout    points  places  median [ms]  p99 [ms]  for 1000 points [us]")
+    print("network  mesh     layout    points   slots  median [ms]  p99 [ms]  for 1000 points [us]")
     for depth, width in NETWORKS:
         calls, sizes = {}, {}
         for model, layout in CASES:
             name = f"{model:8s} {layout:8s}"
             calls[name], sizes[name] = _call(depth, width, model, layout, lens, pose)
         for name, found in interleaved(calls, ROUNDS).items():
-            points, places = sizes[name]
+            points, slots = sizes[name]
             print(
-                f"{depth:2d}x{width:<4d}  {name} {points:7d} {places:7d}  {found['p50']:11.3f}  {found['p99']:8.3f}  "
+                f"{depth:2d}x{width:<4d}  {name} {points:7d} {slots:7d}  {found['p50']:11.3f}  {found['p99']:8.3f}  "
                 f"{1e6 * found['p50'] / points:20.0f}"
             )
 
