@@ -27,6 +27,11 @@ def one_line(error: BaseException) -> str:
     return (" ".join(str(error).split()) or type(error).__name__)[:200]
 
 
+def install_extra(extra: str) -> str:
+    """Advice to install an extra of pyproject.toml, for the message about a missing package."""
+    return f"run: pip install '.[{extra}]' in the folder of vm-embedded"
+
+
 def unknown(what: str, value: object, allowed: Iterable[str]) -> str:
     """Message for an unknown value: the value, the nearest allowed one, and all allowed ones."""
     names = list(allowed)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vm_embedded.errors import InputError, VisualMeshError
+from vm_embedded.errors import InputError, VisualMeshError, install_extra
 from vm_embedded.network.manifest import EDGES, LAYOUTS
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _run(options)
     except ImportError as error:
         missing = error.name or str(error)
-        print(f"vm-export: {missing} is not installed; run: pip install 'vm-embedded[export]'", file=sys.stderr)
+        print(f"vm-export: {missing} is not installed; {install_extra('export')}", file=sys.stderr)
     except VisualMeshError as error:
         print(f"vm-export: {error}", file=sys.stderr)
     return EXIT_FAILED

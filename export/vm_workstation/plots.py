@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vm_embedded.errors import InputError
+from vm_embedded.errors import InputError, install_extra
 from vm_embedded.files import atomic_write
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def new_figure(width: float, height: float) -> Figure:
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise InputError("plots need matplotlib: pip install 'vm-embedded[train]'") from error
+        raise InputError(f"plots need matplotlib; {install_extra('train')}") from error
     return Figure(figsize=(width, height), layout="constrained")
 
 

@@ -145,7 +145,8 @@ def test_command_without_its_extra_says_what_to_install(missing, tmp_path):
     program = f"import sys; sys.modules['{missing}'] = None; from vm_export.cli import main; sys.exit(main(['m.yaml']))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 1
-    assert done.stderr == f"vm-export: {missing} is not installed; run: pip install 'vm-embedded[export]'\n"
+    advice = "run: pip install '.[export]' in the folder of vm-embedded"
+    assert done.stderr == f"vm-export: {missing} is not installed; {advice}\n"
 
 
 def test_edges_are_the_manifest_s():

@@ -72,7 +72,9 @@ def test_without_mitsuba_it_says_what_to_install_in_one_line(maps, tmp_path):
     arguments = [sys.executable, "-m", "vm_synth", str(tmp_path / "out"), "--count", "1", "--hdri", str(maps)]
     done = subprocess.run(arguments, capture_output=True, text=True, env=environment, check=False)
     assert done.returncode == 1
-    assert done.stderr == "vm-synth: rendering needs Mitsuba 3: pip install 'vm-embedded[synth]'\n"
+    assert done.stderr == (
+        "vm-synth: rendering needs Mitsuba 3; run: pip install '.[synth]' in the folder of vm-embedded\n"
+    )
 
 
 def test_a_damaged_map_is_named_and_left_out(maps, tmp_path, capsys):

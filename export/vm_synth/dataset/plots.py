@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vm_embedded.errors import InputError
+from vm_embedded.errors import InputError, install_extra
 from vm_embedded.files import atomic_write
 from vm_embedded.geometry.lens import Size
 
@@ -41,7 +41,7 @@ def load_matplotlib(path: Path) -> Any:
     try:
         import matplotlib
     except ImportError as error:
-        raise InputError("--plots needs matplotlib: pip install 'vm-embedded[synth]'") from error
+        raise InputError(f"--plots needs matplotlib; {install_extra('synth')}") from error
     matplotlib.use("Agg")
     from matplotlib.figure import Figure
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
-from vm_embedded.errors import InputError
+from vm_embedded.errors import InputError, install_extra
 
 VARIANT = "llvm_ad_rgb"
 
@@ -35,7 +35,7 @@ def load_mitsuba() -> ModuleType:
             import drjit
             import mitsuba
         except ImportError as error:
-            raise InputError("rendering needs Mitsuba 3: pip install 'vm-embedded[synth]'") from error
+            raise InputError(f"rendering needs Mitsuba 3; {install_extra('synth')}") from error
     try:
         mitsuba.set_variant(VARIANT)
     except ImportError as error:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import vm_embedded
 from vm_embedded.detection.settings import Settings
-from vm_embedded.errors import InputError, VisualMeshError
+from vm_embedded.errors import InputError, VisualMeshError, install_extra
 from vm_embedded.live.configuration import read_configuration
 from vm_workstation.stopping import stoppable
 
@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _evaluate(parser().parse_args(given))
     except ImportError as error:
         missing = error.name or str(error)
-        print(f"vm-evaluate: {missing} is not installed; run: pip install 'vm-embedded[train]'", file=sys.stderr)
+        print(f"vm-evaluate: {missing} is not installed; {install_extra('train')}", file=sys.stderr)
     except VisualMeshError as error:
         print(f"vm-evaluate: {' '.join(str(error).split())}", file=sys.stderr)
     except KeyboardInterrupt:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
-from vm_embedded.errors import VisualMeshError
+from vm_embedded.errors import VisualMeshError, install_extra
 from vm_embedded.files import check_writable
 from vm_workstation.stopping import stoppable
 
@@ -42,6 +42,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with stoppable():
             return run_training(options) if command is None else commands[command](options)
+    except ImportError as error:
+        if _is_leader():
+            missing = error.name or str(error)
+            print(f"vm-train: {missing} is not installed; {install_extra('train')}", file=sys.stderr)
+        return EXIT_FAILED
     except VisualMeshError as error:
         if _is_leader():
             print(f"vm-train: {' '.join(str(error).split())}", file=sys.stderr)

@@ -10,7 +10,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats
 from vm_embedded.cli.progress import ProgressBar
-from vm_embedded.errors import InputError
+from vm_embedded.errors import InputError, install_extra
 from vm_embedded.files import atomic_write, check_writable
 from vm_export.network import Network
 
@@ -79,7 +79,7 @@ def plot_rates(found: RateSearch, path: Path) -> None:
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise InputError("plots need matplotlib: pip install 'vm-embedded[train]'") from error
+        raise InputError(f"plots need matplotlib; {install_extra('train')}") from error
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
     axes: Any = figure.subplots()
     axes.semilogx(found.rates, found.losses, color="#1b9e77")

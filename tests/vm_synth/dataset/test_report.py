@@ -245,7 +245,8 @@ def test_plots_without_any_ball(tmp_path):
 def test_plots_without_matplotlib_name_the_extra(folder, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert main(["check", str(folder), "--plots", "plots.png"]) == 1
-    assert capsys.readouterr().err == "vm-synth: --plots needs matplotlib: pip install 'vm-embedded[synth]'\n"
+    said = capsys.readouterr().err
+    assert said == "vm-synth: --plots needs matplotlib; run: pip install '.[synth]' in the folder of vm-embedded\n"
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import json
 import re
 import subprocess
+import sys
 
 import pytest
 
@@ -48,6 +49,17 @@ def test_wrong_options_end_in_one_line(arguments, said, data, configuration, tmp
     done = run(data, "-o", tmp_path / "run", *given, code=1)
     assert said in done.stderr
     assert done.stderr.startswith("vm-train: ")
+
+
+@pytest.mark.parametrize("arguments", [["data", "-o", "run"], ["rate", "data"], ["resume", "run"]])
+def test_without_torch_it_says_what_to_install(arguments, tmp_path):
+    program = (
+        f"import sys; sys.modules['torch'] = None; from vm_train.cli.train import main; sys.exit(main({arguments}))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert done.returncode == 1
+    said = "vm-train: torch is not installed; run: pip install '.[train]' in the folder of vm-embedded\n"
+    assert done.stderr == said
 
 
 def test_a_folder_without_pictures_or_a_training_ends_in_one_line(tmp_path):
