@@ -80,7 +80,7 @@ def _parser(command: str, description: str) -> argparse.ArgumentParser:
             action="append",
             metavar="NAME",
             help="mesh model; "
-            + ("repeatable; default all for the shape" if several else "default that of --network, or ring6"),
+            + ("repeatable; default: all models for the shape" if several else "default: from --network, or ring6"),
         )
     plan = made.add_argument_group("object, camera and reach")
     plan.add_argument(
@@ -117,7 +117,7 @@ def _add_camera(group: Any) -> None:
 
 
 def _add_size(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--size", metavar="WxH", help="size of the pictures [px]; default that in the lens file")
+    parser.add_argument("--size", metavar="WxH", help="size of the pictures [px]; default: from the lens file")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -89,7 +89,7 @@ def preview_parser() -> argparse.ArgumentParser:
         prog="vm-synth preview",
         description="Draw a contact sheet of a set. Below each picture is a copy with tinted classes and the ball's "
         "outline, which is computed from position, lens and pose, not from the rendered mask. Small balls are also "
-        "magnified. The set may still be rendering.",
+        "magnified. It also works while the set is rendering.",
     )
     made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
     made.add_argument("--count", type=at_least(1), default=24, metavar="N", help="number of pictures; default 24")
@@ -97,7 +97,10 @@ def preview_parser() -> argparse.ArgumentParser:
     made.add_argument("--width", type=at_least(1), default=320, metavar="PX", help="width of each picture; default 320")
     which = made.add_mutually_exclusive_group()
     which.add_argument(
-        "--first", type=at_least(0), metavar="I", help="start at picture I; default: evenly spread over the set"
+        "--first",
+        type=at_least(0),
+        metavar="I",
+        help="draw the pictures from I on; default: pictures spread evenly over the set",
     )
     which.add_argument("--seed", type=at_least(0), metavar="S", help="choose random pictures with this seed")
     made.add_argument("--output", type=Path, metavar="FILE", help="output file, .jpg or .png; default OUT/preview.jpg")
@@ -113,7 +116,9 @@ def check_parser() -> argparse.ArgumentParser:
     )
     made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
     made.add_argument("--quick", action="store_true", help="skip images and masks")
-    made.add_argument("--shards", type=at_least(1), default=1, metavar="N", help="report each of N shards; default 1")
+    made.add_argument(
+        "--shards", type=at_least(1), default=1, metavar="N", help="report on each of N shards; default 1"
+    )
     made.add_argument(
         "--plots", type=Path, metavar="FILE", help="write histograms to a .png, .svg or .pdf; needs matplotlib"
     )

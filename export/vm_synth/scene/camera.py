@@ -53,7 +53,7 @@ class CameraRanges:
     lens: Mapping[str, Any] = field(
         default_factory=dict,
         metadata={
-            "help": "one lens for all pictures instead of drawn lenses: a table with projection, focal_length [px], "
+            "help": "one lens for all pictures, instead of random lenses: a table with projection, focal_length [px], "
             "fov [rad] and, if needed, center, distortion and size, as in vm.toml"
         },
     )

@@ -31,7 +31,7 @@ class GroundRanges:
     """Section [ground]: the ground below the ball."""
 
     photographed: float = share(
-        0.5, "share of pictures on the floor of the map, if it has a flat one; the others show a field"
+        0.5, "share of pictures that show the flat floor of their map, if it has one; the others show a field"
     )
     detail: tuple[float, float] = range_of(
         0.02,

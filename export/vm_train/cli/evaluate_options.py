@@ -79,7 +79,11 @@ def _add_pictures(made: argparse.ArgumentParser) -> None:
         "ball (sceneX.json of vm-synth); default all",
     )
     group.add_argument(
-        "--min-radius", type=_length, default=2.0, metavar="PX", help="ignore smaller true objects [px]; default 2"
+        "--min-radius",
+        type=_length,
+        default=2.0,
+        metavar="PX",
+        help="ignore true objects of a smaller radius [px]; default 2",
     )
     group.add_argument("--strict", action="store_true", help="stop at a picture that can't be used; default: skip it")
 
