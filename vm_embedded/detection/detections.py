@@ -83,7 +83,7 @@ class ClassPoints:
 
 @dataclass(frozen=True, eq=False)
 class Detections:
-    """The objects of a frame, most confident first, and the n mesh points on screen behind them.
+    """The objects of a frame, most confident first, and the n mesh points on screen.
 
     objects: the accepted objects. rejected: the rejected candidates, each with its reason; empty unless `explain` was
     set. observation: the points. threshold: a point belongs to a class if its probability is above this. timing_ms:

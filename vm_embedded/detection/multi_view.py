@@ -48,7 +48,9 @@ class Sighting:
 def detect_views(
     detector: Detector, views: Mapping[str, CameraView], planes: Sequence[Plane] = (GROUND,)
 ) -> tuple[Sighting, ...]:
-    """Objects that cameras, by their names, show on planes; the most confident first.
+    """Find objects on several planes with several cameras; the most confident object comes first.
+
+    views: the picture, lens and pose of each camera, by its name. planes: the planes to search.
 
     All cameras share the detector's network and meshes. Two detections of one class are one object in two cases:
     - cameras differ, the plane is the same, and they lie less than a diameter apart;

@@ -19,7 +19,7 @@ from .lens import Lens, Size
 class CalibratedLens(Lens):
     """Base of the calibrated lenses.
 
-    focal_lengths: (fx, fy) [px]. optical_center: (cx, cy) [px]. coefficients: of the distortion, in OpenCV's order.
+    focal_lengths: fx and fy [px]. optical_center: cx and cy [px]. coefficients: of the distortion, in OpenCV's order.
 
     Raises InputError for focal lengths that are not above 0 and for numbers that are not finite.
     """

@@ -92,7 +92,7 @@ class Plane:
     def spotlight(cls, name: str, target: Sequence[float], camera: Sequence[float]) -> Plane:
         """The plane through the point `target` that faces a camera at the point `camera` [m].
 
-        The target is the camera's foot point on this plane, so it is in the middle of the mesh.
+        The target is the point of this plane that is closest to the camera, so it is in the middle of the mesh.
 
         Raises GeometryError if both are the same point.
         """

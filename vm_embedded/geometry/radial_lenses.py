@@ -23,8 +23,8 @@ from .lens import Lens, Size
 class RadialLens(Lens):
     """Base of the reference's three lenses.
 
-    focal_length [px]. center: the image center minus the optical center [px]. distortion: (k0, k1) [px^-2, px^-4] of
-    `distortion.undistort`.
+    focal_length: focal length [px]. center: image center minus optical center, as x and y [px]. distortion: k0 [px^-2]
+    and k1 [px^-4] of r_u = r_d (1 + k0 r_d^2 + k1 r_d^4), from distorted to undistorted radius.
 
     Raises InputError for a focal length that is not above 0 and for numbers that are not finite.
     """

@@ -34,13 +34,13 @@ class PoseSettings:
     clock: str = one_of(
         CLOCKS,
         "monotonic",
-        "clock of t: the machine's monotonic clock or its wall clock; arrival ignores t and uses the time of arrival",
+        "clock of t; monotonic and wall: the machine's clocks; arrival: t is ignored, and the time of arrival is used",
     )
     frame: str = one_of(
         FRAMES,
         "camera",
-        "camera frame of the rotation: camera has x forward and y left; optical, as in OpenCV and ROS, has z forward "
-        "and x right",
+        "axes of the camera's frame; camera: x forward, y left, z up; optical (as in OpenCV and ROS): x right, y down, "
+        "z forward",
     )
     latency_ms: float = number(0.0, "time to subtract from t", "ms", (-1000, 1000))
     wait_ms: float = number(40.0, "longest time to wait for a pose that is not older than the frame", "ms", (0, 1000))
@@ -49,9 +49,9 @@ class PoseSettings:
     max_age_ms: float = number(
         100.0, "a frame is not processed if the newest pose is older than the frame by more than this", "ms", (1, 10000)
     )
-    max_climb: float = number(5.0, "fastest change of the height; a faster pose is rejected", "m/s", (0.01, 1000))
+    max_climb: float = number(5.0, "a pose is rejected if its height changes faster than this", "m/s", (0.01, 1000))
     max_turn: float = number(
-        30.0, "fastest turn of the gravity direction; a faster pose is rejected", "rad/s", (0.1, 1000)
+        30.0, "a pose is rejected if its gravity direction turns faster than this", "rad/s", (0.1, 1000)
     )
 
     def __post_init__(self) -> None:
