@@ -69,12 +69,7 @@ def _entries(shard: Path) -> Iterator[_Entry]:
     try:
         with tarfile.open(shard, "r:") as tar:
             for member in tar:
-                number, part = key_and_part(member.name)
-                if member.isfile() and part is not None:
-                    entry = entries.setdefault(number, _Entry(number))
-                    if part in entry.parts:
-                        raise InputError(f"{shard} has two files for the {part} of picture {number}")
-                    entry.parts[part] = member.name, Place(member.offset_data, member.size)
+                _add_member(entries, member, shard)
                 after = member.name
             end = tar.offset
         # tarfile accepts a cut file as a complete archive.
@@ -85,3 +80,14 @@ def _entries(shard: Path) -> Iterator[_Entry]:
     except (tarfile.TarError, OSError, EOFError) as error:
         raise InputError(f"{shard} is cut short or damaged after {after}: {one_line(error)}") from error
     yield from (entry for entry in entries.values() if "image" in entry.parts)
+
+
+def _add_member(entries: dict[str, _Entry], member: tarfile.TarInfo, shard: Path) -> None:
+    """Add a file of a shard to its picture's entry; other members are ignored. Raises InputError for a second file."""
+    number, part = key_and_part(member.name)
+    if not member.isfile() or part is None:
+        return
+    entry = entries.setdefault(number, _Entry(number))
+    if part in entry.parts:
+        raise InputError(f"{shard} has two files for the {part} of picture {number}")
+    entry.parts[part] = member.name, Place(member.offset_data, member.size)

@@ -37,18 +37,19 @@ def write_shards(pictures: Sequence[PictureFiles], out: Path, per_shard: int, re
     for position, start in enumerate(range(0, len(pictures), per_shard)):
         shard = out / f"pictures-{position:06d}.tar"
         if not shard.exists():
-            with (
-                atomic_write(shard) as part,
-                tarfile.open(part, "w", format=tarfile.PAX_FORMAT, encoding="utf-8") as tar,
-            ):
-                for picture in pictures[start : start + per_shard]:
-                    for name, content in _members(picture):
-                        entry = tarfile.TarInfo(name)  # user 0, time 0
-                        entry.size = len(content)
-                        tar.addfile(entry, io.BytesIO(content))
-                    report()
+            _write_shard(shard, pictures[start : start + per_shard], report)
         shards.append(shard)
     return shards
+
+
+def _write_shard(shard: Path, pictures: Sequence[PictureFiles], report: Callable[[], None]) -> None:
+    with atomic_write(shard) as part, tarfile.open(part, "w", format=tarfile.PAX_FORMAT, encoding="utf-8") as tar:
+        for picture in pictures:
+            for name, content in _members(picture):
+                entry = tarfile.TarInfo(name)  # user 0, time 0
+                entry.size = len(content)
+                tar.addfile(entry, io.BytesIO(content))
+            report()
 
 
 def _members(picture: PictureFiles) -> Iterator[tuple[str, bytes]]:

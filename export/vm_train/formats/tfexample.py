@@ -1,11 +1,10 @@
-"""Examples, the payloads of TFRecord files, read and written without TensorFlow or protobuf.
+"""Examples, the payloads of TFRecord files, read without TensorFlow or protobuf.
 
 An Example is a protobuf message that maps names to lists of bytes, floats or whole numbers.
 """
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -169,40 +168,3 @@ def _varint(message: memoryview, at: int) -> tuple[int, int]:
 
 def _no_example(reason: str) -> InputError:
     return InputError(f"not an Example: {reason}")
-
-
-def example_bytes(example: Example) -> bytes:
-    """The payload of an Example as protobuf writes it, with the features in the order of the mapping.
-
-    Raises OverflowError for a number that does not fit into its list.
-    """
-    entries = (
-        _field(1, _field(1, name.encode()) + _field(2, _feature_bytes(feature))) for name, feature in example.items()
-    )
-    return _field(1, b"".join(entries))
-
-
-def _feature_bytes(feature: Feature) -> bytes:
-    match feature:
-        case BytesList(texts):
-            return _field(1, b"".join(_field(1, each) for each in texts))
-        case FloatList(floats):
-            return _field(2, _field(1, struct.pack(f"<{len(floats)}f", *floats)) if floats else b"")
-        case Int64List(integers):
-            packed = b"".join(
-                _varint_bytes(int.from_bytes(each.to_bytes(8, "little", signed=True), "little")) for each in integers
-            )
-            return _field(3, _field(1, packed) if integers else b"")
-
-
-def _field(number: int, value: bytes) -> bytes:
-    return _varint_bytes(number << 3 | _BYTES) + _varint_bytes(len(value)) + value
-
-
-def _varint_bytes(value: int) -> bytes:
-    out = bytearray()
-    while value > 127:
-        out.append(value & 127 | 128)
-        value >>= 7
-    out.append(value)
-    return bytes(out)

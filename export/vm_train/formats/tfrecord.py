@@ -1,4 +1,4 @@
-"""TFRecord files, read and written without TensorFlow.
+"""TFRecord files, read without TensorFlow.
 
 A record is the length of its payload (uint64), the length's checksum (uint32), the payload, and the payload's checksum
 (uint32), all little-endian; checksums are masked CRC-32C. Records are counted from 0.
@@ -8,15 +8,12 @@ from __future__ import annotations
 
 import gzip
 import io
-import struct
 import zlib
-from collections.abc import Iterable, Iterator
-from contextlib import nullcontext
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from vm_embedded.errors import InputError, one_line
-from vm_embedded.files import atomic_write
 
 from .crc32c import masked_crc32c
 from .tfexample import Example, parse_example
@@ -87,19 +84,6 @@ def read_records(path: Path) -> Iterator[Record]:
         raise InputError(f"{path}: record {number}: the gzip file is damaged: {one_line(error)}") from error
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
         raise InputError(f"can't read {path}: {getattr(error, 'strerror', None) or error}") from error
-
-
-def write_records(path: Path, payloads: Iterable[bytes], compressed: bool = False) -> None:
-    """Write a TFRecord file, plain or gzip, atomically. Raises InputError if it can't be written."""
-    with atomic_write(path) as part, part.open("wb") as file:
-        # Without time and name: the same records give the same file. Level 1, as pictures are compressed already.
-        packed = gzip.GzipFile("", "wb", compresslevel=1, fileobj=file, mtime=0) if compressed else nullcontext(file)
-        with packed as stream:
-            for payload in payloads:
-                length = struct.pack("<Q", len(payload))
-                stream.write(length + struct.pack("<I", masked_crc32c(length)))
-                stream.write(payload)
-                stream.write(struct.pack("<I", masked_crc32c(payload)))
 
 
 def _is_gzip(file: io.BufferedReader) -> bool:

@@ -66,25 +66,34 @@ def import_records(
         for record in read_records(path):
             if _is_done(out, number):
                 there += 1
+            elif isinstance(found := _picture_or_fault(record, renaming, normalized, strict), str):
+                skipped.append(found)
             else:
-                try:
-                    picture = _picture(record, renaming, normalized)
-                except WrongUnitError:
-                    raise
-                except VisualMeshError as error:
-                    if strict:
-                        raise
-                    skipped.append(str(error))
-                else:
-                    if wanted is not None:
-                        _write(out / "import.json", wanted.encode())
-                        wanted = None
-                    for name, data in picture.files(number).items():
-                        _write(out / name, data)
-                    count += 1
+                _import_picture(found, number, out, None if count else wanted)
+                count += 1
             number += 1
             report((before + record.position) / sum(sizes))
     return Imported(count, tuple(skipped), there)
+
+
+def _picture_or_fault(
+    record: Record, renaming: Mapping[str, str], normalized: bool, strict: bool
+) -> ExamplePicture | str:
+    """The picture in a record, or the reason to skip it. Raises that as an error if strict or for a wrong unit."""
+    try:
+        return _picture(record, renaming, normalized)
+    except VisualMeshError as error:
+        if strict or isinstance(error, WrongUnitError):
+            raise
+        return str(error)
+
+
+def _import_picture(picture: ExamplePicture, number: int, out: Path, wanted: str | None) -> None:
+    """Write the files of a picture; before, `wanted` as import.json, if it is not None."""
+    if wanted is not None:
+        _write(out / "import.json", wanted.encode())
+    for name, data in picture.files(number).items():
+        _write(out / name, data)
 
 
 def _picture(record: Record, renaming: Mapping[str, str], normalized: bool) -> ExamplePicture:

@@ -10,9 +10,10 @@ from vm_embedded import Orientation, read_lens_file
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_train.data.pictures import find_pictures
-from vm_train.formats.tfexample import BytesList, FloatList, Int64List, example_bytes
-from vm_train.formats.tfrecord import write_records
+from vm_train.formats.tfexample import BytesList, FloatList, Int64List
 from vm_train.formats.tfrecord_import import import_records
+
+from .tfrecord_writer import example_bytes, write_records
 
 LENS = Equisolid(focal_length=90.25, fov=2.75, center=(1.5, -2.25), distortion=(2.0**-20, -(2.0**-42)))
 """Its numbers are the same in 32 bits."""

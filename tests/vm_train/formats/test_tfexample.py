@@ -7,8 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
-from vm_train.formats.tfexample import BytesList, FloatList, Int64List, example_bytes, parse_example
-from vm_train.formats.tfrecord import read_records, write_records
+from vm_train.formats.tfexample import BytesList, FloatList, Int64List, parse_example
+from vm_train.formats.tfrecord import read_records
+
+from .tfrecord_writer import example_bytes, write_records
 
 
 def part(tag, content):
@@ -152,7 +154,7 @@ def test_a_record_that_is_no_example_is_named_with_file_and_number(tmp_path):
     write_records(tmp_path / "file", [BUILT, b"\x0b"])
     first, second = read_records(tmp_path / "file")
     assert first.example() == first.example(checked=False) == parse_example(BUILT)
-    with pytest.raises(InputError, match="file: record 1: not an Example: wire type 3"):
+    with pytest.raises(InputError, match="file: record 1: not an Example: unknown wire type 3"):
         second.example()
 
 

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
 from vm_train.formats.crc32c import crc32c
-from vm_train.formats.tfrecord import read_records, write_records
+from vm_train.formats.tfrecord import read_records
+
+from .tfrecord_writer import write_records
 
 
 def bitwise_crc32c(data):
