@@ -15,9 +15,6 @@ from .people import shoe
 from .primitives import axle, box, capsule, cylinder, rod, rounded_box, sphere
 from .solids import Body, Point, Solid, along, body, rotation
 
-CLEARANCE = 0.06
-"""Smallest distance of all parts from the camera's center [m]."""
-
 
 def tripod(random: np.random.Generator, height: float) -> list[Solid]:
     """Three legs, a column and a head below the camera."""

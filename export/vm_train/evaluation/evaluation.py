@@ -22,16 +22,13 @@ from .answers import PictureAnswer, Subject
 from .object_truth import SceneTruth, read_scene, true_objects
 from .worst_errors import WorstErrors, worst_errors_of
 
-RADII = ("all", "scene")
-"""Radius of mesh and fit. all: the network's. scene: that of each picture's balls, from the sceneX.json of vm-synth."""
-
 
 @dataclass(frozen=True)
 class Rules:
     """How to evaluate pictures.
 
-    radius_of: one of RADII. min_radius: smaller true objects are ignored [px]. strict: stop at the first picture that
-    can't be used.
+    radius_of: radius of mesh and fit. all: the network's; scene: that of each picture's balls, from the sceneX.json of
+    vm-synth. min_radius: smaller true objects are ignored [px]. strict: stop at the first picture that can't be used.
     """
 
     radius_of: str = "all"

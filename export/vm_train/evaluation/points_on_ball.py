@@ -31,9 +31,6 @@ class PosedCamera:
     size: Size
 
 
-PAPER_BALL = Sphere(0.075)
-"""The ball of the authors' pictures."""
-
 PAPER_CAMERA = PosedCamera(
     Orientation.from_roll_pitch(0.9, pitch=math.radians(45.0)),
     Equisolid(focal_length=420.0, fov=2.6, size=(1280, 1024)),

@@ -18,9 +18,6 @@ from vm_embedded.mesh.models import build_mesh
 from ..graphs.hexagonal import HexagonalMesh, visible_hexagonal_mesh
 from .points_on_ball import BEARINGS, EarlySphere, PosedCamera, points_on_ball, rings_across, rows_across, shown_whole
 
-MESHES = ("visual", "hexagonal", "early")
-"""Kinds of curves. visual: our rings. hexagonal: the baseline. early: rings with the widths of EarlySphere."""
-
 DISTANCES: Floats = frozen(np.linspace(0.0, 10.0, 401))
 """Distances of the ball [m]."""
 
@@ -32,10 +29,11 @@ _MAX_DISTANCE = 20.0
 class Curve:
     """Points of one mesh on a ball, over the ball's distance.
 
-    mesh: one of MESHES. intersections: k of the Visual Mesh; a hexagonal mesh has the k of the Visual Mesh that it is
-    compared to. count: points on screen. distances (m,) [m]: on the plane, from below the camera to below the ball's
-    center. mean, low, high (m,): points on the ball over all bearings, NaN where the camera sees no complete ball.
-    rings (m,): rings of the Visual Mesh across the ball, or rows of the hexagonal mesh, averaged over all bearings.
+    mesh: visual, our rings; hexagonal, the baseline; or early, rings with the widths of EarlySphere. intersections: k
+    of the Visual Mesh; a hexagonal mesh has the k of the Visual Mesh that it is compared to. count: points on screen.
+    distances (m,) [m]: on the plane, from below the camera to below the ball's center. mean, low, high (m,): points on
+    the ball over all bearings, NaN where the camera sees no complete ball. rings (m,): rings of the Visual Mesh
+    across the ball, or rows of the hexagonal mesh, averaged over all bearings.
     """
 
     mesh: str

@@ -28,7 +28,7 @@ CAPTIONS = {
     "points_curves": "Points of each class against all other points.",
     "points_over_distance": "Points by distance, at the threshold.",
     "confusion": "The most probable class of the points of each true class.",
-    "points_on_object": "Points on an object over its distance, as in the paper's figure ball_distance_graph. ",
+    "points_on_object": "Points on an object over its distance, as in the paper's figure fig:ball_distance_graph. ",
 }
 """Captions of the plots, in the order of the page."""
 

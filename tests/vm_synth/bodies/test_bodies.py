@@ -7,7 +7,7 @@ import pytest
 
 from vm_embedded.errors import InputError
 from vm_synth.bodies import catalog as bodies
-from vm_synth.bodies.carrier import CARRIERS, CLEARANCE, LOWEST, camera_carrier
+from vm_synth.bodies.carrier import CARRIERS, LOWEST, camera_carrier
 from vm_synth.bodies.catalog import KINDS, ROBOTS, BodyRanges
 from vm_synth.bodies.clutter import CLUTTER, FURNITURE, pedestal
 from vm_synth.bodies.distractors import DISTRACTORS
@@ -16,6 +16,7 @@ from vm_synth.bodies.solids import LABELS, Body, join_bodies, merged
 
 SEEDS = range(12)
 HEIGHTS = (0.2, 0.35, 0.55, 0.8, 1.0, 1.6, 2.2)
+CLEARANCE = 0.06  # [m] between the camera's center and all parts of its carrier
 LEAST_SLOPE = np.tan(np.radians(25.0))
 
 

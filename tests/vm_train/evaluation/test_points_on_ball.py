@@ -12,7 +12,6 @@ from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import build_mesh
 from vm_train.evaluation.points_on_ball import (
     BEARINGS,
-    PAPER_BALL,
     PAPER_CAMERA,
     EarlySphere,
     PosedCamera,
@@ -29,6 +28,9 @@ from ...vm_embedded.strategies import reals
 heights, radii, intersections = reals(0.4, 1.8), reals(0.05, 0.15), st.integers(2, 6)
 FULL = math.pi / 4.0
 """Of k x k points, the part that a round object covers."""
+
+PAPER_BALL = Sphere(0.075)
+"""The ball of the authors' pictures."""
 
 SMALL = PosedCamera(
     Orientation.from_roll_pitch(0.9, pitch=math.radians(45.0)),
