@@ -49,7 +49,10 @@ class TrainingProgress:
 
 @dataclass(frozen=True)
 class TrainingOutcome:
-    """Result of a call of `train`. finished: False if it was stopped. pictures, seconds: looked at, in this call."""
+    """Result of a call of `train`.
+
+    finished: False if it was stopped. pictures, seconds: number of pictures used, and time taken, in this call.
+    """
 
     finished: bool
     progress: TrainingProgress
@@ -80,9 +83,10 @@ def train(run: TrainingRun, hardware: Hardware, stop_requested: Callable[[], boo
 def _train_round(
     run: TrainingRun, hardware: Hardware, progress: TrainingProgress, stop_requested: Callable[[], bool]
 ) -> int:
-    """Train the rest of a round, or until a stop. Updates progress; returns the number of pictures looked at."""
+    """Train the rest of a round, or until a stop. Updates progress; returns the number of pictures used."""
     trainer = _round_trainer(run, hardware, progress)
-    # Workers read some batches ahead of the training. A list of all would not fit into memory for large sets.
+    # Two iterators: the workers take batches `ahead` of time, and the loop takes the same `batches` in step with their
+    # graphs. A list of all would not fit into memory for large sets.
     batches, ahead = tee(_remaining_batches(run, progress.round, trainer.done, progress.validated))
     own_ahead = (each.part(hardware.rank, hardware.size) for each in ahead)
     pictures = 0
@@ -99,6 +103,7 @@ def _train_round(
                 if current.is_out_of_patience(batch):
                     break
                 current.save_if_due(batch)
+                # Stop together: any process may have been asked.
                 if sum_over_processes(torch.tensor(float(stop_requested()))) > 0.0:
                     current.stop(batch)
                     return pictures
@@ -136,7 +141,7 @@ class _Round:
             self._bar.advance()
 
     def is_out_of_patience(self, batch: Batch) -> bool:
-        """Whether a batch ended the last validation that the recipe's patience allows."""
+        """Whether patience has run out: a validation ended, and that many in a row brought no better network."""
         patience = self._run.configuration.training.patience
         waited = self._progress.validated - self._progress.best_epoch
         return batch.validates and batch.last and 0 < patience <= waited
@@ -175,16 +180,20 @@ class _Round:
         objects = [name for name, kind in self._run.configuration.classes.kinds.items() if kind == "object"]
         score = _mean_precision(known, objects)
         self._progress.validated += 1
+        self._warn_if_unseen(known, objects)
+        record = {"epoch": self._progress.validated, "score": score, "average_precision": known}
+        self._log.write(self._trainer.done, record)
+        if score > self._progress.best:
+            self._keep(score)
+
+    def _warn_if_unseen(self, known: dict[str, float], objects: Sequence[str]) -> None:
+        """After the first validation, warn if its pictures show none of the classes that are objects."""
         unseen = bool(objects) and not known.keys() & set(objects)
         if unseen and self._progress.validated == 1 and self._hardware.is_leader:
             print(
                 f"vm-train: the validation shows no {' or '.join(objects)}: all classes choose the best network",
                 file=sys.stderr,
             )
-        record = {"epoch": self._progress.validated, "score": score, "average_precision": known}
-        self._log.write(self._trainer.done, record)
-        if score > self._progress.best:
-            self._keep(score)
 
     def _keep(self, score: float) -> None:
         """Write the round's best network, and the best of all rounds if it is that, too."""
@@ -213,7 +222,7 @@ def _round_trainer(run: TrainingRun, hardware: Hardware, progress: TrainingProgr
     torch.manual_seed(int(np.random.default_rng([recipe.seed, progress.round]).integers(2**31)))
     network = Network(run.configuration.network_shape)
     graders = [Checkpoint.load(run.round_path(each)).last_network for each in range(1, progress.round)]
-    total = recipe.epochs * steps_an_epoch(recipe.looks * run.data.epoch, recipe.batch)
+    total = recipe.epochs * steps_an_epoch(recipe.looks * run.data.pictures_per_epoch, recipe.batch)
     shares, weights = run.shares_and_weights(progress.round)
     teacher = None if run.teacher is None else run.teacher.checkpoint.network
     trainer = Trainer(network, recipe, total, shares, weights, graders, teacher, hardware.device)
@@ -227,7 +236,8 @@ def _round_trainer(run: TrainingRun, hardware: Hardware, progress: TrainingProgr
 def _remaining_batches(run: TrainingRun, training_round: int, done: int, validated: int) -> Iterator[Batch]:
     """Batches of a round after so many steps and validated epochs."""
     for batch in run.data.batches(run.configuration.training, training_round):
-        if batch.epoch >= validated if batch.validates else batch.step > done:
+        remains = batch.epoch >= validated if batch.validates else batch.step > done
+        if remains:
             yield batch
 
 

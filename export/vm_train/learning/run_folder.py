@@ -45,7 +45,8 @@ _FILES = ("train.toml", "pictures.json", _FIRST, _TEACHER, "state.pt", "model.pt
 class TrainingRun:
     """A training as its folder describes it; `begin_run` and `read_run` make it.
 
-    counts (C,): points of each class in some training pictures. first, teacher: trained networks that take part.
+    counts (C,): points of each class in the pictures that data.counted counts. first, teacher: trained networks that
+    take part.
     """
 
     folder: Path
@@ -71,7 +72,7 @@ class TrainingRun:
 
     @property
     def configuration_sha256(self) -> str:
-        """Digest of the configuration and the split."""
+        """Digest of the configuration and of the split, despite its name, which run.json and models keep."""
         text = json.dumps([asdict(self.configuration), asdict(self.data.split)])
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -104,11 +105,12 @@ class TrainingRun:
         """Where a network of this training comes from, for its manifest."""
         recipe, data = self.configuration.training, self.data
         training = data.split.training if data.source is None else data.source.shards
+        count = data.pictures_per_epoch
         used = hashlib.sha256(json.dumps([training, data.split.validation]).encode()).hexdigest()
         return {
             "made_by": f"vm-train {__version__}",
             "data": data.folder.name,
-            "training_pictures": str(data.epoch) if data.source is None else f"{data.epoch} an epoch, streamed",
+            "training_pictures": str(count) if data.source is None else f"{count} an epoch, streamed",
             "validation_pictures": str(len(data.split.validation)),
             "pictures_sha256": used,
             "configuration_sha256": self.configuration_sha256,
@@ -167,7 +169,7 @@ def read_run(folder: Path) -> TrainingRun:
         pictures, unpacked, described = Path(content["data"]), content["unpacked"], content["source"]
         first_sha256, teacher_sha256 = content["first_sha256"], content["teacher_sha256"]
         configuration_sha256 = content["configuration_sha256"]
-        source = None if described is None else StreamSource(**described | {"shards": tuple(described["shards"])})
+        source = None if described is None else StreamSource(**(described | {"shards": tuple(described["shards"])}))
     except OSError as error:
         raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:

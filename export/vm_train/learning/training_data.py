@@ -41,20 +41,20 @@ class TrainingData:
     source: StreamSource | None = None
 
     @property
-    def epoch(self) -> int:
+    def pictures_per_epoch(self) -> int:
         """Number of training pictures in an epoch."""
         return len(self.split.training) if self.source is None else self.source.epoch
 
     @property
     def counted(self) -> int:
         """Number of training pictures whose points `count_points` counts."""
-        return min(_COUNTED, self.epoch)
+        return min(_COUNTED, self.pictures_per_epoch)
 
     def batches(self, recipe: Recipe, training_round: int) -> Iterator[Batch]:
         """All batches of a round, counted from 1."""
         seed = (recipe.seed, training_round)
         validation = len(self.split.validation)
-        batches = schedule(seed, recipe.epochs, recipe.batch, self.epoch, validation, recipe.looks)
+        batches = schedule(seed, recipe.epochs, recipe.batch, self.pictures_per_epoch, validation, recipe.looks)
         return batches if self.source is None else assign_lanes(batches, seed, self.source)
 
     def scheduled_graphs(
@@ -83,12 +83,12 @@ class TrainingData:
         return PictureGraphs(pictures, recipe, DecodedCache(self.unpacked), views)
 
     def count_points(self, configuration: TrainConfiguration, first: FirstLook | None) -> npt.NDArray[np.int64]:
-        """Number (C,) of each class's points in some training pictures, without augmentation.
+        """Number (C,) of each class's points in `counted` training pictures, without augmentation.
 
-        The pictures are spread over the folder, or are the first ones of one lane of the stream. Raises InputError.
+        These pictures are spread over the folder, or are the first ones of one lane of the stream. Raises InputError.
         """
         if self.source is None:
-            items = [Item(int(each)) for each in np.linspace(0, self.epoch - 1, self.counted)]
+            items = [Item(int(each)) for each in np.linspace(0, self.pictures_per_epoch - 1, self.counted)]
         else:
             order = (configuration.training.seed, 0)
             items = [StreamedItem(0, None, order, 0, place) for place in range(self.counted)]
