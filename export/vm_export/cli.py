@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .checkpoint import Checkpoint
     from .reference import Overrides
 
-EXIT_OK, EXIT_FAILED, EXIT_USAGE = 0, 1, 2
+EXIT_OK, EXIT_FAILED = 0, 1
 
 
 def parser() -> argparse.ArgumentParser:

@@ -1,9 +1,10 @@
-"""The layers of a network on points as columns, for the graphs of layouts runs and lattice.
+"""The layers of a network on points side by side, (channels, points), for the graphs of layouts runs and lattice.
 
 Two rewritings make them fast:
 
 - SELU and ELU become cheap operators. With c = ln(alpha) and u = z + c, their value is max(u, c) + exp(min(u, c)), up
-  to a factor and a constant. c goes into the bias of the layer, factor and constant into the weights of the next one.
+  to a factor and a constant. c goes into the bias of the layer, factor and constant into the weights of the next one
+  (`_Activation`).
 - Two classes with a softmax need one output: the difference of their logits.
 """
 
@@ -35,7 +36,8 @@ _SELU_ALPHA, _SELU_SCALE = 1.6732632423543772, 1.0507009873554805
 class _Activation:
     """The parts of an activation that move into the weights of the layers around it.
 
-    If the layer before adds `bias`, the activation is `scale` times the value of its nodes plus `constant`.
+    With `bias` added before it, activation(z) = scale * nodes(z + bias) + constant. The nodes of SELU and ELU are the
+    max and exp in the header, with bias = c.
     """
 
     bias: float = 0.0

@@ -1,7 +1,7 @@
-"""The graph of layout runs, the fast one: points as columns that follow each other along their rings.
+"""The graph of layout runs, the fast one: points as slots that follow each other along their rings.
 
-vm_embedded/network/runs_layout.py prepares its inputs. A column of the input is a slot: a point, a copy of a point, or
-a gap. The neighbors of a point come in groups that lie beside each other in memory, so a convolution over the graph is:
+vm_embedded/network/runs_layout.py prepares its inputs, and explains the words slot, gap, group and column. The
+neighbors of a point come in groups that lie beside each other in memory, so a convolution over the graph is:
 
 1. one convolution of width 3 along memory, which gives a sum for each slot and each group of neighbors;
 2. one look-up for each group, which gives a point the sums of the slots in the middle of its groups;
@@ -17,6 +17,7 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.mesh.mesh import SELF, Groups
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
+from vm_embedded.network.runs_layout import group_offsets
 
 from .column_layers import write_layers
 from .network import Network
@@ -51,16 +52,16 @@ def finished_runs_model(graph: OnnxGraph, classes: int, manifest: Manifest) -> b
 def convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, groups: Groups) -> str:
     """Write a convolution over the graph; return the name of its sums (outputs, m), from x (inputs, m)."""
     outputs, _, inputs = kernel.shape
-    # All windows of three columns, without a copy of each. A row of `thrice` holds a channel of x twice, and a third
-    # time without its last three columns: 3 (m - 1) values. Cut into three rows of m - 1 values, each row begins one
-    # column earlier in x than the row before. Column j of these rows is x at j, j - 1 and j - 2: a window around j - 1.
-    ends = [graph.constant(f"slice.{key}", [value]) for key, value in (("start", 0), ("end", -3), ("axis", 1))]
-    most = graph.node("Slice", [x, *ends], f"{name}.most")
+    # All windows of three slots, without a copy of each. A row of `thrice` holds a channel of x twice, and a third time
+    # without its last three slots: 3 (m - 1) values. Cut into three rows of m - 1 values, each row begins one slot
+    # earlier in x than the row before. Entry j of these rows is x at j, j - 1 and j - 2: a window around j - 1.
+    cut = [graph.constant(f"slice.{key}", [value]) for key, value in (("start", 0), ("end", -3), ("axis", 1))]
+    most = graph.node("Slice", [x, *cut], f"{name}.most")
     thrice = graph.node("Concat", [x, x, most], f"{name}.thrice", axis=1)
     window = graph.node("Reshape", [thrice, graph.constant(f"{name}.window.shape", [3 * inputs, -1])], f"{name}.window")
 
     taps = np.zeros((outputs, len(groups), inputs, 3))
-    for place, group, shift in kernel_places(groups):
+    for place, group, shift in kernel_places(groups):  # row 0 of a window is its right slot, shift +1
         taps[:, group, :, 1 - shift] = kernel[:, place]
     weights = graph.constant(f"{name}.kernel", taps.reshape(outputs * len(groups), 3 * inputs))
     sums = graph.node("MatMul", [weights, window], f"{name}.sums")
@@ -76,5 +77,5 @@ def convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, gro
 def kernel_places(groups: Groups) -> Iterator[tuple[int, int, int]]:
     """Each place of a kernel (the point itself is 0), its group, and its distance from the middle of the group."""
     for number, group in enumerate(groups):
-        for shift, neighbor in enumerate(group, start=-(len(group) // 3)):
+        for shift, neighbor in zip(group_offsets(group), group, strict=True):
             yield (0 if neighbor == SELF else 1 + neighbor), number, shift

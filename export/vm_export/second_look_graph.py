@@ -62,13 +62,13 @@ def _write_gate(graph: OnnxGraph, gate: Gate, answers: str, convolve: Convolve, 
     """
     chosen = graph.node("Gather", [answers, graph.constant("gate.classes", list(gate.classes))], "gate.chosen", axis=0)
     largest = graph.node("ReduceMax", [chosen], "gate.largest", axes=[0], keepdims=1)
-    above = graph.node("Greater", [largest, graph.constant("gate.above", gate.above)], "gate.passed")
-    # A slot off screen looks up the gap in every group, a slot on screen never in the first one. A window around the
-    # gap is in column GAP + 1 of the table.
+    passed = graph.node("Greater", [largest, graph.constant("gate.above", gate.above)], "gate.passed")
+    # The first group holds the point itself, so its middle is the point's own slot; only slots off screen look up the
+    # gap there. The window around the gap is in column GAP + 1 of the table.
     first_group = graph.node("Gather", ["columns", graph.constant("gate.row", [0])], "gate.columns", axis=0)
     off_screen = graph.node("Equal", [first_group, graph.constant("gate.gap", GAP + 1)], "gate.off_screen")
-    on_screen = graph.node("Not", [off_screen], "gate.shown")
-    selected = graph.node("Cast", [graph.node("And", [above, on_screen], "gate.seeds")], "gate.ring0", to=FLOAT)
+    shown = graph.node("Not", [off_screen], "gate.shown")
+    selected = graph.node("Cast", [graph.node("And", [passed, shown], "gate.seeds")], "gate.ring0", to=FLOAT)
     # A convolution whose weights are ones counts the selected slots in each receptive field: above 0 is one ring more.
     for ring in range(1, gate.rings + 1):
         count = convolve(f"gate.step{ring}", selected, np.ones((1, places, 1)))
@@ -78,8 +78,9 @@ def _write_gate(graph: OnnxGraph, gate: Gate, answers: str, convolve: Convolve, 
 
 def _write_slots(graph: OnnxGraph, selected: str) -> str:
     """Write the slots (k,) of the small mesh's points: first a gap, as its off-screen point, then the selected ones."""
-    column = graph.constant("look.one", [1])  # NonZero gives rows and columns of the mask; its columns are the slots
-    found = graph.node("Gather", [graph.node("NonZero", [selected], "look.found"), column], "look.slots", axis=0)
+    # NonZero gives row and column indices of the mask; its second row lists the slots.
+    second = graph.constant("look.one", [1])
+    found = graph.node("Gather", [graph.node("NonZero", [selected], "look.found"), second], "look.slots", axis=0)
     flat = graph.node("Reshape", [found, graph.constant("look.flat", [-1])], "look.shown")
     return graph.node("Concat", [graph.constant("look.gap", [GAP]), flat], "look.all", axis=0)
 

@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-VIEWS = ("ground", "directions")
-"""ground: from above, where the rays meet the height of the objects' centers. directions: by bearing around the middle,
-with the inclination from straight below as the distance from it; that has room for points above the horizon."""
-
 _INK, _POINT, _OBJECT = "#4c72b0", "#22304a", "#d95f02"
 _MOST_LINKS = 200_000
 
 
 def figure_from_above(built: BuiltMesh, view: str, reach: float, objects: tuple[float, ...] = ()) -> Figure:
-    """A figure of the mesh out to `reach` [m] in one of VIEWS, with outlines of objects at some distances [m].
+    """A figure of the mesh out to `reach` [m], with outlines of objects at some distances [m].
+
+    view: ground is from above, where the rays meet the height of the objects' centers. directions is by bearing around
+    the middle, with the inclination from straight below as the distance from it; it has room for points above the
+    horizon.
 
     The paper's fig:mesh_distance shows such rings.
     """

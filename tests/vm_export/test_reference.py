@@ -31,7 +31,7 @@ def test_reference_files_survive_a_round_trip(tmp_path):
     assert len(stored["network"][0][0]["weights"]) == 4 * 7
     read = read_reference(tmp_path / "model.yaml", Overrides(object_radius=0.075))
     assert read.manifest.classes == made.manifest.classes
-    test = export.random_example(made.network, made.manifest, 50, 0)
+    test = export.random_example(made.network, 50, 0)
     with torch.inference_mode():
         again = read.network(torch.from_numpy(test.points), torch.from_numpy(test.neighbors))
     np.testing.assert_allclose(again.numpy(), test.probabilities, atol=1e-5)

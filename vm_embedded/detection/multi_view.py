@@ -55,9 +55,9 @@ def detect_views(
     All cameras share the detector's network and meshes. Two detections of one class are one object in two cases:
     - cameras differ, the plane is the same, and they lie less than a diameter apart;
     - the camera is the same, planes differ, and they lie less than their angular radius apart.
-    In the second case only one of the planes can be right: the one with the largest sum of confidences. The nearest
-    detections are joined first, and an object has at most one detection of each camera on each plane. A camera behind
-    a plane, or too near it for the mesh, sees nothing on it.
+    In the second case only one of the planes can be right: the one with the largest sum of confidences. The detections
+    nearest to each other, relative to these limits, are joined first. An object has at most one detection of each
+    camera on each plane. A camera behind a plane, or too near it for the mesh, sees nothing on it.
 
     Raises InputError for no planes, planes with equal names, or a picture that does not fit.
     """
@@ -74,8 +74,20 @@ def detect_views(
     return tuple(sorted(joined, key=lambda each: -each.detection.confidence))
 
 
+def _sightings(detector: Detector, camera: str, view: CameraView, plane: Plane) -> Iterator[Sighting]:
+    try:
+        orientation = plane.seen_from(view.pose)
+        detector.cache.mesh_height(orientation.height)  # raises if the camera is too low
+    except GeometryError:
+        return
+    for each in detector.detect(view.image, orientation, view.lens):
+        position = plane.to_world(each.position[None], view.pose)[0]
+        away = position - view.pose.position
+        yield Sighting(camera, plane.name, each, position, away / np.linalg.norm(away))
+
+
 def _groups(found: Sequence[Sighting], diameter: float) -> list[list[Sighting]]:
-    """The sightings, grouped by object: the nearest pairs are joined first."""
+    """The sightings, grouped by object: the nearest pairs, as `_apart` measures, are joined first."""
     pairs = []
     for i, one in enumerate(found):
         for j, other in enumerate(found[:i]):
@@ -96,20 +108,9 @@ def _groups(found: Sequence[Sighting], diameter: float) -> list[list[Sighting]]:
     return [[found[each] for each in group] for group in sorted(members.values(), key=min)]
 
 
-def _sightings(detector: Detector, camera: str, view: CameraView, plane: Plane) -> Iterator[Sighting]:
-    try:
-        orientation = plane.seen_from(view.pose)
-        detector.cache.mesh_height(orientation.height)
-    except GeometryError:
-        return
-    for each in detector.detect(view.image, orientation, view.lens):
-        position = plane.to_world(each.position[None], view.pose)[0]
-        away = position - view.pose.position
-        yield Sighting(camera, plane.name, each, position, away / np.linalg.norm(away))
-
-
 def _apart(one: Sighting, other: Sighting, diameter: float) -> float:
-    """Distance of two sightings as a share of the one from which they are two objects; infinite if they always are."""
+    """Distance of two sightings, in units of the limit below which they are one object; infinite for pairs that never
+    are."""
     if one.detection.class_name != other.detection.class_name:
         return math.inf
     if one.camera != other.camera and one.plane == other.plane:

@@ -44,25 +44,6 @@ def distort(radius: Floats, distortion: tuple[float, float]) -> Floats:
     return distorted
 
 
-def distort_series(radius: Number, distortion: tuple[float, float]) -> Number:
-    """Approximate inverse of `undistort` as in the reference: four terms of a series in r_u^2. For comparison only.
-
-    The reference states an error of about 0.2 px, which holds only for mild distortion.
-    """
-    k0, k1 = distortion
-    terms = (
-        -k0,
-        3.0 * k0**2 - k1,
-        -12.0 * k0**3 + 8.0 * k0 * k1,
-        55.0 * k0**4 - 55.0 * k0**2 * k1 + 5.0 * k1**2,
-    )
-    square = radius * radius
-    factor = 0.0
-    for term in reversed(terms):
-        factor = (factor + term) * square
-    return radius * (1.0 + factor)
-
-
 def monotone_radius(distortion: tuple[float, float]) -> float:
     """Distorted radius [px] up to which `undistort` grows; infinity if it grows everywhere."""
     k0, k1 = distortion

@@ -82,10 +82,6 @@ class Shape(ABC):
         depth = np.maximum(-rays[:, 2:], 1e-6)
         return np.asarray(rays * ((height - self.center_height) / depth))
 
-    def intersection_ratio(self, height: float, mesh_height: float) -> float:
-        """Number of rings that cross an object seen from `height`, divided by the number seen from `mesh_height`."""
-        return float(self.spacing(height) / self.spacing(mesh_height))
-
     def _theta(self, n: Number, distance: Number) -> Number:
         """theta of an object n objects out whose axis is at this distance [m] from the vertical (eqn:circle_dtheta)."""
         n = np.asarray(n, dtype=np.float64)

@@ -9,6 +9,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
+from types import UnionType
 
 from ..errors import GeometryError, InputError, ModelError, unknown
 from ..geometry.make_shape import SHAPES, make_shape
@@ -29,8 +30,8 @@ EDGES = ("hard", "same")
 """Replacement of a missing neighbor. hard: the off-screen point, whose input is -1. same: the point itself."""
 
 LAYOUTS = ("plain", "runs", "lattice")
-"""Order of the points in the network's input; see layout.py. plain: rows. runs: columns, ring by ring. lattice: a
-picture."""
+"""Order of the points in the network's input; see layout.py. plain: point by point. runs: slots, ring by ring. lattice:
+a picture."""
 
 POINT_SAMPLINGS = ("bilinear", "footprint")
 """Color of a point. bilinear: at its pixel, from the four around it. footprint: the mean of the area that it stands
@@ -42,6 +43,11 @@ picture's points; see detection/color_normalization.py."""
 
 _LARGEST = 1e9
 """Limit of every radius, distance and number of rings."""
+
+
+def _is_number(value: object, kind: type | UnionType = int | float) -> bool:
+    """Whether a value is a number of this kind. In Python True and False are whole numbers, too; here they are not."""
+    return isinstance(value, kind) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True)
@@ -62,14 +68,26 @@ class ObjectClass:
 class Manifest:
     """Everything that the runtime must know to build the mesh and to read the network's answers.
 
-    shape: of the object, one of SHAPES. radius: of the object that the mesh is made for [m]. object_radius: of the real
-    object [m]. object_height: of a cylinder [m], else 0. any_radius: the network was trained on objects of many radii,
-    so the mesh is made for the real one's. intersections: rings of points across an object of `radius` (the paper's
-    k). mesh: one of MESH_MODELS. max_distance: of the mesh [m]. edge: one of EDGES. classes: in the order of the
-    network's outputs. layout: one of LAYOUTS; runs and lattice need edge hard. operations: multiplications and
-    additions for each point. channels, scale: a point's input is its color in this order of channels, times scale.
-    sampling: one of POINT_SAMPLINGS. colors: one of POINT_COLORS. provenance: origin of the file, for people. Raises
-    ModelError for unknown values.
+    shape: of the object, one of SHAPES.
+    radius: of the object that the mesh is made for [m].
+    object_radius: of the real object [m].
+    intersections: rings of points across an object of `radius` (the paper's k).
+    mesh: one of MESH_MODELS.
+    max_distance: of the mesh [m].
+    edge: one of EDGES.
+    classes: in the order of the network's outputs.
+    object_height: of a cylinder [m], else 0.
+    any_radius: the network was trained on objects of many radii, so the mesh is made for the real one's.
+    self_test: an example with its answer, which each loading of the model file runs.
+    layout: one of LAYOUTS; runs and lattice need edge hard.
+    operations: multiplications and additions for each point.
+    channels: their order in a point's input, which is the point's color times `scale`.
+    scale: see `channels`.
+    sampling: one of POINT_SAMPLINGS.
+    colors: one of POINT_COLORS.
+    provenance: origin of the file, for people.
+
+    Raises ModelError for unknown values.
     """
 
     shape: str
@@ -112,10 +130,12 @@ class Manifest:
             )
         for name in ("radius", "object_radius", "intersections", "max_distance", "scale"):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= _LARGEST:
+            if not _is_number(value) or not 0 < value <= _LARGEST:
                 raise ModelError(f"{name} in the model's manifest must be a number above 0, not {value!r}")
-        self._check_shape()
-        if isinstance(self.operations, bool) or not isinstance(self.operations, int) or self.operations < 0:
+        self._check_object_height()
+        if self.mesh == "wall6":
+            self._check_walls()
+        if not _is_number(self.operations, int) or self.operations < 0:
             raise ModelError(f"operations in the model's manifest must be a whole number, not {self.operations!r}")
         if not isinstance(self.any_radius, bool):
             raise ModelError(f"any_radius in the model's manifest must be true or false, not {self.any_radius!r}")
@@ -125,16 +145,17 @@ class Manifest:
         if not names or len(set(names)) != len(names):
             raise ModelError(f"classes in the model's manifest must be one or more, with different names, not {names}")
 
-    def _check_shape(self) -> None:
+    def _check_object_height(self) -> None:
         tall = self.object_height
-        if isinstance(tall, bool) or not isinstance(tall, int | float) or not 0 <= tall <= _LARGEST:
+        if not _is_number(tall) or not 0 <= tall <= _LARGEST:
             raise ModelError(f"object_height in the model's manifest must be a number of at least 0, not {tall!r}")
         if (self.shape == "cylinder") != (tall > 0):
             raise ModelError(
                 f"object_height must be above 0 for a cylinder and 0 for other shapes; {self.shape} has {tall:g} m"
             )
-        if self.mesh != "wall6":
-            return
+
+    def _check_walls(self) -> None:
+        """Mesh wall6 is for cylinders, its points have no footprints, and the runtime does not locate objects on it."""
         if self.shape != "cylinder":
             raise ModelError(f"mesh wall6 needs shape cylinder, not {self.shape}")
         if self.sampling != "bilinear":

@@ -72,7 +72,7 @@ class RunsLayout(Layout):
         found = np.empty((len(members), sum(map(len, self._groups)) - 1), dtype=np.int32)
         for group, columns, first in zip(self._groups, self.columns, self._first_columns, strict=True):
             middle = columns[members] - first
-            for offset, neighbor in zip(_offsets(group), group, strict=True):
+            for offset, neighbor in zip(group_offsets(group), group, strict=True):
                 if neighbor != SELF:
                     found[:, neighbor] = places[self.slots[middle + offset]]
         return found
@@ -98,7 +98,7 @@ class RunsLayout(Layout):
         return output.T
 
 
-def _offsets(group: tuple[int, ...]) -> range:
+def group_offsets(group: tuple[int, ...]) -> range:
     """Slots of a group's members relative to its middle: -1, 0, 1 for three members, 0, 1 for two, 0 for one."""
     first = -(len(group) // 3)
     return range(first, first + len(group))
@@ -122,9 +122,9 @@ def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Position
         members: npt.NDArray[np.integer] = np.stack(
             [np.arange(n) if each == SELF else neighbors[:n, each] for each in group]
         )
-        middle, torn = _found_in_runs(members, _offsets(group), runs, slot)
+        middle, torn = _found_in_runs(members, group_offsets(group), runs, slot)
         copies, copy = np.unique(members[:, torn], axis=1, return_inverse=True)
-        middle[:n][torn] = count + len(group) * copy.reshape(-1) - _offsets(group)[0]
+        middle[:n][torn] = count + len(group) * copy.reshape(-1) - group_offsets(group)[0]
         parts.append(copies.T.reshape(-1))
         count += copies.size
         middles.append(middle)
@@ -142,7 +142,8 @@ def _found_in_runs(
     """
     n = members.shape[1]
     middle = np.full(n + 1, GAP)
-    for offset, points in zip(offsets, members, strict=True):  # any member on screen gives the middle of a whole group
+    # In a whole group, each member on screen gives the same middle.
+    for offset, points in zip(offsets, members, strict=True):
         np.copyto(middle[:n], slot[points] - offset, where=points < n)
     torn = np.zeros(n, dtype=bool)
     for offset, points in zip(offsets, members, strict=True):
@@ -158,13 +159,15 @@ def _in_runs(left: Indices, right: Indices) -> _Positions:
     """
     n = len(left)
     points = np.arange(n)
-    # A piece starts at i unless i - 1 and i are each other's right and left neighbors.
+    # A piece starts at i unless i - 1 and i are each other's right and left neighbors. The cuts [:n] and
+    # [: len(starts)] are for n = 0: without points there are no pieces.
     starts = np.flatnonzero(np.append(True, (right[:-1] != points[1:]) | (left[1:] != points[:-1]))[:n])
     ends = np.append(starts[1:], n)[: len(starts)] - 1
     piece_at = np.full(n + 1, -1)  # the piece that starts with a point
     piece_at[starts] = np.arange(len(starts))
     follower = piece_at[right[ends]]
-    follower[left[starts[follower]] != ends] = -1  # it starts with the right point, but is not linked back
+    # The follower must be linked back. -1, no follower, looks up the last piece; the result is -1 in either case.
+    follower[left[starts[follower]] != ends] = -1
 
     order, ends_run = _chained(follower)
     lengths = (ends - starts + 1)[order]
@@ -187,6 +190,8 @@ def _chained(follower: _Positions) -> tuple[npt.NDArray[np.intp], Mask]:
     waiting = np.ones(len(follower), dtype=bool)
     # First the pieces that follow no other; the rest are closed rings, which may begin with any piece.
     for first in (*np.flatnonzero(leads).tolist(), *np.flatnonzero(~leads).tolist()):
+        if not waiting[first]:
+            continue
         piece = first
         while piece >= 0 and waiting[piece]:
             waiting[piece] = False

@@ -104,22 +104,27 @@ def test_height_of_is_the_inverse_of_spacing(case):
     assert shape.height_of(float(shape.spacing(height))) == pytest.approx(height, rel=1e-9)
 
 
+def spacing_ratio(shape, height, mesh_height):
+    """How many rings cross an object seen from `height`, relative to the height that the mesh was made for."""
+    return float(shape.spacing(height) / shape.spacing(mesh_height))
+
+
 @given(radii, clearances, clearances)
-def test_intersection_ratio_follows_the_conventions(radius, clearance, mesh_clearance):
+def test_spacing_ratio_follows_the_conventions(radius, clearance, mesh_clearance):
     height, mesh_height = 2.0 * radius * clearance, 2.0 * radius * mesh_clearance
     spheres = math.log(1.0 - 2.0 * radius / height) / math.log(1.0 - 2.0 * radius / mesh_height)
-    assert Sphere(radius).intersection_ratio(height, mesh_height) == pytest.approx(spheres, rel=1e-9)
-    assert Circle(radius).intersection_ratio(height, mesh_height) == pytest.approx(mesh_height / height, rel=1e-12)
+    assert spacing_ratio(Sphere(radius), height, mesh_height) == pytest.approx(spheres, rel=1e-9)
+    assert spacing_ratio(Circle(radius), height, mesh_height) == pytest.approx(mesh_height / height, rel=1e-12)
 
 
 @given(shapes_and_heights(), clearances, reals(0.0, 5.0))
-def test_intersection_ratio_is_the_number_of_objects_that_one_object_covers(case, mesh_clearance, n):
+def test_spacing_ratio_is_the_number_of_objects_that_one_object_covers(case, mesh_clearance, n):
     """Seen from another height an object spans from n to n + ratio of the mesh that was made for the first."""
     shape, height = case
     mesh_height = least_height(shape) * mesh_clearance
     near, far = (shape.phi(each, height) for each in (n, n + 1.0))
     covered = float(shape.n(far, mesh_height) - shape.n(near, mesh_height))
-    assert covered == pytest.approx(shape.intersection_ratio(height, mesh_height), rel=1e-4)
+    assert covered == pytest.approx(spacing_ratio(shape, height, mesh_height), rel=1e-4)
 
 
 def center_of(shape, height, distance, bearing):

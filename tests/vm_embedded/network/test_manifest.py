@@ -133,7 +133,7 @@ def test_an_unknown_entry_names_itself_and_the_nearest_known_one():
 
 @pytest.mark.parametrize("version", [0, 1, FORMAT_VERSION + 1, "1", None, 1.5, ..., [1]], ids=str)
 def test_another_version_is_refused_with_both_and_what_to_do(version):
-    with pytest.raises(ModelError, match=rf"version .*reads {FORMAT_VERSION}.*export the model again"):
+    with pytest.raises(ModelError, match=rf"version .*reads version {FORMAT_VERSION}.*export the model again"):
         Manifest.from_json(changed(format_version=version))
 
 
