@@ -19,7 +19,7 @@ from vm_embedded.mesh.walls import wall_counts, wall_distances
 
 @dataclass(frozen=True)
 class MeshPlan:
-    """The object's shape, the camera height [m], k (rings of points across it) and the reach [m] that a mesh is built for."""
+    """Parameters of a mesh: the object's shape, the camera height [m], the paper's k and the reach [m]."""
 
     shape: Shape
     height: float
