@@ -38,9 +38,9 @@ class Detector:
 
     @classmethod
     def from_file(cls, path: str | Path, settings: Settings | None = None) -> Detector:
-        """A detector from a file that vm-export wrote, or from the name of a network that comes with the package.
+        """Load a detector from a file that vm-export wrote, or by the name of a network of the package.
 
-        Raises InputError for an unknown name, ModelError if the file can't be trusted or does not run.
+        Raises InputError for an unknown name, ModelError if the file is damaged or the network does not run.
         """
         return cls(read_model(model_path(path)), settings)
 

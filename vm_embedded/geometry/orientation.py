@@ -98,7 +98,7 @@ class Orientation:
 
     @cached_property
     def yaw(self) -> float:
-        """Heading of the optical axis [rad], or of the picture's upward direction if the camera looks straight down."""
+        """Angle around the vertical [rad] of the optical axis; of the image's upward direction if it looks straight down."""
         r = self.rotation
         if math.hypot(r[0, 0], r[1, 0]) > 1e-9:
             return math.atan2(r[1, 0], r[0, 0])
