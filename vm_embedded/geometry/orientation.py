@@ -98,7 +98,10 @@ class Orientation:
 
     @cached_property
     def yaw(self) -> float:
-        """Angle around the vertical [rad] of the optical axis; of the image's upward direction if it looks straight down."""
+        """Angle of the optical axis around the vertical [rad].
+
+        If the camera looks straight down, it is the angle of the picture's upward direction.
+        """
         r = self.rotation
         if math.hypot(r[0, 0], r[1, 0]) > 1e-9:
             return math.atan2(r[1, 0], r[0, 0])
