@@ -94,7 +94,7 @@ def _parser(command: str, description: str) -> argparse.ArgumentParser:
     plan.add_argument(
         "--height",
         metavar="M",
-        help="height of the camera [m]; default " + ("1" if command == "quality" else "that in the lens file, or 1"),
+        help="height of the camera [m]; default: " + ("1" if command == "quality" else "from the lens file, or 1"),
     )
     plan.add_argument(
         "--intersections", type=float, metavar="K", help="rings of points across an object (the paper's k); default 4"

@@ -43,8 +43,8 @@ other commands, each with its own --help:
   vm-synth check OUT      describe the set in tables and plots; find missing and damaged files
   vm-synth config         print all entries of scene.toml with meaning, unit, limits and default
 
-To continue a stopped run, repeat the command. Shards can write to one
-folder, or to several folders; then copy all files into one.
+To continue a stopped run, repeat the command.
+Shards can write to one folder, or to several folders; then copy all files into one.
 """
 
 
@@ -88,7 +88,7 @@ def preview_parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="vm-synth preview",
         description="Draw a contact sheet of a set. Below each picture is a copy with tinted classes and the ball's "
-        "outline, which is computed from position, lens and pose, not from the rendered mask. Small balls are also "
+        "outline. The outline is computed from position, lens and pose, not from the rendered mask. Small balls are also "
         "magnified. It also works while the set is rendering.",
     )
     made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")

@@ -60,7 +60,7 @@ class Recipe:
     )
     balance: float = number(
         1.0,
-        "for selection weighted: 0: all points have equal weight; 1: all classes have equal total weight",
+        "class weights for selection weighted; 0: all points have equal weight; 1: all classes have equal total weight",
         "",
         (0.0, 1.0),
     )
