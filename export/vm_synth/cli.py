@@ -88,8 +88,8 @@ def preview_parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="vm-synth preview",
         description="Draw a contact sheet of a set. Below each picture is a copy with tinted classes and the ball's "
-        "outline. The outline is computed from position, lens and pose, not from the rendered mask. Small balls are also "
-        "magnified. It also works while the set is rendering.",
+        "outline. The outline is computed from position, lens and pose, not from the rendered mask. Small balls are "
+        "also magnified. It also works while the set is rendering.",
     )
     made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
     made.add_argument("--count", type=at_least(1), default=24, metavar="N", help="number of pictures; default 24")

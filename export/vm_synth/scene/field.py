@@ -35,7 +35,7 @@ class FieldRanges:
     cover: tuple[float, float] = range_of(0.3, 1.0, "opacity of thin paint on lines", "", (0.0, 1.0))
     thin: float = share(0.5, "share of fields with thin paint")
     wear: tuple[float, float] = range_of(
-        0.0, 0.6, "half of the fields have worn lines; share of paint that is lost there", "", (0.0, 1.0)
+        0.0, 0.6, "share of paint that is lost on worn lines; half of the fields have worn lines", "", (0.0, 1.0)
     )
     goal_height: tuple[float, float] = range_of(0.8, 2.0, "height of goals", "m", (0.2, 3.0))
     goal_width: tuple[float, float] = range_of(1.4, 3.0, "width of goals", "m", (0.3, 8.0))

@@ -17,7 +17,7 @@ class MapRanges:
 
     held_out: tuple[str, ...] = field(
         default=(),
-        metadata={"help": "maps for testing; --held-out renders with only these, without it vm-synth uses all others"},
+        metadata={"help": "maps for testing; with --held-out, vm-synth uses only these; without it, all others"},
     )
     floors: Mapping[str, float] = field(
         default_factory=dict,

@@ -101,7 +101,7 @@ def rate_parser() -> argparse.ArgumentParser:
     """The options of vm-train rate."""
     made = argparse.ArgumentParser(
         prog="vm-train rate",
-        description="Train for some steps while the learning rate increases, until the loss increases; then propose a rate.",
+        description="Train for some steps with an increasing learning rate until the loss increases. Propose a rate.",
     )
     _add_data(made)
     _add_configuration(made)
