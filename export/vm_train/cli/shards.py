@@ -19,8 +19,8 @@ def shards_parser() -> argparse.ArgumentParser:
     """The options of vm-train shards DATA OUT."""
     made = argparse.ArgumentParser(
         prog="vm-train shards",
-        description="Write a folder of pictures as tar files in the format of webdataset. vm-train reads them directly, "
-        "also as a stream. To continue a run that was stopped, repeat the command.",
+        description="Write a folder of pictures as tar files in the format of webdataset. vm-train reads them "
+        "directly, also as a stream. To continue a run that was stopped, repeat the command.",
     )
     made.add_argument("data", type=Path, metavar="DATA", help="folder of imageX.jpg or .png, maskX.png, lensX.yaml")
     made.add_argument("out", type=Path, metavar="OUT", help="folder to write to; created if missing")
