@@ -62,7 +62,9 @@ class UnixListener:
             except ConnectionRefusedError:
                 self.path.unlink(missing_ok=True)
                 return
-        raise InputError(f"can't listen at {self.path}: another process already does")
+        raise InputError(
+            f"can't listen at {self.path}: another process already does; stop the other vm-detect or give another path"
+        )
 
     def close(self) -> None:
         """Stop listening, and remove the file unless another process replaced it."""
@@ -75,21 +77,27 @@ class UnixListener:
 
 
 def checked_address(entry: Field[Any], value: object) -> str:
-    """Check of an entry: ADDRESS:PORT or unix:PATH, several separated by commas, or empty. Raises InputError."""
+    """Check of an entry: ADDRESS:PORT or unix:PATH, several separated by commas, or empty. Raises InputError.
+
+    The entry's metadata holds an example of an address for the error message.
+    """
     if not isinstance(value, str):
         raise InputError(f"{entry.name} must be a string, not {value!r}")
     for each in filter(None, value.split(",")):
         if not (each.startswith("unix:") and len(each) > len("unix:")):
-            parse_address(each, entry.name)
+            parse_address(each, entry.name, entry.metadata["example"])
     return value
 
 
-def parse_address(text: str, name: str) -> tuple[str, int]:
-    """Host and port of "192.168.0.20:5600" or "[::1]:5600". name: for the error message. Raises InputError."""
+def parse_address(text: str, name: str, example: str) -> tuple[str, int]:
+    """Host and port of "192.168.0.20:5600" or "[::1]:5600". name and example: for the error message.
+
+    Raises InputError.
+    """
     host, colon, port = text.strip().rpartition(":")
     host = host.removeprefix("[").removesuffix("]")
     if not (colon and host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):
-        raise InputError(f"{name} must be ADDRESS:PORT, as in 127.0.0.1:5600, not {text!r}")
+        raise InputError(f"{name} must be ADDRESS:PORT, as in {example}, not {text!r}")
     return host, int(port)
 
 

@@ -45,7 +45,7 @@ def plan_and_model(options: argparse.Namespace, file: LensFile | None) -> tuple[
     shape = make_shape(entries["shape"], entries["radius"], entries["object_height"])
     height = 1.0 if file is None or file.orientation is None else file.orientation.height
     if options.height is not None:
-        height = parse_length(options.height)
+        height = parse_length(options.height, "--height")
     plan = MeshPlan(
         shape,
         positive("--height", height),
@@ -76,8 +76,8 @@ def orientation_of(options: argparse.Namespace, file: LensFile, height: float) -
     pitch, roll = (0.0, 0.0) if file.orientation is None else (file.orientation.pitch, file.orientation.roll)
     return Orientation.from_roll_pitch(
         height,
-        roll if options.roll is None else parse_angle(options.roll),
-        pitch if options.pitch is None else parse_angle(options.pitch),
+        roll if options.roll is None else parse_angle(options.roll, "--roll"),
+        pitch if options.pitch is None else parse_angle(options.pitch, "--pitch"),
     )
 
 

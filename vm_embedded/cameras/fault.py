@@ -113,7 +113,7 @@ class FaultScript:
     @classmethod
     def read(cls, path: Path) -> FaultScript:
         """Read a script. Raises InputError."""
-        script: FaultScript = read_sections(cls, path)
+        script: FaultScript = read_sections(cls, path, noun="fault script")
         return replace(script, faults=tuple(sorted((*script.faults, *script.random.draw()), key=lambda each: each.at)))
 
 

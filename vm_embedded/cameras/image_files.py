@@ -124,7 +124,9 @@ def _video(name: str) -> Source:
     capture = cv2.VideoCapture(int(name) if name.isdigit() else name)
     live = name.isdigit() or Path(name).is_char_device()
     if not capture.isOpened():
-        raise InputError(f"can't open {'camera' if live else 'video'} {name}")
+        if live:
+            raise InputError(f"can't open camera {name}")
+        raise InputError(f"{name} is neither an image ({', '.join(IMAGE_SUFFIXES)}) nor a video that OpenCV can read")
     count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
     first = _next_image(capture)
     if first is None:

@@ -15,7 +15,7 @@ def bench_table(found: dict[str, Any]) -> str:
         f"per point; sgemm {found['sgemm_gflops']:g} GFLOP/s on one core",
         f"{walk['frames']} frames of {found['image'][0]}x{found['image'][1]}, "
         f"median {found['runs'][0]['points']} points, around height {walk['height_m']:.2f} m, "
-        f"pitch {math.degrees(walk['pitch_rad']):.0f} deg, roll {math.degrees(walk['roll_rad']):.0f} deg",
+        f"pitch {round(math.degrees(walk['pitch_rad']))} deg, roll {round(math.degrees(walk['roll_rad']))} deg",
         "",
         f"{'threads':>8}{'p50':>9}{'p90':>9}{'p99':>9}{'p99.9':>9}"
         f"{'points/s':>12}{'x floor':>9}{'hits':>8}{'cache MiB':>11}",
@@ -36,9 +36,11 @@ def bench_table(found: dict[str, Any]) -> str:
     bucket, mesh = cold["bucket_ms"], cold["mesh_and_bucket_ms"]
     lines += [
         "",
-        f"cold bucket {bucket['p50']:.1f} (p99 {bucket['p99']:.1f}), with a new mesh "
-        f"{mesh['p50']:.1f} (p99 {mesh['p99']:.1f}); memory of the process {found['rss_mib']:.0f} MiB",
+        f"first frame of a new orientation bucket: {bucket['p50']:.1f} more (p99 {bucket['p99']:.1f}), "
+        f"of a new mesh height: {mesh['p50']:.1f} more (p99 {mesh['p99']:.1f})",
+        f"memory of the process: {found['rss_mib']:.0f} MiB",
         "times in milliseconds; stages: median and share of the total time; x floor: time of the network divided by "
-        "the time of its operations at the sgemm rate",
+        "the time of its operations at the sgemm rate; first frame: median time to prepare mesh and points that the "
+        "cache does not have",
     ]
     return "\n".join(lines)

@@ -197,7 +197,13 @@ def check_lens(configuration: Configuration) -> Finding:
     if lens is None:
         return Finding("lens", WARNING, "no lens is configured", "vm-detect --lens FILE, or set lens in vm.toml")
     if lens.lens.size is None:
-        return Finding("lens", WARNING, "the lens has no image size", "add size = [width, height] to the lens")
+        return Finding(
+            "lens",
+            WARNING,
+            "the lens has no image size",
+            "add it to the lens: size: [width, height] in YAML, size = [width, height] in TOML, image_width and "
+            "image_height in a calibration",
+        )
     if not (camera.width and camera.height):
         return Finding(
             "lens", GOOD, f"for {lens.lens.size[0]} x {lens.lens.size[1]} px; the camera chooses its own size"

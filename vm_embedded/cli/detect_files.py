@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..arrays import Image
 from ..cameras.image_files import Frame, check_file_format, lens_beside, open_source
 from ..detection.detector import Detector
 from ..errors import InputError, VisualMeshError
@@ -45,7 +46,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
             line = _process(frame, detector, pose, options, emit_points)
         except VisualMeshError as error:
             bar.clear()
-            complain(f"{frame.source}: {error}")
+            complain(str(error))
             continue
         bar.clear()
         print(line, flush=True)
@@ -79,8 +80,25 @@ class _DefaultPose:
 def _process(
     frame: Frame, detector: Detector, pose: _DefaultPose, options: argparse.Namespace, emit_points: Sequence[str]
 ) -> str:
-    """Detect in a frame, save the files that the options ask for, and return its line of JSON."""
-    image = frame.read()
+    """Detect in a frame, save the files that the options ask for, and return its line of JSON.
+
+    Raises InputError that names the frame.
+    """
+    image = frame.read()  # its errors name the file
+    try:
+        return _detect(image, frame, detector, pose, options, emit_points)
+    except VisualMeshError as error:
+        raise InputError(f"{frame.source}: {error}") from error
+
+
+def _detect(
+    image: Image,
+    frame: Frame,
+    detector: Detector,
+    pose: _DefaultPose,
+    options: argparse.Namespace,
+    emit_points: Sequence[str],
+) -> str:
     lens, orientation = pose.of(frame)
     detections = detector.detect(image, orientation, lens, explain=options.explain)
     if options.save_points is not None:

@@ -48,7 +48,7 @@ class Workload:
 
 def make_workload(options: argparse.Namespace, given: Configuration) -> Workload:
     """The workload that the options of vm-bench describe. Raises InputError."""
-    swing, sway = parse_angle(options.swing), parse_length(options.sway)
+    swing, sway = parse_angle(options.swing, "--swing"), parse_length(options.sway, "--sway")
     if options.frames < 1:
         raise InputError(f"--frames must be at least 1, not {options.frames}")
     middle = (

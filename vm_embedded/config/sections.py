@@ -20,15 +20,18 @@ Configuration = TypeVar("Configuration")
 
 
 def read_sections(
-    kind: type[Configuration], path: Path | None, overrides: Mapping[str, Mapping[str, Any]] | None = None
+    kind: type[Configuration],
+    path: Path | None,
+    overrides: Mapping[str, Mapping[str, Any]] | None = None,
+    noun: str = "configuration",
 ) -> Configuration:
     """Read a configuration, a dataclass of sections, from a TOML file; without a file, use all defaults.
 
-    overrides: entries by section that replace those of the file. Raises InputError naming the file, line, section and
-    entry, and the allowed values.
+    overrides: entries by section that replace those of the file. noun: the kind of file, for messages. Raises
+    InputError naming the file, line, section and entry, and the allowed values.
     """
-    text = _read_text(path) if path else ""
-    where = f"configuration {path}" if path else "configuration"
+    text = _read_text(path, noun) if path else ""
+    where = f"{noun} {path}" if path else noun
     try:
         table: dict[str, Any] = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -92,13 +95,15 @@ def parse_overrides(given: Sequence[str], example: str) -> dict[str, dict[str, A
     return sections
 
 
-def _read_text(path: Path) -> str:
+def _read_text(path: Path, noun: str) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
-        raise InputError(f"can't read configuration {path}: {error.strerror or error}") from error
-    except ValueError as error:  # not UTF-8, or a path with a zero byte
-        raise InputError(f"configuration {path}: {error}") from error
+        raise InputError(f"can't read {noun} {path}: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{noun} {path} is not a text file") from error
+    except ValueError as error:  # a path with a zero byte
+        raise InputError(f"{noun} {path}: {error}") from error
 
 
 def _checked_section(name: str, value: Any) -> Mapping[str, Any]:

@@ -33,7 +33,9 @@ def _edited_file(path: Path, section: str, entries: Mapping[str, Any]) -> str:
     try:
         text = path.read_bytes().decode("utf-8") if path.exists() else ""
         before = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise InputError(f"configuration {path} is not a text file") from error
+    except (OSError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"can't read configuration {path}: {error}") from error
     edited = edit_section(text, section, entries)
     try:

@@ -47,7 +47,9 @@ def read_lens_file(path: str | Path) -> LensFile:
         if path.stat().st_size > _LARGEST:
             raise InputError(f"{path} is too large for a lens file; at most {_LARGEST} bytes are allowed")
         text = path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:  # ValueError: not text, or a path with a zero byte
+    except UnicodeDecodeError as error:
+        raise InputError(f"lens file {path} is not a text file") from error
+    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
         raise InputError(f"can't read lens file {path}: {getattr(error, 'strerror', None) or error}") from error
     try:
         if path.suffix.lower() == ".toml":

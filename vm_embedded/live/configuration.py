@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..cameras.camera import CameraSettings
-from ..config.entries import check_entries, entry, number, text_line
+from ..config.entries import EntryError, check_entries, entry, number, text_line
 from ..config.sections import read_sections
 from ..config.toml_writer import to_commented_toml
 from ..config.units import angle, length
@@ -63,9 +63,17 @@ class StatusSettings:
         "Unix socket for vm-detect --status and --record; empty: vm-detect.sock in $RUNTIME_DIRECTORY or "
         "$XDG_RUNTIME_DIR, otherwise /tmp/vm-detect-UID.sock",
     )
-    page: str = entry(checked_address, "", "ADDRESS:PORT of the status page, such as 127.0.0.1:8080; empty: no page")
+    page: str = entry(
+        checked_address,
+        "",
+        "ADDRESS:PORT of the status page, such as 127.0.0.1:8080; empty: no page",
+        example="127.0.0.1:8080",
+    )
     metrics: str = entry(
-        checked_address, "", "ADDRESS:PORT or unix:PATH of the metrics for Prometheus; empty: no metrics"
+        checked_address,
+        "",
+        "ADDRESS:PORT or unix:PATH of the metrics for Prometheus; empty: no metrics",
+        example="127.0.0.1:8081",
     )
     budget_ms: float = number(
         0.0,
@@ -144,8 +152,16 @@ def read_configuration(path: str | Path) -> Configuration:
 
 
 def with_overrides(configuration: Configuration, sections: Mapping[str, Mapping[str, Any]]) -> Configuration:
-    """The configuration with the given entries of the given sections replaced. Raises InputError."""
-    changed = {name: replace(getattr(configuration, name), **entries) for name, entries in sections.items()}
+    """The configuration with the given entries of the given sections replaced.
+
+    Raises InputError with the section, the entry and the bad value.
+    """
+    changed: dict[str, Any] = {}
+    for name, entries in sections.items():
+        try:
+            changed[name] = replace(getattr(configuration, name), **entries)
+        except EntryError as error:
+            raise InputError(f"[{name}] {error}") from error
     return replace(configuration, **changed)
 
 

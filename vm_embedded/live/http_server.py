@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -48,11 +49,13 @@ class HttpServer:
             self._file = UnixListener(self._where.removeprefix("unix:"))
             self._server = await asyncio.start_unix_server(self._serve, sock=self._file.socket, limit=8192)
             return
-        host, port = parse_address(self._where, "[status] page or metrics")
+        host, port = parse_address(self._where, "[status] page or metrics", "127.0.0.1:8080")
         try:
             self._server = await asyncio.start_server(self._serve, host, port, limit=8192)
         except OSError as error:
-            raise InputError(f"can't listen at {self._where}: {error.strerror or error}") from error
+            # asyncio's own text repeats the address. An unknown host name has a negative errno.
+            reason = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror or error
+            raise InputError(f"can't listen at {self._where}: {reason}") from error
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()

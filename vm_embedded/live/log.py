@@ -18,11 +18,10 @@ class EventLog:
         self._text = self._stream.isatty()
 
     def __call__(self, event: str, level: str = "info", **fields: Any) -> None:
-        """Log an event with its fields."""
+        """Log an event with its fields. The text form leaves out empty ones."""
         if self._text:
-            details = ", ".join(f"{name} {value}" for name, value in fields.items())
+            details = ", ".join(f"{name} {value}" for name, value in fields.items() if value not in (None, ""))
             line = f"{time.strftime('%H:%M:%S')} {level:7} {event}{': ' if details else ''}{details}"
-
         else:
             now = round(time.time(), 3)
             line = json.dumps({"time": now, "level": level, "event": event, **fields}, default=str)

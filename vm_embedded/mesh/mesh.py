@@ -135,9 +135,10 @@ class MeshModel(ABC):
 def check_size(points: float) -> None:
     """Raises GeometryError for a mesh with too many points, before any memory is allocated."""
     if not points <= MOST_POINTS:
+        number = f"{points:,.0f}" if points < 1e12 else "far too many"
         raise GeometryError(
-            f"the mesh would have {points:.3g} points, and at most {MOST_POINTS:,} are allowed; choose fewer "
-            "intersections, a shorter maximum distance or a larger object"
+            f"the mesh would have {number} points, and at most {MOST_POINTS:,} are allowed; choose fewer "
+            "intersections, a smaller max_distance or a larger object_radius"
         )
 
 

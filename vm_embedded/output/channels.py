@@ -23,13 +23,22 @@ from .messages import Message, to_json_line, to_ros
 FORMATS = ("json", "ros")
 
 
+_UDP_EXAMPLE = "127.0.0.1:5600"
+"""Address to send lines to, for error messages."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class OutputSettings:
     """Section [output]: the channels, the format of the lines, and the backlog of slow readers."""
 
     stdout: bool = switch(True, "write lines to standard output")
     file: str = text_line("", "file to append lines to")
-    udp: str = entry(checked_address, "", "UDP receivers, one datagram per line: ADDRESS:PORT, separated by commas")
+    udp: str = entry(
+        checked_address,
+        "",
+        "UDP receivers, one datagram per line: ADDRESS:PORT, separated by commas",
+        example=_UDP_EXAMPLE,
+    )
     unix: str = text_line("", "Unix socket to create; each reader gets every line")
     format: str = one_of(FORMATS, "json", "json, or ros for the field names of vision_msgs and geometry_msgs in ROS 2")
     frame_id: str = text_line("base_footprint", "ROS name of the frame on the ground below the camera")
@@ -162,7 +171,9 @@ class DatagramChannel:
     def __init__(self, destination: str) -> None:
         self.dropped = 0
         self.failure = ""
-        self._socket, self._address = datagram_socket(*parse_address(destination, "[output] udp"), "can't send to")
+        self._socket, self._address = datagram_socket(
+            *parse_address(destination, "[output] udp", _UDP_EXAMPLE), "can't send to"
+        )
 
     def send(self, line: bytes) -> None:
         """Send a line as a datagram."""

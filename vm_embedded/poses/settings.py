@@ -12,11 +12,19 @@ from ..sockets import parse_address
 CLOCKS = ("monotonic", "wall", "arrival")
 FRAMES = ("camera", "optical")
 
+UDP_EXAMPLE = "0.0.0.0:5600"
+"""Address to receive poses at, for error messages."""
+
 
 def _checked_source(field: Field[Any], value: object) -> str:
     kind, _, rest = value.partition(":") if isinstance(value, str) else ("", "", "")
     if kind == "udp":
-        parse_address(rest, f"{field.name} udp:ADDRESS:PORT")
+        try:
+            parse_address(rest, field.name, UDP_EXAMPLE)
+        except InputError as error:
+            raise InputError(
+                f"{field.name} must be udp:ADDRESS:PORT, as in udp:{UDP_EXAMPLE}, not {value!r}"
+            ) from error
     elif not (value in ("fixed", "stdin") or (kind == "unix" and rest)):
         raise InputError(f"{field.name} must be fixed, stdin, unix:PATH or udp:ADDRESS:PORT, not {value!r}")
     return str(value)

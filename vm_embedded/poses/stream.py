@@ -14,7 +14,7 @@ from ..errors import InputError, VisualMeshError
 from ..sockets import UnixListener, datagram_socket, parse_address
 from .buffer import PoseBuffer
 from .parsing import MAX_LINE_BYTES, parse_pose_line
-from .settings import PoseSettings
+from .settings import UDP_EXAMPLE, PoseSettings
 
 Report = Callable[[str], None]
 """Gets the reason why a pose was rejected."""
@@ -48,7 +48,7 @@ class PoseStream:
                 self._serve, sock=self._listener.socket, limit=MAX_LINE_BYTES
             )
         elif kind == "udp":
-            host, port = parse_address(rest, "pose source")
+            host, port = parse_address(rest, "pose source", UDP_EXAMPLE)
             listening, _ = datagram_socket(host, port, "can't receive poses at", listen=True)
             transport, _ = await loop.create_datagram_endpoint(lambda: _Datagrams(self.take), sock=listening)
             self._transports.append(transport)

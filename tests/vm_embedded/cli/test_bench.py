@@ -28,7 +28,8 @@ def test_command_prints_a_table_and_keeps_all_figures_as_json(tmp_path):
     out = run("--model", MODEL, "--frames", 12, "--json", tmp_path / "all.json", "--up-to", 2).stdout
     assert all(stage in out for stage in ("mesh", "project", "sample", "infer", "cluster"))
     assert "p99.9" in out
-    assert "cold bucket" in out
+    assert "first frame of a new orientation bucket" in out
+    assert "roll 0 deg" in out
     found = json.loads((tmp_path / "all.json").read_text())
     assert found["walk"]["frames"] == 12
     assert found["rss_mib"] > 10

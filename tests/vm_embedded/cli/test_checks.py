@@ -93,6 +93,9 @@ def test_a_lens_for_another_size_is_seen(root):
     assert found(other, root)["lens"].state == BAD
     assert "other proportions" in found(other, root)["lens"].seen
     assert found(replace(HEALTHY, lens=None), root)["lens"].state == WARNING
+    without = replace(HEALTHY, lens=LensFile(Equisolid(focal_length=300.0, fov=2.0), None))
+    assert found(without, root)["lens"].state == WARNING
+    assert "size: [width, height] in YAML" in found(without, root)["lens"].mend
 
 
 def test_a_status_socket_without_a_folder_is_seen(root):

@@ -154,7 +154,8 @@ def test_one_bad_frame_is_named_and_the_others_are_processed(folder):
 def test_a_broken_image_is_named(tmp_path, content, lens):
     (tmp_path / "broken.jpg").write_bytes(content)
     done = detect(tmp_path / "broken.jpg", "--lens", lens, "--height", 0.8, code=1)
-    one_complaint(done, "broken.jpg")
+    one_complaint(done, f"vm-detect: {tmp_path / 'broken.jpg'} ")
+    assert done.stderr.count("broken.jpg") == 1
     assert done.stdout == ""
 
 
@@ -170,7 +171,7 @@ def test_a_directory_without_images_is_named(tmp_path):
 @pytest.mark.parametrize("content", [b"", b"no video at all", os.urandom(20000)])
 def test_an_unreadable_video_is_named(tmp_path, content):
     (tmp_path / "clip.mp4").write_bytes(content)
-    one_complaint(detect(tmp_path / "clip.mp4", code=1), "clip.mp4")
+    one_complaint(detect(tmp_path / "clip.mp4", code=1), "clip.mp4 is neither an image (.jpg, ", "nor a video that")
 
 
 @pytest.mark.parametrize(
@@ -203,7 +204,7 @@ def test_a_frame_without_lens_or_orientation_says_what_to_give(tmp_path, lens):
     ("pose", "part"),
     [
         (("--height", "nan"), "nan"),
-        (("--height", "high"), "high"),
+        (("--height", "high"), "[orientation] height must be a number of meters, as in 0.8, not 'high'"),
         (("--height", "-1"), "-1"),
         (("--height", "0.15"), "0.19"),
         (("--height", "0.8", "--pitch", "nan"), "nan"),

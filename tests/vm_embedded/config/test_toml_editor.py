@@ -25,6 +25,13 @@ def test_a_file_that_can_not_be_edited_is_left_as_it_is(content, tmp_path):
         assert path.read_text() == content
 
 
+def test_a_binary_file_is_refused(tmp_path):
+    path = tmp_path / "vm.toml"
+    path.write_bytes(b"\xff\xd8")
+    with pytest.raises(InputError, match=r"vm\.toml is not a text file"):
+        check_editable(path, "detector", ["threads"])
+
+
 def test_line_endings_are_kept():
     text = "# a\u2028b\r\n[detector]\r\nthreads = 2\r\n"
     assert edit_section(text, "detector", {"threads": 1}) == text.replace("2\r", "1\r")

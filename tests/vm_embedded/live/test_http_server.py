@@ -1,8 +1,24 @@
 """The metrics of a real vm-detect over HTTP."""
 
+import asyncio
 import socket
 
+import pytest
+
 from tests.vm_embedded.live.running import running
+from vm_embedded.errors import InputError
+from vm_embedded.live.http_server import HttpServer
+
+
+def test_a_busy_port_and_an_unknown_host_are_named_once():
+    with socket.socket() as busy:
+        busy.bind(("127.0.0.1", 0))
+        busy.listen()
+        where = f"127.0.0.1:{busy.getsockname()[1]}"
+        with pytest.raises(InputError, match=rf"^can't listen at {where}: Address already in use$"):
+            asyncio.run(HttpServer(where, {}).open())
+    with pytest.raises(InputError, match=r"^can't listen at host\.invalid:1: (?!Unknown error)"):
+        asyncio.run(HttpServer("host.invalid:1", {}).open())
 
 
 def test_figures_are_given_by_address_only_and_nothing_else_is(tmp_path):

@@ -267,7 +267,7 @@ def test_what_is_no_file_is_named(tmp_path):
 def test_a_binary_file_is_refused(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_bytes(bytes(range(256)))
-    with pytest.raises(InputError, match=r"scene\.toml"):
+    with pytest.raises(InputError, match=r"scene\.toml is not a text file"):
         read_sections(SceneConfiguration, path)
 
 
