@@ -188,7 +188,7 @@ def test_taking_the_sun_out_keeps_all_light(size, azimuth, elevation, strength):
 @given(reals(-math.pi, math.pi), reals(math.radians(5.0), math.radians(85.0)), reals(1.0, 20000.0))
 @settings(max_examples=8)
 def test_resizing_keeps_the_light_of_a_sun_below_the_zenith(size, azimuth, elevation, strength):
-    """At the zenith, up to 11 % of it is lost or gained: rows at a map's pole count alike, but differ in solid angle."""
+    """At the zenith up to 11 % is lost or gained: a map's rows there count alike, but differ in solid angle."""
     whole = with_sun(toward(azimuth, elevation), strength, angle=0.035, size=size)
     lighting = environment(whole).lighting(SIZE)
     np.testing.assert_allclose(total_light(lighting.sky) + lighting.sun, total_light(whole), rtol=1e-2)
