@@ -1,8 +1,8 @@
 """Windows and mirror images of labeled graphs.
 
 A window is a part of the picture. Most of a picture is grass. A window of half its width and height has a quarter of
-the points, and most windows lie over an object. So the network sees several times as many objects in the same time. To the
-network, a window is the picture of a camera with a smaller sensor.
+the points, and most windows lie over an object. So the network sees several times as many objects in the same time. To
+the network, a window is the picture of a camera with a smaller sensor.
 
 A mirror image doubles the pictures, because nothing on a field depends on left and right.
 """
