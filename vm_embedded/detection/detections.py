@@ -23,11 +23,11 @@ class Detection:
     class_name: name of its class. confidence: mean probability of the points inside its outline, 0 to 1.
     center (2,) [px]: of the disk with the centroid and the area of its outline. radius [px]: of the same disk.
     outline (m, 2) [px]: the part that the lens sees. bearing (3,): unit vector from the camera to its center.
-    position (3,) [m]: its center. distance [m]: from the camera to its center; it follows from the bearing and the
-    plane. angular_radius [rad]: angle from its center to its outline, for the size that fits the points best.
-    distance_by_angle [m]: distance that follows from `angular_radius` and the real radius. distances_agree: whether the
-    two distances differ by less than the mesh can resolve. points: number of mesh points inside its outline. reason:
-    why it was rejected, or None.
+    position (3,) [m]: its center, where the bearing meets the parallel plane at the height of the center. distance [m]:
+    from the camera to this center. angular_radius [rad]: angle from its center to its outline, for the size that fits
+    the points best. distance_by_angle [m]: distance that follows from `angular_radius` and the real radius.
+    distances_agree: whether the two distances differ by less than the mesh can resolve. points: number of mesh points
+    inside its outline. reason: why it was rejected, or None.
     """
 
     class_name: str

@@ -31,9 +31,10 @@ class Network(Protocol):
 class Observation:
     """A frame's n points on screen with their probabilities, before objects are located among them.
 
-    view: mesh points, lens and orientation of the frame. manifest: of the network. projected: pixels of the layout's m
-    slots, the places in the network's input; copies and gaps count as off screen. slot_probabilities (m, C): the
-    network's output; it has no meaning for slots off screen. timing_ms: time of each stage [ms].
+    view: mesh points, lens and orientation of the frame. manifest: of the network. projected: pixels of the m
+    slots of the layout. A slot is one place in the network's input; it holds a point, a copy of a point, or nothing.
+    Only original points count as on screen. slot_probabilities (m, C): the network's output; it has no meaning for
+    slots off screen. timing_ms: time of each stage [ms].
     """
 
     view: PreparedView

@@ -32,7 +32,8 @@ class Settings:
     cache_mib: float = number(64.0, "memory for meshes and prepared points", "MiB", (0.0, 65536.0))
     object_radius: float | None = number(
         None,
-        "radius of the real object, if it differs from the model's; a network for any radius also gets a new mesh",
+        "radius of your object, if it differs from the model's; a network that was trained for any radius also gets a "
+        "mesh for it",
         "m",
         (1e-3, 10.0),
     )

@@ -15,7 +15,8 @@ class Sphere(Shape):
     """A ball on the plane (paper: fig:sphere_phi).
 
     The closed form of its recursion eqn:sphere_phi_1 is phi(n) = atan(sinh(n s)) with the spacing
-    s = -ln(1 - 2 r / h). It also holds between whole numbers n, so k rings across a ball need no smaller spheres.
+    s = -ln(1 - 2 r / h). It also holds for fractions n, so ring i is simply at phi(i / k). The paper
+    uses smaller spheres for this.
     """
 
     @property

@@ -177,7 +177,10 @@ def _add_hardware(made: argparse.ArgumentParser) -> None:
     group = made.add_argument_group("hardware")
     group.add_argument("--device", choices=DEVICES, default="auto", help="default: a GPU if there is one, else the CPU")
     group.add_argument(
-        "--workers", type=at_least(0), metavar="N", help="processes that read pictures; default: half of the cores"
+        "--workers",
+        type=at_least(0),
+        metavar="N",
+        help="processes that read pictures; default: half of the cores; with a GPU, all cores but one",
     )
     group.add_argument(
         "--threads",

@@ -62,7 +62,8 @@ class MeshSettings:
     )
     equal_at: float = number(
         0.0,
-        "distance at which both grids have the same number of points on an object; 0: both have the same total number",
+        "distance at which both grids have the same number of points on an object, for example 2.5; 0: both have the "
+        "same number of points in the picture",
         "m",
         (0.0, 1e3),
     )

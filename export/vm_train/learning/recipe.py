@@ -40,7 +40,7 @@ class Recipe:
     optimizer: str = one_of(
         OPTIMIZERS,
         "adamw",
-        "optimizer; sgd has momentum; muon suits short trainings, with a rate of 0.007 to 0.02",
+        "optimizer; sgd has momentum; muon suits short trainings, with a rate of 0.006 to 0.02",
     )
     schedule: str = one_of(
         SCHEDULES,
