@@ -50,7 +50,9 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
     )
 
     far = _parser(
-        "range", "Show pixels and points on an object over distance, and the distance beyond which a mesh is too fine."
+        "range",
+        "Show pixels and points on an object over distance, and the distance beyond which neighboring mesh points are "
+        "less than a pixel apart, so that they repeat each other's colors.",
     )
     _add_camera(far)
     _add_size(far)

@@ -17,8 +17,9 @@ from .observation import Observation
 class Detection:
     """One object on the observation plane, or, with a `reason`, a rejected candidate.
 
-    The coordinates are in the plane's frame: the origin is on the plane below the camera, z points up, and the x axis
-    has the yaw of the orientation.
+    The coordinates are in the plane's frame. Its origin is on the plane below the camera, and z points up. This is the
+    frame that the orientation maps to: the x axis is the direction of yaw 0. Without a yaw, x points where the camera
+    looks.
 
     class_name: name of its class. confidence: mean probability of the points inside its outline, 0 to 1.
     center (2,) [px]: of the disk with the centroid and the area of its outline. radius [px]: of the same disk.

@@ -56,9 +56,9 @@ def detect_views(
     - cameras differ, the plane is the same, and they lie less than a diameter apart;
     - the camera is the same, planes differ, and they lie less than their angular radius apart.
     The detections nearest to each other, relative to these limits, are joined first. An object has at most one
-    detection of each camera on each plane. In the second case, only one of the planes can be right. For each plane, the
-    confidences of the joined detections on it are added; the plane with the largest sum wins. A camera behind a plane,
-    or too near it for the mesh, sees nothing on it.
+    detection of each camera on each plane. In the second case, only one plane can be right. For each plane, the
+    confidences of all its detections of this object, from all cameras, are added. The largest sum wins. A camera behind
+    a plane, or too near it for the mesh, sees nothing on it.
 
     Raises InputError for no planes, planes with equal names, or a picture that does not fit.
     """

@@ -3,9 +3,10 @@
 The paper calls the point below the camera a singularity of its mesh (section "Discussion and Conclusion"). The rings
 around it have a makeshift number of points, and links between rings of very different sizes meet at any angle.
 
-Here ring i has 6 i points there, like the i-th hexagon of a hexagonal lattice. In a plane that shows an object n
-objects out at the radius n, a hexagonal lattice has the same density everywhere, also at its middle. From the middle
-outwards the hexagons turn gradually into circles, and continue as the rings of the paper's mesh.
+Here ring i has 6 i points there, like the i-th hexagon of a hexagonal lattice. Draw the plane such that the distance
+from the middle counts objects: a point n objects out is drawn at radius n. Then all objects are equally long, and a
+hexagonal lattice has the same density everywhere, also in the middle. From the middle outwards the hexagons gradually
+become circles, and continue as the rings of the paper's mesh.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ class Cap(MeshModel):
         phi = inclinations(shape, height, intersections, max_distance)
         counts = ring_counts(shape, height, intersections, len(phi))
         rings = np.arange(len(counts), dtype=np.int32)
-        # The cap ends where hexagons would have over half a point less across an object than the rings.
+        # In the ring's direction, a ring puts k points on an object. Hexagons of the cap put at least k - 1/2 on it, or
+        # k / 2 for k below 1. Rings up to k belong to the cap in any case.
         enough = 6 * rings >= (1.0 - 0.5 / max(intersections, 1.0)) * counts
         hexagons = int(np.argmin(np.append(enough | (rings <= intersections), False))) - 1
         counts[1 : hexagons + 1] = 6 * rings[1 : hexagons + 1]
