@@ -98,6 +98,9 @@ VARIANTS: dict[str, Variant] = {
     "learned low": Variant({}, only="low"),
     "learned high": Variant({}, only="high"),
 }
+"""Networks to compare, by name; "base" has five layers. The paper compares depths, widths and activations (section
+"Network Architecture"), ways to select points (section "Training"), and both meshes (section "Precision")."""
+
 LENSES, HEIGHTS = ("rectilinear", "fisheye"), ("low", "high")
 """Halves of the pictures: by projection, equisolid and equidistant being fisheyes, and by the camera's height."""
 

@@ -95,7 +95,10 @@ def transfer(results: dict[str, Any], kinds: tuple[str, ...]) -> str:
 
 
 def plot(results: dict[str, Any]) -> None:
-    """The paper's figures: precision over recall of ball points, and their average precision over distance."""
+    """Precision over recall of ball points, and their average precision over distance.
+
+    Both are for both meshes and three depths, as in the paper's fig:pr_curve and fig:pr_map (section "Precision").
+    """
     import matplotlib
     from matplotlib.figure import Figure
 

@@ -20,7 +20,7 @@ REFERENCE = NetworkShape(
         Layer("convolution", 5, "softmax"),
     )
 )
-"""The authors' network: 7 layers of 16, 5 of 8, 5 classes."""
+"""The network of the paper's authors: 7 layers of 16, 5 of 8, 5 classes."""
 
 NETWORKS = {
     "3x4": (NetworkShape.uniform(3, 4, 2), 4.0, 10.0),
@@ -28,7 +28,8 @@ NETWORKS = {
     "9x4": (NetworkShape.uniform(9, 4, 2), 4.0, 10.0),
     "13x16": (REFERENCE, 6.0, 20.0),
 }
-"""Name: shape, intersections, maximum distance [m]."""
+"""Name: shape, intersections, maximum distance [m]. The first three have the paper's depths (section "Network
+Architecture"): a layer sees one ring farther, and at k = 4 a ball's radius is two rings."""
 
 
 def checkpoint(shape: NetworkShape, intersections: float, max_distance: float) -> Checkpoint:

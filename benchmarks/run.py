@@ -125,7 +125,10 @@ def median_frame(models: Models, work: list[Frame], name: str) -> Frame:
 
 
 def whole_calls(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
-    """Whole calls with a warm cache, against the network alone on the same points."""
+    """Whole calls with a warm cache, against the network alone on the same points.
+
+    The paper measures from the picture to the network's output (section "Execution performance").
+    """
     found: dict[str, Any] = {}
     for name in NETWORKS:
         frame = median_frame(models, work, name)
@@ -166,7 +169,7 @@ def shipped(rounds: int) -> dict[str, Any]:
 def peers(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
     """Whole calls in turns on the same frame: the Visual Mesh with five and nine layers, and its peers.
 
-    The paper's tab:visualmesh_performance.
+    The paper's tab:visualmesh_performance. Its sections "Abstract" and "Discussion and Conclusion" compare the times.
     """
     frame = median_frame(models, work, "5x4")
     calls: dict[str, Callable[[], object]] = {}
@@ -191,7 +194,10 @@ def peers(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
 
 
 def growth(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
-    """Whole calls of a five-layer network over intersections, distance, resolution and threads."""
+    """Whole calls of a five-layer network over intersections, distance, resolution and threads.
+
+    The paper: a higher resolution does not increase the cost (section "Discussion and Conclusion").
+    """
     frame = median_frame(models, work, "5x4")
 
     def row(detector: Detector, frame: Frame, **what: float) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from benchmarks.shipped import FRAMES_AN_HOUR, NETWORKS
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.settings import Settings
+from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import GeometryError
 from vm_train.data.pictures import read_picture
 from vm_train.evaluation.answers import ExactSubject, load_subject
@@ -53,7 +54,7 @@ def scored(pictures: list[tuple[list[TrueObject], Observation]], settings: Setti
     """Scores of all pictures with some settings."""
     scores = ObjectScores(min_radius=2.0)
     for truths, observation in pictures:
-        found, _ = locate(observation, settings)
+        found, _ = locate(observation, None, settings, Stopwatch())
         scores.add(truths, found)
     return scores
 

@@ -1,7 +1,7 @@
 """Writes the pages that are made from the programs, so that both stay the same:
 
 - docs/command-line.md from the parsers and from the usage texts of the robot's scripts,
-- docs/vm.toml, scene.toml and train.toml from the entries of configurations,
+- docs/vm.toml, scene.toml, train.toml and look.toml from the entries of configurations,
 - docs/api.md from the docstrings (api_page.py).
 
 `python docs/help_pages.py` writes them; a test checks that they are current.
@@ -25,6 +25,7 @@ from vm_synth.scene import configuration as scene
 from vm_train.cli import evaluate
 from vm_train.cli import options as train
 from vm_train.learning import configuration as training
+from vm_train.look import configuration as look
 
 DOCS = Path(__file__).parent
 SCRIPTS = DOCS.parent / "deploy" / "robot"
@@ -38,6 +39,7 @@ def pages() -> dict[Path, str]:
         DOCS / "vm.toml": to_commented_toml(detection.Configuration(), detection.HEADER),
         DOCS / "scene.toml": to_commented_toml(scene.SceneConfiguration(), scene.HEADER),
         DOCS / "train.toml": to_commented_toml(training.TrainConfiguration(), training.HEADER),
+        DOCS / "look.toml": to_commented_toml(look.LookConfiguration(), look.LOOK_HEADER),
     }
 
 

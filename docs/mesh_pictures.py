@@ -169,7 +169,7 @@ def draw_tall():
 
 
 def mesh_for_posts(model, height):
-    """wall6 for posts, or ring6 for their feet, from a camera height [m]."""
+    """wall6 for posts, or ring6 for their feet (circles of the same radius on the ground), from a camera height [m]."""
     shape = POST if model == "wall6" else Circle(POST.radius)
     return BuiltMesh.build(model, MeshPlan(shape, height, 4.0, 10.0))
 

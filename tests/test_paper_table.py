@@ -87,6 +87,13 @@ def test_every_row_leads_to_its_code(label, cell):
             assert re.search(rf"{label.strip('`')}\b", texts[0]), f"{name} in {file} does not name {label}"
 
 
+@pytest.mark.parametrize(("title", "cell"), [(label, cell) for label, _, cell in ROWS if not label.startswith("`")])
+def test_a_named_file_says_the_section_that_it_comes_from(title, cell):
+    files = {file for file, _ in code_of(cell)}
+    texts = [re.sub(r"\n *(?:# )?", " ", (TOP / file).read_text()) for file in files]
+    assert not texts or any(f'"{title}"' in text for text in texts), f'none of {sorted(files)} has "{title}"'
+
+
 @pytest.mark.parametrize(("claim", "cell"), [(claim, cell) for _, claim, cell in ROWS if "`" in claim])
 def test_claims_name_only_what_their_code_has(claim, cell):
     texts = "".join((TOP / file).read_text() for file, _ in code_of(cell)) + (TOP / "docs" / "meshes.md").read_text()

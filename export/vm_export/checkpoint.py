@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import io
 import json
-import pickle
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-import torch
-
 from vm_embedded.errors import InputError, ModelError, one_line
-from vm_embedded.files import atomic_write
 from vm_embedded.network.manifest import Manifest
 
 from .grid import VISUAL, Grid
 from .network import Network
 from .network_shape import NetworkShape
 from .second_look import Gate, SecondLook
+from .torch_files import load_values, save_values
 
 _FORMAT = "vm-embedded checkpoint 3"
 
@@ -58,20 +54,12 @@ class Checkpoint:
         }
         if isinstance(self.network, SecondLook):
             content["first"] = {"network": self.network.first.shape.as_dict(), "gate": asdict(self.network.gate)}
-        file = io.BytesIO()  # torch reports a full disk in its own way
-        torch.save(content, file)
-        with atomic_write(Path(path)) as part:
-            part.write_bytes(file.getbuffer())
+        save_values(path, content)
 
     @classmethod
     def load(cls, path: str | Path) -> Checkpoint:
         """Read a checkpoint without executing anything in it. Raises InputError or ModelError."""
-        try:
-            content = torch.load(path, map_location="cpu", weights_only=True)
-        except OSError as error:
-            raise InputError(f"can't read {path}: {error.strerror or error}") from error
-        except (pickle.UnpicklingError, RuntimeError, EOFError, ValueError, KeyError) as error:
-            raise InputError(f"{path} is not a checkpoint: {one_line(error)}") from error
+        content = load_values(path, "a checkpoint")
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
             raise InputError(f"{path} is not a checkpoint of format {_FORMAT!r}; train the network again")
         last = Network(NetworkShape.from_dict(content["network"]))

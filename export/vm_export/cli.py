@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vm_embedded.errors import InputError, VisualMeshError, install_extra
+from vm_embedded.network.bundled import SHIPPED, model_path
 from vm_embedded.network.manifest import EDGES, LAYOUTS
 
 if TYPE_CHECKING:
     from .checkpoint import Checkpoint
+    from .look_checkpoint import LookCheckpoint
     from .reference import Overrides
 
 EXIT_OK, EXIT_FAILED = 0, 1
@@ -25,7 +27,12 @@ def parser() -> argparse.ArgumentParser:
         description="Write a network as a self-describing ONNX file, and check its answers against torch.",
         epilog="Exit status: 0 written, 1 not written (standard error says why), 2 wrong usage.",
     )
-    parser.add_argument("model", type=Path, help="checkpoint (.pt), or network of the reference implementation (.yaml)")
+    parser.add_argument(
+        "model",
+        type=Path,
+        help="checkpoint (.pt), network of the reference implementation (.yaml), or a model file (.onnx, or the name "
+        "of a network of the package) whose close look you want to change",
+    )
     parser.add_argument(
         "-o", "--output", type=Path, help="file to write; default: the name of the model with .onnx or .yaml"
     )
@@ -33,11 +40,16 @@ def parser() -> argparse.ArgumentParser:
         "--layout",
         choices=LAYOUTS,
         help="write one file, in this layout; default: the fastest layout, and NAME.plain.onnx for other ONNX runtimes "
-        "(a network with a second look has only layout runs)",
+        "(a network with a second look has only the layout `runs`)",
     )
     parser.add_argument(
         "--to-yaml", action="store_true", help="write the format of the reference implementation instead"
     )
+    looks = parser.add_mutually_exclusive_group()
+    looks.add_argument(
+        "--look", type=Path, metavar="LOOK", help="checkpoint (.pt) of a close look to write into the model file"
+    )
+    looks.add_argument("--no-look", action="store_true", help="copy a model file (.onnx) without its close look")
     facts = parser.add_argument_group("entries that the file lacks, or that you want to replace")
     facts.add_argument(
         "--intersections", type=float, metavar="K", help="rings of points across an object (the paper's k)"
@@ -72,17 +84,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
+    if str(options.model) in SHIPPED:
+        options.model = model_path(options.model)
+    _check_options(options)
     # Imported here: without torch, --help still works and the error is one clear line.
-    from .export import export, fastest_layout
+    from .export import change_look, export, fastest_layout
+    from .look_checkpoint import LookCheckpoint
     from .reference import write_reference
 
     output = options.output or options.model.with_suffix(".yaml" if options.to_yaml else ".onnx")
     portable = output.with_suffix(".plain" + output.suffix)
-    for path in (output,) if options.to_yaml or options.layout else (output, portable):
-        if path.resolve() == options.model.resolve():
-            raise InputError(f"{path} is the input and would be overwritten; give another file with --output")
-    if options.to_yaml and options.layout:
-        raise InputError("--layout is for ONNX files; leave it out with --to-yaml")
+    one_file = options.to_yaml or options.layout or _is_model_file(options.model)
+    for path in (output,) if one_file else (output, portable):
+        for given in filter(None, (options.model, options.look)):
+            if path.resolve() == given.resolve():
+                raise InputError(f"{path} is the input and would be overwritten; give another file with --output")
+    look = LookCheckpoint.load(options.look) if options.look else None
+    if _is_model_file(options.model):
+        difference = change_look(options.model, output, look)
+        _print_written(output, f"mesh network of {options.model}", look, difference)
+        return EXIT_OK
     checkpoint = _load(options.model, _overrides(options))
     print(f"{options.model}: {_description(checkpoint)}")
     if options.to_yaml:
@@ -94,10 +115,45 @@ def _run(options: argparse.Namespace) -> int:
     files = {portable: "plain"} if both else {}
     files[output] = layout
     for path, layout in files.items():
-        difference = export(checkpoint, path, layout)
-        size = path.stat().st_size / 1000
-        print(f"{path}: layout {layout}, {size:.1f} kB, largest difference to torch {difference:.1e}")
+        _print_written(path, f"layout {layout}", look, export(checkpoint, path, layout, look))
     return EXIT_OK
+
+
+def _is_model_file(path: Path) -> bool:
+    return path.suffix.lower() == ".onnx"
+
+
+def _check_options(options: argparse.Namespace) -> None:
+    """Refuse options that do not fit each other or the kind of the input. Raises InputError."""
+    if options.to_yaml and (options.layout or options.look):
+        option = "--layout" if options.layout else "--look"
+        raise InputError(f"{option} is for ONNX files; leave it out with --to-yaml")
+    if not _is_model_file(options.model):
+        if options.no_look:
+            raise InputError(f"--no-look is for model files (.onnx); leave it out for {options.model}")
+        return
+    names = ("layout", "to_yaml", "intersections", "radius", "object_radius", "max_distance", "edge", "classes")
+    values = {f"--{name.replace('_', '-')}": getattr(options, name) for name in names}
+    given = [option for option, value in values.items() if value is not None and value is not False]
+    if given:
+        raise InputError(
+            f"{', '.join(given)} can't change a model file; give the checkpoint (.pt) instead of {options.model}"
+        )
+    if not options.look and not options.no_look:
+        raise InputError(f"{options.model} is a model file already; change its close look with --look or --no-look")
+
+
+def _print_written(path: Path, content: str, look: LookCheckpoint | None, difference: float | None) -> None:
+    """Print a line about a written file: its networks, its size, and the difference to torch of those that are new."""
+    parts = [content]
+    if look is not None:
+        contract = look.contract
+        channels = ", ".join(map(str, contract.channels))
+        parts.append(f"close look at {contract.object_class} ({contract.size} x {contract.size}, channels {channels})")
+    parts.append(f"{path.stat().st_size / 1000:.1f} kB")
+    if difference is not None:
+        parts.append(f"largest difference to torch {difference:.1e}")
+    print(f"{path}: {', '.join(parts)}")
 
 
 def _description(checkpoint: Checkpoint) -> str:
@@ -145,7 +201,9 @@ def _load(path: Path, overrides: Overrides) -> Checkpoint:
     if path.suffix.lower() in (".yaml", ".yml"):
         return read_reference(path, overrides)
     if path.suffix.lower() != ".pt":
-        raise InputError(f"{path} must be a checkpoint (.pt) or a network of the reference implementation (.yaml)")
+        raise InputError(
+            f"{path} must be a checkpoint (.pt), network of the reference implementation (.yaml) or model file (.onnx)"
+        )
     checkpoint = overrides.apply_to(Checkpoint.load(path))
     if not checkpoint.grid.is_visual:
         raise InputError(f"{path} was trained on a {checkpoint.grid.kind} grid; the runtime has only the Visual Mesh")

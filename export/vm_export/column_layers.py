@@ -1,4 +1,4 @@
-"""The layers of a network on points side by side, (channels, points), for the graphs of layouts runs and lattice.
+"""The layers of a network on points side by side, (channels, points), for the graphs of `runs` and `lattice`.
 
 Two rewritings make them fast:
 

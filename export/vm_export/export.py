@@ -16,12 +16,14 @@ from vm_embedded.files import atomic_write
 from vm_embedded.mesh.grids import lattice_neighbors
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
-from vm_embedded.network.model_file import ModelFile
+from vm_embedded.network.model_file import ModelFile, read_model
 from vm_embedded.network.self_test import SelfTest
 from vm_embedded.network.session import Session
 
+from .attach_look import attached, detached
 from .checkpoint import Checkpoint
 from .lattice_graph import lattice_model
+from .look_checkpoint import LookCheckpoint
 from .network import Network
 from .plain_graph import plain_model
 from .runs_graph import runs_model
@@ -29,11 +31,11 @@ from .second_look import SecondLook
 from .second_look_graph import second_look_model
 
 LARGEST_DIFFERENCE = 1e-4
-"""Largest difference of a probability that is allowed between ONNX Runtime and torch."""
+"""Largest difference of an answer that is allowed between ONNX Runtime and torch."""
 
 _WIDEST = {"convolution": 64, "separable": 32, "dense": 1024}
-"""The largest width of a layer, by kind, for which layout runs is faster. Convolutions and separable ones are measured
-(docs/performance.md); dense layers have no look-ups, so their width hardly matters."""
+"""The largest width of a layer, by kind, for which the layout `runs` is faster. Convolutions and separable ones are
+measured (docs/performance.md); dense layers have no look-ups, so their width hardly matters."""
 
 _CHECKED_POINTS = (1, 2, 7, 64, 1000, 5000)
 
@@ -41,9 +43,9 @@ _CHECKED_POINTS = (1, 2, 7, 64, 1000, 5000)
 def fastest_layout(checkpoint: Checkpoint) -> str:
     """The fastest layout for a network of this shape: runs or plain.
 
-    Layout runs saves look-ups and costs multiplications. A convolution multiplies three slots for each group: for
-    ring6, 9 places for 7 weights. A separable convolution becomes a full one. So layout runs gains less for wider
-    layers. A second look has only layout runs.
+    The layout `runs` saves look-ups and costs multiplications. A convolution multiplies three slots for each group: for
+    ring6, 9 places for 7 weights. A separable convolution becomes a full one. So the layout `runs` gains less for wider
+    layers. A second look has only the layout `runs`.
     """
     if isinstance(checkpoint.network, SecondLook):
         return "runs"
@@ -54,7 +56,7 @@ def fastest_layout(checkpoint: Checkpoint) -> str:
 def onnx_model(network: Network | SecondLook, manifest: Manifest) -> bytes:
     """The bytes of an ONNX model in the manifest's layout, of standard operators only.
 
-    Raises ModelError for a second look in another layout than runs, and for layout lattice with a mesh that has none.
+    Raises ModelError for a second look in another layout than `runs`, and for `lattice` with a mesh that has none.
     """
     if isinstance(network, SecondLook):
         if manifest.layout != "runs":
@@ -64,18 +66,21 @@ def onnx_model(network: Network | SecondLook, manifest: Manifest) -> bytes:
     return models[manifest.layout](network, manifest)
 
 
-def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) -> float:
-    """Write the model file of a checkpoint and return the largest difference to torch of a probability.
+def export(
+    checkpoint: Checkpoint, path: str | Path, layout: str | None = None, look: LookCheckpoint | None = None
+) -> float:
+    """Write the model file of a checkpoint and return the largest difference to torch of an answer.
 
-    layout: one of LAYOUTS; default the fastest one. ONNX Runtime runs the model before it is written. Raises ModelError
-    if a probability differs by more than LARGEST_DIFFERENCE or the layout does not fit the manifest, and InputError if
-    the file can't be written.
+    layout: one of LAYOUTS; default the fastest one. look: a look network to write into the same file. ONNX Runtime runs
+    the networks before the file is written. Raises ModelError if an answer differs by more than LARGEST_DIFFERENCE, the
+    layout does not fit the manifest, or the look does not fit its classes, and InputError if the file can't be written.
     """
     layout = layout or fastest_layout(checkpoint)
     network = checkpoint.network.eval()
     provenance = {**checkpoint.manifest.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"}
     manifest = replace(
         checkpoint.manifest,
+        look=None,
         layout=layout,
         operations=network.operations,
         provenance=provenance,
@@ -83,25 +88,57 @@ def export(checkpoint: Checkpoint, path: str | Path, layout: str | None = None) 
     )
     content = onnx_model(network, manifest)
     difference = largest_difference(content, network, manifest)
-    if not difference <= LARGEST_DIFFERENCE:
-        raise ModelError(
-            f"{path} is not written: probabilities of ONNX Runtime and torch differ by {difference:.2g}; at most "
-            f"{LARGEST_DIFFERENCE:g} is allowed"
-        )
-    with atomic_write(Path(path)) as part:
-        part.write_bytes(content)
+    _check_difference(path, "probabilities", difference)
+    if look is not None:
+        content, look_difference = attached(content, manifest, look)
+        _check_difference(path, "answers of the close look", look_difference)
+        difference = max(difference, look_difference)
+    _write(path, content)
     return difference
 
 
+def change_look(model: str | Path, path: str | Path, look: LookCheckpoint | None) -> float | None:
+    """Write a copy of a model file with this look network, or without any; its mesh network stays as it is.
+
+    Return the largest difference to torch of the look's answers, None without a look. Raises ModelError if an answer
+    differs by more than LARGEST_DIFFERENCE, the look does not fit the file's classes, or there is none to remove, and
+    InputError if the file can't be written.
+    """
+    read = read_model(model)
+    if look is not None:
+        content, difference = attached(read.content, read.manifest, look)
+        _check_difference(path, "answers of the close look", difference)
+        _write(path, content)
+        return difference
+    if read.look is None:
+        raise ModelError(f"{model} has no close look to remove")
+    _write(path, detached(read.content, read.manifest))
+    return None
+
+
+def _check_difference(path: str | Path, what: str, difference: float) -> None:
+    """Raises ModelError if ONNX Runtime and torch differ too much, or if an answer is NaN."""
+    if not difference <= LARGEST_DIFFERENCE:
+        raise ModelError(
+            f"{path} is not written: {what} of ONNX Runtime and torch differ by {difference:.2g}; at most "
+            f"{LARGEST_DIFFERENCE:g} is allowed"
+        )
+
+
+def _write(path: str | Path, content: bytes) -> None:
+    with atomic_write(Path(path)) as part:
+        part.write_bytes(content)
+
+
 def largest_difference(content: bytes, network: Network | SecondLook, manifest: Manifest) -> float:
-    """The largest difference of a probability between ONNX Runtime and torch, for graphs of different sizes."""
+    """The largest difference of a probability between ONNX Runtime and torch, for graphs of different sizes.
+
+    NaN if a probability is NaN.
+    """
     session = Session(ModelFile(Path("the new model"), content, replace(manifest, self_test=None), ""))
     steps = manifest.model.steps if manifest.layout == "lattice" else None
-    worst = 0.0
-    for seed, points in enumerate(_CHECKED_POINTS):
-        test = random_example(network, points, seed, steps)
-        worst = max(worst, float(np.abs(session.answer(test) - test.probabilities[:-1]).max()))
-    return worst
+    tests = (random_example(network, points, seed, steps) for seed, points in enumerate(_CHECKED_POINTS))
+    return float(np.max([np.abs(session.answer(test) - test.probabilities[:-1]).max() for test in tests]))
 
 
 def random_example(
@@ -109,7 +146,7 @@ def random_example(
 ) -> SelfTest:
     """A random graph of `points` points with random colors, rounded as SelfTest.as_dict rounds, and torch's answer.
 
-    steps: with them, for layout lattice, the graph is a random part of a lattice with these `MeshModel.steps`.
+    steps: with them, for the layout `lattice`, the graph is a random part of a lattice with these `MeshModel.steps`.
     """
     random = np.random.default_rng(seed)
     colors: Singles = np.full((points + 1, 3), OFF_SCREEN, dtype=np.float32)

@@ -1,4 +1,4 @@
-"""The graph of layout lattice: ordinary convolutions of 3 x 3 pixels, and no look-ups.
+"""The graph of the layout `lattice`: ordinary convolutions of 3 x 3 pixels, and no look-ups.
 
 vm_embedded/network/lattice_layout.py prepares its inputs. The points of a grid become the pixels of a picture. The
 off-screen point is a pixel with only gaps around it: it goes through every layer, and before each convolution all
@@ -19,7 +19,7 @@ from .onnx_graph import BOOL, FLOAT, OnnxGraph
 
 
 def lattice_model(network: Network, manifest: Manifest) -> bytes:
-    """The bytes of an ONNX model in layout lattice.
+    """The bytes of an ONNX model in the layout `lattice`.
 
     Inputs: points (3, rows * columns) float32 and shown (rows, columns) bool, as LatticeLayout gives them. Output:
     probabilities (C, rows * columns) float32. Raises ModelError for a mesh whose neighbors are not at fixed steps.

@@ -3,6 +3,8 @@
 Half of the time of a training goes into this gather and its gradient. Torch's indexing adds gradients one by one. Here
 the places that read a point are sorted by point, and each point sums the gradients of its places in one go. That is
 four times as fast with four channels and twice as fast with sixteen, and the order of the sums is always the same.
+
+It is the paper's gather step (section "Training").
 """
 
 from __future__ import annotations

@@ -8,11 +8,12 @@ from torch import nn
 from .neighborhood import Neighborhood
 from .network_shape import Layer, NetworkShape
 
+# The paper compares SELU, ELU and ReLU (section "Network Architecture").
 _ACTIVATIONS: dict[str, type[nn.Module]] = {"selu": nn.SELU, "relu": nn.ReLU, "elu": nn.ELU, "tanh": nn.Tanh}
 
 
 class GraphConvolution(nn.Module):
-    """The paper's graph convolution: a linear layer on the values of a point and of its N neighbors.
+    """The paper's graph convolution (section "Network"): a linear layer on a point and its N neighbors.
 
     It gathers (N + 1) * inputs values, the point's own channels first, then those of each neighbor in turn. With six
     neighbors this is the counterpart of a 3 x 3 convolution.

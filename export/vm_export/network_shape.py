@@ -58,7 +58,10 @@ class NetworkShape:
         kind: str = "convolution",
         neighbors: int = 6,
     ) -> NetworkShape:
-        """`depth` convolutions, all but the last one of `width` channels: the networks of the paper."""
+        """`depth` convolutions, all but the last one of `width` channels.
+
+        The networks of the paper (section "Network Architecture").
+        """
         inner = (Layer(kind, width, activation),) * (depth - 1)
         return cls((*inner, Layer(kind, classes, head)), neighbors)
 
@@ -72,6 +75,7 @@ class NetworkShape:
         """Multiplications and additions for each point, without activations."""
         total, inputs = 0, 3
         for layer in self.layers:
+            # With six neighbors 7 places, where a 3 x 3 convolution has 9 (paper: section "Network").
             places = 1 if layer.kind == "dense" else self.neighbors + 1
             mixed = places * inputs * layer.width if layer.kind == "convolution" else inputs * layer.width
             total += 2 * (mixed + (places * inputs if layer.kind == "separable" else 0))

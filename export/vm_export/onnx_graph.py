@@ -13,7 +13,8 @@ _OPSETS = {"": 17, "ai.onnx.ml": 3}
 _IR_VERSION = 8
 """ONNX Runtime reads this version since 1.12: a robot may have an older one than the workstation."""
 
-FLOAT, INT32, INT64, BOOL = TensorProto.FLOAT, TensorProto.INT32, TensorProto.INT64, TensorProto.BOOL
+FLOAT, UINT8, INT32, INT64 = TensorProto.FLOAT, TensorProto.UINT8, TensorProto.INT32, TensorProto.INT64
+BOOL = TensorProto.BOOL
 
 Tensors = dict[str, tuple[int, list[int | str]]]
 """Inputs or outputs of a model by name: element type and shape; a text in a shape names a free dimension."""
@@ -27,10 +28,11 @@ class OnnxGraph:
         self._constants: dict[str, onnx.TensorProto] = {}
 
     def constant(self, name: str, value: npt.ArrayLike) -> str:
-        """Add a constant, integers as int64 and other numbers as float32; return its name."""
+        """Add a constant, integers as int64, truths as bool and other numbers as float32; return its name."""
         array = np.asarray(value)
-        kind = np.int64 if np.issubdtype(array.dtype, np.integer) else np.float32
-        self._constants[name] = numpy_helper.from_array(np.ascontiguousarray(array, dtype=kind), name)
+        if array.dtype != bool:
+            array = array.astype(np.int64 if np.issubdtype(array.dtype, np.integer) else np.float32)
+        self._constants[name] = numpy_helper.from_array(np.ascontiguousarray(array), name)
         return name
 
     def node(self, operator: str, inputs: list[str], output: str, domain: str = "", **attributes: Any) -> str:

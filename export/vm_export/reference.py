@@ -29,7 +29,7 @@ from .network_shape import Layer, NetworkShape
 from .second_look import SecondLook
 
 DEFAULT_CLASSES = ("ball", "goal", "line", "field", "environment")
-"""The classes of a file that has five outputs and no class_map: those of the authors' networks, in their order."""
+"""The classes of a file that has five outputs and no class_map: those of the reference's networks, in their order."""
 
 _MESHES = tuple(name for name in MESH_MODELS if name not in ("cap6", "wall6"))
 """The mesh models of the reference."""

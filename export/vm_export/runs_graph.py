@@ -1,4 +1,4 @@
-"""The graph of layout runs, the fast one: points as slots that follow each other along their rings.
+"""The graph of the layout `runs`, the fast one: points as slots that follow each other along their rings.
 
 vm_embedded/network/runs_layout.py prepares its inputs, and explains the words slot, gap, group and column. The
 neighbors of a point come in groups that lie beside each other in memory, so a convolution over the graph is:
@@ -25,7 +25,7 @@ from .onnx_graph import FLOAT, INT64, OnnxGraph
 
 
 def runs_model(network: Network, manifest: Manifest) -> bytes:
-    """The bytes of an ONNX model in layout runs.
+    """The bytes of an ONNX model in the layout `runs`.
 
     Inputs: points (3, m) float32 and columns (G, m) int64, as RunsLayout gives them. Output: probabilities (C, m)
     float32.
@@ -40,7 +40,7 @@ def runs_model(network: Network, manifest: Manifest) -> bytes:
 
 
 def finished_runs_model(graph: OnnxGraph, classes: int, manifest: Manifest) -> bytes:
-    """The bytes of a model whose graph has the inputs and the output of layout runs."""
+    """The bytes of a model whose graph has the inputs and the output of the layout `runs`."""
     return graph.model(
         {"points": (FLOAT, [3, "slots"]), "columns": (INT64, [len(manifest.model.groups), "slots"])},
         {"probabilities": (FLOAT, [classes, "slots"])},
@@ -54,7 +54,8 @@ def convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, gro
     outputs, _, inputs = kernel.shape
     # All windows of three slots, without a copy of each. A row of `thrice` holds a channel of x twice, and a third time
     # without its last three slots: 3 (m - 1) values. Cut into three rows of m - 1 values, each row begins one slot
-    # earlier in x than the row before. Entry j of these rows is x at j, j - 1 and j - 2: a window around j - 1.
+    # earlier in x than the row before. Entry j of these rows is x at j, j - 1 and j - 2: a window around j - 1. (From
+    # j = 2 on; x begins with gaps, so nothing looks up the first two.)
     cut = [graph.constant(f"slice.{key}", [value]) for key, value in (("start", 0), ("end", -3), ("axis", 1))]
     most = graph.node("Slice", [x, *cut], f"{name}.most")
     thrice = graph.node("Concat", [x, x, most], f"{name}.thrice", axis=1)

@@ -1,4 +1,4 @@
-"""The graph of a network with a second look, in layout runs.
+"""The graph of a network with a second look, in the layout `runs`.
 
 The graph has four parts:
 
@@ -7,7 +7,8 @@ The graph has four parts:
 3. the selected points become a small mesh, in which all other points are the off-screen point;
 4. the second network answers for the small mesh, and its answers replace those of the first one.
 
-Inputs and output are those of every other network in layout runs, so the runtime does not know of the second look.
+Inputs and output are those of every other network in the layout `runs`, so the runtime does not know of the second
+look.
 The small mesh has few points and no runs: each place of a receptive field is looked up alone.
 """
 
@@ -27,7 +28,7 @@ from .second_look import Gate, SecondLook
 
 
 def second_look_model(network: SecondLook, manifest: Manifest) -> bytes:
-    """The bytes of an ONNX model in layout runs, with inputs and output as `runs_model` gives them."""
+    """The bytes of an ONNX model in the layout `runs`, with inputs and output as `runs_model` gives them."""
     graph, groups = OnnxGraph(), manifest.model.groups
 
     def convolve(name: str, x: str, kernel: Floats) -> str:
@@ -42,7 +43,7 @@ def second_look_model(network: SecondLook, manifest: Manifest) -> bytes:
     def convolve_small_mesh(name: str, x: str, kernel: Floats) -> str:
         outputs, places, inputs = kernel.shape
         seen = graph.columns_of(x, fields, f"{name}.seen")  # (inputs, places * k)
-        shape = graph.constant(f"{name}.receptive.shape", [places * inputs, -1])
+        shape = graph.constant(f"{name}.receptive.shape", [inputs * places, -1])
         receptive = graph.node("Reshape", [seen, shape], f"{name}.receptive")
         weights = graph.constant(f"{name}.kernel", kernel.transpose(0, 2, 1).reshape(outputs, -1))
         return graph.node("MatMul", [weights, receptive], f"{name}.sums")

@@ -1,4 +1,8 @@
-"""The useful range of a mesh with a lens: pixels and points on an object over its distance."""
+"""The useful range of a mesh with a lens: pixels and points on an object over its distance.
+
+The paper: a higher resolution reaches farther, a too low one samples a pixel twice (section "Discussion and
+Conclusion").
+"""
 
 from __future__ import annotations
 

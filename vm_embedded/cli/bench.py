@@ -38,9 +38,9 @@ def parser() -> argparse.ArgumentParser:
     """The command line of vm-bench."""
     parser = argparse.ArgumentParser(
         prog="vm-bench",
-        description="Measure the detector on this machine while a robot walks: the whole call and its stages, with one "
-        "thread and with more, with a warm and a cold cache. Compare the network's time with the theoretical minimum "
-        "for its operations.",
+        description="Measure the detector on this machine, with the poses of a simulated robot that walks: the whole "
+        "call and its stages, with one thread and with more, and the extra time of a frame whose orientation or height "
+        "is not in the cache of meshes. Compare the network's time with the theoretical minimum for its operations.",
         epilog="Exit status: 0 success, 1 failure (the reason is on standard error), 2 wrong usage, 130 interrupted. "
         + ANGLES,
     )

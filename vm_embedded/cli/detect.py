@@ -36,10 +36,11 @@ def parser() -> argparse.ArgumentParser:
         prog="vm-detect",
         description="Find objects in images, videos or live cameras, and print one line of JSON for each frame.",
         epilog="Exit status for files: 0, at least one frame was processed; 1, no frame was processed. For a live "
-        "camera: 0, a signal stopped it, or the played file has ended; 1, the played file has ended and no frame could "
-        "be processed; 75, reads of the camera hang, and a restart may help; 78, the configuration can't be used, and "
-        "a restart would fail again. For --status: 0, the state is ok; 1, the state is not ok, or nothing answers. "
-        "Always: 2, the options can't be parsed; 130, interrupted. " + ANGLES,
+        "camera: 0, a signal such as Ctrl-C stopped it, or the played file has ended; 1, a second signal ended it at "
+        "once, or the played file has ended and no frame could be processed; 75, reads of the camera hang, and a "
+        "restart may help; 78, the configuration can't be used, and a restart would fail again. For --status: 0, the "
+        "state is ok; 1, the state is not ok, or nothing answers. Always: 2, the options can't be parsed. Without a "
+        "running live camera: 130, interrupted with Ctrl-C. " + ANGLES,
     )
     parser.add_argument(
         "--camera",

@@ -21,14 +21,15 @@ class Detection:
     frame that the orientation maps to: the x axis is the direction of yaw 0. Without a yaw, x points where the camera
     looks.
 
-    class_name: name of its class. confidence: mean probability of the points inside its outline, 0 to 1.
-    center (2,) [px]: of the disk with the centroid and the area of its outline. radius [px]: of the same disk.
-    outline (m, 2) [px]: the part that the lens sees. bearing (3,): unit vector from the camera to its center.
-    position (3,) [m]: its center, where the bearing meets the parallel plane at the height of the center. distance [m]:
-    from the camera to this center. angular_radius [rad]: angle from its center to its outline, for the size that fits
-    the points best. distance_by_angle [m]: distance that follows from `angular_radius` and the real radius.
-    distances_agree: whether the two distances differ by less than the mesh can resolve. points: number of mesh points
-    inside its outline. reason: why it was rejected, or None.
+    class_name: name of its class. confidence: 0 to 1; with a close look its calibrated probability, otherwise the mean
+    probability of the points inside its outline. center (2,) [px]: centroid of its outline. radius [px]: of a disk with
+    the same area as its outline. outline (m, 2) [px]: the part that the lens sees. bearing (3,): unit vector from the
+    camera to its center. position (3,) [m]: its center: where the bearing meets the plane that is parallel to the
+    observation plane, at the height of the object's center. distance [m]: from the camera to this center.
+    angular_radius [rad]: angle from its center to its outline, for the size that the close look saw or that fits the
+    points best. distance_by_angle [m]: distance that follows from `angular_radius` and the real radius.
+    distances_agree: whether the two distances agree: they differ by at most 20 % with a close look, otherwise by less
+    than the mesh can resolve. points: number of mesh points inside its outline. reason: why it was rejected, or None.
     """
 
     class_name: str
@@ -118,7 +119,7 @@ class Detections:
 
     @property
     def rays(self) -> Floats:
-        """Unit vectors (n, 3) to the points, in the frame's own observation plane."""
+        """Unit vectors (n, 3) from the camera to the points, in the plane's frame, as in Detection."""
         return self.observation.rays
 
     @property

@@ -8,6 +8,7 @@ from ..arrays import Image
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from ..network.bundled import model_path
+from ..network.close_look import CloseLook
 from ..network.model_file import ModelFile, read_model
 from ..network.session import Session
 from .cache import MeshCache
@@ -15,6 +16,7 @@ from .detections import Detections
 from .objects import locate
 from .observation import Observation, observe
 from .pixel_formats import checked_image
+from .pyramid import Pyramid
 from .settings import Settings
 from .stopwatch import Stopwatch
 
@@ -33,6 +35,7 @@ class Detector:
         self.settings = settings or Settings()
         self.manifest = model.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         self.session = Session(model, self.settings.threads, self.settings.spinning)
+        self.look = CloseLook(model, self.settings.threads, self.settings.spinning) if self.manifest.look else None
         self.cache = MeshCache(self.manifest, self.settings)
         self.shape = self.manifest.object_shape
 
@@ -56,18 +59,21 @@ class Detector:
 
     def observe(self, image: Image, orientation: Orientation, lens: Lens) -> Observation:
         """Classify the mesh points in an image: the first step of `detect`, with the same arguments and errors."""
-        watch = Stopwatch()
         image = checked_image(image, self.settings.format)
         size = image.shape[1], image.shape[0]
-        view = self.cache.view(orientation, lens.for_image(size), size)
+        lens = lens.for_image(size)
+        watch = Stopwatch()
+        view = self.cache.view(orientation, lens, size)
         watch.lap("mesh")
-        return observe(image, view, self.manifest, self.session, self.settings, watch)
+        return observe(Pyramid(image, self.settings.format), view, self.manifest, self.session, self.settings, watch)
 
     def locate(self, observation: Observation, explain: bool = False) -> Detections:
-        """Find objects among classified points: the second step of `detect`."""
+        """Find objects among classified points: the second step of `detect`.
+
+        The result keeps the frame in memory. Raises ModelError if the close look does not run.
+        """
         watch = Stopwatch()
-        found, rejected = locate(observation, self.settings, explain)
-        watch.lap("cluster")
+        found, rejected = locate(observation, self.look, self.settings, watch, explain)
         timing = {**observation.timing_ms, **watch.stages}
         timing["total"] = sum(timing.values())
         return Detections(found, rejected, observation, self.settings.threshold, timing)

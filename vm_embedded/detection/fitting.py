@@ -1,4 +1,4 @@
-"""Where an object fits a candidate best: the paper's best fitting subgraph."""
+"""Where an object fits a candidate best: the paper's best fitting subgraph (section "Discussion and Conclusion")."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ _SCALES = np.geomspace(0.6, 1.8, 15)
 def fit(view: PreparedView, candidate: Candidate) -> Candidate:
     """The candidate with the center [m] of the object whose subgraph fits best.
 
-    If points were independent, the likeliest object would have the largest sum of log-odds inside its outline: the best
-    of a grid of places, then of finer grids around it. The outline is half a ring spacing soft, so the sum has no
-    plateaus between points. Points off screen add nothing, so an object that the border cuts gets its true center.
+    If points were independent, the likeliest object would have the largest sum of log-odds inside its outline. The
+    search takes the best of a grid of places, then of finer grids around it. The outline is half a ring spacing soft,
+    so the sum has no plateaus between points. Points off screen add nothing, so an object that the border cuts gets its
+    true center.
     """
     center = candidate.center
     rays = np.ascontiguousarray(view.layout.rays[candidate.near])
@@ -55,5 +56,8 @@ def best_scale(view: PreparedView, candidate: Candidate, offset: Floats) -> floa
 
 
 def _share_inside(offset: Floats, view: PreparedView) -> Floats:
-    """1 for points inside the outline, 0 outside; it falls over half a ring spacing around it."""
+    """1 for points inside the outline, 0 outside; it falls over half a ring spacing around it.
+
+    offset: from the center, 1 on the outline, as `Shape.offset` gives it; `view.spacing` has the same unit.
+    """
     return np.clip(0.5 + (1.0 - offset) / (0.5 * view.spacing), 0.0, 1.0)

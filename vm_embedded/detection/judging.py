@@ -32,9 +32,9 @@ def _misfit(view: PreparedView, candidate: Candidate, settings: Settings) -> str
     quarter of a spacing inside to three quarters outside, because a ring that grazes the object shows some of it. The
     band that must be empty is the next 1.5 spacings.
 
-    Less than one object from the nadir the mesh is singular (the paper's second limitation, section "Discussion and
-    Conclusion"): ring6 has too few points there, and uneven links. An object may seem to cover twice its area, so the
-    band is farther out by sqrt(2).
+    Nearer to the nadir than one object's size, the mesh is singular (the paper's second limitation, section
+    "Discussion and Conclusion"): ring6 has too few points there, and uneven links. An object may seem to cover twice
+    its area, so the band is farther out by sqrt(2).
     """
     center, p = candidate.center, candidate.probabilities
     if center[2] >= 0.0 or np.linalg.norm(center) > _FARTHEST * view.height:

@@ -34,7 +34,8 @@ class Sighting:
 
     camera: name of the camera with the most confident detection. plane: name of the plane of that detection.
     detection: the most confident detection, in that plane's frame. position (3,) [m]: center of the object.
-    direction (3,): unit vector from that camera. also: further detections of the same object, most confident first.
+    direction (3,): unit vector from that camera. also: further detections of the same object, those on the same plane
+    first.
     """
 
     camera: str
@@ -53,8 +54,9 @@ def detect_views(
     views: the picture, lens and pose of each camera, by its name. planes: the planes to search.
 
     All cameras share the detector's network and meshes. Two detections of one class are one object in two cases:
-    - cameras differ, the plane is the same, and they lie less than a diameter apart;
-    - the camera is the same, planes differ, and they lie less than their angular radius apart.
+    - the cameras differ, the plane is the same, and the detections lie less than a diameter apart;
+    - the camera is the same, the planes differ, and the angle between the detections' directions is less than the
+      larger of their angular radii.
     The detections nearest to each other, relative to these limits, are joined first. An object has at most one
     detection of each camera on each plane. In the second case, only one plane can be right. For each plane, the
     confidences of all its detections of this object, from all cameras, are added. The largest sum wins. A camera behind
@@ -76,6 +78,7 @@ def detect_views(
 
 
 def _sightings(detector: Detector, camera: str, view: CameraView, plane: Plane) -> Iterator[Sighting]:
+    """What one camera sees on one plane; nothing if it is behind the plane or too near it."""
     try:
         orientation = plane.seen_from(view.pose)
         detector.cache.mesh_height(orientation.height)  # raises if the camera is too low
@@ -102,7 +105,7 @@ def _groups(found: Sequence[Sighting], diameter: float) -> list[list[Sighting]]:
         if kept == merged:
             continue
         seen = [(found[each].camera, found[each].plane) for each in members[kept] + members[merged]]
-        if len(set(seen)) == len(seen):
+        if len(set(seen)) == len(seen):  # at most one of each camera on each plane
             for each in members[merged]:
                 group_of[each] = kept
             members[kept] += members.pop(merged)

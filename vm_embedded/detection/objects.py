@@ -1,4 +1,9 @@
-"""From an observation to objects on the plane: propose, fit, judge, describe."""
+"""From an observation to objects on the plane.
+
+With a close look, the likely points propose places, and a second network judges each of them (`looking.py`). Without
+one, clusters of likely points are candidates, and their points decide: propose, fit, judge (`candidates.py`,
+`fitting.py`, `judging.py`).
+"""
 
 from __future__ import annotations
 
@@ -7,55 +12,121 @@ import math
 import cv2
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Singles
 from .candidates import Candidate, propose
 from .detections import Detection
 from .fitting import best_scale, fit
 from .judging import judge
+from .looking import Judgment, Look, look_closely
 from .observation import Observation
+from .projection import along
 from .settings import Settings
+from .stopwatch import Stopwatch
+
+_SAME_SIZE = 0.2
+"""With a close look, two distances agree if the apparent size differs from the expected one by less than this share."""
 
 
 def locate(
-    observation: Observation, settings: Settings, explain: bool = False
+    observation: Observation, look: Look | None, settings: Settings, watch: Stopwatch, explain: bool = False
 ) -> tuple[tuple[Detection, ...], tuple[Detection, ...]]:
     """The objects that an observation shows, most confident first, and, with `explain`, the rejected candidates.
 
-    It looks only for classes of the kind "object".
+    It searches only for classes of the kind "object". watch: gets the stage cluster; with a close look also propose and
+    look. Raises ModelError if the close look does not run.
     """
-    view = observation.view
-    found: list[Candidate] = []
-    rejected: list[Candidate] = []
+    objects: list[Detection] = []
+    reasons: list[Detection] = []
     for object_class, probabilities in zip(observation.manifest.classes, observation.slot_probabilities.T, strict=True):
+        name = object_class.name
         if object_class.kind != "object":
             continue
-        accepted: list[Candidate] = []
-        for candidate in propose(observation, object_class.name, probabilities, settings):
-            if candidate.reason is None:
-                candidate = judge(view, fit(view, candidate), accepted, settings)
-            if candidate.reason is None:
-                accepted.append(candidate)
-            else:
-                rejected.append(candidate)
-        found += accepted
-    objects = [_describe(observation, each) for each in found]
-    reasons = [_describe(observation, each) for each in rejected] if explain else []
+        if look is not None and look.contract.object_class == name:
+            judged = look_closely(observation, look, probabilities, settings, watch, explain)
+            objects += [_describe_judgment(observation, name, each) for each in judged if each.reason is None]
+            reasons += [_describe_judgment(observation, name, each) for each in judged if each.reason]
+        else:
+            candidates = _candidates(observation, name, probabilities, settings)
+            objects += [_describe_candidate(observation, each) for each in candidates if each.reason is None]
+            reasons += [_describe_candidate(observation, each) for each in candidates if explain and each.reason]
+    watch.lap("cluster")
     return tuple(sorted(objects, key=lambda each: -each.confidence)), tuple(reasons)
 
 
-def _describe(observation: Observation, candidate: Candidate) -> Detection:
-    """The candidate as a detection, in the frame's own observation plane."""
-    view, center = observation.view, candidate.center
-    offset = view.shape.offset(view.layout.rays[candidate.near], center[None], view.height)[0]
+def _candidates(
+    observation: Observation, class_name: str, probabilities: Singles, settings: Settings
+) -> list[Candidate]:
+    """The candidates of a class without a close look; those that are not objects have a reason."""
+    view = observation.view
+    accepted: list[Candidate] = []
+    rejected: list[Candidate] = []
+    for candidate in propose(observation, class_name, probabilities, settings):
+        if candidate.reason is None:
+            candidate = judge(view, fit(view, candidate), accepted, settings)
+        (accepted if candidate.reason is None else rejected).append(candidate)
+    return accepted + rejected
+
+
+def _describe_candidate(observation: Observation, candidate: Candidate) -> Detection:
+    """The candidate as a detection: its confidence is the mean probability of the points inside its outline."""
+    view = observation.view
+    offset = view.shape.offset(view.layout.rays[candidate.near], candidate.center[None], view.height)[0]
     inside = candidate.probabilities[offset < 1.0]
-    distance = float(np.linalg.norm(center))
     scale = best_scale(view, candidate, offset)
-    outline = view.pixels(view.shape.outline(center, view.height))
-    # An object at the edge of the lens's view may have no outline in it.
-    middle, radius = _disk(outline if len(outline) > 2 else observation.projected.pixels[candidate.near])
-    return Detection(
-        class_name=candidate.class_name,
+    return _detection(
+        observation,
+        candidate.class_name,
+        candidate.center,
         confidence=float(inside.mean()) if len(inside) else 0.0,
+        scale=scale,
+        distances_agree=abs(scale - 1.0) <= view.spacing,  # a ring more or less on each side
+        points=len(inside),
+        around=observation.projected.pixels[candidate.near],
+        reason=candidate.reason,
+    )
+
+
+def _describe_judgment(observation: Observation, class_name: str, judgment: Judgment) -> Detection:
+    """What a close look saw, as a detection."""
+    view = observation.view
+    covered = view.shape.covers(view.layout.rays, judgment.center[None], view.height)[0]
+    return _detection(
+        observation,
+        class_name,
+        judgment.center,
+        confidence=judgment.confidence,
+        scale=judgment.scale,
+        distances_agree=abs(judgment.scale - 1.0) <= _SAME_SIZE,
+        points=int((covered & observation.projected.on_screen).sum()),
+        around=observation.projected.pixels[[int(np.argmax(along(view.layout.rays, judgment.center)))]],
+        reason=judgment.reason,
+    )
+
+
+def _detection(
+    observation: Observation,
+    class_name: str,
+    center: Floats,
+    *,
+    confidence: float,
+    scale: float,
+    distances_agree: bool,
+    points: int,
+    around: Floats,
+    reason: str | None,
+) -> Detection:
+    """A detection in the plane's frame.
+
+    center (3,) [m]: relative to the camera in the mesh frame. scale: apparent size as a share of the expected one.
+    around (p, 2) [px]: stands for the outline of an object at the edge of the lens's view, which may have none in it.
+    """
+    view = observation.view
+    distance = float(np.linalg.norm(center))
+    outline = view.pixels(view.shape.outline(center, view.height))
+    middle, radius = _disk(outline if len(outline) > 2 else around)
+    return Detection(
+        class_name=class_name,
+        confidence=confidence,
         center=middle,
         radius=radius,
         outline=outline,
@@ -64,9 +135,9 @@ def _describe(observation: Observation, candidate: Candidate) -> Detection:
         distance=distance,
         angular_radius=math.asin(min(scale * view.shape.radius / distance, 1.0)),
         distance_by_angle=distance / scale,
-        distances_agree=abs(scale - 1.0) <= view.spacing,
-        points=len(inside),
-        reason=candidate.reason,
+        distances_agree=distances_agree,
+        points=points,
+        reason=reason,
     )
 
 

@@ -9,12 +9,13 @@ from typing import Protocol
 
 import numpy as np
 
-from ..arrays import Floats, Image, Indices, Mask, Singles
+from ..arrays import Floats, Indices, Mask, Singles
 from ..network.layout import Layout
 from ..network.manifest import Manifest
 from .color_normalization import normalize_colors
 from .prepared_view import PreparedView
 from .projection import Projection, project
+from .pyramid import Pyramid
 from .sampling import sample
 from .settings import Settings
 from .stopwatch import Stopwatch
@@ -31,12 +32,13 @@ class Network(Protocol):
 class Observation:
     """A frame's n points on screen with their probabilities, before objects are located among them.
 
-    view: mesh points, lens and orientation of the frame. manifest: of the network. projected: pixels of the m
-    slots of the layout. A slot is one place in the network's input; it holds a point, a copy of a point, or nothing.
+    pyramid: the frame. view: its mesh points, lens and orientation. manifest: of the network. projected: pixels of the
+    m slots of the layout. A slot is one place in the network's input; it holds a point, a copy of a point, or nothing.
     Only original points count as on screen. slot_probabilities (m, C): the network's output; it has no meaning for
     slots off screen. timing_ms: time of each stage [ms].
     """
 
+    pyramid: Pyramid
     view: PreparedView
     manifest: Manifest
     projected: Projection[Layout]
@@ -64,7 +66,7 @@ class Observation:
 
     @cached_property
     def rays(self) -> Floats:
-        """Unit vectors (n, 3) to the points, in the frame's own observation plane."""
+        """Unit vectors (n, 3) from the camera to the points, in the plane's frame, as in Detection."""
         return np.asarray(self.layout.rays[self._shown] @ self.view.heading.T)
 
     @cached_property
@@ -74,20 +76,20 @@ class Observation:
 
 
 def observe(
-    image: Image, view: PreparedView, manifest: Manifest, network: Network, settings: Settings, watch: Stopwatch
+    pyramid: Pyramid, view: PreparedView, manifest: Manifest, network: Network, settings: Settings, watch: Stopwatch
 ) -> Observation:
-    """Project the view's points into the image and classify them.
+    """Project the view's points into the frame and classify them.
 
-    image: as `checked_image` returns it. watch: gets the stages project, sample and infer. Raises ModelError if the
+    watch: gets the stages project, sample and infer. Raises ModelError if the
     network does not run.
     """
     projected = project(view.layout, view.rotation, view.lens, view.size)
     watch.lap("project")
-    return classify(image, view, projected, manifest, network, settings, watch)
+    return classify(pyramid, view, projected, manifest, network, settings, watch)
 
 
 def classify(
-    image: Image,
+    pyramid: Pyramid,
     view: PreparedView,
     projected: Projection[Layout],
     manifest: Manifest,
@@ -95,15 +97,15 @@ def classify(
     settings: Settings,
     watch: Stopwatch,
 ) -> Observation:
-    """Sample the image at projected points, and let the network classify them. See `observe`."""
+    """Sample the frame at projected points, and let the network classify them. See `observe`."""
     layout = view.layout
     # The network needs the colors of copies, too. They must not count twice in the mean color, nor in an object.
     shown = projected.only(layout.original)
     points = layout.new_points()
     colors = layout.colors_of(points)  # a view: writing to it fills `points`
-    sample(image, projected.pixels, settings.format, settings.sampling, colors, view.levels)
+    sample(pyramid, projected.pixels, settings.sampling, colors, view.levels)
     normalize_colors(colors, manifest.colors, shown.on_screen)
     watch.lap("sample")
     probabilities = network.run(layout, points, projected.on_screen)
     watch.lap("infer")
-    return Observation(view, manifest, shown, probabilities, watch.stages)
+    return Observation(pyramid, view, manifest, shown, probabilities, watch.stages)

@@ -1,4 +1,7 @@
-"""From the mesh to the picture: the pixels of the points, and whether they are on screen."""
+"""From the mesh to the picture: the pixels of the points, and whether they are on screen.
+
+The paper projects the points of the mesh in the same way (section "Graph Structure of the Mesh").
+"""
 
 from __future__ import annotations
 

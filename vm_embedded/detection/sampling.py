@@ -1,4 +1,7 @@
-"""The colors of the picture at the points of the mesh."""
+"""The colors of the picture at the points of the mesh.
+
+They are the network's input (paper: section "Graph Structure of the Mesh").
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import numpy.typing as npt
 
 from ..arrays import Floats, Image, Singles
 from .footprint import Levels
-from .pixel_formats import rgb_channels
+from .pyramid import Pyramid
 
 SAMPLINGS = ("exact", "fast")
 """exact: bilinear in floating point. fast: by OpenCV in 8 bits, rounded to whole gray levels and 1/32 px."""
@@ -16,37 +19,25 @@ SAMPLINGS = ("exact", "fast")
 _FOLD = 256  # remap takes tables of at most 32766 a side, so the list of points is folded into rows
 
 
-def sample(
-    image: Image, pixels: Floats, format: str, sampling: str, out: Singles, levels: Levels | None = None
-) -> None:
-    """Write the RGB colors, from 0 to 1, at pixels (n, 2) into `out` (n, 3).
+def sample(pyramid: Pyramid, pixels: Floats, sampling: str, out: Singles, levels: Levels | None = None) -> None:
+    """Write the RGB colors, from 0 to 1, at pixels (n, 2) of the frame into `out` (n, 3).
 
-    image: as `checked_image` returns it for `format`. sampling: one of SAMPLINGS. levels: the points that each picture
-    of the pyramid colors, for footprints. The color is arbitrary where one of the four pixels around a point is outside
-    of the image.
+    sampling: one of SAMPLINGS. levels: the points that each level of the pyramid colors, for footprints. The color is
+    arbitrary where one of the four pixels around a point is outside of the image.
     """
-    image, channels = rgb_channels(image, format)
     take = _exact if sampling == "exact" else _fast
     with np.errstate(invalid="ignore", over="ignore"):  # pixels outside of the lens's view may be NaN
         if levels is None:
-            planes = take(image, pixels)
-            for column, channel in enumerate(channels):
+            planes = take(pyramid.level(0), pixels)
+            for column, channel in enumerate(pyramid.channels):
                 np.multiply(planes[channel], np.float32(1.0 / 255.0), out=out[:, column])
             return
         for level, points in enumerate(levels):
-            if level:
-                image = _halved(image)
             if len(points):
+                image = pyramid.level(level)
                 planes = take(image, _in_halved(pixels[points], level, image))
-                for column, channel in enumerate(channels):
+                for column, channel in enumerate(pyramid.channels):
                     out[points, column] = planes[channel] * np.float32(1.0 / 255.0)
-
-
-def _halved(image: Image) -> Image:
-    """A picture of half the width and height, without the last row or column of an odd number."""
-    height, width = (max(side // 2, 1) for side in image.shape[:2])
-    even = image[: 2 * height, : 2 * width]
-    return np.asarray(cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def _in_halved(pixels: Floats, level: int, image: Image) -> Floats:

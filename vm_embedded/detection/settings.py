@@ -23,7 +23,8 @@ class Settings:
     height_tolerance: float = number(
         0.5,
         "a new camera height gets its own mesh if the number of rings across an object changes by more than this; "
-        "0: each frame gets a mesh for its own height and heading, which is slower (as in the reference)",
+        "0 (as in the reference): each frame gets a mesh for its own height, and the mesh does not follow the "
+        "camera's yaw; this is slower",
         "rings",
         (0.0, 2.0),
     )
@@ -45,6 +46,10 @@ class Settings:
         (0.1, 1e4),
     )
     threshold: float = share(0.5, "a point belongs to a class if its probability is above this")
+    min_confidence: float = share(
+        0.5, "close look: lowest probability of an object; below it, the proposal is rejected"
+    )
+    max_proposals: int = number(40, "close look: largest number of proposals", "", (1, 1000))
     min_inside: float = share(0.85, "lowest mean probability inside the outline; below it, the object is rejected")
     max_around: float = share(
         0.25, "highest mean probability just outside the outline; above it, the object is rejected"

@@ -1,4 +1,6 @@
-"""The upright cylinder: goal posts, robots, legs. The paper names it as a shape that could be added.
+"""The upright cylinder: goal posts, robots, legs.
+
+The paper names it as a shape that could be added (section "Visual Mesh Geometry").
 
 Each object stands where the shadow of the one before it ends, for a light at the camera. Let t = tan(phi) be the slope
 to the near foot of a cylinder of radius r and height H. Its shadow ends at the slope (h t + 2 r) / (h - H). This

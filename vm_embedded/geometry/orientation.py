@@ -3,6 +3,9 @@
 Frames: the camera's x points along the optical axis, y left and z up. The observation plane is z = 0 of its frame,
 with z up. `H_oc` ("o from c") maps camera coordinates to plane coordinates. Only this module converts from the optical
 frame of OpenCV and ROS (x right, y down, z forward).
+
+The paper's mesh needs the height and the orientation of the camera (section "Visual Mesh Geometry"). It follows the
+plane, so a network handles turns of the camera better (section "Discussion and Conclusion").
 """
 
 from __future__ import annotations

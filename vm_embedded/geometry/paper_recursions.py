@@ -21,7 +21,7 @@ def circle_phi1(phi: float, radius: float, height: float) -> float:
 
 
 def circle_dtheta(phi: float, radius: float, height: float) -> float:
-    """Angular width [rad] of a circle or a sphere around the vertical; the paper's eqn:circle_dtheta.
+    """Azimuth angle (around the vertical) [rad] that a circle or a sphere covers; the paper's eqn:circle_dtheta.
 
     Raises GeometryError where the object covers the point below the camera.
     """

@@ -59,7 +59,8 @@ class Plane:
     """All points p [m] of the world with normal . p = offset. Objects lie on the side that the normal points to.
 
     name: identifies the plane in sightings. normal: of any length; it is scaled to length 1. offset [m]: distance from
-    the world's origin along the normal; it is scaled like the normal.
+    the world's origin along the normal, if the normal has length 1; otherwise the offset is divided by the normal's
+    length, too.
 
     Raises GeometryError for a normal of length 0 and for numbers that are not finite.
     """
@@ -106,7 +107,8 @@ class Plane:
     def axes(self) -> Floats:
         """Rotation (3, 3) from world to plane frame: its rows are two directions in the plane, and the normal.
 
-        The first direction is the world's x axis projected onto the plane, or its z axis if the normal is close to x.
+        The first direction is the world's x axis projected onto the plane. If the normal is close to that axis, it is
+        the world's z axis projected onto the plane.
         """
         normal = np.array(self.normal)
         along = np.eye(3)[0 if abs(self.normal[0]) < 0.99 else 2]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Number
+from ..arrays import Floats, Mask, Number
 from ..errors import GeometryError
 
 
@@ -38,7 +38,7 @@ class Shape(ABC):
 
     @abstractmethod
     def spacing(self, height: Number) -> Number:
-        """The number s through which the height enters: phi depends only on n * s."""
+        """The number s of a height [m]. The height changes phi only through s: phi depends only on n * s."""
 
     @abstractmethod
     def height_of(self, spacing: float) -> float:
@@ -54,11 +54,11 @@ class Shape(ABC):
 
     @abstractmethod
     def theta(self, n: Number, height: Number) -> Number:
-        """Angle around the vertical [rad] that an object covers, at the distance of n objects.
+        """Azimuth angle (around the vertical) [rad] that an object covers, at the distance of n objects.
 
         It is Delta theta in the paper's fig:geometry.
 
-        Up to n = 0.5 the object covers the nadir. There the width is 2 pi / (1 + 2 n), as in the reference: the whole
+        Up to n = 0.5 the object covers the nadir. There the angle is 2 pi / (1 + 2 n), as in the reference: the whole
         circle at the nadir and pi at n = 0.5.
         """
 
@@ -69,6 +69,10 @@ class Shape(ABC):
         rays: (n, 3) unit vectors from the camera. centers: (m, 3) of the objects, relative to the camera [m]. Both are
         in the observation-plane frame.
         """
+
+    def covers(self, rays: Floats, centers: Floats, height: float, share: float = 1.0) -> Mask:
+        """Whether the offset of rays (n, 3) from objects at `centers` (m, 3) is less than `share`; (m, n)."""
+        return np.asarray(self.offset(rays, centers, height) < share)
 
     @abstractmethod
     def outline(self, center: Floats, height: float, count: int = 48) -> Floats:
@@ -88,6 +92,7 @@ class Shape(ABC):
         with np.errstate(divide="ignore", over="ignore"):
             sine = self.radius / np.abs(distance)
         beyond = 2.0 * np.arcsin(np.minimum(sine, 1.0))
+        # Up to n = 0.5 the paper's equation has a singularity (section "Circle").
         return np.where(n <= 0.5, 2.0 * np.pi / (1.0 + 2.0 * n), beyond)
 
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..arrays import Floats, Number
+from ..arrays import Floats, Mask, Number
 from ..errors import GeometryError
 from .shape import Shape, all_between, tangents
 
@@ -42,7 +42,7 @@ class Sphere(Shape):
         return np.arcsinh(np.tan(phi)) / self.spacing(height)
 
     def theta(self, n: Number, height: Number) -> Number:
-        # eqn:circle_dtheta at the height of the ball's center, h - r, as in the reference.
+        # eqn:circle_dtheta (paper: section "Sphere") at the height of the ball's center, h - r, as in the reference.
         return self._theta(n, (height - self.radius) * np.tan(self.phi(n, height)))
 
     def offset(self, rays: Floats, centers: Floats, height: float) -> Floats:
@@ -50,6 +50,12 @@ class Sphere(Shape):
         cosine = np.sqrt(np.maximum(1.0 - (self.radius / distance) ** 2, 0.0))
         # Chords instead of angles: they are proportional within the few degrees of a ball, and need no trigonometry.
         return np.asarray(np.sqrt(np.maximum(1.0 - (centers / distance) @ rays.T, 0.0) / (1.0 - cosine)))
+
+    def covers(self, rays: Floats, centers: Floats, height: float, share: float = 1.0) -> Mask:
+        # As `offset`, without a root for each pair: the chord's square is compared.
+        distance = np.linalg.norm(centers, axis=1, keepdims=True)
+        cosine = np.sqrt(np.maximum(1.0 - (self.radius / distance) ** 2, 0.0))
+        return np.asarray((centers / distance) @ rays.T > 1.0 - share * share * (1.0 - cosine))
 
     def outline(self, center: Floats, height: float, count: int = 48) -> Floats:
         distance = float(np.linalg.norm(center))

@@ -3,10 +3,11 @@
 The paper calls the point below the camera a singularity of its mesh (section "Discussion and Conclusion"). The rings
 around it have a makeshift number of points, and links between rings of very different sizes meet at any angle.
 
-Here ring i has 6 i points there, like the i-th hexagon of a hexagonal lattice. Draw the plane such that the distance
-from the middle counts objects: a point n objects out is drawn at radius n. Then all objects are equally long, and a
-hexagonal lattice has the same density everywhere, also in the middle. From the middle outwards the hexagons gradually
-become circles, and continue as the rings of the paper's mesh.
+Here ring i has 6 i points there, like the i-th hexagon of a hexagonal lattice. Imagine a drawing of the plane, in which
+a point's distance from the middle is the number of objects that fit between the two. In this drawing, every object has
+the length 1 in the direction away from the middle. A hexagonal lattice has the same density everywhere in this drawing,
+also in the middle. From the middle outwards the hexagons gradually become circles, and continue as the rings of the
+paper's mesh.
 """
 
 from __future__ import annotations

@@ -55,7 +55,8 @@ class Grid(MeshModel):
 
     A point has the column n and the row m, and its neighbors are `steps` away. With four or eight neighbors u = n / k
     and v = m / k. With six neighbors each row is shifted by half a step, and rows are closer than columns:
-    u = (n + m / 2) / k and v = sqrt(3) / 2 m / k.
+    u = (n + m / 2) / k and v = sqrt(3) / 2 m / k. In the code, half counts half steps along a row: 2 n, or 2 n + m with
+    six neighbors.
     """
 
     steps: tuple[tuple[int, int], ...]
@@ -70,7 +71,6 @@ class Grid(MeshModel):
         shape.spacing(height)  # raises GeometryError for a height without a mesh
         x, y = self._quarter(shape, height, intersections, max_distance)
         last_row, last_half = (size - 1 for size in x.shape)
-        # half counts half steps along a row: 2 n, or 2 n + m with six neighbors.
         m, half = (each.astype(np.int32) for each in np.mgrid[-last_row : last_row + 1, -last_half : last_half + 1])
         shown = np.isfinite(x[np.abs(m), np.abs(half)])
         m, half = m[shown], half[shown]
@@ -101,6 +101,7 @@ class Grid(MeshModel):
         halves = math.floor(u_most / 0.5) + 2
         m, half = (axis.reshape(-1) for axis in np.mgrid[:rows, :halves].astype(np.int32))
         steps = np.stack([0.5 * half, row_step * m], axis=1)
+        # Points are where n is whole: half = 2 n, or 2 n + m with six neighbors.
         tried = np.flatnonzero(((half - m if six else half) % 2 == 0) & _within(steps, border))
         u, v = (steps[tried] / intersections).T
         x, y = _positions(self.kind, u, v, shape, height)

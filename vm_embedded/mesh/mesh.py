@@ -22,8 +22,8 @@ SELF = -1
 """Stands for the point itself in `Groups`, where a neighbor is named by its position among the point's neighbors."""
 
 Groups = tuple[tuple[int, ...], ...]
-"""Groups of one to three neighbors, each from left to right, that layout runs puts side by side in memory. Each
-neighbor, and SELF, is in exactly one group. (left, SELF, right) comes first."""
+"""Groups of one to three neighbors, each from left to right, that the layout `runs` puts side by side in memory.
+Each neighbor, and SELF, is in exactly one group. (left, SELF, right) comes first."""
 
 MOST_POINTS = 8_000_000
 """Largest number of points in a mesh: more than the pixels of a camera, and more than OpenCV samples at once."""
@@ -95,6 +95,8 @@ class MeshModel(ABC):
         """The mesh for objects of this shape, seen from a height [m], out to `max_distance` [m].
 
         intersections: rings of points across an object (the paper's k), and points of a ring across it.
+
+        The paper requires height and radius, too (section "Visual Mesh Geometry").
 
         Raises GeometryError for a shape, a height, a number of intersections or a distance that this model cannot
         build.

@@ -28,7 +28,7 @@ _GROUPS = {
 }
 """`MeshModel.groups` by name. With eight neighbors, top is top left or top right again, so it has its own group."""
 
-# Float noise must not change the number of points in a ring. No exact value is this close above a whole number.
+# Subtracted before rounding up, so that float noise above a whole number does not add a point to a ring.
 _CEIL_EPSILON = 1e-9
 
 
@@ -56,7 +56,8 @@ class Rings(MeshModel):
 def inclinations(shape: Shape, height: float, intersections: float, max_distance: float) -> Floats:
     """The paper's phi_n (rings,) [rad] of all rings, the nadir first, with k = `intersections` rings across an object.
 
-    fig:geometry shows them for k = 1.
+    The paper defines them for k = 1 (section "Visual Mesh Geometry", fig:geometry), and then for any k (section "Object
+    Dependent Sample Density").
 
     The last ring is the last one closer than `max_distance` [m]. Raises GeometryError for a height that is too low for
     the shape, and for too many rings.
@@ -114,7 +115,7 @@ def ring_neighbors(counts: Indices, start: Indices, place: Indices, width: int, 
     """
     missing = int(start[-1])
     inner, own, outer = _beside(counts, start)
-    # The reference rounds this fraction in floating point, and whole numbers would round differently.
+    # A float, as in the reference: integer arithmetic would round some places differently.
     fraction = (place + nudge) / own.size
     outwards, inwards = fraction * outer.size, fraction * inner.size
     outwards_floor, inwards_floor = outwards.astype(np.int32), inwards.astype(np.int32)

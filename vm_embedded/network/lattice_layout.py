@@ -1,4 +1,4 @@
-"""Layout lattice: the points as pixels of a picture, for networks of ordinary convolutions without look-ups."""
+"""The layout `lattice`: the points as pixels of a picture, for networks of ordinary convolutions without look-ups."""
 
 from __future__ import annotations
 

@@ -17,10 +17,11 @@ from ..geometry.shape import Shape
 from ..mesh.mesh import MeshModel
 from ..mesh.models import MESH_MODELS
 from ..mesh.walls import wall_counts
+from .look_contract import LookContract
 from .self_test import SelfTest
 
 METADATA_KEY = "visual_mesh"
-FORMAT_VERSION = 5
+FORMAT_VERSION = 6
 
 KINDS = ("object", "upright", "area", "background")
 """Kinds of classes. object: has the mesh's shape; the runtime locates it. upright, area: the runtime reports its points
@@ -85,6 +86,7 @@ class Manifest:
     scale: see `channels`.
     sampling: one of POINT_SAMPLINGS.
     colors: one of POINT_COLORS.
+    look: description of the look network, if the file has one; see close_look.py.
     provenance: origin of the file, for people.
 
     Raises ModelError for unknown values.
@@ -107,6 +109,7 @@ class Manifest:
     scale: float = 1.0 / 255.0
     sampling: str = "bilinear"
     colors: str = "absolute"
+    look: LookContract | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -133,6 +136,7 @@ class Manifest:
             if not _is_number(value) or not 0 < value <= _LARGEST:
                 raise ModelError(f"{name} in the model's manifest must be a number above 0, not {value!r}")
         self._check_object_height()
+        self._check_look()
         if self.mesh == "wall6":
             self._check_walls()
         if not _is_number(self.operations, int) or self.operations < 0:
@@ -152,6 +156,13 @@ class Manifest:
         if (self.shape == "cylinder") != (tall > 0):
             raise ModelError(
                 f"object_height must be above 0 for a cylinder and 0 for other shapes; {self.shape} has {tall:g} m"
+            )
+
+    def _check_look(self) -> None:
+        objects = [each.name for each in self.classes if each.kind == "object"]
+        if self.look is not None and self.look.object_class not in objects:
+            raise ModelError(
+                f"the close look judges class {self.look.object_class!r}, but the classes of kind object are {objects}"
             )
 
     def _check_walls(self) -> None:
@@ -213,7 +224,8 @@ class Manifest:
 
     def as_json(self) -> str:
         """The manifest as the model file holds it."""
-        data = asdict(self) | {"format_version": FORMAT_VERSION}
+        data = asdict(replace(self, look=None)) | {"format_version": FORMAT_VERSION}
+        data["look"] = self.look.as_dict() if self.look else None
         data["self_test"] = self.self_test.as_dict() if self.self_test else None
         return json.dumps(data, sort_keys=True)
 
@@ -244,6 +256,8 @@ class Manifest:
             data["provenance"] = {str(key): str(value) for key, value in data["provenance"].items()}
         except (TypeError, KeyError, AttributeError) as error:
             raise ModelError(f"the model's manifest has malformed classes or provenance: {error}") from error
+        if data["look"] is not None:
+            data["look"] = LookContract.from_dict(data["look"])
         if data["self_test"] is not None:
             data["self_test"] = SelfTest.from_dict(data["self_test"])
         return cls(**data)

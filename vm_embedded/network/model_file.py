@@ -6,12 +6,15 @@ one Protocol Buffers message; the walk below knows the wire format and the few f
 
 from __future__ import annotations
 
+import base64
+import binascii
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import ModelError
+from .look_contract import LOOK_KEY
 from .manifest import METADATA_KEY, Manifest
 
 # Fields of a message that hold further messages, by the numbers of onnx.proto: every place that can hold a tensor.
@@ -32,12 +35,13 @@ _DEEPEST = 64
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A model file's bytes, its manifest, and the SHA-256 of the bytes."""
+    """A model file's bytes, its manifest, the SHA-256 of the bytes, and the ONNX file of its look network, if any."""
 
     path: Path
     content: bytes
     manifest: Manifest
     sha256: str
+    look: bytes | None = None
 
 
 def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
@@ -59,9 +63,25 @@ def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
         if METADATA_KEY not in metadata:
             raise ModelError("no Visual Mesh manifest in its metadata; was it written by vm-export?")
         manifest = Manifest.from_json(metadata[METADATA_KEY])
+        look = _look(metadata, manifest)
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from error
-    return ModelFile(path, content, manifest, hashlib.sha256(content).hexdigest())
+    return ModelFile(path, content, manifest, hashlib.sha256(content).hexdigest(), look)
+
+
+def _look(metadata: dict[str, str], manifest: Manifest) -> bytes | None:
+    """The ONNX file of the look network, if the manifest describes one. Raises ModelError."""
+    if (LOOK_KEY in metadata) != (manifest.look is not None):
+        has, lacks = ("manifest", "metadata") if manifest.look else ("metadata", "manifest")
+        raise ModelError(f"its {has} has a close look, its {lacks} has none")
+    if manifest.look is None:
+        return None
+    try:
+        content = base64.b64decode(metadata[LOOK_KEY], validate=True)
+        _metadata(content)
+    except (ModelError, binascii.Error, ValueError) as error:
+        raise ModelError(f"its close look can't be read: {error}") from error
+    return content
 
 
 def _metadata(content: bytes) -> dict[str, str]:

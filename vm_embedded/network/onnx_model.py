@@ -88,4 +88,4 @@ class OnnxModel:
             raise ModelError(f"{self.path}: self-test answered in shape {answer.shape}, not {expected.shape}")
         error = float(np.abs(answer - expected).max(initial=0.0))
         if not error <= _SELF_TEST_TOLERANCE:
-            raise ModelError(f"{self.path}: self-test failed, probabilities are off by {error:.2g}")
+            raise ModelError(f"{self.path}: self-test failed, answers are off by {error:.2g}")

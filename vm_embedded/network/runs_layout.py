@@ -1,4 +1,4 @@
-"""Layout runs: points in an order in which a point's neighbors lie beside each other in memory.
+"""The layout `runs`: points in an order in which a point's neighbors lie beside each other in memory.
 
 The words that this file uses:
 
@@ -49,7 +49,7 @@ _Positions = npt.NDArray[np.int64]
 
 
 class RunsLayout(Layout):
-    """The slots of a mesh in layout runs, and the columns in which each slot finds the sums of its groups.
+    """The slots of a mesh in the layout `runs`, and the columns in which each slot finds the sums of its groups.
 
     columns: (G, m) positions in a layer's table of G (m - 1) sums.
     """
@@ -64,6 +64,7 @@ class RunsLayout(Layout):
         original[places] = True
         self.original = frozen(original)
         self.rays = frozen(np.take(np.append(mesh.rays.T, np.full((3, 1), np.nan), axis=1), slots, axis=1)).T
+        # Of each group: the column of the sum around slot 0.
         self._first_columns = 1 + (count - 1) * np.arange(len(middles), dtype=np.int32)[:, None]
         self.columns = frozen(middles.astype(np.int32) + self._first_columns)
 
@@ -111,7 +112,7 @@ def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Position
     the group's middle (G, m).
     """
     n = len(neighbors) - 1
-    # The second gap at the end is for a group of three that begins with the last point.
+    # A second gap at the end: a group of three may begin with the last point, with its other members off screen.
     runs = np.append(_in_runs(neighbors[:n, groups[0][0]], neighbors[:n, groups[0][-1]]), n)
     slot = np.full(n + 1, GAP)  # of each point, and of the off-screen point
     filled = np.flatnonzero(runs < n)
@@ -124,6 +125,8 @@ def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Position
         )
         middle, torn = _found_in_runs(members, group_offsets(group), runs, slot)
         copies, copy = np.unique(members[:, torn], axis=1, return_inverse=True)
+        # A torn group's copy begins at slot count + len(group) * copy. The first offset, negative or 0, leads from the
+        # middle back to this begin.
         middle[:n][torn] = count + len(group) * copy.reshape(-1) - group_offsets(group)[0]
         parts.append(copies.T.reshape(-1))
         count += copies.size
@@ -173,7 +176,7 @@ def _in_runs(left: Indices, right: Indices) -> _Positions:
     lengths = (ends - starts + 1)[order]
     first_slot = _GAPS_BEFORE + np.cumsum(np.append(0, lengths + ends_run))  # of each piece, and of the end
     runs = np.full(first_slot[-1], n)
-    within = points - np.repeat(np.cumsum(lengths) - lengths, lengths)  # place of a point in its piece
+    within = np.arange(n) - np.repeat(np.cumsum(lengths) - lengths, lengths)  # place of a point in its piece
     runs[np.repeat(first_slot[:-1], lengths) + within] = np.repeat(starts[order], lengths) + within
     return runs
 

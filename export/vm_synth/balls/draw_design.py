@@ -1,4 +1,7 @@
-"""Draws the design of a ball: its pattern, colors, marks, wear and gloss."""
+"""Draws the design of a ball: its pattern, colors, marks, wear and gloss.
+
+The paper has 140 models of balls, also with less than 50 % white (section "Dataset").
+"""
 
 from __future__ import annotations
 

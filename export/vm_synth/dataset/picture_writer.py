@@ -1,4 +1,7 @@
-"""Writes a rendered picture with its masks, lens and scene description."""
+"""Writes a rendered picture with its masks, lens and scene description.
+
+The paper's pictures come with masks and poses, too (section "Dataset").
+"""
 
 from __future__ import annotations
 

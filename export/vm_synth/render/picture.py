@@ -3,6 +3,8 @@
 Ground and sky are computed without noise. The sky is looked up in the map. Under a distant map the irradiance E is the
 same on the whole plane, so the ground's radiance is albedo E / pi, times the share of light that objects do not block.
 Only objects and their shadows are traced.
+
+The paper's pictures come from physically based rendering, too (section "Dataset").
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The camera of a scene: lens, height and orientation."""
+"""The camera of a scene: lens, height and orientation.
+
+The paper has equisolid and rectilinear lenses (section "Dataset").
+"""
 
 from __future__ import annotations
 

@@ -58,6 +58,7 @@ class TargetRanges:
         "m",
         (0.0, 100.0),
     )
+    # The paper has fewer far balls, so its plots are noisy there (section "Precision").
     even: float = share(
         0.0, "share of pictures whose ball distance is uniformly distributed instead, for more far balls"
     )

@@ -67,6 +67,8 @@ def _draw_camera_and_spot(
 
     The ball's angular size, or its distance, has a uniform distribution. floor: angle below the horizon where a
     photographed floor begins [rad], or None.
+
+    The paper's balls are uniform in pixel size, from 0 to 10 m (section "Dataset").
     """
     for _ in range(ATTEMPTS):
         orientation = draw_orientation(random, ranges.camera)

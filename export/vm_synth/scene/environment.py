@@ -2,6 +2,8 @@
 
 A map is an equirectangular picture, row 0 at the zenith. World frame: z up, azimuth a = atan2(y, x); the map's column
 is u = 1/2 - a / 2 pi of its width, so a turn to the left moves left in the picture.
+
+The paper lights its scenes with 360 degree HDR images, too (section "Dataset").
 """
 
 from __future__ import annotations

@@ -19,7 +19,9 @@ TURFS = ("blades", "felt", "natural")
 class FieldRanges:
     """Section [field]: soccer fields."""
 
-    length: tuple[float, float] = range_of(5.0, 14.0, "length of a field; the authors' is 9 x 6 m", "m", (1.0, 120.0))
+    length: tuple[float, float] = range_of(
+        5.0, 14.0, "length of a field; that of the paper's authors is 9 x 6 m", "m", (1.0, 120.0)
+    )
     proportion: tuple[float, float] = range_of(0.6, 0.75, "width of a field as a share of its length", "", (0.3, 1.0))
     line_width: tuple[float, float] = range_of(0.045, 0.085, "width of lines", "m", (0.01, 0.5))
     border: tuple[float, float] = range_of(0.3, 2.0, "width of the carpet outside of the outer lines", "m", (0.0, 20.0))

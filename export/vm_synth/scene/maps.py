@@ -1,4 +1,7 @@
-"""Which environment maps of a folder are rendered."""
+"""Which environment maps of a folder are rendered.
+
+The paper's maps are from RoboCup, a laboratory and HDRI Haven (section "Dataset").
+"""
 
 from __future__ import annotations
 

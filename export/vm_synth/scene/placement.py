@@ -40,7 +40,10 @@ def in_picture(lens: RadialLens, size: Size, rays: Floats, margin: float) -> Mas
 
 
 def draw_ball_at(random: np.random.Generator, ranges: SceneConfiguration, center: Floats, radius: float) -> PlacedBall:
-    """Draw a ball with any design and attitude around a center (3,) [m]."""
+    """Draw a ball with any design and attitude around a center (3,) [m].
+
+    The mesh is not invariant to rotations of the object (paper: section "Discussion and Conclusion").
+    """
     attitude, _ = np.linalg.qr(random.normal(size=(3, 3)))
     attitude[:, 0] *= np.sign(np.linalg.det(attitude))
     return PlacedBall(center, radius, attitude, draw_design(random, ranges.ball_design))

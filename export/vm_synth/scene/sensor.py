@@ -1,6 +1,8 @@
 """The camera sensor of one picture: its exposure, colors, blur, noise and compression, drawn from ranges.
 
 `vm_synth.render.image_processing` applies these parameters.
+
+The paper varies the intensity of the light (section "Dataset"); here the exposure varies.
 """
 
 from __future__ import annotations

@@ -21,6 +21,8 @@ from .evaluate_options import points_parser
 from .evaluate_points import run_points
 
 if TYPE_CHECKING:
+    from vm_embedded.network.look_contract import LookContract
+
     from ..evaluation.answers import Subject
     from ..evaluation.evaluation import Evaluation
 
@@ -126,6 +128,7 @@ def _about(options: argparse.Namespace, settings: Settings, subject: Subject, co
             "max_distance": manifest.max_distance,
             "grid": grid.kind + (f", equal at {grid.equal_at:g} m" if grid.equal_at else ""),
             **{f"provenance {key}": value for key, value in manifest.provenance.items()},
+            **_about_look(manifest.look),
         },
         "data": {
             "folders": [str(each) for each in options.data],
@@ -135,6 +138,18 @@ def _about(options: argparse.Namespace, settings: Settings, subject: Subject, co
         },
         "rules": {"radius_of": options.radius_of, "min_radius": options.min_radius, "as_robot": options.as_robot},
         "settings": asdict(settings),
+    }
+
+
+def _about_look(look: LookContract | None) -> dict[str, Any]:
+    """The close look of a model, for scores.json."""
+    if look is None:
+        return {"close_look": None}
+    return {
+        "close_look": f"{look.object_class}, {look.size} x {look.size} samples, extent {look.extent:g} radii, points "
+        f"above {look.above:g}, {look.passes} pass{'es' * (look.passes != 1)}",
+        "close_look_channels": list(look.channels),
+        **{f"close_look provenance {key}": value for key, value in look.provenance.items()},
     }
 
 
@@ -148,11 +163,11 @@ def _notes(options: argparse.Namespace, settings: Settings, subject: Subject, re
         low, high = min(result.radii), max(result.radii)
         found = f"radii from {low:.3f} to {high:.3f} m" if high > low else f"a radius of {low:.3f} m"
         notes.append(
-            f"The balls in these pictures have {found}, but mesh and fit are for {radius:g} m. --radius-of scene uses "
+            f"The balls in these pictures have {found}, but the detector expects {radius:g} m. --radius-of scene uses "
             "the radius of each picture's ball."
         )
     if options.radius_of == "scene":
-        notes.append("Mesh and fit use the radius of each picture's ball.")
+        notes.append("The detector expects the radius of each picture's ball.")
     return notes
 
 

@@ -75,8 +75,8 @@ def _add_pictures(made: argparse.ArgumentParser) -> None:
         "--radius-of",
         choices=("all", "scene"),
         default="all",
-        help="radius for mesh and fit. all: the network's radius for all pictures; scene: the radius of each picture's "
-        "ball (sceneX.json of vm-synth); default all",
+        help="radius for the mesh, and for the search for the outline that fits best. all: the network's radius for "
+        "all pictures; scene: the radius of each picture's ball (sceneX.json of vm-synth); default all",
     )
     group.add_argument(
         "--min-radius",
@@ -118,7 +118,8 @@ def points_parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--early",
         action="store_true",
-        help="also draw the Visual Mesh with the ring widths of an early version of the reference",
+        help="also draw the Visual Mesh with the theta (azimuth angle of an object) of an early version of the "
+        "reference implementation",
     )
     return made
 

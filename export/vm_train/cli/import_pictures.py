@@ -23,8 +23,8 @@ def import_parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="vm-train import",
         description="Convert TFRecord files (plain or gzip) of the reference implementation to a folder of pictures. "
-        "Images and masks keep their bytes; a file beside them holds lens and pose. Records without a usable picture "
-        "are named and skipped. To continue an import that was stopped, repeat the command.",
+        "Images and masks are copied without any change; a file beside them holds lens and pose. Records without a "
+        "usable picture are named and skipped. To continue an import that was stopped, repeat the command.",
     )
     made.add_argument("files", type=Path, nargs="+", metavar="FILES", help="TFRecord files, in this order")
     made.add_argument("out", type=Path, metavar="OUT", help="folder to write to; created if missing")

@@ -9,6 +9,7 @@ from vm_workstation.option_types import at_least
 
 from .check import check_parser
 from .import_pictures import import_parser
+from .look import look_config_parser, look_parser
 from .shards import shards_parser
 from .stream_options import add_stream
 
@@ -16,6 +17,8 @@ DEVICES = ("auto", "cpu", "cuda")
 
 _EPILOG = """\
 other commands (add --help for their options):
+  vm-train look DATA           train the close look of a network: it judges the network's proposals
+  vm-train look-config         print a look.toml with all entries and their defaults
   vm-train resume RUN          continue a training that was stopped
   vm-train check DATA          count what the pictures show, and list the damaged ones
   vm-train preview DATA        draw augmented pictures with the points of the mesh
@@ -123,6 +126,8 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
     """All parsers, by command."""
     made = (
         parser(),
+        look_parser(),
+        look_config_parser(),
         resume_parser(),
         check_parser(),
         preview_parser(),

@@ -17,6 +17,7 @@ from ..data.pictures import find_pictures
 from ..learning.configuration import HEADER, TrainConfiguration
 from .check import run_check
 from .import_pictures import run_import
+from .look import print_look_config, resume_look, run_look
 from .options import parsers
 from .shards import run_shards
 from .training import EXIT_INTERRUPTED, EXIT_OK, find_good_pictures, read_configuration, run_resume, run_training
@@ -28,11 +29,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-train and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     commands: dict[str, Callable[[argparse.Namespace], int]] = {
-        "resume": run_resume,
+        "look": run_look,
+        "resume": _resume,
         "check": _check,
         "preview": _preview,
         "rate": _rate,
         "config": _config,
+        "look-config": print_look_config,
         "import": run_import,
         "shards": run_shards,
     }
@@ -51,9 +54,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if _is_leader():
             print(f"vm-train: {' '.join(str(error).split())}", file=sys.stderr)
         return EXIT_FAILED
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         if _is_leader():
-            print("vm-train: stopped", file=sys.stderr)
+            print(f"vm-train: {'; '.join(['stopped', *map(str, error.args)])}", file=sys.stderr)
         sys.stdout.flush()
         os._exit(EXIT_INTERRUPTED)  # ends the workers, too; a normal exit might wait for them forever
 
@@ -61,6 +64,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _is_leader() -> bool:
     """Whether this is the process that reports, of those that torchrun started."""
     return os.environ.get("RANK", "0") == "0"
+
+
+def _resume(options: argparse.Namespace) -> int:
+    """Resume the training of a network, or of a close look."""
+    from ..look.run_folder import is_look_run
+
+    return resume_look(options) if is_look_run(options.run) else run_resume(options)
 
 
 def _check(options: argparse.Namespace) -> int:

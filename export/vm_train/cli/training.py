@@ -135,7 +135,7 @@ def _train(folder: Path, hardware: Hardware, moved_to: Path | None = None) -> in
         hardware = replace(hardware, workers=source.workers)
         if hardware.is_leader:
             print(f"vm-train: {hardware.workers} workers read the stream, as run.json says", file=sys.stderr)
-    with locked(folder) if hardware.is_leader else nullcontext(), _stop_requests() as stop_requested:
+    with locked(folder) if hardware.is_leader else nullcontext(), stop_requests() as stop_requested:
         outcome = train(run, hardware, stop_requested)
     if hardware.is_leader:
         _report(run, outcome)
@@ -171,7 +171,7 @@ def _message_of_error(work: Callable[[], object]) -> str | None:
 
 
 @contextmanager
-def _stop_requests() -> Iterator[Callable[[], bool]]:
+def stop_requests() -> Iterator[Callable[[], bool]]:
     """Yield a function that tells whether Ctrl-C or SIGTERM has asked for a stop after the current step.
 
     The same signal once more stops at once; the other one does not, because torchrun sends one after the other.

@@ -7,6 +7,7 @@ robot shares meshes between similar poses, so its points differ.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -20,11 +21,14 @@ from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Network, Observation, classify
 from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.detection.projection import Projection
+from vm_embedded.detection.proposals import propose_places
+from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.orientation import Orientation, rotation_z
 from vm_embedded.network.choose_layout import choose_layout
+from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.layout import Layout
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import read_model
@@ -42,16 +46,21 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, eq=False)
 class PictureAnswer:
     """The answer to a picture: pixels (n, 2), distances (n,) on the plane [m] and probabilities (n, C) of its points,
-    and the objects found, most confident first."""
+    and the objects found, most confident first.
+
+    proposals: centers (c, 3) [m] of the proposals for the close look, by its class, relative to the camera in the frame
+    of the found objects' bearings. Empty without a close look.
+    """
 
     pixels: Floats
     distances: Floats
     probabilities: Singles
     found: tuple[Detection, ...]
+    proposals: Mapping[str, Floats]
 
 
 class Subject(Protocol):
-    """A network to evaluate. sha256: of its file."""
+    """A network to evaluate. sha256: of its file. look: its close look, if it has one."""
 
     @property
     def manifest(self) -> Manifest: ...
@@ -59,9 +68,11 @@ class Subject(Protocol):
     def grid(self) -> Grid: ...
     @property
     def sha256(self) -> str: ...
+    @property
+    def look(self) -> CloseLook | None: ...
 
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
-        """Its answer to a picture. radius [m]: of the objects, for mesh and fit, if not the manifest's.
+        """Its answer to a picture. radius [m]: of the objects, for the mesh and the fits, if not the manifest's.
 
         Raises GeometryError if the camera is too low for a mesh, and InputError for a lens that does not fit.
         """
@@ -76,13 +87,14 @@ class ExactSubject:
     sha256: str
     settings: Settings
     network: Network
+    look: CloseLook | None = None
 
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         observation = self.observe(picture, radius)
         found: tuple[Detection, ...] = ()
         if self.grid.is_visual:
-            found, _ = locate(observation, self.settings)
-        return _answer(observation, found)
+            found, _ = locate(observation, self.look, self.settings, Stopwatch())
+        return _answer(observation, found, self.look, self.settings)
 
     def observe(self, picture: Picture, radius: float | None = None) -> Observation:
         """The points of a picture with their probabilities; see `Subject.answer`."""
@@ -95,7 +107,9 @@ class ExactSubject:
         pixels = np.append(shown.pixels, np.full((1, 2), np.nan), axis=0)[layout.slots]  # NaN in gaps
         projected = Projection(layout, pixels, layout.slots < len(shown))
         view = _view(picture, layout, manifest, self.grid)
-        return classify(picture.image, view, projected, manifest, self.network, self.settings, Stopwatch())
+        return classify(
+            Pyramid(picture.image, "bgr"), view, projected, manifest, self.network, self.settings, Stopwatch()
+        )
 
 
 @dataclass(eq=False)
@@ -110,15 +124,30 @@ class RobotSubject:
     def manifest(self) -> Manifest:
         return self.detector.manifest
 
+    @property
+    def look(self) -> CloseLook | None:
+        return self.detector.look
+
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         assert radius is None  # a robot's network is for balls of one size
         seen = self.detector.detect(picture.image, _orientation(picture), picture.lens.lens)
-        return _answer(seen.observation, seen.objects)
+        return _answer(seen.observation, seen.objects, self.look, self.detector.settings)
 
 
-def _answer(observation: Observation, found: tuple[Detection, ...]) -> PictureAnswer:
+def _answer(
+    observation: Observation, found: tuple[Detection, ...], look: CloseLook | None, settings: Settings
+) -> PictureAnswer:
     distances = plane_distances(observation.rays, observation.view.height)
-    return PictureAnswer(observation.pixels, distances, observation.probabilities, found)
+    proposals = {} if look is None else _proposals(observation, look, settings)
+    return PictureAnswer(observation.pixels, distances, observation.probabilities, found, proposals)
+
+
+def _proposals(observation: Observation, look: CloseLook, settings: Settings) -> dict[str, Floats]:
+    """The places that the close look gets to see; see PictureAnswer."""
+    contract = look.contract
+    probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
+    centers = propose_places(observation, probabilities, contract.above, settings.max_proposals)
+    return {contract.object_class: centers @ observation.view.heading.T}
 
 
 def _view(picture: Picture, layout: Layout, manifest: Manifest, grid: Grid) -> PreparedView:
@@ -149,7 +178,8 @@ def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subj
         if as_robot:
             return RobotSubject(Detector(model, settings), model.sha256)
         session = Session(model, settings.threads, settings.spinning)
-        return ExactSubject(model.manifest, VISUAL, model.sha256, settings, session)
+        look = CloseLook(model, settings.threads, settings.spinning) if model.manifest.look else None
+        return ExactSubject(model.manifest, VISUAL, model.sha256, settings, session, look)
     if kind != ".pt":
         raise InputError(f"{path}: a model must be a checkpoint (.pt) or a model file (.onnx), not {path.suffix!r}")
     if as_robot:

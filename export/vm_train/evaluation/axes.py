@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 _COLORS = ("#d62728", "#1f77b4", "#2ca02c", "#7f7f7f", "#ff7f0e", "#9467bd", "#17becf", "#8c564b", "#e377c2", "#bcbd22")
 _LINES = ("-", "--", ":")
+FEWEST = 10
+"""Objects that a bin needs to be drawn; the scores of fewer depend on chance."""
+
 _MOST = 300  # points of a long curve
 
 

@@ -1,4 +1,4 @@
-"""The result of an evaluation: scores of points and objects, the worst errors, and the pictures that can't be used.
+"""The result of an evaluation: scores of points, objects and proposals, the worst errors, and the skipped pictures.
 
 Results for parts of the pictures add up to the result for all of them.
 """
@@ -18,6 +18,7 @@ from ..data.picture_files import PictureFault, PictureFiles
 from ..data.pictures import Picture, read_picture
 from ..scores.object_scores import ObjectScores
 from ..scores.point_scores import PointScores
+from ..scores.proposal_scores import ProposalScores
 from .answers import PictureAnswer, Subject
 from .object_truth import SceneTruth, read_scene, true_objects
 from .worst_errors import WorstErrors, worst_errors_of
@@ -27,8 +28,9 @@ from .worst_errors import WorstErrors, worst_errors_of
 class Rules:
     """How to evaluate pictures.
 
-    radius_of: radius of mesh and fit. all: the network's; scene: that of each picture's balls, from the sceneX.json of
-    vm-synth. min_radius: smaller true objects are ignored [px]. strict: stop at the first picture that can't be used.
+    radius_of: radius for the mesh, and for the search for the outline that fits best. all: the network's; scene: that
+    of each picture's balls, from the sceneX.json of vm-synth. min_radius: smaller true objects are ignored [px].
+    strict: stop at the first picture that can't be used.
     """
 
     radius_of: str = "all"
@@ -49,12 +51,14 @@ class CameraPose:
 class Evaluation:
     """The result for some pictures.
 
-    objects: scores for each class of the kind object. poses: of the evaluated pictures. radii: of the balls [m], one
-    for each picture with a sceneX.json. faults: the reason for each picture that was not evaluated, by path.
+    objects: scores for each class of the kind object. proposals: scores for the class of the close look, if there is
+    one. poses: of the evaluated pictures. radii: of the balls [m], one for each picture with a sceneX.json. faults: the
+    reason for each picture that was not evaluated, by path.
     """
 
     points: PointScores
     objects: dict[str, ObjectScores]
+    proposals: dict[str, ProposalScores] = field(default_factory=dict)
     poses: list[CameraPose] = field(default_factory=list)
     radii: list[float] = field(default_factory=list)
     faults: dict[str, str] = field(default_factory=dict)
@@ -66,13 +70,16 @@ class Evaluation:
         classes = subject.manifest.classes
         objects = [each.name for each in classes if each.kind == "object" and subject.grid.is_visual]
         scores = {name: ObjectScores(min_radius=rules.min_radius) for name in objects}
-        return cls(PointScores([each.name for each in classes]), scores)
+        looks = [] if subject.look is None else [subject.look.contract.object_class]
+        proposals = {name: ProposalScores(min_radius=rules.min_radius) for name in looks if name in scores}
+        return cls(PointScores([each.name for each in classes]), scores, proposals)
 
     def __add__(self, other: Evaluation) -> Evaluation:
         """The result for the pictures of both. Raises InputError if their classes or rules differ."""
         return Evaluation(
             self.points + other.points,
             {name: scores + other.objects[name] for name, scores in self.objects.items()},
+            {name: scores + other.proposals[name] for name, scores in self.proposals.items()},
             self.poses + other.poses,
             self.radii + other.radii,
             self.faults | other.faults,
@@ -90,6 +97,8 @@ class Evaluation:
                 found = [each for each in answer.found if each.class_name == name]
                 mistakes = self.objects[name].add(truths, found)
                 self.worst += worst_errors_of(files, name, truths, found, mistakes)
+            if name in self.proposals:
+                self.proposals[name].add(truths, answer.proposals[name])
         if scene is not None:
             self.radii.append(scene.ball_radius)
         orientation = picture.lens.orientation

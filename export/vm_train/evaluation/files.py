@@ -14,8 +14,9 @@ from vm_embedded.files import atomic_write
 from vm_workstation.plots import save_figure
 
 from .evaluation import Evaluation
-from .object_plots import distance_errors, object_curves, objects_over_distance
+from .object_plots import distance_errors, object_curves, objects_over_distance, reliability
 from .point_plots import confusion, point_curves, points_over_distance
+from .proposal_plot import proposal_recalls
 from .report import page
 from .tables import as_csv, as_json
 from .worst_errors import WorstError
@@ -24,10 +25,10 @@ from .worst_pictures import draw_error
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_TABLES = ("points", "point_curves", "confusion", "objects", "object_curves")
+_TABLES = ("points", "point_curves", "confusion", "objects", "object_curves", "calibration", "proposals")
 _PLOTS = (
     *("points_curves", "points_over_distance", "confusion", "points_on_object"),
-    *("objects_curves", "objects_over_distance", "distance_error"),
+    *("objects_curves", "objects_over_distance", "distance_error", "reliability", "proposals"),
 )
 _QUALITY = 85  # of the small JPEG pictures
 
@@ -79,6 +80,9 @@ def _figures(evaluation: Evaluation, threshold: float) -> dict[str, Figure]:
         figures["objects_curves"] = object_curves(objects)
         figures["objects_over_distance"] = objects_over_distance(objects)
         figures["distance_error"] = distance_errors(objects)
+        figures["reliability"] = reliability(objects)
+    if evaluation.proposals:
+        figures["proposals"] = proposal_recalls(evaluation.proposals, objects)
     return figures
 
 

@@ -1,4 +1,4 @@
-"""Plots of the scores of objects: curves, scores over distance, and errors of distance."""
+"""Plots of the scores of objects: curves, scores over distance, errors of distance, and calibration."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import numpy as np
 
 from vm_workstation.plots import new_figure
 
+from ..scores.calibration import BINS
 from ..scores.object_ranking import ObjectRanking
 from ..scores.object_scores import ObjectScores
 from .axes import (
+    FEWEST,
     add_legend,
     bin_middles,
     colors,
@@ -30,9 +32,6 @@ if TYPE_CHECKING:
 
 Objects = Mapping[str, ObjectScores]
 """Scores by class; at least one."""
-
-_FEWEST = 10
-"""Objects that a distance bin needs to be drawn; the scores of fewer depend on chance."""
 
 
 def object_curves(objects: Objects) -> Figure:
@@ -74,7 +73,7 @@ def objects_over_distance(objects: Objects) -> Figure:
         for overlap, style in zip(scores.overlaps, line_styles(len(scores.overlaps)), strict=True):
             rankings = [scores.ranking(overlap, number) for number in range(len(middles))]
             for axes, score in zip(panels, drawn.values(), strict=False):
-                values = [score(each) if each.truths >= _FEWEST else math.nan for each in rankings]
+                values = [score(each) if each.truths >= FEWEST else math.nan for each in rankings]
                 look: dict[str, Any] = {"color": color, "linestyle": style, "marker": ".", "markersize": 5}
                 axes.plot(middles, values, linewidth=1.2, label=f"{name}, IoU {overlap:g}", **look)
         numbers = [scores.ranking(scores.overlaps[0], number).truths for number in range(len(middles))]
@@ -97,7 +96,7 @@ def distance_errors(objects: Objects) -> Figure:
     for name, scores, color in _with_colors(objects):
         middles = bin_middles(scores.distance_edges)
         every = [scores.ranking(scores.overlaps[0], number).errors() for number in range(len(middles))]
-        known = [each.count >= _FEWEST for each in every]
+        known = [each.count >= FEWEST for each in every]
         columns = [[each.bias, each.low, each.high, each.relative_median, each.relative_p90] for each in every]
         bias, low, high, median, p90 = np.where(known, np.array(columns, dtype=np.float64).T, np.nan)
         signed.plot(middles, bias, color=color, marker=".", linewidth=1.3, label=f"{name}: median")
@@ -111,6 +110,30 @@ def distance_errors(objects: Objects) -> Figure:
         add_legend(axes)
     signed.axhline(0.0, color="black", linewidth=0.7)
     relative.set_ylim(bottom=0.0)
+    return figure
+
+
+def reliability(objects: Objects) -> Figure:
+    """Share of right objects over their confidence, at the first overlap, and the number of objects in each bin.
+
+    Vertical lines are 90 % intervals.
+    """
+    figure = new_figure(11.0, 4.6)
+    shares, numbers = figure.subplots(1, 2)
+    shares.plot([0.0, 1.0], [0.0, 1.0], color="black", linewidth=0.7)
+    for name, scores, color in _with_colors(objects):
+        found = scores.ranking(scores.overlaps[0]).reliability
+        label = f"{name}, ECE {found.error:.3f}" if found.total else name
+        shares.vlines(found.confidences, *found.intervals(), color=color, alpha=0.4, linewidth=1.0)
+        shares.plot(found.confidences, found.right, color=color, marker="o", markersize=4, linewidth=1.3, label=label)
+        numbers.stairs(found.counts, np.linspace(0.0, 1.0, BINS + 1), color=color, label=name)
+    unit_square(shares, "mean confidence", "share right")
+    label_axes(numbers, "confidence", "found objects")
+    numbers.set_xlim(0.0, 1.0)
+    numbers.set_yscale("symlog", linthresh=1.0, linscale=0.3)  # most objects are in few bins
+    numbers.yaxis.set_major_formatter("{x:g}")
+    numbers.set_ylim(bottom=0.0)
+    add_legend(numbers)
     return figure
 
 

@@ -100,21 +100,34 @@ def _of_scene(picture: Picture, ball: SceneBall) -> TrueObject:
     mask = np.zeros((height, width), dtype=np.float32)
     mask[window] = share
     radius = math.sqrt(polygon_area(sphere_outline(lens, orientation, **whole, unseen=True)) / math.pi)
-    return TrueObject(mask, ball.center, radius, ball.visible)
+    toward = ball.center - (0.0, 0.0, orientation.height)
+    distance = float(np.linalg.norm(toward))
+    angle = math.asin(min(ball.radius / distance, 1.0))
+    return TrueObject(mask, ball.center, radius, ball.visible, toward / distance, angle)
 
 
 def _of_mask(picture: Picture, shown: Mask, shape: Shape) -> list[TrueObject]:
     count, pieces, facts, _ = cv2.connectedComponentsWithStats(shown.astype(np.uint8), connectivity=8)
     areas = facts[1:, cv2.CC_STAT_AREA].tolist()
     masks = (pieces == number for number in range(1, count))
-    return [
-        TrueObject(mask, _place(picture, mask, shape), math.sqrt(area / math.pi))
-        for mask, area in zip(masks, areas, strict=True)
-    ]
+    return [_of_piece(picture, mask, area, shape) for mask, area in zip(masks, areas, strict=True)]
 
 
-def _place(picture: Picture, mask: Mask, shape: Shape) -> Floats:
-    """Position (3,) [m] of an object of that shape, from its pixels in a mask (h, w); NaN above the horizon."""
+def _of_piece(picture: Picture, mask: Mask, area: float, shape: Shape) -> TrueObject:
+    """An object of that shape, from its pixels in a mask (h, w). Above the horizon, its place and size are NaN."""
+    orientation = picture.lens.orientation
+    assert orientation is not None
+    bearing = _bearing(picture, mask)
+    position, angle = np.full(3, np.nan), math.nan
+    if bearing[2] < 0.0:
+        center = shape.center_along(bearing[None], orientation.height)[0]
+        position = center + np.array([0.0, 0.0, orientation.height])
+        angle = math.asin(min(shape.radius / float(np.linalg.norm(center)), 1.0))
+    return TrueObject(mask, position, math.sqrt(area / math.pi), bearing=bearing, angular_radius=angle)
+
+
+def _bearing(picture: Picture, mask: Mask) -> Floats:
+    """Unit vector (3,) along the mean ray through the pixels of a mask (h, w); NaN if the lens sees none of them."""
     orientation = picture.lens.orientation
     assert orientation is not None
     height, width = mask.shape
@@ -123,7 +136,4 @@ def _place(picture: Picture, mask: Mask, shape: Shape) -> Floats:
     rays = rays[np.isfinite(rays).all(axis=1)]
     middle = rays.mean(axis=0) if len(rays) else np.zeros(3)
     length = float(np.linalg.norm(middle))
-    if not length > 0.0 or middle[2] >= 0.0:
-        return np.full(3, np.nan)
-    center = shape.center_along(middle[None] / length, orientation.height)[0]
-    return np.asarray(center + np.array([0.0, 0.0, orientation.height]))
+    return np.asarray(middle / length) if length > 0.0 else np.full(3, np.nan)

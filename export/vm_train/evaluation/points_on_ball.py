@@ -1,4 +1,7 @@
-"""Number of mesh points, rings and rows on a ball in view of a camera."""
+"""Number of mesh points, rings and rows on a ball in view of a camera.
+
+The paper: it varies by at most 1 in phi and theta (section "Graph Structure of the Mesh").
+"""
 
 from __future__ import annotations
 
@@ -36,7 +39,7 @@ PAPER_CAMERA = PosedCamera(
     Equisolid(focal_length=420.0, fov=2.6, size=(1280, 1024)),
     (1280, 1024),
 )
-"""A camera like that of the authors' pictures. It sees from the point below itself to the horizon.
+"""A camera like that of the pictures of the paper's authors. It sees from the point below itself to the horizon.
 
 Of the camera in its figure, the paper gives only the size of the pictures, 1280 x 1024 px. Height and lens come from
 the pictures published with the paper's code: 0.78 to 1.2 m high, median 0.9 m; equisolid, f = 420 px, fov 1.6 to 2.6
@@ -45,11 +48,11 @@ rad.
 
 
 class EarlySphere(Sphere):
-    """A ball with the theta of an early version of the authors' program: 2 asin(r / (h tan(phi) + r)).
+    """A ball with the theta of an early version of the reference: 2 asin(r / (h tan(phi) + r)).
 
     The added r avoids the singularity of the paper's `circle_dtheta`, where the sine would exceed 1. But it makes the
     rings near the camera's foot too dense, by (d + r) / d at distance d. The result is a peak at 0 m like the one in
-    the paper's figure; our theta has no such peak.
+    the paper's figure (section "Precision"); our theta has no such peak.
     """
 
     def theta(self, n: Number, height: Number) -> Number:

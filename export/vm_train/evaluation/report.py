@@ -12,19 +12,29 @@ from .summary import (
     as_meters,
     as_number,
     as_percent,
+    as_radii,
+    calibration,
     object_table,
     point_table,
+    proposal_counts,
+    proposal_tables,
     subject,
     tables_by_overlap,
 )
 
 CAPTIONS = {
     "objects_curves": "Objects: precision and false objects per picture, over recall. The curves end at the detector's "
-    "settings, because the objects that it rejects have no confidence.",
+    "settings, because objects that it rejects do not count.",
     "objects_over_distance": "Objects by distance, at the detector's settings. The plots leave out bins with fewer "
     "than 10 true objects.",
     "distance_error": "Distance errors on the plane, of the objects found at the lower IoU. The plots leave out bins "
     "with fewer than 10 of them.",
+    "reliability": "Calibration: share of the found objects that are right at the lower IoU, in 15 bins of confidence, "
+    "with 90 % intervals. On the diagonal, nine of ten objects found with a confidence of 0.9 are right. The expected "
+    "calibration error (ECE) is the mean distance from the diagonal, weighted by the number of objects in each bin.",
+    "proposals": "Proposals: share of the true objects with a proposal near their center, within 0.5 or 1 apparent "
+    "radius (r). Dotted: share of the true objects that the detector finds. The plots leave out bins with fewer than "
+    "10 true objects.",
     "points_curves": "Points of each class against all other points.",
     "points_over_distance": "Points by distance, at the threshold.",
     "confusion": "The most probable class of the points of each true class.",
@@ -33,7 +43,7 @@ CAPTIONS = {
 """Captions of the plots, in the order of the page."""
 
 _STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #222; max-width: 1120px; margin: 2em auto; padding: 0 1em }
+body { font: 15px/1.45 system-ui, sans-serif; color: #222; max-width: 1180px; margin: 2em auto; padding: 0 1em }
 h1 { font-size: 1.5em; margin-bottom: 0.1em } h2 { font-size: 1.2em; margin: 2em 0 0.4em }
 p.note { background: #fff6dd; border-left: 4px solid #e0b030; padding: 0.5em 0.8em }
 .cards { display: flex; flex-wrap: wrap; gap: 0.7em; margin: 1em 0 }
@@ -44,9 +54,13 @@ th, td { padding: 0.2em 0.75em; text-align: right; border-bottom: 1px solid #e8e
 td { white-space: nowrap } .facts td { white-space: normal; overflow-wrap: anywhere }
 th:first-child, td:first-child, .facts td { text-align: left } th { color: #555; font-weight: 600 }
 figure { margin: 1.2em 0 } figure img { max-width: 100% } figcaption { color: #555; font-size: 0.9em }
-.strip { display: flex; flex-wrap: wrap; gap: 0.8em } .strip figure { margin: 0 }
+.strip { display: flex; flex-wrap: wrap; gap: 0.8em; align-items: flex-start } .strip figure { margin: 0 }
 .true { color: #1f9a33 } .found { color: #c22bc2 }
 """
+
+_OBJECT_PLOTS = ("objects_curves", "objects_over_distance", "distance_error", "reliability")
+
+_CENTER = "Center: angle between the rays to the true and the found center, over the object's apparent radius (r)."
 
 _KEY = '<p>Outlines: <b class="true">true</b>, <b class="found">found</b>.</p>'
 
@@ -62,8 +76,14 @@ def page(scores: Scores, plots: Mapping[str, bytes], strips: Mapping[str, Sequen
     ]
     for name, by_overlap in scores["objects"].items():
         parts.append(f"<h2>Objects of class {escape(name)}</h2>{_table(*object_table(by_overlap))}")
-        parts.append(f"<p>{escape(_ignored(by_overlap))}</p>")
-    parts += [_plot(name, plots, about) for name in ("objects_curves", "objects_over_distance", "distance_error")]
+        parts.append(f"<p>{_CENTER} {escape(_ignored(by_overlap))}</p>")
+        parts.append(f"<p>{escape(calibration(scores['calibration'][name]))}.</p>")
+    parts += [_plot(name, plots, about) for name in _OBJECT_PLOTS]
+    for name, found in scores["proposals"].items():
+        tables = "".join(_table(*each) for each in proposal_tables(found))
+        parts.append(f"<h2>Proposals for class {escape(name)}</h2><p>{escape(proposal_counts(found))}.</p>")
+        parts.append(f'<div class="strip">{tables}</div>')
+    parts.append(_plot("proposals", plots, about))
     for heading, pictures in strips.items():
         if pictures:
             parts.append(f"<h2>{escape(heading)}</h2>{_KEY}{_strip(pictures)}")
@@ -98,7 +118,12 @@ def _cards(scores: Scores) -> str:
             (as_number(first["false_per_picture"], 2), f"{name}: false per picture"),
             (as_meters(errors["distance_median"]), f"{name}: distance error, median"),
             (as_meters(errors["distance_p90"]), f"{name}: distance error, 90 %"),
+            (as_radii(errors["center_median"]), f"{name}: center error, median"),
+            (as_number(scores["calibration"][name]["expected_error"]), f"{name}: calibration error (ECE)"),
         ]
+    for name, found in scores["proposals"].items():
+        cards.append((as_percent(found["all"]["recall_0.5"]), f"{name}: proposed within 0.5 radii"))
+        cards.append((as_number(found["mean_count"], 1), f"{name}: proposals per picture"))
     for name, bins in scores["points"].items():
         cards.append((as_number(bins["all"]["average_precision"]), f"points of {name}: AP"))
     shown = (f'<div class="card"><b>{value}</b><span>{escape(label)}</span></div>' for value, label in cards)

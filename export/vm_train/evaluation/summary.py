@@ -1,4 +1,4 @@
-"""The scores that people read first: tables of objects and of points, for a terminal and for the report."""
+"""The scores that people read first: tables of objects, proposals and points, for a terminal and for the report."""
 
 from __future__ import annotations
 
@@ -19,7 +19,11 @@ def lines(scores: Scores) -> str:
     rows = [subject(scores)]
     for name, by_overlap in scores["objects"].items():
         heading, body = object_table(by_overlap)
-        rows += ["", f"objects of class {name}", *aligned([heading, *body])]
+        rows += ["", f"objects of class {name}", *aligned([heading, *body]), calibration(scores["calibration"][name])]
+    for name, found in scores["proposals"].items():
+        rows += ["", f"proposals for class {name}: {proposal_counts(found)}"]
+        for heading, body in proposal_tables(found):
+            rows += aligned([heading, *body])
     heading, body = point_table(scores["points"])
     return "\n".join([*rows, "", "points", *aligned([heading, *body])])
 
@@ -42,7 +46,7 @@ def object_table(by_overlap: Scores) -> Table:
     first = next(iter(overlaps.values()))
     heading = ["distance [m]", "true"]
     heading += [f"{score}@{overlap}" for score in ("recall", "precision", "AP") for overlap in overlaps]
-    heading += ["false/picture", "error median", "error 90 %"]
+    heading += ["false/picture", "error median", "error 90 %", "center median"]
     rows: list[Sequence[str]] = []
     for distance, each in first.items():
         if not each["truths"] and not each["false"]:
@@ -54,8 +58,40 @@ def object_table(by_overlap: Scores) -> Table:
         errors = each["errors"]
         row += [as_number(each["false_per_picture"])]
         row += [as_meters(errors["distance_median"]), as_meters(errors["distance_p90"])]
+        row += [as_radii(errors["center_median"])]
         rows.append(row)
     return heading, rows
+
+
+def calibration(found: Scores) -> str:
+    """A sentence on the calibration of a class's confidences."""
+    error = as_number(found["expected_error"])
+    return f"Expected calibration error (ECE): {error}, from {found['found']} found objects at IoU {found['iou']:g}"
+
+
+def proposal_counts(found: Scores) -> str:
+    """The number of proposals per picture."""
+    return f"{as_number(found['mean_count'], 1)} per picture, at most {found['largest_count']}"
+
+
+def proposal_tables(found: Scores) -> list[Table]:
+    """The recall of a class's proposals by distance, by radius and by visible share, without bins that have no object.
+
+    The first table begins with the recall of all objects.
+    """
+    tables: list[Table] = []
+    for measure, unit in (("distance", " [m]"), ("radius", " [px]"), ("visible", "")):
+        bins = found[f"by_{measure}"]
+        shown = ({"all": found["all"]} if measure == "distance" else {}) | bins
+        reaches = [key for key in found["all"] if key.startswith("recall_")]
+        heading = [measure + unit, "true", *(f"within {key.removeprefix('recall_')} r" for key in reaches)]
+        rows: list[Sequence[str]] = [
+            [name, str(each["truths"]), *(as_percent(each[key]) for key in reaches)]
+            for name, each in shown.items()
+            if each["truths"] or name == "all"
+        ]
+        tables.append((heading, rows))
+    return tables
 
 
 def point_table(points: Scores) -> Table:
@@ -75,6 +111,11 @@ def as_number(value: float | None, digits: int = 3) -> str:
 def as_percent(value: float | None) -> str:
     """A share as a percentage, "-" for None."""
     return "-" if value is None else f"{100.0 * value:.1f} %"
+
+
+def as_radii(value: float | None) -> str:
+    """An angle in apparent radii, "-" for None."""
+    return "-" if value is None else f"{value:.2f} r"
 
 
 def as_meters(value: float | None) -> str:

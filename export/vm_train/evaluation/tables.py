@@ -37,6 +37,14 @@ def as_json(evaluation: Evaluation, threshold: float) -> dict[str, Any]:
             }
             for name, scores in evaluation.objects.items()
         },
+        "calibration": {
+            name: {"iou": scores.overlaps[0], **scores.ranking(scores.overlaps[0]).reliability.as_dict()}
+            for name, scores in evaluation.objects.items()
+        },
+        "proposals": {
+            name: {"min_visible": scores.min_visible, "min_radius": scores.min_radius, **scores.as_dict()}
+            for name, scores in evaluation.proposals.items()
+        },
     }
 
 
@@ -49,6 +57,9 @@ def as_csv(evaluation: Evaluation, threshold: float) -> dict[str, str]:
     }
     if evaluation.objects:
         found |= {"objects": _text(_object_rows(evaluation)), "object_curves": _text(_object_curves(evaluation))}
+        found["calibration"] = _text(_calibration_rows(evaluation))
+    if evaluation.proposals:
+        found["proposals"] = _text(_proposal_rows(evaluation))
     return found
 
 
@@ -91,6 +102,22 @@ def _object_curves(evaluation: Evaluation) -> Iterable[dict[str, object]]:
             for row in zip(curve.thresholds, curve.precision, curve.recall, strict=True):
                 values = dict(zip(("confidence", "precision", "recall"), map(_short, row), strict=True))
                 yield {"class": name, "iou": overlap, **values}
+
+
+def _calibration_rows(evaluation: Evaluation) -> Iterable[dict[str, object]]:
+    for name, scores in evaluation.objects.items():
+        overlap = scores.overlaps[0]
+        for row in scores.ranking(overlap).reliability.rows():
+            yield {"class": name, "iou": overlap, **row}
+
+
+def _proposal_rows(evaluation: Evaluation) -> Iterable[dict[str, object]]:
+    for name, scores in evaluation.proposals.items():
+        counts = {"mean_count": scores.mean_count, "largest_count": scores.largest_count}
+        yield {"class": name, "by": "all", "bin": "all", **scores.recall().as_dict(), **counts}
+        for measure in scores.edges:
+            for place, recall in scores.recalls_by(measure).items():
+                yield {"class": name, "by": measure, "bin": place, **recall.as_dict()}
 
 
 def _short(value: float) -> str:

@@ -2,6 +2,9 @@
 
 Labels stay correct because nothing in the image moves. A camera error changes the pose and lens that the mesh is
 projected with, as errors of a robot's joints and calibration do, so the network gets other points of the same image.
+
+No augmentation is meant to scale pictures, because objects always have the same size in the mesh (paper: section
+"Discussion and Conclusion").
 """
 
 from __future__ import annotations

@@ -58,7 +58,7 @@ class GraphRecipe:
     def draw_view(self, picture: Picture, manifest: Manifest, random: np.random.Generator) -> LabeledGraph:
         """The whole graph of a picture with random camera error and blur, in absolute colors. Raises InputError."""
         changed = perturb_sharpness(perturb_camera(picture, self.augmentation, random), self.augmentation, random)
-        # absolute: the tone is drawn later, before colors are normalized
+        # Without normalized colors: draw_example first changes the tone, then normalizes.
         return self._whole_graph(changed, replace(manifest, colors="absolute"))
 
     def draw_example(self, view: LabeledGraph, random: np.random.Generator) -> LabeledGraph:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from vm_embedded.arrays import Floats, Indices, Singles
 from vm_embedded.detection.color_normalization import normalize_colors
 from vm_embedded.detection.footprint import Levels, footprint_levels, uniform_levels
+from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.sampling import sample
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
@@ -55,7 +56,7 @@ def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> Label
     shown = seen_points(picture.lens, (width, height), manifest, grid)
     points = np.full((len(shown) + 1, 3), OFF_SCREEN, dtype=np.float32)
     levels = levels_for(picture, shown.graph.rays, manifest, grid)
-    sample(picture.image, shown.pixels, "bgr", "exact", points[:-1], levels)
+    sample(Pyramid(picture.image, "bgr"), shown.pixels, "exact", points[:-1], levels)
     normalize_colors(points[:-1], manifest.colors)
     x, y = np.rint(shown.pixels).astype(np.intp).T
     assert picture.lens.orientation is not None

@@ -3,6 +3,8 @@
 A point at an outline shows both sides, so its label may lean on its neighbors' labels (label smoothing at outlines
 only). A larger, trained network knows which points are easily mistaken; its probabilities say more than labels
 (knowledge distillation, G. Hinton and others, 2015).
+
+The paper names no loss (section "Training").
 """
 
 from __future__ import annotations

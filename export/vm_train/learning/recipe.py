@@ -24,7 +24,7 @@ class Recipe:
     window: float = number(
         1.0,
         "train on random windows with this share of the picture's width and height; in pictures with objects, most "
-        "windows show one; 1: train on whole pictures",
+        "windows contain an object; 1: train on whole pictures",
         "",
         (0.05, 1.0),
     )
@@ -80,6 +80,7 @@ class Recipe:
         "",
         (0.0, 0.999999),
     )
+    # "This resampling was run twice" (paper: section "Training"): three rounds.
     rounds: int = number(3, "for selection hard: networks to train one after the other", "", (2, 10))
     patience: int = number(
         0, "a round ends after this many epochs without a better validation score; 0: it never ends early", "", (0, 1e6)

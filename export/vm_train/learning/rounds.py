@@ -199,7 +199,8 @@ class _Round:
         """Write the round's best network, and the best of all rounds if it is that, too."""
         progress, run = self._progress, self._run
         progress.best, progress.best_epoch = score, progress.validated
-        best_ever, progress.best_ever = progress.best_ever, max(progress.best_ever, score)
+        is_best_ever = score > progress.best_ever
+        progress.best_ever = max(progress.best_ever, score)
         if not self._hardware.is_leader:
             return
         provenance = run.provenance() | {
@@ -212,7 +213,7 @@ class _Round:
         network = self._trainer.result if run.first is None else run.first.followed_by(self._trainer.result)
         checkpoint = Checkpoint(network, manifest, run.configuration.grid)
         checkpoint.save(run.round_path(progress.round))
-        if score > best_ever:
+        if is_best_ever:
             checkpoint.save(run.model_path)
 
 

@@ -191,13 +191,13 @@ def read_run(folder: Path) -> TrainingRun:
     return run
 
 
-def check_unused(folder: Path) -> None:
-    """Raise InputError if a folder holds a training, or files that one would overwrite."""
+def check_unused(folder: Path, names: Sequence[str] = _FILES) -> None:
+    """Raise InputError if a folder holds a training, or one of the files `names`, which one would overwrite."""
     if (folder / "run.json").exists():
         raise InputError(f"{folder} holds a training already: vm-train resume {folder}, or give another folder")
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file: give a new folder")
-    present = [name for name in _FILES if (folder / name).exists()]
+    present = [name for name in names if (folder / name).exists()]
     if present:
         raise InputError(f"{folder} holds {', '.join(present)}, which a training would overwrite: give a new folder")
 

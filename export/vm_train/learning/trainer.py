@@ -7,7 +7,6 @@ gradient is that of the mean loss over the selected points of all parts.
 
 from __future__ import annotations
 
-import io
 import math
 import pickle
 from collections.abc import Mapping, Sequence
@@ -22,8 +21,8 @@ from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from vm_embedded.arrays import Floats, Singles
 from vm_embedded.errors import InputError, one_line
-from vm_embedded.files import atomic_write
 from vm_export.network import Network
+from vm_export.torch_files import save_values
 
 from ..graphs.labeled_graph import LabeledGraph, join_graphs
 from ..graphs.schedule import Item
@@ -167,19 +166,16 @@ class Trainer:
             "done": self.done,
             "network": self.network.state_dict(),
             "average": None if self._average is None else self._average.state_dict(),
-            "descent": self._optimizer.state_dict(),
+            "optimizer": self._optimizer.state_dict(),
             "more": dict(more),
         }
-        content = io.BytesIO()  # torch reports a full disk in its own way; write_bytes raises OSError
-        torch.save(state, content)
-        with atomic_write(path) as part:
-            part.write_bytes(content.getbuffer())
+        save_values(path, state)
 
     def load(self, state: Mapping[str, Any]) -> None:
         """Resume from a state that `read_state` read. Raises InputError if it belongs to another training."""
         try:
             self.network.load_state_dict(state["network"])
-            self._optimizer.load_state_dict(state["descent"])
+            self._optimizer.load_state_dict(state["optimizer"])
             if self._average is not None:
                 self._average.load_state_dict(state["average"])
             self.done = int(state["done"])

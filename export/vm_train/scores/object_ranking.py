@@ -1,4 +1,4 @@
-"""Found objects ranked by confidence: precision, recall, false objects, and errors of distance.
+"""Found objects ranked by confidence: precision, recall, false objects, and errors of place.
 
 Scores without a value, such as the recall without any true object, are NaN, never 0; `as_dict` writes None.
 """
@@ -15,16 +15,18 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Mask
 
+from .calibration import Reliability
 from .curves import Outcome, PrecisionRecall, ratio, shares, without_nan
 
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Errors [m] of correctly found objects, and their number. All errors are NaN if there are none.
+    """Errors of correctly found objects, in meters unless stated, and their number. All are NaN if there are none.
 
     distance_*: absolute error of the distance. bias, low, high: median, 10 % and 90 % quantile of the signed error,
     positive if found too far away. relative_*: absolute error over the true distance. place_*: distance on the plane
-    from the true to the found position.
+    from the true to the found position. center_*: angle between the rays to the true and the found center, over the
+    true angular radius.
     """
 
     count: int
@@ -37,6 +39,8 @@ class Errors:
     relative_p90: float
     place_median: float
     place_p90: float
+    center_median: float
+    center_p90: float
 
 
 @dataclass(frozen=True)
@@ -55,9 +59,9 @@ class ObjectOutcome(Outcome):
 class ObjectRanking:
     """The found objects that count, at one overlap.
 
-    confidence (m,). right (m,): whether it matches a true object. true_distance, found_distance, place_error (m,) [m];
-    true distance and place error of false objects are NaN. truths: number of true objects that count. pictures: number
-    of all pictures, whatever the distance.
+    confidence (m,). right (m,): whether it matches a true object. true_distance, found_distance, place_error (m,) [m].
+    center_error (m,) [apparent radii]. True distance and errors of false objects are NaN. truths: number of true
+    objects that count. pictures: number of all pictures, whatever the distance.
     """
 
     confidence: Floats
@@ -65,6 +69,7 @@ class ObjectRanking:
     true_distance: Floats
     found_distance: Floats
     place_error: Floats
+    center_error: Floats
     truths: int
     pictures: int
 
@@ -80,6 +85,11 @@ class ObjectRanking:
         last = np.flatnonzero(np.diff(ranked, append=-np.inf))  # of each group of equal confidences
         return PrecisionRecall(ranked[last], hits[last] / (last + 1.0), shares(hits[last], self.truths), self.truths)
 
+    @cached_property
+    def reliability(self) -> Reliability:
+        """Share of right objects in bins of confidence."""
+        return Reliability.of(self.confidence, self.right)
+
     def at(self, confidence: float = 0.0) -> ObjectOutcome:
         """The outcome if all objects of at least this confidence are reported."""
         reported = self.confidence >= confidence
@@ -94,7 +104,8 @@ class ObjectRanking:
         absolute = np.abs(signed)
         away = true > 0.0  # below the camera, a relative error is undefined
         relative = absolute[away] / true[away]
-        place = self.place_error[chosen]
+        place, center = self.place_error[chosen], self.center_error[chosen]
+        center = center[np.isfinite(center)]
         return Errors(
             count=len(true),
             distance_median=_quantile(absolute, 0.5),
@@ -106,10 +117,12 @@ class ObjectRanking:
             relative_p90=_quantile(relative, 0.9),
             place_median=_quantile(place, 0.5),
             place_p90=_quantile(place, 0.9),
+            center_median=_quantile(center, 0.5),
+            center_p90=_quantile(center, 0.9),
         )
 
     def as_dict(self, confidence: float = 0.0) -> dict[str, Any]:
-        """All numbers except the curve, for JSON."""
+        """All numbers except curve and reliability, for JSON."""
         outcome = self.at(confidence)
         counts = {"truths": self.truths, "pictures": self.pictures, "hits": outcome.hits, "false": outcome.false}
         values = {

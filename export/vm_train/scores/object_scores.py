@@ -1,4 +1,4 @@
-"""Scores of found objects: precision and recall at an overlap, false objects, and errors of distance; all by distance.
+"""Scores of found objects: precision and recall at an overlap, false objects, and errors of place; all by distance.
 
 Distances are on the plane, from the point below the camera to the point below the object's center, for true and found
 objects alike. The rules are those of COCO:
@@ -33,7 +33,10 @@ from .object_ranking import ObjectRanking
 from .overlaps import FoundObject, TrueObject, common_areas
 
 OVERLAPS = (0.5, 0.75)
-"""Least IoU of a correctly found object. The paper has 0.75, because at 0.5 the center may lie on the edge."""
+"""Least IoU of a correctly found object.
+
+The paper has 0.75, because at 0.5 the center may lie on the edge (section "Precision").
+"""
 
 MIN_VISIBLE = 0.25
 """Least visible share of a true object that counts."""
@@ -50,6 +53,7 @@ class _CountedObject:
     true_distance: float
     found_distance: float
     place_error: float
+    center_error: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +65,7 @@ class Mistakes(Generic[AnyFound]):
 
 
 class ObjectScores:
-    """Scores of the objects of all pictures so far. They are exact: it keeps five numbers of every found object.
+    """Scores of the objects of all pictures so far. They are exact: it keeps six numbers of every found object.
 
     distance_edges (D + 1,) [m]: bins include their lower edge; objects outside all bins count only in scores over all
     distances. overlaps: thresholds of IoU. min_visible, min_radius [px]: true objects with a smaller visible share or
@@ -114,7 +118,7 @@ class ObjectScores:
         return mistakes[0]
 
     def _ignores(self, truth: TrueObject) -> bool:
-        return truth.visible < self.min_visible or truth.radius < self.min_radius
+        return truth.is_ignored(self.min_visible, self.min_radius)
 
     def __add__(self, other: ObjectScores) -> ObjectScores:
         """Scores of the pictures of both. Raises InputError if their rules differ."""
@@ -151,6 +155,7 @@ class ObjectScores:
             true_distance=true[here],
             found_distance=found[here],
             place_error=np.array([each.place_error for each in counted], dtype=np.float64)[here],
+            center_error=np.array([each.center_error for each in counted], dtype=np.float64)[here],
             truths=int(self._within(np.array(self._truths, dtype=np.float64), distance_bin).sum()),
             pictures=self.pictures,
         )
@@ -194,4 +199,5 @@ def _counted_object(found: FoundObject, truth: TrueObject | None) -> _CountedObj
         true_distance=_distance(true),
         found_distance=_distance(found.position),
         place_error=_distance(found.position - true),
+        center_error=math.nan if truth is None else float(truth.offsets(found.bearing[None])[0]),
     )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -22,7 +23,7 @@ class FoundObject(Protocol):
     """A found object, for example a `vm_embedded.detection.detections.Detection`.
 
     confidence: 0 to 1. outline (m, 2) [px]: of the whole object, also outside the picture. position (3,) [m]: on the
-    plane.
+    plane. bearing (3,): unit vector from the camera to its center.
     """
 
     @property
@@ -31,6 +32,8 @@ class FoundObject(Protocol):
     def outline(self) -> Floats: ...
     @property
     def position(self) -> Floats: ...
+    @property
+    def bearing(self) -> Floats: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +43,28 @@ class TrueObject:
     mask (h, w): bool, or the share of each pixel that the object covers, 0 to 1. If known, it includes hidden parts
     inside the picture: with the visible part alone, the IoU of a correct outline could not exceed `visible`. position
     (3,) [m]: on the plane, in the same frame as found positions; NaN if unknown. radius [px]: of a disk with the area
-    of the whole outline. visible: visible share of the outline.
+    of the whole outline. visible: visible share of the outline. bearing (3,): unit vector from the camera to its
+    center, in the frame of found bearings; NaN if unknown. angular_radius [rad]: NaN if unknown.
     """
 
     mask: Mask | Singles
     position: Floats
     radius: float
     visible: float = 1.0
+    bearing: Floats = field(default_factory=lambda: np.full(3, np.nan))
+    angular_radius: float = math.nan
+
+    def is_ignored(self, min_visible: float, min_radius: float) -> bool:
+        """Whether less than `min_visible` of it is visible, or its radius is below `min_radius` [px]."""
+        return self.visible < min_visible or self.radius < min_radius
+
+    def offsets(self, rays: Floats) -> Floats:
+        """Angles (n,) between unit vectors (n, 3) and the ray to its center, over its angular radius.
+
+        0 at the center, 1 at the outline of a ball; NaN if its bearing or angular radius is unknown.
+        """
+        chords = np.linalg.norm(rays - self.bearing, axis=1)
+        return np.asarray(2.0 * np.arcsin(np.minimum(chords / 2.0, 1.0)) / self.angular_radius)
 
 
 def coverage(outline: Floats, size: Size) -> tuple[Window, Floats]:

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from vm_embedded.detection.footprint import levels_of, uniform_levels
 from vm_embedded.detection.pixel_formats import checked_image
+from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.sampling import SAMPLINGS, sample
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import build_mesh
@@ -44,7 +45,7 @@ def test_points_that_are_alike_have_one_level():
 
 def colored(image, pixels, levels, sampling="exact", format="bgr"):
     out = np.empty((len(pixels), 3), dtype=np.float32)
-    sample(checked_image(image, format), pixels, format, sampling, out, levels)
+    sample(Pyramid(checked_image(image, format), format), pixels, sampling, out, levels)
     return out
 
 

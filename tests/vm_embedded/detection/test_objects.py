@@ -13,7 +13,9 @@ from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.detection.projection import Projection, project, to_camera
+from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
+from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
@@ -22,6 +24,7 @@ from vm_embedded.mesh.models import build_mesh
 from vm_embedded.network.plain_layout import PlainLayout
 
 SIZE = (1280, 1024)
+PICTURE = Pyramid(np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8), "bgr")
 K = 5.0
 BALLS = ball_manifest(radius=0.08, object_radius=0.08, intersections=K)
 
@@ -36,7 +39,7 @@ def scene_at(height=0.9, pitch=0.6, shape=None, mesh_shape=None, lens=None):
     rings = K * float(shape.spacing(height) / mesh_shape.spacing(height))
     view = PreparedView(layout, None, shape, rings, height, orientation.level, np.eye(3), lens, SIZE)
     projected = project(layout, orientation.level, lens, SIZE)
-    return Observation(view, BALLS, projected, np.zeros((len(layout), 1), dtype=np.float32))
+    return Observation(PICTURE, view, BALLS, projected, np.zeros((len(layout), 1), dtype=np.float32))
 
 
 def reordered(scene, order):
@@ -70,7 +73,8 @@ def lowest_of(scene):
 
 
 def objects_in(scene, probability, **settings):
-    return locate(replace(scene, slot_probabilities=probability[:, None]), Settings(**settings), explain=True)
+    answered = replace(scene, slot_probabilities=probability[:, None])
+    return locate(answered, None, Settings(**settings), Stopwatch(), explain=True)
 
 
 @given(distance=st.floats(0.6, 6.0), heading=st.floats(-0.4, 0.4), height=st.floats(0.5, 1.3))
@@ -179,7 +183,7 @@ def test_noise_never_breaks_the_search(seed, share):
 def test_reasons_are_only_collected_when_asked_for():
     scene = scene_at()
     observation = replace(scene, slot_probabilities=ideal(scene, (1.3, 0.0), radius=0.3)[:, None])
-    _, rejected = locate(observation, Settings())
+    _, rejected = locate(observation, None, Settings(), Stopwatch())
     assert rejected == ()
 
 

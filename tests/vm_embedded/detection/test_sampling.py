@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.detection.pixel_formats import FORMATS, checked_image
+from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.sampling import SAMPLINGS, sample
 from vm_embedded.errors import InputError
 
@@ -17,7 +18,7 @@ BAYER = ("bayer_rggb", "bayer_bggr", "bayer_grbg", "bayer_gbrg")
 
 def sampled(image, pixels, format, sampling):
     out = np.full((len(pixels), 3), np.nan, dtype=np.float32)
-    sample(checked_image(image, format), pixels, format, sampling, out)
+    sample(Pyramid(checked_image(image, format), format), pixels, sampling, out)
     return out
 
 
@@ -187,7 +188,7 @@ def test_sampling_writes_into_a_part_of_a_larger_array(sampling):
     random = np.random.default_rng(3)
     image, pixels = noise(random, 8, 9, 3), pixels_in(random, 5, 8, 9)
     points = np.full((6, 3), -1.0, dtype=np.float32)
-    sample(image, pixels, "rgb", sampling, out=points[:-1])
+    sample(Pyramid(image, "rgb"), pixels, sampling, out=points[:-1])
     np.testing.assert_array_equal(points[:-1], sampled(image, pixels, "rgb", sampling))
     np.testing.assert_array_equal(points[-1], [-1.0] * 3)
 

@@ -14,7 +14,7 @@ from vm_embedded.errors import InputError
 KNOWN = {each.name: each for each in fields(Settings)}
 RANGES = {name: each.metadata["limits"] for name, each in KNOWN.items() if "limits" in each.metadata}
 CHOICES = {name: each.metadata["allowed"] for name, each in KNOWN.items() if "allowed" in each.metadata}
-WHOLE = {"threads"}
+WHOLE = {"threads", "max_proposals"}
 
 
 def test_the_defaults_are_within_their_ranges():

@@ -38,6 +38,8 @@ cache_mib = 32
 object_radius = 0.11
 max_distance = 7.5
 threshold = 0.6
+min_confidence = 0.8
+max_proposals = 30
 min_inside = 0.7
 max_around = 0.3
 max_widths = 3
@@ -76,6 +78,8 @@ def test_a_full_configuration_is_read(write):
         "object_radius": 0.11,
         "max_distance": 7.5,
         "threshold": 0.6,
+        "min_confidence": 0.8,
+        "max_proposals": 30,
         "min_inside": 0.7,
         "max_around": 0.3,
         "max_widths": 3,

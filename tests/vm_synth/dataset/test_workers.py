@@ -101,7 +101,7 @@ def test_shards_join_to_the_same_set(tmp_path, small, whole):
     assert joined == whole
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long), signal.SIGKILL])
 def test_what_is_stopped_goes_on_with_the_same_command(how, tmp_path, small, whole):
     arguments = [*COMMAND, str(tmp_path), *small, "--workers", "1"]
     process = started(arguments)

@@ -12,7 +12,9 @@ from pathlib import Path
 import cv2
 import pytest
 
+from tests.vm_export.looks import look_checkpoint
 from vm_export.checkpoint import Checkpoint
+from vm_export.export import change_look
 from vm_export.grid import Grid
 from vm_train.cli.evaluate import main
 
@@ -54,10 +56,11 @@ def test_it_writes_a_summary_tables_plots_and_a_report(evaluated, data):
     assert "objects of class ball" in done.stdout
     assert "report.html" in done.stdout
     tables = {"scores.json", "points.csv", "point_curves.csv", "confusion.csv", "objects.csv", "object_curves.csv"}
+    tables.add("calibration.csv")
     assert {path.name for path in out.iterdir()} == tables | {"report.html", "plots"}
     plots = {path.name for path in (out / "plots").iterdir()}
     assert {f"{name}.{kind}" for name in ("points_on_object", "confusion") for kind in ("png", "svg")} < plots
-    assert len(plots) == 14
+    assert len(plots) == 16
     assert all(cv2.imread(str(path)) is not None for path in (out / "plots").glob("*.png"))
 
 
@@ -82,6 +85,64 @@ def test_scores_say_what_was_evaluated_and_tables_hold_the_same_numbers(evaluate
     with (out / "confusion.csv").open() as file:
         confusion = [[int(row[f"taken for {name}"]) for name in scores["points"]] for row in csv.DictReader(file)]
     assert confusion[:4] == scores["confusion"]["all"]
+
+
+def test_calibration_counts_all_objects_that_the_scores_count(evaluated):
+    out, done = evaluated
+    scores = json.loads((out / "scores.json").read_text())
+    found, at_half = scores["calibration"]["ball"], scores["objects"]["ball"]["iou_0.5"]["all"]
+    assert (found["iou"], len(found["bins"])) == (0.5, 15)
+    assert found["found"] == sum(each["count"] for each in found["bins"]) == at_half["hits"] + at_half["false"]
+    with (out / "calibration.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    for row, expected in zip(rows, found["bins"], strict=True):
+        assert [float(row[key]) if row[key] else None for key in expected] == list(expected.values())
+    assert "calibration error (ECE)" in done.stdout
+
+
+@pytest.fixture(scope="module")
+def looking(tmp_path_factory):
+    """A model file with a close look of random weights."""
+    path = tmp_path_factory.mktemp("looking") / "looking.onnx"
+    change_look(MODEL, path, look_checkpoint(seed=1))
+    return path
+
+
+def test_a_close_look_s_proposals_have_scores_of_their_own(capsys, looking, data, tmp_path):
+    out = tmp_path / "out"
+    options = ("--radius-of", "scene", "--max-proposals", 7, "--min-confidence", 0)
+    done = run(looking, data, "-o", out, "--workers", 2, *options)
+    assert "proposals for class ball: " in done.stdout
+    assert {f"proposals.{kind}" for kind in ("png", "svg")} < {path.name for path in (out / "plots").iterdir()}
+    page = (out / "report.html").read_text()
+    assert "<h2>Proposals for class ball</h2>" in page
+    assert 'alt="proposals"' in page
+    scores = json.loads((out / "scores.json").read_text())
+    assert scores["about"]["model"]["close_look"].startswith("ball, 8 x 8 samples")
+    found = scores["proposals"]["ball"]
+    assert found["pictures"] == 8
+    assert 0.0 < found["mean_count"] <= found["largest_count"] <= 7
+    assert found["all"]["truths"] == scores["objects"]["ball"]["iou_0.5"]["all"]["truths"]
+    with (out / "proposals.csv").open() as file:
+        rows = {(row["by"], row["bin"]): row for row in csv.DictReader(file)}
+    assert len(rows) == 1 + 20 + 7 + 5
+    for (by, place), row in rows.items():
+        expected = found["all"] if by == "all" else found[f"by_{by}"][place]
+        assert [float(row[key]) if row[key] else None for key in expected] == list(expected.values())
+    again = tmp_path / "again"
+    assert main([str(each) for each in (looking, data, "-o", again, "--workers", 1, *options)]) == 0
+    for name in ("scores.json", "proposals.csv", "report.html", "plots/proposals.svg"):
+        assert (out / name).read_bytes() == (again / name).read_bytes()
+    assert "proposals for class ball" in capsys.readouterr().out
+    assert main([str(MODEL), str(data), "-o", str(again), "--workers", "1"]) == 0
+    assert "proposals for class" not in capsys.readouterr().out
+    assert json.loads((again / "scores.json").read_text())["proposals"] == {}
+    assert not list(again.rglob("proposals.*"))
+
+
+def test_a_robot_s_proposals_have_scores_too(looking, data, tmp_path):
+    assert main([str(each) for each in (looking, data, "-o", tmp_path, "--workers", 1, "--as-robot")]) == 0
+    assert json.loads((tmp_path / "scores.json").read_text())["proposals"]["ball"]["pictures"] == 8
 
 
 def test_the_report_needs_nothing_else(evaluated):

@@ -51,8 +51,8 @@ def data(tmp_path_factory):
 @pytest.mark.parametrize(
     ("model", "layouts"),
     [
-        ("cap6", ("plain", "runs")),
-        ("xmgrid8", ("runs", "lattice")),
+        pytest.param("cap6", ("plain", "runs"), marks=pytest.mark.long),
+        pytest.param("xmgrid8", ("runs", "lattice"), marks=pytest.mark.long),
         ("wall6", ("plain", "runs")),
     ],
 )

@@ -81,7 +81,13 @@ def test_the_same_command_gives_the_same_weights(whole, data, configuration, tmp
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("how", "steps"), [(signal.SIGINT, 2), (signal.SIGTERM, 9), (signal.SIGKILL, 9), (signal.SIGKILL, 24)]
+    ("how", "steps"),
+    [
+        (signal.SIGINT, 2),
+        pytest.param(signal.SIGTERM, 9, marks=pytest.mark.long),
+        (signal.SIGKILL, 9),
+        pytest.param(signal.SIGKILL, 24, marks=pytest.mark.long),
+    ],
 )
 def test_what_is_stopped_at_any_moment_ends_with_the_same_weights(how, steps, whole, data, configuration, tmp_path):
     folder = tmp_path / "run"
@@ -116,7 +122,7 @@ def wait_for_steps(path, count, process):
         time.sleep(0.005)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_processes_have_the_same_loss_curve(whole, data, configuration, tmp_path):
     command = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node=2", "--master-port=0", "--standalone"]
     done = subprocess.run(

@@ -36,6 +36,7 @@ def test_a_rare_class_does_not_leave_the_training_without_points(data, configura
     assert min(each["points"] for each in records if "points" in each) > 30
 
 
+@pytest.mark.long
 def test_an_evaluation_knows_the_colors_of_its_training(data, tmp_path):
     folder = Path(shutil.copytree(data, tmp_path / "data"))
     for path in folder.glob("mask*.png"):
@@ -51,7 +52,7 @@ def test_an_evaluation_knows_the_colors_of_its_training(data, tmp_path):
     assert "give it with --list" in part.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_hexagonal_network_trains_and_is_not_exported(data, configuration, tmp_path):
     folder = tmp_path / "run"
     hexagonal = ["--set", "mesh.grid=hexagonal", "--set", "mesh.equal_at=1.5", "--set", "training.selection=balanced"]
@@ -62,7 +63,7 @@ def test_a_hexagonal_network_trains_and_is_not_exported(data, configuration, tmp
     assert not Path(folder / "model.onnx").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_small_network_learns_to_find_the_balls_of_pictures_it_has_not_seen(configuration, tmp_path):
     """Five layers of four channels; docs/training.md has the whole of it."""
     data = draw_set(tmp_path / "data", 160, seed=4, size=(320, 256))

@@ -14,6 +14,7 @@ from vm_embedded.network.model_file import read_model
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
 from vm_train.evaluation.object_truth import SceneBall, SceneTruth, read_scene, true_objects
+from vm_workstation.sphere_outline import sphere_outline
 
 from ...drawn_scenes import MODEL
 from ..drawn import RADIUS, draw_set
@@ -50,6 +51,18 @@ def test_a_scene_s_ball_covers_what_its_mask_shows(pictures):
         assert ball.radius == pytest.approx(math.sqrt(mask.sum() / math.pi), rel=0.05)
         assert ball.position.tolist() == scene.ball.center.tolist()
         assert ball.visible == 1.0
+        toward = scene.ball.center - (0.0, 0.0, picture.lens.orientation.height)
+        assert ball.offsets(toward[None] / np.linalg.norm(toward)) == pytest.approx(0.0, abs=1e-6)
+        assert ball.angular_radius == pytest.approx(math.asin(RADIUS / np.linalg.norm(toward)))
+
+
+def test_the_outline_of_a_ball_is_one_radius_from_its_center(pictures):
+    for picture, scene, mask in whole_balls(pictures):
+        (ball,) = true_objects(picture, scene, MANIFEST)["ball"]
+        size, orientation = mask.shape[::-1], picture.lens.orientation
+        outline = sphere_outline(picture.lens.lens.for_image(size), orientation, scene.ball.center, RADIUS, size)
+        rays = picture.lens.lens.for_image(size).unproject(outline, size) @ orientation.rotation.T
+        assert ball.offsets(rays) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_a_mask_alone_gives_nearly_the_same_ball(pictures):
@@ -58,6 +71,9 @@ def test_a_mask_alone_gives_nearly_the_same_ball(pictures):
         (ball,) = true_objects(picture, None, manifest)["ball"]
         assert (ball.mask == mask).all()
         assert ball.position == pytest.approx(scene.ball.center, rel=0.06, abs=0.02)
+        (true,) = true_objects(picture, scene, manifest)["ball"]
+        assert true.offsets(ball.bearing[None])[0] < 0.15
+        assert ball.angular_radius == pytest.approx(true.angular_radius, rel=0.06)
 
 
 def test_every_piece_of_a_mask_is_an_object(pictures):
@@ -75,6 +91,8 @@ def test_what_is_above_the_horizon_has_no_place(pictures):
     labels[0:3, 70:80] = 0
     (found,) = true_objects(replace(picture, labels=labels), None, MANIFEST)["ball"]
     assert np.isnan(found.position).all()
+    assert np.isfinite(found.bearing).all()
+    assert np.isnan(found.offsets(found.bearing[None])).all()
 
 
 def test_a_scene_without_a_ball_and_a_hidden_one(pictures):

@@ -30,7 +30,7 @@ FULL = math.pi / 4.0
 """Of k x k points, the part that a round object covers."""
 
 PAPER_BALL = Sphere(0.075)
-"""The ball of the authors' pictures."""
+"""The ball of the pictures of the paper's authors."""
 
 SMALL = PosedCamera(
     Orientation.from_roll_pitch(0.9, pitch=math.radians(45.0)),

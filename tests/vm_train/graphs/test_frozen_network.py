@@ -41,6 +41,7 @@ def change(path):
     checkpoint.save(path)
 
 
+@pytest.mark.long
 def test_a_second_look_is_trained_on_what_the_first_passes_on(one, data, configuration, tmp_path):
     """Whether views are kept or not, and however it is stopped; the file holds both networks, and is evaluated."""
     first = one / "model.pt"
@@ -99,6 +100,7 @@ def test_a_teacher_goes_along_and_changes_what_is_learned(one, data, configurati
     assert "teacher.pt was changed since the training began" in refused.stderr
 
 
+@pytest.mark.long
 def test_a_second_look_may_teach_a_single_network(one, data, configuration, tmp_path):
     settings = ("--config", configuration, "--workers", 0, "--threads", 1, "--set", "training.epochs=1")
     run(data, "-o", tmp_path / "large", "--first", one / "model.pt", *settings)

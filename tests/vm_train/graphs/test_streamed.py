@@ -146,7 +146,7 @@ def test_what_is_stopped_ends_with_the_same_weights(stops, place, whole, tmp_pat
     assert same(trained(training, stops), whole)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_so_it_does_with_two_workers(place, whole, tmp_path):
     shards = sorted((place / "shards").glob("*.tar"))
     undisturbed = trained(begun(place, tmp_path / "one", shards, workers=2))

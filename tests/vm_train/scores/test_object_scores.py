@@ -36,15 +36,22 @@ class Square:
         rows, columns = range(max(self.top, 0), self.top + self.side), range(max(self.left, 0), self.left + self.side)
         return {(x, y) for x in columns for y in rows if x < WIDTH and y < HEIGHT}
 
+    @property
+    def bearing(self):
+        """Unit vector to its center, for a camera with 100 px per radian near its axis."""
+        ray = np.array([100.0, self.left + self.side / 2.0, self.top + self.side / 2.0])
+        return ray / np.linalg.norm(ray)
+
     def true(self, kind=bool):
         mask = np.zeros((HEIGHT, WIDTH), dtype=kind)
         for x, y in self.pixels:
             mask[y, x] = 1
-        return TrueObject(mask, np.array([0.0, self.distance, 0.1]), self.side / 2.0, self.share)
+        position, angle = np.array([0.0, self.distance, 0.1]), 0.005 * self.side
+        return TrueObject(mask, position, self.side / 2.0, self.share, self.bearing, angle)
 
     def found(self):
         corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * self.side + (self.left, self.top) - 0.5
-        return FoundObject(self.share, corners, np.array([self.distance, 0.0, 0.1]))
+        return FoundObject(self.share, corners, np.array([self.distance, 0.0, 0.1]), self.bearing)
 
 
 def overlap(one, other):
@@ -162,6 +169,17 @@ def test_errors_are_those_of_the_right_ones_that_are_confident_enough(shown, lea
         assert signed == pytest.approx(np.percentile(found - true, [10, 50, 90]).tolist())
         assert errors.relative_median == pytest.approx(np.median(np.abs(found - true) / true))
         assert errors.place_p90 == pytest.approx(np.percentile(np.hypot(found, true), 90))  # one ahead, one at the left
+
+
+@given(pictures)
+def test_center_errors_are_angles_in_radii_of_the_true_object(shown):
+    right = [(true, found) for _, true, found in judged(shown, 0.5)[0] if true is not None]
+    errors = scored(shown).ranking(0.5).errors()
+    if right:
+        angles = [math.acos(min(float(true.bearing @ found.bearing), 1.0)) for true, found in right]
+        expected = [angle / (0.005 * true.side) for angle, (true, _) in zip(angles, right, strict=True)]
+        assert errors.center_median == pytest.approx(np.median(expected), abs=1e-5)
+        assert errors.center_p90 == pytest.approx(np.percentile(expected, 90), abs=1e-5)
 
 
 @given(pictures, pictures)

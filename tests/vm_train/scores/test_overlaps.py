@@ -1,7 +1,7 @@
 """The share of pixels inside outlines, and overlaps of disks, against formulas."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -21,6 +21,7 @@ class FoundObject:
     confidence: float
     outline: Floats
     position: Floats
+    bearing: Floats = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
 
 
 def circle(x, y, radius, corners=256):

@@ -1,0 +1,72 @@
+"""Checkpoints of look networks: weights, contract and examples in one .pt file of plain values and tensors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from vm_embedded.arrays import Image
+from vm_embedded.errors import InputError, ModelError, one_line
+from vm_embedded.network.look_contract import LookContract
+
+from .look_network import LookNetwork, LookShape
+from .torch_files import load_values, save_values
+
+_FORMAT = "vm-embedded look 1"
+
+
+@dataclass(frozen=True, eq=False)
+class LookCheckpoint:
+    """A trained look network, its contract, which has no self-test yet, and patches for that test.
+
+    examples: uint8 (k, size, size, 3), RGB, from validation pictures; at least one. Raises ModelError if the parts do
+    not fit each other.
+    """
+
+    network: LookNetwork
+    contract: LookContract
+    examples: Image
+
+    def __post_init__(self) -> None:
+        shape, contract = self.network.shape, self.contract
+        if (contract.size, contract.channels) != (shape.size, shape.channels):
+            raise ModelError(
+                f"the look network has size {shape.size} and channels {list(shape.channels)}, but its contract says "
+                f"{contract.size} and {list(contract.channels)}"
+            )
+        sides = (shape.size, shape.size, 3)
+        if self.examples.dtype != np.uint8 or self.examples.shape[1:] != sides or not len(self.examples):
+            raise ModelError(
+                f"examples of a look network must be one or more uint8 patches of {sides}, not "
+                f"{self.examples.dtype} {self.examples.shape}"
+            )
+
+    def save(self, path: str | Path) -> None:
+        """Write the checkpoint. Raises InputError."""
+        content = {
+            "format": _FORMAT,
+            "network": self.network.shape.as_dict(),
+            "contract": replace(self.contract, self_test=None).as_dict(),
+            "examples": torch.from_numpy(np.ascontiguousarray(self.examples)),
+            "state": self.network.state_dict(),
+        }
+        save_values(path, content)
+
+    @classmethod
+    def load(cls, path: str | Path) -> LookCheckpoint:
+        """Read a checkpoint without executing anything in it. Raises InputError or ModelError."""
+        content = load_values(path, "a checkpoint of a look network")
+        if not isinstance(content, dict) or content.get("format") != _FORMAT:
+            found = content.get("format") if isinstance(content, dict) else None
+            raise InputError(f"{path} is not a checkpoint of format {_FORMAT!r}; its format is {found!r}")
+        try:
+            network = LookNetwork(LookShape.from_dict(content["network"]))
+            network.load_state_dict(content["state"])
+            return cls(network.eval(), LookContract.from_dict(content["contract"]), content["examples"].numpy())
+        except (RuntimeError, KeyError, TypeError, AttributeError) as error:
+            raise InputError(f"{path}: its parts do not fit each other: {one_line(error)}") from error
+        except (InputError, ModelError) as error:
+            raise type(error)(f"{path}: {error}") from error

@@ -1,0 +1,70 @@
+"""The graph of a look network: ordinary convolutions on patches.
+
+The colors of a patch stay as they lie in memory: row by row, the three colors of a sample side by side. The first
+convolution takes that as a picture of one channel with three columns for each sample. So its kernel of 3 x 3 samples
+has 3 x 9 columns, its step of two samples is six columns, and no operator has to sort the colors into channels.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from vm_embedded.arrays import Floats
+from vm_embedded.network.look_contract import ANSWERS
+
+from .look_network import NOISE_FLOOR, LookNetwork
+from .onnx_graph import FLOAT, UINT8, OnnxGraph
+
+
+def look_model(network: LookNetwork) -> bytes:
+    """The bytes of an ONNX model. Input: patches (n, size, size, 3) uint8. Output: answers (n, 4) float32."""
+    graph, size = OnnxGraph(), network.shape.size
+    weights = {name: value.detach().double().numpy() for name, value in network.state_dict().items()}
+    x = _write_normalization(graph, size)
+    for index, layer in enumerate(network.typed_convolutions):
+        kernel, bias = weights[f"convolutions.{index}.weight"], weights[f"convolutions.{index}.bias"]
+        step, columns = layer.stride[0], 1
+        if index == 0:
+            kernel, columns = kernel.transpose(0, 2, 3, 1).reshape(-1, 1, 3, 9), 3
+        layout = {"kernel_shape": [3, 3 * columns], "pads": [1, columns] * 2, "strides": [step, columns * step]}
+        x = _write_layer(graph, "Conv", f"layer{index}", x, kernel, bias, **layout)
+        x = graph.node("Relu", [x], f"layer{index}.activation")
+    x = graph.node("Flatten", [x], "flat", axis=1)
+    x = _write_layer(graph, "Gemm", "hidden", x, weights["hidden.weight"], weights["hidden.bias"], transB=1)
+    x = graph.node("Relu", [x], "hidden.activation")
+
+    # The calibration of the probability's logit goes into its weights.
+    kernel, bias = weights["answers.weight"].copy(), weights["answers.bias"].copy()
+    scale, offset = weights["calibration"]
+    kernel[0], bias[0] = kernel[0] * scale, bias[0] * scale + offset
+    linear = _write_layer(graph, "Gemm", "last", x, kernel, bias, transB=1)
+    is_probability = graph.constant("last.is_probability", [name == "probability" for name in ANSWERS])
+    graph.node("Where", [is_probability, graph.node("Sigmoid", [linear], "last.sigmoid"), linear], "answers")
+    return graph.model(
+        {"patches": (UINT8, ["n", size, size, 3])},
+        {"answers": (FLOAT, ["n", len(ANSWERS)])},
+        {},
+        "Look network of a Visual Mesh model: probability, shift to the right and down, and log size, for each patch.",
+    )
+
+
+def _write_normalization(graph: OnnxGraph, size: int) -> str:
+    """Write the function look_network.normalized; return the name of its result (n, 1, size, 3 * size).
+
+    ONNX Runtime pools faster than it reduces.
+    """
+    one_channel = graph.constant("input.shape", [0, 1, size, 3 * size])
+    x = graph.node("Cast", [graph.node("Reshape", ["patches", one_channel], "input")], "input.colors", to=FLOAT)
+    x = graph.node("Sub", [x, graph.node("GlobalAveragePool", [x], "input.mean")], "input.centered")
+    variance = graph.node("GlobalAveragePool", [graph.node("Mul", [x, x], "input.squares")], "input.variance")
+    deviation = graph.node("Sqrt", [variance], "input.deviation")
+    scale = graph.node("Add", [deviation, graph.constant("input.floor", NOISE_FLOOR)], "input.scale")
+    return graph.node("Div", [x, scale], "input.normalized")
+
+
+def _write_layer(
+    graph: OnnxGraph, operator: str, name: str, x: str, kernel: Floats, bias: Floats, **attributes: Any
+) -> str:
+    """Write a linear layer of the input x; return the name of its result."""
+    constants = [graph.constant(f"{name}.kernel", kernel), graph.constant(f"{name}.bias", bias)]
+    return graph.node(operator, [x, *constants], f"{name}.linear", **attributes)

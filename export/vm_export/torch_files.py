@@ -1,0 +1,32 @@
+"""Files of plain values and tensors, written and read by torch."""
+
+from __future__ import annotations
+
+import io
+import pickle
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from vm_embedded.errors import InputError, one_line
+from vm_embedded.files import atomic_write
+
+
+def save_values(path: str | Path, content: Mapping[str, Any]) -> None:
+    """Write plain values and tensors. Raises InputError if the file can't be written."""
+    file = io.BytesIO()  # torch reports a full disk in its own way; write_bytes raises OSError
+    torch.save(dict(content), file)
+    with atomic_write(Path(path)) as part:
+        part.write_bytes(file.getbuffer())
+
+
+def load_values(path: str | Path, what: str) -> Any:
+    """Read a file of `save_values` without executing anything in it. Raises InputError if it is not `what`."""
+    try:
+        return torch.load(path, map_location="cpu", weights_only=True)
+    except OSError as error:
+        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+    except (pickle.UnpicklingError, RuntimeError, EOFError, ValueError, KeyError) as error:
+        raise InputError(f"{path} is not {what}: {one_line(error)}") from error

@@ -1,0 +1,137 @@
+"""vm-train look: train the close look of a mesh network, or resume such a training."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from vm_embedded.config.sections import parse_overrides, read_sections
+from vm_embedded.config.toml_writer import to_commented_toml
+from vm_embedded.errors import InputError
+from vm_embedded.network.bundled import SHIPPED, model_path
+from vm_workstation.option_types import at_least
+
+from ..data.pictures import find_pictures
+from ..data.split import split_by_seed
+from ..look.configuration import LOOK_HEADER, LookConfiguration
+from .training import EXIT_INTERRUPTED, EXIT_OK, stop_requests
+
+
+def look_parser() -> argparse.ArgumentParser:
+    """The options of vm-train look."""
+    made = argparse.ArgumentParser(
+        prog="vm-train look",
+        description="Train the close look of a mesh network: a small network that judges a patch of the picture at "
+        "each proposal of the mesh network. You can stop or kill it at any time: vm-train resume continues, and the "
+        "final network is the same as without the stop.",
+    )
+    made.add_argument("data", type=Path, metavar="DATA", help="folder of imageX.jpg or .png, maskX.png, lensX.yaml")
+    made.add_argument(
+        "--from",
+        type=Path,
+        required=True,
+        dest="model",
+        metavar="MODEL",
+        help="mesh network whose proposals it judges: a checkpoint (.pt), a model file (.onnx), or a network of the "
+        f"package ({', '.join(SHIPPED)})",
+    )
+    made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
+    made.add_argument(
+        "--config", type=Path, metavar="FILE", help="configuration, look.toml; missing entries keep their defaults"
+    )
+    made.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="SECTION.ENTRY=VALUE",
+        help="override an entry of the configuration, for example training.epochs=5; repeat it for each entry",
+    )
+    made.add_argument("--strict", action="store_true", help="fail if a picture is damaged; default: skip it")
+    made.add_argument("--workers", type=at_least(1), metavar="N", help="processes that cut patches; default: all cores")
+    made.add_argument(
+        "--threads",
+        type=at_least(1),
+        metavar="N",
+        help="computing threads; default 1; another number changes the last digits of results",
+    )
+    return made
+
+
+def look_config_parser() -> argparse.ArgumentParser:
+    """The parser of vm-train look-config, which has no options."""
+    return argparse.ArgumentParser(
+        prog="vm-train look-config",
+        description="Print a look.toml with all entries, their meanings, units, limits and defaults.",
+    )
+
+
+def print_look_config(options: argparse.Namespace) -> int:
+    """Print a look.toml with all defaults."""
+    print(to_commented_toml(LookConfiguration(), LOOK_HEADER), end="")
+    return EXIT_OK
+
+
+def run_look(options: argparse.Namespace) -> int:
+    """Begin the training of a close look, train, and return the exit status. Raises VisualMeshError."""
+    from ..look.run_folder import begin_look_run
+
+    configuration = read_sections(LookConfiguration, options.config, parse_overrides(options.set, "training.epochs=5"))
+    model = model_path(options.model)
+    numbers = [each.number for each in find_pictures(options.data)]
+    split = split_by_seed(numbers, configuration.data.validation, 0.0, configuration.data.split_seed)
+    strict, threads = options.strict, options.threads or 1
+    run = begin_look_run(options.output, options.data, split, configuration, model, str(options.model), strict, threads)
+    count = len(split.training), len(split.validation)
+    print(f"{options.data}: {len(numbers)} pictures: {count[0]} for training, {count[1]} for validation", flush=True)
+    return _train(run.folder, None, options)
+
+
+def resume_look(options: argparse.Namespace) -> int:
+    """Resume the training of a close look and return the exit status. Raises VisualMeshError."""
+    if options.device == "cuda":
+        raise InputError(f"{options.run} is the training of a close look, which runs on the CPU: leave out --device")
+    return _train(options.run, options.data, options)
+
+
+def _train(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> int:
+    """Train from the last state of a folder on; moved_to: where the pictures are now. Returns the exit status.
+
+    Raises KeyboardInterrupt that tells how to continue.
+    """
+    try:
+        finished = _train_on(folder, moved_to, options)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"continue with vm-train resume {folder}") from None
+    if not finished:
+        print(f"vm-train: stopped; continue with vm-train resume {folder}", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    return EXIT_OK
+
+
+def _train_on(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> bool:
+    """Train until the end, or until Ctrl-C or SIGTERM between two steps. Returns whether it is finished."""
+    from ..learning.hardware import set_up_hardware
+    from ..learning.run_folder import locked
+    from ..look.collected import collect
+    from ..look.run_folder import read_look_run
+    from ..look.training import is_finished, train_look
+
+    run = read_look_run(folder)
+    if moved_to is not None:
+        run = replace(run, data=moved_to.resolve())
+    workers = options.workers or len(os.sched_getaffinity(0))
+    with locked(folder), set_up_hardware("cpu", workers, options.threads or run.threads) as hardware:
+        if hardware.size > 1:
+            raise InputError("vm-train look runs in one process: start it without torchrun")
+        if is_finished(run):
+            print(f"{run.look_path}: the training was finished already")
+        else:
+            collected = collect(run, workers)
+            with stop_requests() as stop_requested:
+                if not train_look(run, collected, workers, stop_requested):
+                    return False
+    print(f"next: vm-export {run.mesh} --look {run.look_path} -o {folder / 'model.onnx'}")
+    return True

@@ -1,0 +1,99 @@
+"""Augmentation of patches: mirror images, and colors, blur, noise and compression as of other cameras and lights."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import torch
+from torch.nn import functional
+
+from .configuration import PatchAugmentation
+
+_Change = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+
+_REACH = 3
+"""Samples that the blur reaches to each side."""
+
+
+def augment(
+    patches: torch.Tensor, targets: torch.Tensor, settings: PatchAugmentation, random: torch.Generator
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Changed copies of patches, uint8 (n, size, size, 3), as floats from 0 to 255, and their targets (n, 3).
+
+    An entry that is switched off leaves the random numbers of the others as they are.
+    """
+    count = len(patches)
+    chance = torch.rand((6, count), generator=random)
+    strength = torch.rand((3, count), generator=random)
+    normal = torch.randn((4, count), generator=random)
+    order = torch.rand((count, 3), generator=random).argsort(dim=1)
+    x = patches.float() / 255.0
+    x, targets = _mirrored(x, targets, chance[0] < settings.mirror)
+    x = x.clamp_min(1e-4) ** _each(torch.exp(settings.gamma * normal[0]))
+    x = x * torch.exp(settings.gain * normal[1:].T)[:, None, None, :]
+    x = _where(chance[1] < settings.swap, lambda some, rows: _permuted(some, order[rows]), x)
+    x = _where(chance[2] < settings.gray, lambda some, rows: some.mean(dim=3, keepdim=True).expand_as(some), x)
+    low, high = settings.blur
+    sigma = low + (high - low) * strength[0]
+    x = _where(chance[3] < settings.blur_share, lambda some, rows: _blurred(some, sigma[rows]), x)
+    deviation = settings.noise * strength[1]
+    x = _where(chance[4] < settings.noise_share, lambda some, rows: _noisy(some, deviation[rows], random), x)
+    x = x.clamp(0.0, 1.0) * 255.0
+    low, high = settings.jpeg
+    quality = low + (high - low) * strength[2]
+    return _where(chance[5] < settings.jpeg_share, lambda some, rows: _compressed(some, quality[rows]), x), targets
+
+
+def _each(values: torch.Tensor) -> torch.Tensor:
+    """Values (n,) of patches, to combine with the patches."""
+    return values[:, None, None, None]
+
+
+def _where(chosen: torch.Tensor, change: _Change, x: torch.Tensor) -> torch.Tensor:
+    """The patches x with a change of those that are chosen (n,); `change` gets these and their positions."""
+    rows = chosen.nonzero()[:, 0]
+    if len(rows):
+        x = x.clone()
+        x[rows] = change(x[rows], rows)
+    return x
+
+
+def _mirrored(x: torch.Tensor, targets: torch.Tensor, chosen: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Chosen patches (n,) as mirror images; their objects lie to the other side."""
+    sides = torch.where(chosen[:, None], torch.tensor([-1.0, 1.0, 1.0]), torch.tensor(1.0))
+    return torch.where(_each(chosen), x.flip(2), x), targets * sides
+
+
+def _permuted(x: torch.Tensor, order: torch.Tensor) -> torch.Tensor:
+    """Patches with their color channels in another order (n, 3)."""
+    return x.gather(3, order[:, None, None, :].expand_as(x))
+
+
+def _blurred(x: torch.Tensor, sigma: torch.Tensor) -> torch.Tensor:
+    """Patches after a Gaussian blur with a standard deviation (n,) for each."""
+    count, size = x.shape[:2]
+    steps = torch.arange(-_REACH, _REACH + 1.0)
+    kernel = torch.exp(-0.5 * (steps / sigma[:, None]) ** 2)
+    kernel = (kernel / kernel.sum(dim=1, keepdim=True)).repeat_interleave(3, dim=0)[:, None, None, :]
+    rows = x.permute(0, 3, 1, 2).reshape(1, 3 * count, size, size)
+    for _ in range(2):  # along the rows, then along the columns
+        padded = functional.pad(rows, (_REACH, _REACH, 0, 0), mode="replicate")
+        rows = functional.conv2d(padded, kernel, groups=3 * count).transpose(2, 3)
+    return rows.reshape(count, 3, size, size).permute(0, 2, 3, 1)
+
+
+def _noisy(x: torch.Tensor, deviation: torch.Tensor, random: torch.Generator) -> torch.Tensor:
+    """Patches with noise of a standard deviation (n,) for each, where 1 is white."""
+    return x + torch.randn(x.shape, generator=random) * _each(deviation)
+
+
+def _compressed(x: torch.Tensor, quality: torch.Tensor) -> torch.Tensor:
+    """Patches, 0 to 255, after JPEG compression with a quality (n,) for each."""
+    images = x.flip(3).round().to(torch.uint8).numpy()  # BGR, as OpenCV has it
+    made = np.empty_like(images)
+    for image, target, each in zip(images, made, quality.tolist(), strict=True):
+        file = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, round(each)])[1]
+        target[:] = cv2.imdecode(file, cv2.IMREAD_COLOR)
+    return torch.from_numpy(made).float().flip(3)

@@ -1,0 +1,99 @@
+"""All patches of a training, from the files in its folder."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vm_embedded.arrays import Mask
+from vm_embedded.cli.progress import ProgressBar
+from vm_embedded.errors import InputError
+
+from .collection import collect_patches
+from .patch_set import PatchChunk, PatchSet
+from .run_folder import LookRun
+
+_NAMED = 20
+"""Pictures that can't be used, to name."""
+
+
+@dataclass(frozen=True)
+class Collected:
+    """The patches of a run: for training, and proposals for validation. objects: in validation pictures; proposed: of
+    these, those that some proposal is at."""
+
+    training: PatchSet
+    validation: PatchSet
+    objects: int
+    proposed: int
+
+    @property
+    def pictures(self) -> int:
+        """Number of training pictures with patches."""
+        return len(np.unique(self.training.pictures))
+
+
+def collect(run: LookRun, workers: int) -> Collected:
+    """Collect the patches of a run, or read those that are collected, and name the pictures that can't be used.
+
+    Raises InputError and VisualMeshError.
+    """
+    bar = ProgressBar(len(run.numbers), "vm-train")
+    try:
+        paths = collect_patches(run, workers, bar.show)
+    finally:
+        bar.clear()
+    # The patches may fill a large part of the memory: the first pass counts them, the second one keeps them.
+    counts = {False: 0, True: 0}
+    objects = proposed = 0
+    faults: list[str] = []
+    for validates, chunk in _chunks(run, paths):
+        objects, proposed = objects + chunk.objects, proposed + chunk.proposed
+        faults += chunk.faults
+        for part in counts:
+            counts[part] += int((validates == part).sum())
+    _complain(faults)
+    sets = {part: PatchSet.empty(run.configuration.patches.size, count) for part, count in counts.items()}
+    ends = {False: 0, True: 0}
+    for validates, chunk in _chunks(run, paths):
+        for part in sets:
+            ends[part] = sets[part].write(ends[part], chunk.patches.part(validates == part))
+    _check(run, sets[False], "training")
+    _check(run, sets[True], "validation")
+    return Collected(sets[False], sets[True], objects, proposed)
+
+
+def _chunks(run: LookRun, paths: Sequence[Path]) -> Iterator[tuple[Mask, PatchChunk]]:
+    """Each file of patches, and which of its patches (n,) are for validation."""
+    numbers = set(run.split.validation)
+    validates = np.array([each in numbers for each in run.numbers])
+    for path in paths:
+        chunk = PatchChunk.load(path)
+        yield validates[chunk.patches.pictures], chunk
+
+
+def _complain(faults: Sequence[str]) -> None:
+    """Name the pictures that can't be used."""
+    for fault in faults[:_NAMED]:
+        print(f"vm-train: {fault}", file=sys.stderr)
+    if len(faults) > _NAMED:
+        print(f"vm-train: and {len(faults) - _NAMED} more pictures can't be used", file=sys.stderr)
+
+
+def _check(run: LookRun, part: PatchSet, name: str) -> None:
+    """Raise InputError if a part has no patch with, or none without, an object."""
+    if not len(part):
+        raise InputError(
+            f"no picture for {name} can be used; vm-train check {run.data} tells why (if the masks have other colors, "
+            "give them in [classes] of --config)"
+        )
+    if not 0 < part.objects < len(part):
+        found = "none" if not part.objects else "all"
+        raise InputError(
+            f"{found} of the {len(part)} patches for {name} show the object {run.object_class}: the close look needs "
+            f"both; check {run.data} with vm-train check, and that {run.model} proposes objects in it"
+        )

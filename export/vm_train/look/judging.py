@@ -1,0 +1,109 @@
+"""What the mesh network and its close look together find in the validation pictures, as on a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import torch
+
+from vm_embedded.arrays import Floats, Image, Mask, Singles
+from vm_embedded.detection.looking import look_closely
+from vm_embedded.detection.patches import Tangents
+from vm_embedded.detection.settings import Settings
+from vm_embedded.detection.stopwatch import Stopwatch
+from vm_embedded.errors import GeometryError, InputError
+from vm_embedded.network.look_contract import LookContract
+from vm_export.look_network import LookNetwork
+
+from .labels import OBJECT, UNLABELED, VISIBLE, label_places
+from .observing import Item, Observer, items_of, results_of
+from .run_folder import LookRun
+
+
+class TorchLook:
+    """A look network in torch in place of a CloseLook, on one thread. It is not calibrated yet."""
+
+    def __init__(self, network: LookNetwork, contract: LookContract) -> None:
+        torch.set_num_threads(1)
+        self._network, self.contract = network.eval(), contract
+
+    def run(self, patches: Image) -> Singles:
+        """Answers (n, 4) to patches (n, size, size, 3), as `CloseLook.run` gives them."""
+        with torch.inference_mode():
+            answers: Singles = self._network(torch.from_numpy(patches)).numpy()
+        return answers
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """n objects that were found in pictures: logits (n,) before the calibration, and whether each is right (n,).
+
+    objects: number of true objects that are visible. pictures: number of pictures.
+    """
+
+    logits: Floats
+    right: Mask
+    objects: int
+    pictures: int
+
+    @classmethod
+    def joined(cls, parts: Sequence[Found]) -> Found:
+        """All objects of several parts."""
+        return cls(
+            np.concatenate([np.empty(0), *(each.logits for each in parts)]),
+            np.concatenate([np.empty(0, dtype=np.bool_), *(each.right for each in parts)]),
+            sum(each.objects for each in parts),
+            sum(each.pictures for each in parts),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """Finds the objects in a picture."""
+
+    observer: Observer
+    look: TorchLook
+    settings: Settings
+
+    @classmethod
+    def of(cls, run: LookRun, network: LookNetwork, contract: LookContract) -> Judge:
+        """The judge of a run. Raises InputError or ModelError."""
+        settings = Settings(max_proposals=run.configuration.patches.proposals, min_confidence=0.0)
+        return cls(Observer.of(run), TorchLook(network, contract), settings)
+
+    def __call__(self, item: Item) -> Found:
+        """The objects in a picture; none if it can't be used."""
+        try:
+            seen = self.observer.observe(item.files)
+        except (InputError, GeometryError):  # was reported when the patches were collected
+            return Found(np.empty(0), np.empty(0, dtype=np.bool_), 0, 0)
+        judged = look_closely(seen.observation, self.look, seen.probabilities, self.settings, Stopwatch())
+        kept = [each for each in judged if each.reason is None]
+        centers = np.array([each.center for each in kept]).reshape(-1, 3)
+        labels = label_places(Tangents.at(seen.observation.view, centers), seen.truths).labels
+        p = np.clip(np.array([each.confidence for each in kept], dtype=np.float64), 1e-9, 1.0 - 1e-7)
+        clear = labels != UNLABELED
+        visible = int((seen.truths.visible >= VISIBLE).sum())
+        return Found(np.log(p / (1.0 - p))[clear], labels[clear] == OBJECT, visible, 1)
+
+
+def judge_validation(
+    run: LookRun, network: LookNetwork, contract: LookContract, workers: int, stop: Callable[[int], bool]
+) -> Found | None:
+    """What is found in the validation pictures of a run, with so many processes; 1 uses only this process.
+
+    stop: gets the number of pictures that are done; if it returns True, this returns None. Raises InputError and
+    VisualMeshError.
+    """
+    items = [each for each in items_of(run) if each.validates]
+    parts: list[Found] = []
+    with closing(results_of(partial(Judge.of, run, network, contract), items, workers)) as results:
+        for part in results:
+            parts.append(part)
+            if stop(len(parts)):
+                return None
+    return Found.joined(parts)

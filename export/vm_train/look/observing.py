@@ -1,0 +1,123 @@
+"""What the mesh network and the truth say about a picture, and work on many pictures in several processes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+from vm_embedded.arrays import Singles
+from vm_embedded.detection.observation import Observation
+from vm_embedded.errors import InputError
+from vm_embedded.network.manifest import Manifest
+from vm_workstation.worker_process import interrupts_blocked, start_worker, worker_pool
+
+from ..data.classes import Classes
+from ..data.picture_files import PictureFiles
+from ..data.pictures import find_pictures, read_picture
+from ..evaluation.answers import ExactSubject
+from ..evaluation.object_truth import SceneTruth, read_scene
+from .labels import Truths, find_truths
+from .run_folder import LookRun
+
+_TASK = 5
+"""Pictures that a worker gets at a time."""
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Item:
+    """A picture: its files, its position in the run's list, and whether it is for validation."""
+
+    files: PictureFiles
+    position: int
+    validates: bool
+
+
+def items_of(run: LookRun) -> list[Item]:
+    """All pictures of a run. Raises InputError if the folder lost one."""
+    files = {each.number: each for each in find_pictures(run.data)}
+    lost = [number for number in run.numbers if number not in files]
+    if lost:
+        raise InputError(
+            f"{run.data} lacks picture {lost[0]}, which the training began with; if the pictures were moved, give "
+            "their folder with --data"
+        )
+    validation = set(run.split.validation)
+    return [Item(files[number], position, number in validation) for position, number in enumerate(run.numbers)]
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """A picture after the mesh network: probabilities (m,) of the judged class at the slots, and the true objects."""
+
+    observation: Observation
+    probabilities: Singles
+    truths: Truths
+
+
+@dataclass(frozen=True, eq=False)
+class Observer:
+    """The mesh network of a run. classes: colors in masks. in_masks: a manifest with the classes of the masks."""
+
+    subject: ExactSubject
+    classes: Classes
+    in_masks: Manifest
+    object_class: str
+
+    @classmethod
+    def of(cls, run: LookRun) -> Observer:
+        """Read the mesh network. Raises InputError or ModelError."""
+        subject, table = run.subject(), run.configuration.classes
+        in_masks = replace(subject.manifest, classes=table.outputs, look=None, self_test=None)
+        return cls(subject, table.mask_classes(), in_masks, run.object_class)
+
+    def observe(self, files: PictureFiles) -> Observed:
+        """Raises InputError or GeometryError for a picture that can't be used."""
+        picture = read_picture(files, self.classes)
+        scene = read_scene(files.image.with_name(f"scene{files.number}.json"))
+        observation = self.subject.observe(picture, self._radius(scene))
+        manifest = observation.manifest
+        in_masks = replace(self.in_masks, radius=manifest.radius, object_radius=manifest.object_radius)
+        truths = find_truths(picture, scene, in_masks, observation.view, self.object_class)
+        return Observed(observation, observation.slot_probabilities[:, manifest.column(self.object_class)], truths)
+
+    def _radius(self, scene: SceneTruth | None) -> float | None:
+        """Radius of the objects to look for [m]: that of the scene, if the mesh network is for any radius."""
+        return scene.ball_radius if scene is not None and self.subject.manifest.any_radius else None
+
+
+def results_of(
+    make: Callable[[], Callable[[Item], Result]], items: Sequence[Item], workers: int
+) -> Generator[Result, None, None]:
+    """Results of the function that `make` makes for all items, in order. Each of so many processes makes its own.
+
+    1 uses only this process. Raises what the function raises, and VisualMeshError if a worker was killed.
+    """
+    if workers < 2 or len(items) <= _TASK:
+        if items:
+            yield from map(make(), items)
+        return
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
+    with worker_pool(min(workers, -(-len(items) // _TASK)), _start, (make,)) as pool:
+        with interrupts_blocked():
+            results = pool.map(_work, items, chunksize=_TASK)
+        yield from results
+
+
+_worker: Callable[[Item], Any] | None = None
+"""The state of a worker process."""
+
+
+def _start(make: Callable[[], Callable[[Item], Any]]) -> None:
+    global _worker
+    start_worker()
+    _worker = make()
+
+
+def _work(item: Item) -> Any:
+    assert _worker is not None
+    return _worker(item)

@@ -1,0 +1,129 @@
+"""Labeled patches, and the files that hold them."""
+
+from __future__ import annotations
+
+import hashlib
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from vm_embedded.arrays import Image, Singles
+from vm_embedded.errors import InputError, one_line
+from vm_embedded.files import atomic_write
+
+from .labels import OBJECT
+from .places import PROPOSED
+
+
+@dataclass(frozen=True, eq=False)
+class PatchSet:
+    """n labeled patches.
+
+    patches (n, size, size, 3): RGB. labels (n,): NOTHING or OBJECT. targets (n, 3): see PlaceLabels. kinds (n,): of
+    places, as in places.py. pictures (n,): positions of their pictures in the run's list.
+    """
+
+    patches: Image
+    labels: npt.NDArray[np.int8]
+    targets: Singles
+    kinds: npt.NDArray[np.int8]
+    pictures: npt.NDArray[np.int32]
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    @property
+    def objects(self) -> int:
+        """Number of patches that show an object."""
+        return int((self.labels == OBJECT).sum())
+
+    @property
+    def proposed(self) -> npt.NDArray[np.bool_]:
+        """Which patches (n,) are at proposals of the mesh network."""
+        return np.asarray(self.kinds == PROPOSED)
+
+    def part(self, chosen: npt.NDArray[Any]) -> PatchSet:
+        """The patches of a mask (n,), or with these positions."""
+        return PatchSet(*(each[chosen] for each in self._arrays()))
+
+    def sha256(self) -> str:
+        """Digest of everything in the set."""
+        digest = hashlib.sha256()
+        for each in self._arrays():
+            digest.update(np.ascontiguousarray(each).data)
+        return digest.hexdigest()
+
+    @classmethod
+    def empty(cls, size: int, count: int = 0) -> PatchSet:
+        """A set of `count` patches that are yet to be written."""
+        return cls(
+            np.empty((count, size, size, 3), dtype=np.uint8),
+            np.zeros(count, dtype=np.int8),
+            np.zeros((count, 3), dtype=np.float32),
+            np.zeros(count, dtype=np.int8),
+            np.zeros(count, dtype=np.int32),
+        )
+
+    def write(self, start: int, other: PatchSet) -> int:
+        """Replace the patches from position `start` on by those of another set. Returns the position after them."""
+        end = start + len(other)
+        for target, source in zip(self._arrays(), other._arrays(), strict=True):
+            target[start:end] = source
+        return end
+
+    @classmethod
+    def joined(cls, size: int, sets: Sequence[PatchSet]) -> PatchSet:
+        """All patches of several sets, in order."""
+        made = cls.empty(size, sum(map(len, sets)))
+        start = 0
+        for each in sets:
+            start = made.write(start, each)
+        return made
+
+    def _arrays(self) -> tuple[npt.NDArray[Any], ...]:
+        return self.patches, self.labels, self.targets, self.kinds, self.pictures
+
+
+@dataclass(frozen=True, eq=False)
+class PatchChunk:
+    """What was collected from some pictures.
+
+    objects: number of visible true objects in them; proposed: number of these that some proposal is at; both for
+    validation pictures only. faults: the reason for each picture that can't be used.
+    """
+
+    patches: PatchSet
+    objects: int
+    proposed: int
+    faults: tuple[str, ...]
+
+    def save(self, path: Path) -> None:
+        """Write the chunk. Raises InputError if it can't be written."""
+        patches = self.patches
+        with atomic_write(path) as part, part.open("wb") as file:
+            np.savez(
+                file,
+                patches=patches.patches,
+                labels=patches.labels,
+                targets=patches.targets,
+                kinds=patches.kinds,
+                pictures=patches.pictures,
+                truths=np.array([self.objects, self.proposed], dtype=np.int64),
+                faults=np.array(self.faults, dtype=np.str_),
+            )
+
+    @classmethod
+    def load(cls, path: Path) -> PatchChunk:
+        """Read a chunk. Raises InputError naming the file."""
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                objects, proposed = file["truths"].tolist()
+                arrays = (file[name] for name in ("patches", "labels", "targets", "kinds", "pictures"))
+                return cls(PatchSet(*arrays), objects, proposed, tuple(map(str, file["faults"])))
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            raise InputError(f"can't read {path}: {one_line(error)}; remove it and resume the training") from error

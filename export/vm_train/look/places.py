@@ -1,0 +1,94 @@
+"""The places that patches are cut at: proposals of the mesh network, places beside true objects, and random places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from vm_embedded.arrays import Floats, Image, Singles
+from vm_embedded.detection.observation import Observation
+from vm_embedded.detection.patches import Tangents, cut_patches, patch_nodes
+from vm_embedded.detection.prepared_view import PreparedView
+from vm_embedded.detection.proposals import propose_places
+
+from .configuration import PatchSettings
+from .labels import VISIBLE, Truths
+
+PROPOSED, JITTERED, RANDOM = 0, 1, 2
+"""Kinds of places."""
+
+_DRAWS = 4
+"""Pixels to draw for each random place; many of them show no plane."""
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """n places: centers (n, 3) relative to the camera in the mesh frame [m], their kinds (n,), and factors (n,) by
+    which their patches are larger than the object that is expected there needs."""
+
+    centers: Floats
+    kinds: npt.NDArray[np.int8]
+    factors: Floats
+
+    def __len__(self) -> int:
+        return len(self.centers)
+
+    @classmethod
+    def of(cls, kind: int, centers: Floats, factors: Floats | None = None) -> Places:
+        """Places of one kind. factors: 1 by default."""
+        count = len(centers)
+        return cls(centers, np.full(count, kind, dtype=np.int8), np.ones(count) if factors is None else factors)
+
+    def __add__(self, other: Places) -> Places:
+        return Places(
+            np.concatenate([self.centers, other.centers]),
+            np.concatenate([self.kinds, other.kinds]),
+            np.concatenate([self.factors, other.factors]),
+        )
+
+    def part(self, chosen: npt.NDArray[np.bool_]) -> Places:
+        """The places of a mask (n,)."""
+        return Places(self.centers[chosen], self.kinds[chosen], self.factors[chosen])
+
+    def tangents(self, view: PreparedView) -> Tangents:
+        """The planes of their patches; the radius includes the factor."""
+        found = Tangents.at(view, self.centers)
+        return replace(found, radius=found.radius * self.factors)
+
+    def cut(self, observation: Observation, settings: PatchSettings) -> Image:
+        """Their patches (n, size, size, 3), RGB."""
+        nodes = patch_nodes(observation.view, self.tangents(observation.view), settings.extent)
+        return cut_patches(observation.pyramid, nodes, settings.size)
+
+
+def proposed_places(observation: Observation, probabilities: Singles, settings: PatchSettings) -> Places:
+    """The proposals of a class from the slots' probabilities (m,), best first."""
+    return Places.of(PROPOSED, propose_places(observation, probabilities, settings.above, settings.proposals))
+
+
+def jittered_places(view: PreparedView, truths: Truths, settings: PatchSettings, random: np.random.Generator) -> Places:
+    """Places up to `jitter` radii from true objects of which enough is visible, in turn, with factors of the size."""
+    chosen = np.flatnonzero(truths.visible >= VISIBLE)
+    distance, angle, size = random.random((3, settings.jittered))
+    if not len(chosen):
+        return Places.of(JITTERED, np.empty((0, 3)))
+    chosen = chosen[np.arange(settings.jittered) % len(chosen)]
+    objects = Tangents.at(view, truths.centers[chosen])
+    off, angle = settings.jitter * np.sqrt(distance), 2.0 * np.pi * angle
+    rays = objects.rays(off * np.cos(angle), off * np.sin(angle))
+    factors = np.exp(settings.size_jitter * (2.0 * size - 1.0))
+    below = rays[:, 2] < 0.0
+    return Places.of(JITTERED, view.shape.center_along(rays[below], view.height), factors[below])
+
+
+def random_places(observation: Observation, settings: PatchSettings, random: np.random.Generator) -> Places:
+    """Places on the plane at random pixels of the picture, as far as the mesh reaches."""
+    view = observation.view
+    pixels = random.random((_DRAWS * settings.random, 2)) * view.size - 0.5
+    rays = view.lens.unproject(pixels, view.size) @ view.rotation.T
+    rays = rays[np.isfinite(rays).all(axis=1)]
+    centers = view.shape.center_along(rays[rays[:, 2] < 0.0], view.height)
+    near = np.hypot(centers[:, 0], centers[:, 1]) < observation.manifest.max_distance
+    return Places.of(RANDOM, centers[near][: settings.random])

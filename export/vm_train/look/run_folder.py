@@ -1,0 +1,218 @@
+"""The folder of a training of a close look: what it was begun with, and what it has produced.
+
+look.toml: the configuration. pictures.json: the split of the pictures. run.json: where the pictures are. mesh.onnx or
+mesh.pt: a copy of the mesh network. patches/: the patches, in chunks. state.pt: the state to resume from. log.jsonl,
+tensorboard/: the record of each step. look.pt: the network. result.json: what it finds in the validation
+pictures, and how often its probabilities are right.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from vm_embedded import __version__
+from vm_embedded.config.sections import read_sections
+from vm_embedded.config.toml_writer import to_commented_toml
+from vm_embedded.detection.settings import Settings
+from vm_embedded.errors import InputError, unknown
+from vm_embedded.files import atomic_write
+
+from ..data.split import Split, read_split, write_split
+from ..evaluation.answers import ExactSubject, load_subject
+from ..learning.run_folder import check_unused
+from .configuration import LookConfiguration
+
+KIND = "look"
+_FORMAT = 1
+_FILES = (
+    "look.toml",
+    "pictures.json",
+    "mesh.onnx",
+    "mesh.pt",
+    "patches",
+    "state.pt",
+    "log.jsonl",
+    "look.pt",
+    "result.json",
+)
+"""Files that a new training would overwrite."""
+
+
+@dataclass(frozen=True)
+class LookRun:
+    """A training as its folder describes it; `begin_look_run` and `read_look_run` make it.
+
+    data: folder of the pictures. model: the mesh network as the user named it. mesh: its copy. object_class: class to
+    judge. strict: whether a picture that can't be used ends the training. threads: number of computing threads; a
+    resumed training takes the same.
+    """
+
+    folder: Path
+    data: Path
+    split: Split
+    configuration: LookConfiguration
+    model: str
+    mesh: Path
+    mesh_sha256: str
+    object_class: str
+    strict: bool
+    threads: int
+
+    @property
+    def state_path(self) -> Path:
+        """File of the state to resume from."""
+        return self.folder / "state.pt"
+
+    @property
+    def look_path(self) -> Path:
+        """File of the trained network."""
+        return self.folder / "look.pt"
+
+    @property
+    def patches(self) -> Path:
+        """Folder of the patches."""
+        return self.folder / "patches"
+
+    @property
+    def numbers(self) -> list[str]:
+        """Numbers of all pictures, in order."""
+        return sorted([*self.split.training, *self.split.validation])
+
+    @property
+    def configuration_sha256(self) -> str:
+        """Digest of the configuration, the split and the mesh network."""
+        text = json.dumps([asdict(self.configuration), asdict(self.split), self.mesh_sha256])
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def subject(self) -> ExactSubject:
+        """The mesh network. Raises InputError or ModelError."""
+        return load_mesh(self.mesh)
+
+
+def load_mesh(path: Path) -> ExactSubject:
+    """A mesh network that can propose places. Raises InputError or ModelError."""
+    subject = load_subject(path, Settings())
+    assert isinstance(subject, ExactSubject)
+    if not subject.grid.is_visual:
+        raise InputError(f"{path}: a close look needs a network on the Visual Mesh, not on a {subject.grid.kind} grid")
+    return subject
+
+
+def judged_class(configuration: LookConfiguration, subject: ExactSubject, model: str) -> str:
+    """The class that the look network judges. Raises InputError if model or masks do not have it as an object."""
+    objects = [each.name for each in subject.manifest.classes if each.kind == "object"]
+    if not objects:
+        raise InputError(f"{model} has no class of the kind object, so there is nothing to look at")
+    name = configuration.patches.object_class or objects[0]
+    if name not in objects:
+        raise InputError(f"[patches] object_class: {unknown(f'object of {model}', name, objects)}")
+    in_masks = [each for each, kind in configuration.classes.kinds.items() if kind == "object"]
+    if name not in in_masks:
+        raise InputError(
+            f"{model} has class {name!r}, but the objects of [classes] are {', '.join(in_masks) or 'none'}: give the "
+            "class and its colors in masks there"
+        )
+    return name
+
+
+def begin_look_run(
+    folder: Path,
+    data: Path,
+    split: Split,
+    configuration: LookConfiguration,
+    model: Path,
+    name: str,
+    strict: bool = False,
+    threads: int = 1,
+) -> LookRun:
+    """Write the files of a new training. model: file of the mesh network; name: as the user named it.
+
+    Raises InputError, also if the folder holds a training, and ModelError.
+    """
+    check_unused(folder, _FILES)
+    _ = configuration.shape
+    subject = load_mesh(model)
+    object_class = judged_class(configuration, subject, name)
+    try:
+        (folder / "patches").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
+    mesh = folder / f"mesh{model.suffix.lower()}"
+    run = LookRun(
+        folder, data.resolve(), split, configuration, name, mesh, subject.sha256, object_class, strict, threads
+    )
+    with atomic_write(mesh) as part:
+        part.write_bytes(model.read_bytes())
+    write_split(folder / "pictures.json", split)
+    _write(folder / "look.toml", to_commented_toml(configuration))
+    _write(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
+    return run
+
+
+def is_look_run(folder: Path) -> bool:
+    """Whether a folder holds the training of a close look; false also if its run.json can't be read."""
+    try:
+        content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(content, dict) and content.get("kind") == KIND
+
+
+def read_look_run(folder: Path) -> LookRun:
+    """Read a training that was begun. Raises InputError, also if its files were changed since, and ModelError."""
+    path = folder / "run.json"
+    try:
+        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if content["format"] != _FORMAT:
+            raise InputError(f"{path} was written by another release: begin the training again")
+        run = LookRun(
+            folder,
+            Path(content["data"]),
+            read_split(folder / "pictures.json"),
+            read_sections(LookConfiguration, folder / "look.toml"),
+            str(content["model"]),
+            folder / str(content["mesh"]),
+            str(content["mesh_sha256"]),
+            str(content["object_class"]),
+            bool(content["strict"]),
+            int(content["threads"]),
+        )
+        configuration_sha256 = content["configuration_sha256"]
+    except OSError as error:
+        raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{path} is damaged: {error}") from error
+    if run.configuration_sha256 != configuration_sha256:
+        raise InputError(
+            f"{folder / 'look.toml'} or pictures.json was changed since the training began: "
+            "undo the change, or begin another training in a new folder"
+        )
+    if run.subject().sha256 != run.mesh_sha256:
+        raise InputError(f"{run.mesh} was changed since the training began: begin another one")
+    return run
+
+
+def _description(run: LookRun) -> dict[str, Any]:
+    """The content of run.json."""
+    return {
+        "kind": KIND,
+        "format": _FORMAT,
+        "version": __version__,
+        "data": str(run.data),
+        "model": run.model,
+        "mesh": run.mesh.name,
+        "mesh_sha256": run.mesh_sha256,
+        "object_class": run.object_class,
+        "strict": run.strict,
+        "threads": run.threads,
+        "configuration_sha256": run.configuration_sha256,
+    }
+
+
+def _write(path: Path, text: str) -> None:
+    with atomic_write(path) as part:
+        part.write_text(text, encoding="utf-8")

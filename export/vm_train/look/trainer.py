@@ -1,0 +1,138 @@
+"""Trains a look network step by step, and saves and loads the state between two steps.
+
+A step depends only on the seed, its number and the weights before it. So a training that resumes from its last state
+ends with the same weights.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch.nn import functional
+
+from vm_embedded.arrays import Floats
+from vm_embedded.errors import InputError, one_line
+from vm_export.look_network import LookNetwork
+from vm_export.torch_files import save_values
+
+from ..learning.optimizer import ScheduledOptimizer
+from ..learning.recipe import Recipe
+from .augmentation import augment
+from .configuration import LookRecipe, PatchAugmentation
+from .labels import OBJECT
+from .patch_set import PatchSet
+from .scores import logits_of
+
+_PRECISE = 0.1
+"""Errors of center and size above this have an absolute instead of a squared loss."""
+
+
+@dataclass(frozen=True)
+class LookStep:
+    """A step's number, from 1, its losses of presence and of place and size, and the learning rate."""
+
+    number: int
+    presence: float
+    place: float
+    rate: float
+
+
+class LookTrainer:
+    """A network that is trained for `total` steps on patches. Raises InputError if none shows an object, or all do."""
+
+    def __init__(
+        self, network: LookNetwork, patches: PatchSet, recipe: LookRecipe, augmentation: PatchAugmentation, total: int
+    ) -> None:
+        self.network = network.train()
+        self.recipe, self.total, self.done = recipe, total, 0
+        self._augmentation, self._patches = augmentation, patches
+        self._images, self._targets = torch.from_numpy(patches.patches), torch.from_numpy(patches.targets)
+        self._with, self._without = (np.flatnonzero((patches.labels == OBJECT) == each) for each in (True, False))
+        for chosen, what in ((self._with, "shows an object"), (self._without, "shows no object")):
+            if not len(chosen):
+                raise InputError(f"none of the {len(patches)} training patches {what}")
+        self._errors: npt.NDArray[np.float32] | None = None
+        self._chances: Floats | None = None
+        self._optimizer = ScheduledOptimizer(network, Recipe(rate=recipe.rate, decay=recipe.decay), total)
+
+    def grade(self) -> float:
+        """Draw patches without an object by the network's errors from now on. Returns the mean error, 0 to 1."""
+        self.network.eval()
+        logits = logits_of(self.network, self._patches.patches[self._without])[:, 0]
+        self.network.train()
+        self._set_errors(0.5 + 0.5 * np.tanh(0.5 * logits))
+        return float(np.mean(0.5 + 0.5 * np.tanh(0.5 * logits)))
+
+    def _set_errors(self, errors: npt.NDArray[np.float32]) -> None:
+        self._errors = errors
+        self._chances = np.cumsum(errors.astype(np.float64) + self.recipe.floor)
+
+    def step(self) -> LookStep:
+        """Learn from one batch. Raises InputError if the loss is NaN or infinite."""
+        rate = self._optimizer.rate
+        chosen, shown = self._draw(np.random.default_rng([self.recipe.seed, 1, self.done]))
+        random = torch.Generator().manual_seed(_seed(self.recipe.seed, 2, self.done))
+        patches, targets = augment(self._images[chosen], self._targets[chosen], self._augmentation, random)
+        answers = self.network.logits(patches)
+        presence = functional.binary_cross_entropy_with_logits(answers[:, 0], shown)
+        errors = functional.smooth_l1_loss(answers[:, 1:], targets, reduction="none", beta=_PRECISE).sum(dim=1)
+        place = (errors * shown).sum() / shown.sum()
+        loss = presence + place
+        if not math.isfinite(loss.item()):
+            raise InputError(
+                f"the loss of step {self.done + 1} is NaN or infinite: begin again with a lower training.rate"
+            )
+        self._optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        self._optimizer.step()
+        self.done += 1
+        return LookStep(self.done, presence.item(), place.item(), rate)
+
+    def _draw(self, random: np.random.Generator) -> tuple[torch.Tensor, torch.Tensor]:
+        """Positions (batch,) of the patches of a step, and whether each shows an object (1) or not (0)."""
+        batch = self.recipe.batch
+        count = min(max(round(self.recipe.positives * batch), 1), batch - 1)
+        shown = self._with[random.integers(len(self._with), size=count)]
+        if self._chances is None:
+            others = random.integers(len(self._without), size=batch - count)
+        else:
+            others = np.searchsorted(self._chances, random.random(batch - count) * self._chances[-1], side="right")
+            others = np.minimum(others, len(self._without) - 1)
+        chosen = np.concatenate([shown, self._without[others]])
+        return torch.from_numpy(chosen), (torch.arange(batch) < count).float()
+
+    def save(self, path: Path, more: Mapping[str, Any]) -> None:
+        """Write the state to resume from, with `more` plain values. Raises InputError if it can't be written."""
+        state = {
+            "done": self.done,
+            "network": self.network.state_dict(),
+            "optimizer": self._optimizer.state_dict(),
+            "errors": None if self._errors is None else torch.from_numpy(self._errors),
+            "more": dict(more),
+        }
+        save_values(path, state)
+
+    def load(self, state: Mapping[str, Any]) -> None:
+        """Resume from a state that `read_state` read. Raises InputError if it belongs to another training."""
+        try:
+            self.network.load_state_dict(state["network"])
+            self._optimizer.load_state_dict(state["optimizer"])
+            if state["errors"] is not None:
+                if len(state["errors"]) != len(self._without):
+                    raise ValueError("it has another number of patches")
+                self._set_errors(state["errors"].numpy())
+            self.done = int(state["done"])
+        except (RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+            raise InputError(f"the state belongs to another training: {one_line(error)}") from error
+
+
+def _seed(*parts: int) -> int:
+    """A seed for torch that depends on all parts."""
+    return int(np.random.default_rng(parts).integers(2**62))

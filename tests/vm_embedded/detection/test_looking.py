@@ -1,0 +1,130 @@
+"""The close look: decides by probability, moves to the center it saw, and reports each object once."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vm_embedded.detection.looking import look_at
+from vm_embedded.detection.objects import locate
+from vm_embedded.detection.settings import Settings
+from vm_embedded.detection.stopwatch import Stopwatch
+from vm_embedded.network.look_contract import LookContract
+
+from .views import center_at, observation_of, view_at
+
+EXTENT = 1.75
+
+
+class BrightDisk:
+    """Answers as a perfect look network does to a picture of white balls on black ground, by arithmetic."""
+
+    def __init__(self, passes=2):
+        self.contract = LookContract(object_class="ball", size=32, extent=EXTENT, above=0.03, passes=passes)
+        self.seen = []
+
+    def run(self, patches):
+        self.seen.append(len(patches))
+        light = patches[..., 0] / 255.0
+        steps = ((np.arange(32) + 0.5) / 16.0 - 1.0) * EXTENT
+        total = np.maximum(light.sum(axis=(1, 2)), 1e-9)
+        right, down = (light.sum(axis=axis) @ steps / total for axis in (1, 2))
+        radius = np.sqrt(np.maximum(light.mean(axis=(1, 2)), 1e-9) * (2.0 * EXTENT) ** 2 / np.pi)
+        size = np.log(radius)
+        fits = (np.abs(size) < 0.3) & (np.hypot(right, down) < 0.6)
+        return np.stack([np.where(fits, 0.9, 0.05), right, down, size], axis=1).astype(np.float32)
+
+
+def found_in(observation, look, explain=True, **settings):
+    watch = Stopwatch()
+    found, rejected = locate(observation, look, Settings(**settings), watch, explain)
+    assert list(watch.stages) == ["propose", "look", "cluster"]
+    return found, rejected
+
+
+@pytest.fixture(scope="module")
+def scene():
+    view = view_at()
+    return observation_of(view, center_at(view, (200.0, 380.0)), center_at(view, (430.0, 260.0)))
+
+
+def true_centers(scene):
+    return center_at(scene.view, (200.0, 380.0)), center_at(scene.view, (430.0, 260.0))
+
+
+def test_each_ball_is_found_once_where_it_is_and_as_large_as_it_is(scene):
+    found, _ = found_in(scene, BrightDisk())
+    assert len(found) == 2
+    for center in true_centers(scene):
+        ball = min(found, key=lambda each: abs(each.distance - np.linalg.norm(center)))
+        assert ball.distance == pytest.approx(np.linalg.norm(center), rel=0.01)
+        np.testing.assert_allclose(ball.position, center + np.array([0.0, 0.0, scene.view.height]), atol=0.02)
+        assert ball.confidence == pytest.approx(0.9)
+        assert ball.distances_agree
+        assert ball.distance_by_angle == pytest.approx(ball.distance, rel=0.1)
+        assert ball.points > 5
+
+
+def test_looks_move_to_the_center_even_from_a_place_beside_it(scene):
+    center = true_centers(scene)[0]
+    beside = center + np.array([0.0, 0.05, 0.0])
+    moved, answers = look_at(scene, BrightDisk(passes=3), beside[None])
+    assert np.linalg.norm(moved[0] - center) < 0.2 * np.linalg.norm(beside - center)
+    assert answers[0, 0] == pytest.approx(0.9)
+
+
+def test_only_proposals_with_a_chance_are_looked_at_again(scene):
+    look = BrightDisk()
+    bare = replace(scene, slot_probabilities=np.full_like(scene.slot_probabilities, 0.5))
+    found_in(bare, look, max_proposals=30)
+    assert look.seen == [30, 30]  # 0.05 is a chance
+
+    class Sure(BrightDisk):
+        def run(self, patches):
+            answers = super().run(patches)
+            answers[answers[:, 0] < 0.5, 0] = 0.0
+            return answers
+
+    look = Sure()
+    found_in(bare, look, max_proposals=30)
+    assert look.seen[0] == 30
+    assert len(look.seen) == 1 or look.seen[1] < 15
+
+
+def test_what_is_too_improbable_has_a_reason(scene):
+    found, rejected = found_in(scene, BrightDisk(), min_confidence=0.95)
+    assert not found
+    assert all(each.reason.startswith("probability 0.") and each.reason.endswith("below 0.95") for each in rejected[:2])
+
+
+def test_an_object_that_is_seen_from_two_proposals_is_one(scene):
+    class Everywhere(BrightDisk):
+        """Sees the same ball from the other proposals, too."""
+
+        def run(self, patches):
+            answers = super().run(patches)
+            answers[:, 0] = np.where(answers[:, 3] > -3.0, 0.9, 0.0)
+            return answers
+
+    background = replace(scene, slot_probabilities=np.maximum(scene.slot_probabilities, np.float32(0.1)))
+    found, rejected = found_in(background, Everywhere(passes=3))
+    assert len(found) == 2
+    assert any(each.reason.startswith("the same object as the one at ") for each in rejected)
+
+
+def test_reasons_are_only_collected_when_asked_for(scene):
+    assert found_in(scene, BrightDisk(), explain=False, min_confidence=0.95) == ((), ())
+
+
+@pytest.mark.parametrize("size", [-3e38, 3e38])
+def test_a_network_that_sees_impossible_sizes_gives_finite_numbers(scene, size):
+    class Giant(BrightDisk):
+        def run(self, patches):
+            answers = super().run(patches)
+            answers[:, 3] = size
+            return answers
+
+    found, rejected = found_in(scene, Giant(), min_confidence=0.0)
+    for each in (*found, *rejected):
+        json.dumps(each.as_dict(), allow_nan=False)

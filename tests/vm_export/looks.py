@@ -1,0 +1,27 @@
+"""Seeded look networks and their checkpoints."""
+
+import torch
+
+from tests.looks import look_contract, random_patches
+from vm_export.look_checkpoint import LookCheckpoint
+from vm_export.look_network import LookNetwork, LookShape
+
+SHAPE = LookShape(size=8, channels=(4, 5, 6))
+
+
+def look_network(seed=0, shape=SHAPE):
+    """A network with random weights, whose answers differ from patch to patch, and a calibration that matters."""
+    torch.manual_seed(seed)
+    network = LookNetwork(shape).eval()
+    with torch.no_grad():
+        for name, value in network.named_parameters():
+            if name.endswith("weight"):
+                torch.nn.init.kaiming_normal_(value, nonlinearity="relu")
+        network.calibration.copy_(torch.tensor([0.7, -0.4]))
+    return network
+
+
+def look_checkpoint(seed=0, shape=SHAPE, **changes):
+    """A checkpoint with three examples; changes: other entries of its contract."""
+    contract = look_contract(**{"size": shape.size, "channels": shape.channels} | changes)
+    return LookCheckpoint(look_network(seed, shape), contract, random_patches(3, shape.size, seed))

@@ -1,0 +1,318 @@
+"""Look networks: torch and ONNX Runtime agree, and checkpoints and model files keep them."""
+
+from dataclasses import replace
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.looks import random_patches
+from tests.vm_export.checkpoints import checkpoint, manifest
+from tests.vm_export.looks import SHAPE, look_checkpoint, look_network
+from vm_embedded.errors import InputError, ModelError
+from vm_embedded.network.close_look import CloseLook
+from vm_embedded.network.model_file import read_model
+from vm_embedded.network.session import Session
+from vm_export import attach_look, export
+from vm_export.checkpoint import Checkpoint
+from vm_export.look_checkpoint import LookCheckpoint
+from vm_export.look_graph import look_model
+from vm_export.look_network import LookNetwork, LookShape, normalized
+
+from ..vm_embedded.strategies import seeds
+
+
+def ball_checkpoint(seed=0):
+    return Checkpoint(checkpoint(seed).network, manifest())
+
+
+def torch_answers(network, patches):
+    with torch.inference_mode():
+        return network(torch.from_numpy(patches)).numpy()
+
+
+def onnx_answers(content, patches):
+    return onnxruntime.InferenceSession(content).run(["answers"], {"patches": patches})[0]
+
+
+widths = st.integers(1, 20)
+shapes = st.builds(
+    LookShape, size=st.integers(8, 40), channels=st.tuples(widths, widths, widths), hidden=st.integers(0, 20)
+)
+
+
+@given(shape=shapes, seed=st.integers(0, 1000), count=st.integers(0, 9))
+@settings(max_examples=25)
+def test_every_look_gives_the_same_answers_in_onnx_runtime(shape, seed, count):
+    network = look_network(seed, shape)
+    patches = random_patches(count, shape.size, seed)
+    answers = onnx_answers(look_model(network), patches)
+    assert answers.shape == (count, 4)
+    np.testing.assert_allclose(answers, torch_answers(network, patches), atol=1e-5)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 40, 300])
+def test_one_graph_takes_any_number_of_patches(count):
+    network, patches = look_network(), random_patches(count)
+    np.testing.assert_allclose(onnx_answers(look_model(network), patches), torch_answers(network, patches), atol=1e-5)
+
+
+def test_the_graph_has_standard_operators_only_and_is_the_same_each_time():
+    content = look_model(look_network())
+    model = onnx.load_from_string(content)
+    assert {node.domain for node in model.graph.node} == {""}
+    assert look_model(look_network()) == content
+
+
+def test_onnx_runtime_joins_convolutions_and_activations(tmp_path):
+    options = onnxruntime.SessionOptions()
+    options.optimized_model_filepath = str(tmp_path / "optimized.onnx")
+    options.log_severity_level = 4
+    onnxruntime.InferenceSession(look_model(look_network(shape=LookShape())), options)
+    operators = [node.op_type for node in onnx.load(tmp_path / "optimized.onnx").graph.node]
+    assert "Relu" not in operators
+    assert sum("Conv" in each for each in operators) == 4
+
+
+@given(seeds, st.integers(-100, 100))
+@settings(max_examples=20)
+def test_brightness_does_not_matter(seed, change):
+    network = look_network()
+    patches = np.random.default_rng(seed).integers(100, 156, (2, 8, 8, 3), dtype=np.uint8)
+    brighter = (patches + np.int16(change)).astype(np.uint8)
+    np.testing.assert_allclose(torch_answers(network, brighter), torch_answers(network, patches), atol=1e-4)
+    content = look_model(network)
+    np.testing.assert_allclose(onnx_answers(content, brighter), onnx_answers(content, patches), atol=1e-4)
+
+
+@given(seeds, st.integers(0, 7))
+@settings(max_examples=20)
+def test_each_patch_is_judged_by_itself(seed, chosen):
+    patches, content = random_patches(8, seed=seed), look_model(look_network())
+    alone = onnx_answers(content, patches[chosen : chosen + 1])
+    np.testing.assert_allclose(alone, onnx_answers(content, patches)[chosen : chosen + 1], atol=1e-5)
+
+
+def test_noise_on_a_plain_surface_is_not_amplified():
+    patches = torch.full((3, 8, 8, 3), 100.0)
+    patches[1, :4] += 2.0
+    patches[2, :4] += 100.0
+    plain, faint, strong = normalized(patches).std(dim=(1, 2, 3), correction=0).tolist()
+    assert plain == 0.0
+    assert faint == pytest.approx(1 / 5)
+    assert strong == pytest.approx(50 / 54)
+
+
+def test_colors_as_floats_are_those_as_bytes():
+    network, patches = look_network(), random_patches(4)
+    np.testing.assert_array_equal(torch_answers(network, patches.astype(np.float32)), torch_answers(network, patches))
+
+
+def test_calibration_changes_probabilities_only():
+    network, patches = look_network(), torch.from_numpy(random_patches(5))
+    with torch.inference_mode():
+        logits = network.logits(patches)
+        network.calibration.copy_(torch.tensor([1.0, 0.0]))
+        plain = network(patches)
+        network.calibration.copy_(torch.tensor([0.5, 1.0]))
+        calibrated = network(patches)
+    torch.testing.assert_close(plain[:, 0], torch.sigmoid(logits[:, 0]))
+    torch.testing.assert_close(calibrated[:, 0], torch.sigmoid(0.5 * logits[:, 0] + 1.0))
+    for answers in (plain, calibrated):
+        torch.testing.assert_close(answers[:, 1:], logits[:, 1:])
+
+
+def test_a_new_network_is_not_calibrated():
+    assert LookNetwork(LookShape()).calibration.tolist() == [1.0, 0.0]
+
+
+def test_hidden_units_default_to_the_last_channels():
+    assert LookNetwork(LookShape(channels=(4, 5, 6))).hidden.out_features == 6
+    assert LookNetwork(LookShape(channels=(4, 5, 6), hidden=9)).hidden.out_features == 9
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"size": 7}, "size .* from 8 to 128, not 7"),
+        ({"size": 129}, "not 129"),
+        ({"channels": (4, 5)}, r"channels .* three numbers .*not \[4, 5\]"),
+        ({"channels": (4, 0, 5)}, r"not \[4, 0, 5\]"),
+        ({"channels": (4, 5, 1025)}, "1 to 1024"),
+        ({"hidden": -1}, "hidden .*not -1"),
+    ],
+)
+def test_a_shape_out_of_range_is_refused(changes, message):
+    with pytest.raises(InputError, match=message):
+        LookShape(**changes)
+
+
+@given(shapes)
+def test_a_shape_is_read_back_as_it_was_written(shape):
+    assert LookShape.from_dict(shape.as_dict()) == shape
+
+
+@pytest.mark.parametrize("data", [{}, {"size": 8, "channels": 3, "hidden": 0}, {"size": 8, "channels": [1, 2]}])
+def test_a_shape_that_is_not_complete_is_refused(data):
+    with pytest.raises(InputError, match="can't read the shape"):
+        LookShape.from_dict(data)
+
+
+def test_a_checkpoint_is_read_back_as_it_was_written(tmp_path):
+    made = look_checkpoint(3, passes=2, provenance={"trained_by": "a test"})
+    made.save(tmp_path / "look.pt")
+    torch.load(tmp_path / "look.pt", weights_only=True)
+    read = LookCheckpoint.load(tmp_path / "look.pt")
+    assert read.network.shape == made.network.shape
+    assert read.contract == made.contract
+    np.testing.assert_array_equal(read.examples, made.examples)
+    for name, value in made.network.state_dict().items():
+        assert torch.equal(read.network.state_dict()[name], value)
+
+
+@pytest.mark.parametrize("content", [b"", b"nothing", b"PK\x03\x04 broken"])
+def test_a_broken_checkpoint_is_refused(tmp_path, content):
+    (tmp_path / "look.pt").write_bytes(content)
+    with pytest.raises(InputError, match=r"look\.pt is not a checkpoint of a look network"):
+        LookCheckpoint.load(tmp_path / "look.pt")
+
+
+def test_a_checkpoint_of_another_kind_is_refused(tmp_path):
+    checkpoint().save(tmp_path / "model.pt")
+    with pytest.raises(InputError, match=r"model\.pt is not .* 'vm-embedded look 1'.* 'vm-embedded checkpoint"):
+        LookCheckpoint.load(tmp_path / "model.pt")
+    look_checkpoint().save(tmp_path / "look.pt")
+    with pytest.raises(InputError, match=r"look\.pt is not a checkpoint of format 'vm-embedded checkpoint"):
+        Checkpoint.load(tmp_path / "look.pt")
+    with pytest.raises(InputError, match="can't read"):
+        LookCheckpoint.load(tmp_path / "missing.pt")
+
+
+@pytest.mark.parametrize(
+    ("entry", "value"),
+    [
+        ("network", {}),
+        ("network", {"size": 16, "channels": [4, 5, 6], "hidden": 0}),
+        ("contract", {}),
+        ("examples", torch.zeros(3, 8, 8, 3)),
+        ("examples", None),
+        ("state", {}),
+        ("state", None),
+        ("state", ...),
+    ],
+)
+def test_a_checkpoint_whose_parts_do_not_fit_is_refused_by_name(tmp_path, entry, value):
+    look_checkpoint().save(tmp_path / "look.pt")
+    content = torch.load(tmp_path / "look.pt", weights_only=True) | {entry: value}
+    torch.save({key: each for key, each in content.items() if each is not ...}, tmp_path / "look.pt")
+    with pytest.raises((InputError, ModelError), match=r"look\.pt") as caught:
+        LookCheckpoint.load(tmp_path / "look.pt")
+    assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "examples", [random_patches(0), random_patches(3, size=9), random_patches(3).astype(np.float32)]
+)
+def test_examples_that_do_not_fit_are_refused(examples):
+    with pytest.raises(ModelError, match=r"examples .* uint8 patches of \(8, 8, 3\)"):
+        replace(look_checkpoint(), examples=examples)
+
+
+@pytest.mark.parametrize("changes", [{"size": 9}, {"channels": (4, 5, 7)}])
+def test_a_contract_for_another_network_is_refused(changes):
+    with pytest.raises(ModelError, match="its contract says"):
+        look_checkpoint(**changes)
+
+
+@pytest.mark.parametrize("layout", ["plain", "runs"])
+def test_a_model_file_holds_both_networks(tmp_path, layout):
+    mesh, look = ball_checkpoint(), look_checkpoint(provenance={"trained_by": "a test"})
+    assert export.export(mesh, tmp_path / "model.onnx", layout, look) < 1e-4
+    read = read_model(tmp_path / "model.onnx")
+    onnx.checker.check_model(onnx.load(tmp_path / "model.onnx"), full_check=True)
+    example = export.random_example(mesh.network, 50, 1)
+    np.testing.assert_allclose(Session(read).answer(example), example.probabilities[:-1], atol=1e-5)
+
+    close = CloseLook(read)
+    assert close.contract.provenance["trained_by"] == "a test"
+    assert close.contract.provenance["exported_by"].startswith("vm-export")
+    np.testing.assert_array_equal(close.contract.self_test.patches, look.examples)
+    patches = random_patches(20, seed=5)
+    np.testing.assert_allclose(close.run(patches), torch_answers(look.network, patches), atol=1e-5)
+
+
+def test_a_look_changes_nothing_but_the_metadata(tmp_path):
+    export.export(ball_checkpoint(), tmp_path / "without.onnx")
+    export.export(ball_checkpoint(), tmp_path / "with.onnx", look=look_checkpoint())
+    assert export.change_look(tmp_path / "without.onnx", tmp_path / "attached.onnx", look_checkpoint()) < 1e-4
+    assert (tmp_path / "attached.onnx").read_bytes() == (tmp_path / "with.onnx").read_bytes()
+    assert export.change_look(tmp_path / "with.onnx", tmp_path / "removed.onnx", None) is None
+    assert (tmp_path / "removed.onnx").read_bytes() == (tmp_path / "without.onnx").read_bytes()
+    graphs = [onnx.load(tmp_path / name).graph for name in ("without.onnx", "with.onnx")]
+    assert graphs[0] == graphs[1]
+
+
+def test_a_look_replaces_the_one_before(tmp_path):
+    export.export(ball_checkpoint(), tmp_path / "model.onnx", look=look_checkpoint(1))
+    export.change_look(tmp_path / "model.onnx", tmp_path / "other.onnx", look_checkpoint(2))
+    export.export(ball_checkpoint(), tmp_path / "expected.onnx", look=look_checkpoint(2))
+    assert (tmp_path / "other.onnx").read_bytes() == (tmp_path / "expected.onnx").read_bytes()
+
+
+def test_other_metadata_of_a_model_file_stays(tmp_path):
+    export.export(ball_checkpoint(), tmp_path / "model.onnx")
+    model = onnx.load(tmp_path / "model.onnx")
+    model.metadata_props.add(key="author", value="Zoë")
+    onnx.save(model, tmp_path / "model.onnx")
+    export.change_look(tmp_path / "model.onnx", tmp_path / "other.onnx", look_checkpoint())
+    kept = {each.key: each.value for each in onnx.load(tmp_path / "other.onnx").metadata_props}
+    assert sorted(kept) == ["author", "visual_mesh", "visual_mesh_look"]
+    assert kept["author"] == "Zoë"
+
+
+def test_a_look_that_differs_from_torch_is_not_written(tmp_path, monkeypatch):
+    other = look_model(look_network(5))
+    monkeypatch.setattr(attach_look, "look_model", lambda network: other)
+    export.export(ball_checkpoint(), tmp_path / "model.onnx")
+    with pytest.raises(ModelError, match=r"answers of the close look .* differ by"):
+        export.export(ball_checkpoint(), tmp_path / "new.onnx", look=look_checkpoint())
+    with pytest.raises(ModelError, match=r"answers of the close look .* differ by"):
+        export.change_look(tmp_path / "model.onnx", tmp_path / "new.onnx", look_checkpoint())
+    assert [path.name for path in tmp_path.iterdir()] == ["model.onnx"]
+
+
+def test_networks_whose_answers_are_not_numbers_are_not_written(tmp_path):
+    look, mesh = look_checkpoint(), ball_checkpoint()
+    with torch.no_grad():
+        look.network.answers.bias[2] = torch.nan
+        mesh.last_network.typed_layers[0].linear.bias[0] = torch.nan
+    with pytest.raises(ModelError, match="close look: its answers are NaN or infinite"):
+        export.export(ball_checkpoint(), tmp_path / "model.onnx", look=look)
+    with pytest.raises(ModelError, match="differ by nan"):
+        export.export(mesh, tmp_path / "model.onnx")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_look_for_a_class_that_is_no_object_is_not_written(tmp_path):
+    for name in ("goal", "environment"):
+        with pytest.raises(ModelError, match=rf"'{name}'.* kind object are \['ball'\]"):
+            export.export(ball_checkpoint(), tmp_path / "model.onnx", look=look_checkpoint(object_class=name))
+    assert not list(tmp_path.iterdir())
+
+
+def test_there_must_be_a_look_to_remove(tmp_path):
+    export.export(ball_checkpoint(), tmp_path / "model.onnx")
+    with pytest.raises(ModelError, match=r"model\.onnx has no close look to remove"):
+        export.change_look(tmp_path / "model.onnx", tmp_path / "other.onnx", None)
+
+
+def test_a_look_of_the_usual_size_fits_its_sizes():
+    made = look_checkpoint(shape=LookShape())
+    assert made.network.shape != SHAPE
+    np.testing.assert_allclose(
+        onnx_answers(look_model(made.network), made.examples), torch_answers(made.network, made.examples), atol=1e-5
+    )

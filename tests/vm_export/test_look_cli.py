@@ -1,0 +1,104 @@
+"""vm-export with close looks, as a user types it."""
+
+import pytest
+
+from tests.looks import random_patches
+from tests.vm_export.checkpoints import checkpoint, manifest
+from tests.vm_export.looks import look_checkpoint
+from tests.vm_export.test_cli import names_in, run
+from tests.vm_export.test_reference import reference_file
+from vm_embedded.network.close_look import CloseLook
+from vm_embedded.network.model_file import read_model
+from vm_export.checkpoint import Checkpoint
+from vm_export.cli import main
+from vm_export.export import export
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with a checkpoint and a close look."""
+    Checkpoint(checkpoint().network, manifest()).save(tmp_path / "model.pt")
+    look_checkpoint().save(tmp_path / "look.pt")
+    return tmp_path
+
+
+def has_look(path):
+    """Whether a model file has a close look that runs and passes its self-test."""
+    read = read_model(path)
+    return read.look is not None and len(CloseLook(read).run(random_patches(2))) == 2
+
+
+def test_command_attaches_a_look_to_both_files(folder):
+    done = run(folder / "model.pt", "--look", folder / "look.pt")
+    assert names_in(folder) == ["look.pt", "model.onnx", "model.plain.onnx", "model.pt"]
+    assert has_look(folder / "model.onnx")
+    assert has_look(folder / "model.plain.onnx")
+    assert done.stdout.count("close look at ball (8 x 8, channels 4, 5, 6)") == 2
+    assert "largest difference" in done.stdout
+
+
+def test_command_attaches_a_look_in_the_layout_that_it_is_told(folder):
+    run(folder / "model.pt", "--look", folder / "look.pt", "--layout", "plain", "-o", folder / "out.onnx")
+    assert names_in(folder) == ["look.pt", "model.pt", "out.onnx"]
+    assert has_look(folder / "out.onnx")
+
+
+def test_command_attaches_a_look_to_a_network_of_the_reference(folder):
+    reference_file(folder / "model.yaml")
+    run(folder / "model.yaml", "--look", folder / "look.pt", "--classes", "ball:object,field:area")
+    assert has_look(folder / "model.onnx")
+
+
+def test_command_attaches_a_look_to_a_model_file_and_removes_it(folder):
+    run(folder / "model.pt")
+    before = (folder / "model.onnx").read_bytes()
+    done = run(folder / "model.onnx", "--look", folder / "look.pt", "-o", folder / "new.onnx")
+    assert has_look(folder / "new.onnx")
+    assert "close look at ball" in done.stdout
+    run(folder / "new.onnx", "--no-look", "-o", folder / "old.onnx")
+    assert not has_look(folder / "old.onnx")
+    assert (folder / "old.onnx").read_bytes() == (folder / "model.onnx").read_bytes() == before
+    assert names_in(folder) == ["look.pt", "model.onnx", "model.plain.onnx", "model.pt", "new.onnx", "old.onnx"]
+
+
+def test_command_attaches_a_look_to_a_network_of_the_package(folder):
+    run("ball-5x4", "--look", folder / "look.pt", "-o", folder / "out.onnx")
+    assert has_look(folder / "out.onnx")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("model.pt", "--look", "missing.pt"), "can't read"),
+        (("model.pt", "--look", "model.pt"), "is not a checkpoint of format 'vm-embedded look"),
+        (("look.pt",), "is not a checkpoint of format 'vm-embedded checkpoint"),
+        (("model.pt", "--look", "look.pt", "--to-yaml"), "--look is for ONNX files"),
+        (("model.pt", "--look", "look.pt", "-o", "look.pt"), "would be overwritten"),
+        (("model.pt", "--no-look"), "--no-look is for model files (.onnx)"),
+        (("model.pt", "--look", "look.pt", "--classes", "goal:object,other:background"), "kind object are ['goal']"),
+        (("given.onnx",), "is a model file already"),
+        (("given.onnx", "--look", "look.pt"), "would be overwritten"),
+        (("given.onnx", "--no-look", "-o", "new.onnx"), "has no close look to remove"),
+        (("given.onnx", "--look", "look.pt", "-o", "new.onnx", "--layout", "plain"), "--layout can't change"),
+        (("given.onnx", "--look", "look.pt", "-o", "new.onnx", "--radius", "0"), "--radius can't change"),
+        (("given.onnx", "--to-yaml", "--edge", "same", "--max-distance", "9"), "--to-yaml, --max-distance, --edge"),
+        (("missing.onnx", "--look", "look.pt", "-o", "new.onnx"), "No such file"),
+        (("damaged.onnx", "--look", "look.pt", "-o", "new.onnx"), "damaged.onnx: not an ONNX file"),
+        (("given.onnx", "--look", "look.pt", "-o", "no/such/new.onnx"), "can't write"),
+    ],
+)
+def test_command_says_in_one_line_what_is_wrong(folder, capsys, arguments, message):
+    export(Checkpoint.load(folder / "model.pt"), folder / "given.onnx")
+    (folder / "damaged.onnx").write_bytes((folder / "given.onnx").read_bytes()[:-9])
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    given = [str(folder / each) if each.endswith((".pt", ".onnx")) else each for each in arguments]
+    assert main(given) == 1
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.startswith("vm-export: ")
+    assert len(said.splitlines()) == 1
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_command_takes_one_of_the_two_options(folder):
+    assert "not allowed with" in run(folder / "model.pt", "--look", folder / "look.pt", "--no-look", code=2).stderr

@@ -1,0 +1,84 @@
+"""Augmentation of patches."""
+
+from dataclasses import fields, replace
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vm_train.look.augmentation import augment
+from vm_train.look.configuration import PatchAugmentation
+
+OFF = PatchAugmentation(
+    mirror=0.0, gamma=0.0, gain=0.0, swap=0.0, gray=0.0, blur_share=0.0, noise_share=0.0, jpeg_share=0.0
+)
+PATCHES = torch.randint(20, 230, (6, 16, 16, 3), generator=torch.Generator().manual_seed(1)).to(torch.uint8)
+TARGETS = torch.rand((6, 3), generator=torch.Generator().manual_seed(2)) - 0.5
+
+
+def augmented(wanted, seed=0, patches=PATCHES):
+    return augment(patches, TARGETS[: len(patches)], wanted, torch.Generator().manual_seed(seed))
+
+
+def test_everything_switched_off_changes_nothing():
+    patches, targets = augmented(OFF)
+    assert torch.allclose(patches, PATCHES.float(), atol=1e-3)
+    assert torch.equal(targets, TARGETS)
+
+
+def test_a_mirror_image_has_its_object_on_the_other_side():
+    patches, targets = augmented(replace(OFF, mirror=1.0))
+    assert torch.allclose(patches, PATCHES.flip(2).float(), atol=1e-3)
+    assert torch.equal(targets, TARGETS * torch.tensor([-1.0, 1.0, 1.0]))
+
+
+@pytest.mark.parametrize("name", ["gamma", "gain", "swap", "gray", "blur_share", "noise_share", "jpeg_share"])
+def test_each_entry_changes_the_patches_and_leaves_the_targets(name):
+    patches, targets = augmented(replace(OFF, **{name: 1.0}))
+    assert (patches - PATCHES.float()).abs().amax(dim=(1, 2, 3)).median() > 2.0
+    assert torch.equal(targets, TARGETS)
+
+
+@settings(max_examples=15)
+@given(st.integers(0, 2**60))
+def test_all_entries_together_stay_within_the_limits_and_depend_on_the_seed_alone(seed):
+    shares = {each.name: 1.0 for each in fields(PatchAugmentation) if each.name.endswith("share")}
+    everything = PatchAugmentation(mirror=0.5, swap=0.5, gray=0.5, gamma=1.0, gain=1.0, **shares)
+    patches, targets = augmented(everything, seed)
+    assert patches.shape == PATCHES.shape
+    assert 0.0 <= patches.min() <= patches.max() <= 255.0
+    again, targets_again = augmented(everything, seed)
+    assert torch.equal(patches, again)
+    assert torch.equal(targets, targets_again)
+
+
+def test_a_gray_patch_has_no_color():
+    patches, _ = augmented(replace(OFF, gray=1.0))
+    assert torch.allclose(patches[..., 0], patches[..., 2])
+
+
+def test_a_permutation_keeps_the_values_of_every_sample():
+    patches, _ = augmented(replace(OFF, swap=1.0))
+    assert torch.allclose(patches.sort(dim=3).values, PATCHES.float().sort(dim=3).values, atol=1e-3)
+
+
+def test_blur_keeps_plain_patches_and_the_mean_and_lowers_the_contrast():
+    blurred = replace(OFF, blur_share=1.0, blur=(1.0, 1.0))
+    plain = torch.full((2, 16, 16, 3), 90, dtype=torch.uint8)
+    assert torch.allclose(augmented(blurred, patches=plain)[0], plain.float(), atol=1e-2)
+    patches, _ = augmented(blurred)
+    assert patches.mean() == pytest.approx(PATCHES.float().mean().item(), abs=1.0)
+    assert patches.std() < 0.5 * PATCHES.float().std()
+
+
+def test_an_entry_leaves_the_draws_of_the_others():
+    bright, _ = augmented(replace(OFF, gain=0.02))
+    both, _ = augmented(replace(OFF, gain=0.02, gray=1.0))
+    assert torch.allclose(both[..., 0], bright.mean(dim=3), atol=1e-2)
+
+
+def test_compression_keeps_the_color_of_plain_patches():
+    plain = torch.tensor([200, 40, 20], dtype=torch.uint8).expand(2, 16, 16, 3).contiguous()
+    patches, _ = augmented(replace(OFF, jpeg_share=1.0), patches=plain)
+    assert torch.allclose(patches, plain.float(), atol=8.0)

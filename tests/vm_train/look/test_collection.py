@@ -1,0 +1,147 @@
+"""Patches are the same whoever collects them, and whatever interrupts it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vm_embedded.config.sections import read_sections
+from vm_embedded.errors import InputError
+from vm_embedded.network.bundled import model_path
+from vm_train.data.pictures import find_pictures
+from vm_train.data.split import split_by_seed
+from vm_train.look import collection
+from vm_train.look.configuration import LookConfiguration
+from vm_train.look.labels import NOTHING, OBJECT
+from vm_train.look.patch_set import PatchChunk
+from vm_train.look.places import JITTERED, PROPOSED, RANDOM
+from vm_train.look.run_folder import begin_look_run, is_look_run, read_look_run
+
+
+@pytest.fixture(autouse=True)
+def _small_chunks(monkeypatch):
+    monkeypatch.setattr(collection, "CHUNK", 6)
+
+
+@pytest.fixture
+def begin(drawn, tiny, tmp_path):
+    """Begins a run on the drawn pictures, or those of another folder."""
+
+    def begin_one(name="run", data=drawn, strict=False):
+        split = split_by_seed([each.number for each in find_pictures(data)], 0.25, 0.0, 0)
+        configuration = read_sections(LookConfiguration, tiny)
+        model = model_path("ball-5x4")
+        return begin_look_run(tmp_path / name, data, split, configuration, model, "ball-5x4", strict)
+
+    return begin_one
+
+
+@pytest.fixture
+def damaged(drawn, tmp_path):
+    """The drawn pictures, of which one has no lens file."""
+    folder = tmp_path / "damaged"
+    folder.mkdir()
+    for path in drawn.iterdir():
+        (folder / path.name).symlink_to(path)
+    (folder / "lens0007.yaml").unlink()
+    return folder
+
+
+def collect_patches(run, workers, report=lambda done: None):
+    return [PatchChunk.load(path) for path in collection.collect_patches(run, workers, report)]
+
+
+def content(run):
+    return {path.name: path.read_bytes() for path in sorted(run.patches.iterdir())}
+
+
+def test_patches_have_labels_and_come_from_all_kinds_of_places(begin):
+    run = begin()
+    done = []
+    chunks = collect_patches(run, 1, done.append)
+    assert done == list(range(21))
+    assert sorted(content(run)) == [f"{number:05d}.npz" for number in range(4)]
+    validation = {run.numbers.index(number) for number in run.split.validation}
+    kinds = set()
+    for chunk in chunks:
+        patches = chunk.patches
+        assert patches.patches.shape == (len(patches), 16, 16, 3)
+        assert set(patches.labels.tolist()) <= {OBJECT, NOTHING}
+        assert not patches.targets[patches.labels == NOTHING].any()
+        validates = np.isin(patches.pictures, list(validation))
+        assert patches.proposed[validates].all()
+        kinds |= set(patches.kinds.tolist())
+    assert kinds == {PROPOSED, JITTERED, RANDOM}
+    assert 3 <= sum(each.proposed for each in chunks) <= sum(each.objects for each in chunks) <= len(validation)
+
+
+def test_two_workers_write_the_same_files_as_one(begin):
+    one, two = begin("one"), begin("two")
+    collect_patches(one, 1)
+    collect_patches(two, 2)
+    assert content(one) == content(two)
+
+
+def test_an_interrupted_collection_keeps_its_chunks_and_ends_with_the_same_files(begin):
+    whole, run = begin("whole"), begin()
+    collect_patches(whole, 1)
+
+    def interrupt(done):
+        if done == 15:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        collect_patches(run, 1, interrupt)
+    assert len(content(run)) == 2
+    (run.patches / "00001.npz").unlink()
+    done = []
+    collect_patches(read_look_run(run.folder), 1, done.append)
+    assert done == list(range(6, 21))
+    assert content(run) == content(whole)
+
+
+def test_a_picture_that_cannot_be_used_is_left_out_and_named(begin, damaged):
+    whole, run = begin("whole"), begin(data=damaged)
+    chunks, others = collect_patches(run, 1), collect_patches(whole, 1)
+    assert [each.faults for each in chunks] == [(), ("picture 0007: lens0007.yaml: is missing",), (), ()]
+    assert set(chunks[1].patches.pictures) == {6, 8, 9, 10, 11}
+    assert chunks[2].patches.sha256() == others[2].patches.sha256()
+
+
+def test_a_strict_run_ends_with_the_picture_and_goes_on_when_it_is_repaired(begin, damaged, drawn):
+    run = begin(data=damaged, strict=True)
+    with pytest.raises(InputError, match=r"picture 0007: lens0007.yaml: is missing; repair it and continue with"):
+        collect_patches(run, 1)
+    (damaged / "lens0007.yaml").symlink_to(drawn / "lens0007.yaml")
+    assert not any(each.faults for each in collect_patches(read_look_run(run.folder), 1))
+
+
+def test_a_picture_that_has_left_the_folder_is_named(begin, damaged):
+    run = begin(data=damaged)
+    (damaged / "image0003.jpg").unlink()
+    with pytest.raises(InputError, match=r"lacks picture 0003, which the training began with; .* --data"):
+        collect_patches(run, 1)
+
+
+def test_a_damaged_chunk_is_named(begin):
+    run = begin()
+    (run.patches / "00002.npz").write_bytes(b"PK")
+    with pytest.raises(InputError, match=r"00002.npz: .*; remove it and resume"):
+        collect_patches(run, 1)
+
+
+def test_files_that_were_changed_since_the_beginning_are_refused(begin):
+    run = begin()
+    assert is_look_run(run.folder)
+    mesh, toml = run.mesh.read_bytes(), (run.folder / "look.toml").read_text()
+    run.mesh.write_bytes(Path(model_path("ball-9x4")).read_bytes())
+    with pytest.raises(InputError, match=r"mesh\.onnx was changed"):
+        read_look_run(run.folder)
+    run.mesh.write_bytes(mesh)
+    (run.folder / "look.toml").write_text(toml.replace("epochs = 4", "epochs = 5"))
+    with pytest.raises(InputError, match=r"look.toml or pictures.json was changed"):
+        read_look_run(run.folder)
+    (run.folder / "run.json").write_text("{}")
+    assert not is_look_run(run.folder)
+    with pytest.raises(InputError, match="is damaged"):
+        read_look_run(run.folder)

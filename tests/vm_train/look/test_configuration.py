@@ -1,0 +1,56 @@
+"""look.toml: entries, limits and what fits together."""
+
+from itertools import pairwise
+
+import pytest
+
+from vm_embedded.config.sections import parse_overrides, read_sections
+from vm_embedded.config.toml_writer import to_commented_toml
+from vm_embedded.errors import InputError
+from vm_train.look.configuration import LOOK_HEADER, LookConfiguration, LookRecipe
+
+
+def read(*entries):
+    return read_sections(LookConfiguration, None, parse_overrides(entries, "training.epochs=5"))
+
+
+def test_the_printed_file_is_the_default_configuration(tmp_path):
+    path = tmp_path / "look.toml"
+    path.write_text(to_commented_toml(LookConfiguration(), LOOK_HEADER))
+    assert read_sections(LookConfiguration, path) == LookConfiguration()
+    lines = path.read_text().splitlines()
+    assert all(before.startswith("#") for before, line in pairwise(lines) if " = " in line and "kind" not in line)
+
+
+def test_the_shape_of_the_network_comes_from_two_sections():
+    shape = read("patches.size=24", "network.channels=[4, 6, 8]", "network.hidden=5").shape
+    assert (shape.size, shape.channels, shape.hidden) == (24, (4, 6, 8), 5)
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ("patches.size=4", "size must be a whole number from 8 to 128 px, not 4"),
+        ("patches.sizee=16", "unknown entry in [patches] 'sizee'; did you mean 'size'?"),
+        ("network.channels=[4, 8]", "channels must be three whole numbers from 1 to 1024, as [16, 32, 48], not [4, 8]"),
+        ("network.channels=[4, 8, 0]", "channels must be three whole numbers"),
+        ("network.channels=[4, 8, true]", "channels must be three whole numbers"),
+        ("training.rounds=20", "rounds must be at most epochs, which is 12, not 20"),
+        ("augmentation.blur=[2, 1]", "blur must be [low, high]; 2 is above 1"),
+        ("classes.ball=1", 'ball must be like { kind = "object"'),
+    ],
+)
+def test_a_wrong_entry_is_named_with_what_is_allowed(entry, said):
+    with pytest.raises(InputError) as error:
+        read(entry)
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize(("epochs", "rounds"), [(12, 3), (7, 3), (5, 5), (4, 1)])
+def test_rounds_share_the_epochs(epochs, rounds):
+    recipe = LookRecipe(epochs=epochs, rounds=rounds)
+    found = [recipe.round_of(each) for each in range(epochs)]
+    assert found == sorted(found)
+    assert set(found) == set(range(rounds))
+    counts = [found.count(each) for each in range(rounds)]
+    assert max(counts) - min(counts) <= 1

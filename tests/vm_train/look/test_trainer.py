@@ -1,0 +1,124 @@
+"""Training steps are repeatable, also after an interruption, and prefer hard patches in later rounds."""
+
+import numpy as np
+import pytest
+import torch
+
+from vm_embedded.errors import InputError
+from vm_export.look_network import LookNetwork, LookShape
+from vm_train.learning.trainer import read_state
+from vm_train.look.configuration import LookRecipe, PatchAugmentation
+from vm_train.look.labels import NOTHING, OBJECT
+from vm_train.look.patch_set import PatchSet
+from vm_train.look.scores import logits_of
+from vm_train.look.trainer import LookTrainer
+
+SIZE = 16
+RECIPE = LookRecipe(epochs=3, batch=12, rate=0.01)
+
+
+def patch_set(count=60):
+    """Dark patches; each third shows a bright disk, right of the middle or left of it."""
+    random = np.random.default_rng(4)
+    made = PatchSet.empty(SIZE, count)
+    made.patches[:] = random.integers(0, 60, made.patches.shape)
+    made.labels[:] = NOTHING
+    at = np.arange(SIZE) - 7.5
+    for each in range(0, count, 3):
+        side = 2.0 if each % 2 else -2.0
+        made.patches[each][np.hypot(at[:, None], at - side) < 5.0] = 220
+        made.labels[each] = OBJECT
+        made.targets[each] = (side / 5.0, 0.0, 0.1)
+    return made
+
+
+def trainer(patches=None, recipe=RECIPE, total=40):
+    torch.manual_seed(recipe.seed)
+    network = LookNetwork(LookShape(SIZE, (4, 6, 8), 8))
+    return LookTrainer(network, patches or patch_set(), recipe, PatchAugmentation(), total)
+
+
+def weights(made):
+    return {name: value.clone() for name, value in made.network.state_dict().items()}
+
+
+def same(first, second):
+    return all(torch.equal(first[name], second[name]) for name in first)
+
+
+def test_it_learns_presence_and_place():
+    made = trainer(recipe=LookRecipe(batch=24, rate=0.02), total=150)
+    steps = [made.step() for _ in range(150)]
+    assert steps[-1].presence < 0.3 * steps[0].presence
+    patches = patch_set()
+    found = logits_of(made.network.eval(), patches.patches)
+    shown = patches.labels == OBJECT
+    assert ((found[:, 0] > 0) == shown).all()
+    assert np.abs(found[shown, 1] - patches.targets[shown, 0]).max() < 0.2
+
+
+@pytest.mark.parametrize(("graded", "stop"), [(None, 3), (2, 2), (2, 4), (4, 3)])
+def test_what_is_interrupted_ends_with_the_same_weights(graded, stop, tmp_path):
+    def run(made, until):
+        while made.done < until:
+            if made.done == graded:
+                made.grade()
+            made.step()
+
+    whole = trainer()
+    run(whole, 8)
+    first, second = trainer(), trainer()
+    run(first, stop)
+    first.save(tmp_path / "state.pt", {"validated": 1})
+    state = read_state(tmp_path / "state.pt")
+    assert state["more"] == {"validated": 1}
+    second.load(state)
+    run(second, 8)
+    assert same(weights(second), weights(whole))
+    assert not same(weights(first), weights(whole))
+
+
+def test_graded_patches_are_drawn_by_their_errors():
+    """One dark patch in forty has the disk of an object, so the network is wrong about it."""
+    patches = patch_set()
+    made = trainer(patches, LookRecipe(batch=24, rate=0.02), 200)
+    for _ in range(100):
+        made.step()
+    hard = 1
+    patches.patches[hard] = patches.patches[3]
+    mean = made.grade()
+    assert 0.0 < mean < 0.2
+    drawn = np.concatenate([made._draw(np.random.default_rng(each))[0].numpy() for each in range(100)])
+    others = drawn[patches.labels[drawn] == NOTHING]
+    assert (others == hard).mean() > 4.0 / 40
+
+
+def test_a_third_of_each_batch_shows_an_object():
+    chosen, shown = trainer()._draw(np.random.default_rng(0))
+    patches = patch_set()
+    assert ((patches.labels[chosen.numpy()] == OBJECT) == shown.numpy()).all()
+    assert shown.sum() == 4
+
+
+@pytest.mark.parametrize(("label", "what"), [(OBJECT, "shows no object"), (NOTHING, "shows an object")])
+def test_patches_of_one_kind_are_refused(label, what):
+    patches = patch_set()
+    patches.labels[:] = label
+    with pytest.raises(InputError, match=f"none of the 60 training patches {what}"):
+        trainer(patches)
+
+
+def test_a_loss_that_is_no_number_ends_the_training():
+    made = trainer(recipe=LookRecipe(batch=12, rate=1e3), total=40)
+    with torch.no_grad():
+        made.network.answers.weight *= torch.inf
+    with pytest.raises(InputError, match="is NaN or infinite: begin again with a lower"):
+        made.step()
+
+
+def test_a_state_of_another_training_is_refused(tmp_path):
+    made = trainer()
+    made.grade()
+    made.save(tmp_path / "state.pt", {})
+    with pytest.raises(InputError, match="belongs to another training"):
+        trainer(patch_set(30)).load(read_state(tmp_path / "state.pt"))

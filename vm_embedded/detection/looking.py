@@ -1,0 +1,122 @@
+"""The close look: a small network decides about each proposal of the mesh network.
+
+It sees a patch of the picture in which the proposed object would fill the same disk at every distance. It says how
+probable the object is, where its center is, and how large it is. Then it looks again, where it saw the center.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..arrays import Floats, Image, Singles
+from ..network.look_contract import LookContract
+from .observation import Observation
+from .patches import Tangents, cut_patches, patch_nodes
+from .proposals import propose_places
+from .settings import Settings
+from .stopwatch import Stopwatch
+
+_WORTH = 0.02
+"""Probability above which a proposal is worth another look."""
+
+
+_LARGEST_SIZE = 3.0
+"""Limit of the logarithm of a size: a bad network must not lead to numbers that can't be written."""
+
+
+class Look(Protocol):
+    """Anything that judges patches: a CloseLook, or a look network in torch."""
+
+    @property
+    def contract(self) -> LookContract: ...
+
+    def run(self, patches: Image) -> Singles:
+        """Answers (n, 4) to patches (n, size, size, 3), as `CloseLook.run` gives them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judgment:
+    """A proposal after the close look.
+
+    center (3,): of the object, relative to the camera in the mesh frame [m]. confidence: calibrated probability.
+    scale: apparent size as a share of the expected one. reason: why it is not an object, or None.
+    """
+
+    center: Floats
+    confidence: float
+    scale: float
+    reason: str | None = None
+
+
+def look_closely(
+    observation: Observation,
+    look: Look,
+    probabilities: Singles,
+    settings: Settings,
+    watch: Stopwatch,
+    explain: bool = False,
+) -> list[Judgment]:
+    """The objects of the look's class, most probable first, from the slots' probabilities (m,).
+
+    explain: also the rejected proposals, with their reasons. watch: gets the stages propose and look. Raises ModelError
+    if the network does not run.
+    """
+    centers = propose_places(observation, probabilities, look.contract.above, settings.max_proposals)
+    watch.lap("propose")
+    centers, answers = look_at(observation, look, centers)
+    judged = _judged(observation, centers, answers, settings, explain)
+    watch.lap("look")
+    return judged
+
+
+def look_at(observation: Observation, look: Look, centers: Floats) -> tuple[Floats, Singles]:
+    """Look at places with centers (c, 3) [m] in the mesh frame, as often as the contract says.
+
+    Returns the centers (c, 3) that the network saw, and its answers (c, 4), as `CloseLook.run` gives them.
+    """
+    view, contract = observation.view, look.contract
+    centers, answers = centers.copy(), np.zeros((len(centers), 4), dtype=np.float32)
+    worth = np.arange(len(centers))
+    for _ in range(contract.passes):
+        tangents = Tangents.at(view, centers[worth])
+        nodes = patch_nodes(view, tangents, contract.extent)
+        answers[worth] = found = look.run(cut_patches(observation.pyramid, nodes, contract.size))
+        rays = tangents.rays(found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
+        centers[worth] = view.shape.center_along(rays, view.height)
+        worth = worth[(found[:, 0] > _WORTH) & (rays[:, 2] < 0.0)]
+        if not len(worth):
+            break
+    return centers, answers
+
+
+def _judged(
+    observation: Observation, centers: Floats, answers: Singles, settings: Settings, explain: bool
+) -> list[Judgment]:
+    """Judgments of places with centers (c, 3) [m] and the network's answers (c, 4), most probable first."""
+    view = observation.view
+    kept: list[Floats] = []
+    judged: list[Judgment] = []
+    for number in np.argsort(-answers[:, 0], kind="stable"):
+        center, (probability, _, _, size) = centers[number], answers[number].tolist()
+        if probability < settings.min_confidence and not explain:
+            break
+        reason = None
+        if center[2] >= 0.0:
+            reason = "on the horizon or above it"
+        elif probability < settings.min_confidence:
+            reason = f"probability {probability:.2f}, below {settings.min_confidence:g}"
+        elif kept:
+            ray = (center / np.linalg.norm(center))[None]
+            offset = view.shape.offset(ray, np.stack(kept), view.height)[:, 0]
+            if offset.min() < 1.0:
+                reason = f"the same object as the one at {np.linalg.norm(kept[int(np.argmin(offset))]):.2f} m"
+        if reason is None:
+            kept.append(center)
+        if reason is None or explain:
+            scale = math.exp(min(max(size, -_LARGEST_SIZE), _LARGEST_SIZE))
+            judged.append(Judgment(center, probability, scale, reason))
+    return judged

@@ -1,0 +1,139 @@
+"""Patches: the picture around places where an object may be, in which an object has the same size at every distance.
+
+A patch is a square in the plane that touches the unit sphere around the camera in the direction of the object. One
+axis is level, the other one points up. Its side is a fixed number of the object's apparent radii. So a ball at one
+meter gets as many samples as a ball at ten: the paper's constant sample density, one level deeper.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+
+from ..arrays import Floats, Image, Singles
+from .prepared_view import PreparedView
+from .pyramid import Pyramid
+
+_NODES = 4
+"""Rays along a side that go through the lens. A cubic polynomial through their pixels gives those of all samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tangents:
+    """The planes of c patches: unit vectors to their centers, to the right and down in them, each (c, 3), and the
+    object's radius in them (c,), as the tangent of an angle."""
+
+    axes: Floats
+    right: Floats
+    down: Floats
+    radius: Floats
+
+    @classmethod
+    def at(cls, view: PreparedView, centers: Floats) -> Tangents:
+        """The planes for objects with centers (c, 3) [m], relative to the camera in the mesh frame."""
+        distance = np.linalg.norm(centers, axis=1)
+        axes = centers / distance[:, None]
+        x, y, z = axes.T
+        level = np.hypot(x, y)
+        level, ahead, left = np.where(level > 1e-9, (level, x, y), ((1.0,), (1.0,), (0.0,)))
+        right_x, right_y = left / level, -ahead / level
+        right = np.stack([right_x, right_y, np.zeros_like(x)], axis=1)
+        down = np.stack([-z * right_y, z * right_x, x * right_y - y * right_x], axis=1)  # axes x right
+        radius = view.shape.radius / np.sqrt(np.maximum(distance**2 - view.shape.radius**2, 1e-12))
+        return cls(axes, right, down, radius)
+
+    def turned(self, rotation: Floats) -> Tangents:
+        """The same planes in another frame; rotation (3, 3) maps that frame to this one."""
+        return Tangents(self.axes @ rotation, self.right @ rotation, self.down @ rotation, self.radius)
+
+    def rays(self, right: Floats, down: Floats) -> Floats:
+        """Unit vectors (..., c, 3) to places (..., c) in the planes, in radii to the right and down of the centers."""
+        x, y = right * self.radius, down * self.radius
+        rays = self.axes + x[..., None] * self.right + y[..., None] * self.down
+        rays /= np.sqrt(1.0 + x * x + y * y)[..., None]
+        return np.asarray(rays)
+
+
+def patch_nodes(view: PreparedView, tangents: Tangents, extent: float) -> Singles:
+    """Pixels (2, c, N, N), x and y, of a grid over patches in these planes.
+
+    extent: half the side of a patch, in apparent radii. The grid goes from border to border, row by row from the upper
+    left. A ray outside of the lens's view is moved to the edge of the view.
+    """
+    steps = np.linspace(-extent, extent, _NODES)
+    down, right = (each.reshape(-1, 1) for each in np.meshgrid(steps, steps, indexing="ij"))
+    rays = tangents.turned(view.rotation).rays(right, down)  # (N * N, c, 3)
+    pixels = view.lens.project(_in_view(rays.reshape(-1, 3), view.lens.limit), view.size)
+    return pixels.astype(np.float32).reshape(_NODES, _NODES, -1, 2).transpose(3, 2, 0, 1)
+
+
+def samples(nodes: Singles, size: int) -> Singles:
+    """Pixels (2, c, size, size) of patches' samples, from those of their nodes (2, c, N, N).
+
+    The samples are in the middles of size x size squares, which cover the patch.
+    """
+    weights = _node_weights(nodes.shape[2], size)
+    return np.asarray(np.matmul(weights, np.ascontiguousarray(nodes) @ weights.T))
+
+
+@lru_cache(maxsize=32)
+def _node_weights(count: int, size: int) -> Singles:
+    """Share (size, count) of each of `count` nodes in each of `size` samples: Lagrange's polynomials."""
+    at = (np.arange(size) + 0.5) / size * (count - 1)
+    shares = [
+        np.prod([(at - other) / (node - other) for other in range(count) if other != node], axis=0)
+        for node in range(count)
+    ]
+    return np.stack(shares, axis=1).astype(np.float32)
+
+
+def cut_patches(pyramid: Pyramid, nodes: Singles, size: int) -> Image:
+    """Colors (c, size, size, 3), RGB, of patches with these nodes (2, c, N, N) [px] in the whole frame.
+
+    Each patch is read from the sharpest level of the pyramid with less than two pixels between samples. Outside of the
+    frame it repeats the frame's border.
+    """
+    count = nodes.shape[1]
+    levels = np.floor(np.log2(np.maximum(_spacing(nodes, size), 1.0))).astype(np.intp)
+    order = np.argsort(levels, kind="stable")
+    levels = levels[order]
+    shrunk = (nodes[:, order] + np.float32(0.5)) * np.exp2(-levels, dtype=np.float32)[:, None, None] - np.float32(0.5)
+    x, y = samples(shrunk, size).reshape(2, count, size, size)
+    patches = np.empty((count, size, size, 3), dtype=np.uint8)
+    for level in np.unique(levels):
+        part = slice(*np.searchsorted(levels, (level, level + 1)))
+        tables = x[part].reshape(-1, size), y[part].reshape(-1, size)
+        colors = cv2.remap(pyramid.level(level), *tables, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        patches[order[part]] = _rgb(np.asarray(colors, dtype=np.uint8), pyramid.channels).reshape(-1, size, size, 3)
+    return patches
+
+
+def _rgb(colors: Image, channels: tuple[int, int, int]) -> Image:
+    """Colors (n, size[, channels]) as RGB (n, size, 3), with red, green and blue in these channels."""
+    if colors.ndim == 2:
+        return np.asarray(cv2.cvtColor(colors, cv2.COLOR_GRAY2RGB))
+    if colors.shape[2] == 4:
+        code = cv2.COLOR_RGBA2RGB if channels[0] == 0 else cv2.COLOR_BGRA2RGB
+        return np.asarray(cv2.cvtColor(colors, code))
+    return colors if channels[0] == 0 else np.asarray(cv2.cvtColor(colors, cv2.COLOR_BGR2RGB))
+
+
+def _spacing(nodes: Singles, size: int) -> Singles:
+    """Pixels (c,) between two samples in the middle of each patch."""
+    middle, step = nodes.shape[2] // 2, (nodes.shape[2] - 1) / size
+    right = nodes[:, :, middle, middle] - nodes[:, :, middle, middle - 1]
+    down = nodes[:, :, middle, middle] - nodes[:, :, middle - 1, middle]
+    return np.asarray(step * np.sqrt(np.abs(right[0] * down[1] - right[1] * down[0])))
+
+
+def _in_view(camera: Floats, limit: float) -> Floats:
+    """Unit rays (n, 3) in the camera frame; those more than `limit` [rad] from the axis are moved there, in place."""
+    beyond = np.flatnonzero(camera[:, 0] < np.cos(limit))
+    if len(beyond):
+        sine = np.maximum(np.hypot(camera[beyond, 1], camera[beyond, 2]), 1e-12)
+        camera[beyond, 0] = np.cos(limit)
+        camera[beyond, 1:] *= (np.sin(limit) / sine)[:, None]
+    return camera

@@ -1,0 +1,113 @@
+"""The description of a look network in a model file's manifest, and its example."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Image, Singles
+from ..errors import ModelError
+
+LOOK_KEY = "visual_mesh_look"
+"""Key of the look network, an ONNX file as base64, in the metadata of a model file."""
+
+ANSWERS = ("probability", "right", "down", "size")
+"""Outputs of a look network for a patch; see CloseLook.run."""
+
+
+@dataclass(frozen=True, eq=False)
+class LookTest:
+    """Patches (n, size, size, 3), RGB, and the network's answers (n, 4) to them."""
+
+    patches: Image
+    answers: Singles
+
+    def as_dict(self) -> dict[str, Any]:
+        """Text and nested lists for JSON."""
+        return {
+            "patches": base64.b64encode(np.ascontiguousarray(self.patches).tobytes()).decode(),
+            "answers": np.round(self.answers.astype(float), 6).tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], size: int) -> LookTest:
+        """Inverse of `as_dict`, for patches of size x size samples. Raises ModelError."""
+        try:
+            answers = np.array(data["answers"], dtype=np.float32).reshape(-1, len(ANSWERS))
+            content = np.frombuffer(base64.b64decode(data["patches"], validate=True), dtype=np.uint8)
+            return cls(content.reshape(len(answers), size, size, 3), answers)
+        except (KeyError, TypeError, ValueError, OverflowError, binascii.Error) as error:
+            raise ModelError(f"self-test of the close look can't be read: {error}") from error
+
+
+@dataclass(frozen=True, kw_only=True)
+class LookContract:
+    """What the runtime must know to cut patches for a look network.
+
+    object_class: name of the class that it judges.
+    size: samples along each side of a patch, 8 to 128.
+    extent: half the side of a patch [expected radii], 0.5 to 8.
+    above: probability above which a mesh point counts for a proposal, 0 to 0.99.
+    passes: largest number of looks at a proposal, 1 to 4; each further look is where the one before saw the center.
+    channels: of the network's convolutions at each resolution, for people.
+    self_test: an example with its answers, which each loading of the model file runs.
+    provenance: origin of the network, for people.
+
+    Raises ModelError for values out of range.
+    """
+
+    object_class: str
+    size: int
+    extent: float
+    above: float
+    passes: int
+    channels: tuple[int, ...] = ()
+    self_test: LookTest | None = None
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.object_class, str):
+            raise ModelError(f"object_class of the close look must be a name, not {self.object_class!r}")
+        for name, whole, low, high in (
+            ("size", True, 8, 128),
+            ("extent", False, 0.5, 8.0),
+            ("above", False, 0.0, 0.99),
+            ("passes", True, 1, 4),
+        ):
+            value = getattr(self, name)
+            right_kind = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
+            if not right_kind or not low <= value <= high:
+                kind = "a whole number" if whole else "a number"
+                raise ModelError(f"{name} of the close look must be {kind} from {low} to {high}, not {value!r}")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        data = {each.name: getattr(self, each.name) for each in fields(self)}
+        return data | {
+            "channels": list(self.channels),
+            "provenance": dict(self.provenance),
+            "self_test": None if self.self_test is None else self.self_test.as_dict(),
+        }
+
+    @classmethod
+    def from_dict(cls, data: object) -> LookContract:
+        """Inverse of `as_dict`. Raises ModelError for missing, unknown or malformed entries."""
+        names = {each.name for each in fields(cls)}
+        if not isinstance(data, dict) or set(data) != names:
+            found = sorted(data) if isinstance(data, dict) else data
+            raise ModelError(f"look in the model's manifest must have the entries {sorted(names)}, not {found!r}")
+        try:
+            channels = tuple(int(each) for each in data["channels"])
+            provenance = {str(key): str(value) for key, value in data["provenance"].items()}
+        except (TypeError, ValueError, OverflowError, AttributeError) as error:
+            raise ModelError(f"look in the model's manifest has malformed channels or provenance: {error}") from error
+        contract = cls(**data | {"channels": channels, "provenance": provenance, "self_test": None})
+        if data["self_test"] is None:
+            return contract
+        test = LookTest.from_dict(data["self_test"], contract.size)
+        return cls(**data | {"channels": channels, "provenance": provenance, "self_test": test})
