@@ -55,9 +55,8 @@ def without_bucket(detector, image, orientation, lens):
 
     def whole(orientation, lens, size):
         view = prepared(orientation, lens, size)
-        return replace(
-            view, layout=choose_layout(fresh.cache._build(fresh.cache.mesh_height(orientation.height)), fresh.manifest)
-        )
+        mesh = fresh.cache._build(fresh.cache.mesh_height(orientation.height))
+        return view._replace(layout=choose_layout(mesh, fresh.manifest))
 
     fresh.cache.view = whole
     return fresh.detect(image, orientation, lens)

@@ -48,7 +48,7 @@ def reordered(scene, order):
     layout = PlainLayout(mesh.part(order), "hard")
     layout.slots = order.astype(np.int32)
     projected = Projection(layout, scene.projected.pixels[order], scene.projected.on_screen[order])
-    return replace(scene, view=replace(scene.view, layout=layout), projected=projected)
+    return replace(scene, view=scene.view._replace(layout=layout), projected=projected)
 
 
 def ideal(scene, *spots, radius=None):
