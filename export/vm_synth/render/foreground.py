@@ -123,8 +123,8 @@ class _Buffers:
         single = rays.astype(np.float32)
         light = tracer.trace_light(scene.camera, single, len(offsets), scene.seed + side)
         np.minimum(light, brightest, out=light)
-        what = tracer.first_hits(scene.camera, single)
         surfaces = tracer.first_surfaces(scene.camera, single)
+        what = surfaces.what
         covered = (what != NOTHING).reshape(len(rows), -1, 1)
         depth = np.where(np.isfinite(surfaces.depth), surfaces.depth, 1.0)
         here = rows, columns
