@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from vm_embedded.arrays import Floats, Singles
+from vm_embedded.arrays import Floats, Mask, Singles
 from vm_embedded.errors import InputError
 
 from ..balls.texture import paint_texture
@@ -156,13 +156,14 @@ class Tracer:
         for part in _batches(len(rays)):
             ray = self._ray(origin, rays[part])
             hit = self._scene.ray_intersect_preliminary(ray, coherent=True)
-            found[part] = self._what(hit.shape, hit.prim_index)
+            found[part] = _to_numpy(self._what(hit.shape, hit.prim_index))
         return found
 
-    def trace_light(self, origin: Floats, rays: Singles, per_pixel: int, seed: int) -> Singles:
+    def trace_light(self, origin: Floats, rays: Singles, wanted: Mask, per_pixel: int, seed: int) -> Singles:
         """Radiance (n, 3) that returns along rays (n, 3) from the origin (3,), one path per ray.
 
-        per_pixel: number of successive rays of the same pixel, a power of 4. Their paths are spread evenly.
+        wanted: which rays (n,) to trace; others return 0. per_pixel: number of successive rays of the same pixel, a
+        power of 4. Their paths are spread evenly.
         """
         mi = self._mi
         evenly = mi.load_dict({"type": "ldsampler", "sample_count": per_pixel})
@@ -172,7 +173,7 @@ class Tracer:
             sampler = evenly.clone()
             sampler.seed(self._dr.opaque(mi.UInt32, (seed + 7919 * number) & 0xFFFFFFFF), part.stop - part.start)
             ray = mi.RayDifferential3f(self._ray(origin, rays[part]))
-            light, _, _ = self._integrator.sample(self._scene, sampler, ray)
+            light, _, _ = self._integrator.sample(self._scene, sampler, ray, None, self._float(wanted[part]) > 0.0)
             found[part] = _to_numpy(self._dr.ravel(light)).reshape(-1, 3)
         return np.nan_to_num(found, copy=False, posinf=0.0, neginf=0.0)
 
@@ -186,8 +187,9 @@ class Tracer:
             ray = mi.RayDifferential3f(self._ray(origin, rays[part]))
             met = self._scene.ray_intersect(ray)
             color = met.bsdf(ray).eval_diffuse_reflectance(met, met.is_valid())
-            dr.eval(color, met.sh_frame.n, met.t, met.shape, met.prim_index)
-            what[part] = self._what(met.shape, met.prim_index)
+            hit = self._what(met.shape, met.prim_index)
+            dr.eval(hit, color, met.sh_frame.n, met.t)
+            what[part] = _to_numpy(hit)
             albedo[part] = _to_numpy(dr.ravel(color)).reshape(-1, 3)
             normal[part] = _to_numpy(dr.ravel(met.sh_frame.n)).reshape(-1, 3)
             depth[part] = _to_numpy(met.t)
@@ -218,16 +220,12 @@ class Tracer:
             result[part] = lit / np.maximum(full, 1e-9)
         return _BOUNCED + (1.0 - _BOUNCED) * result
 
-    def _what(self, shape: Any, triangle: Any) -> Hits:
+    def _what(self, shape: Any, triangle: Any) -> Any:
         """What rays hit (n,), as in first_hits, from the shapes and the numbers of their triangles."""
-        shape = self._dr.reinterpret_array(self._mi.UInt32, shape)
-        self._dr.eval(shape, triangle)
-        shapes, triangles = _to_numpy(shape), _to_numpy(triangle)
-        what = np.full(len(shapes), NOTHING, dtype=np.int32)
-        for number, meaning in self._meanings.items():
-            if meaning != NOTHING:
-                here = shapes == number
-                what[here] = triangles[here] if meaning == 0 else meaning
+        mi, dr = self._mi, self._dr
+        number, what = dr.reinterpret_array(mi.UInt32, shape), mi.Int32(NOTHING)
+        for each, meaning in self._meanings.items():
+            what = dr.select(number == each, mi.Int32(triangle) if meaning == 0 else meaning, what)
         return what
 
     def _ray(self, origin: Floats, rays: Singles) -> Any:
