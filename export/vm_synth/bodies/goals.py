@@ -69,8 +69,7 @@ def _net(random: np.random.Generator, side: float, top: float, depth: float, roo
     panels = [_panel(ground + left, ridge + left, ground + right, ridge + right, spacing)]
     if roof:
         panels.append(_panel(ridge + left, bar + left, ridge + right, bar + right, spacing))
-    for edge in (left, right):
-        panels.append(_panel(ground + edge, ridge + edge, foot + edge, bar + edge, spacing))
+    panels += [_panel(ground + edge, ridge + edge, foot + edge, bar + edge, spacing) for edge in (left, right)]
     points = np.concatenate(panels)
     points[..., 0] += sag * np.sin(np.pi * points[..., 2] / top) * (points[..., 0] < -sag)
     return body([cords(points, radius, sides=3).painted(paint)], "environment", "goal net")

@@ -141,7 +141,7 @@ def rotation(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Floats:
 
 def along(start: Point, end: Point) -> Floats:
     """Rotation (3, 3) that maps z to the direction from start to end, and x as close to forward as possible."""
-    return along_each(np.subtract(end, start)[None])[0]
+    return np.asarray(along_each(np.subtract(end, start)[None])[0])
 
 
 def along_each(steps: Floats) -> Floats:

@@ -197,28 +197,33 @@ class Tracer:
 
     def unblocked_light(self, points: Floats, random: np.random.Generator) -> Singles:
         """Share (n, 3) of the environment's light that reaches points (n, 2) [m] of the plane past all objects."""
-        mi, dr = self._mi, self._dr
         result = np.empty((len(points), 3), dtype=np.float32)
         for part in _batches(len(points)):
-            places = mi.Point3f(*(self._float(column) for column in points[part].T), self._opaque(1e-3))
-            shift = self._float(random.random(part.stop - part.start, dtype=np.float32))
-
-            rounds = self._opaque(_SHADOW_RAYS)  # Dr.Jit multiplies by the reciprocal of a constant
-
-            def add_ray(number: Any, lit: Any, full: Any, places: Any = places, shift: Any = shift) -> tuple[Any, ...]:
-                stratum = (mi.Float(number) + shift) / rounds
-                chosen = dr.minimum(mi.UInt32(stratum * _LIGHTS), _LIGHTS - 1)
-                direction = dr.gather(mi.Vector3f, self._light_directions, chosen)
-                color = dr.gather(mi.Color3f, self._light_colors, chosen)
-                blocked = self._scene.ray_test(mi.Ray3f(places, direction))
-                return number + 1, lit + dr.select(blocked, 0.0, color), full + color
-
-            start = mi.UInt32(0), dr.zeros(mi.Color3f), dr.zeros(mi.Color3f)
-            _, lit, full = dr.while_loop(start, lambda number, lit, full: number < _SHADOW_RAYS, add_ray)
-            dr.eval(lit, full)
-            lit, full = (_to_numpy(dr.ravel(each)).reshape(-1, 3) for each in (lit, full))
+            places = self._mi.Point3f(*(self._float(column) for column in points[part].T), self._opaque(1e-3))
+            sums = self._sum_lights(places, self._float(random.random(part.stop - part.start, dtype=np.float32)))
+            lit, full = (_to_numpy(self._dr.ravel(each)).reshape(-1, 3) for each in sums)
             result[part] = lit / np.maximum(full, 1e-9)
         return _BOUNCED + (1.0 - _BOUNCED) * result
+
+    def _sum_lights(self, places: Any, shift: Any) -> tuple[Any, Any]:
+        """Sums (n, 3) of the lights that n places see, and of all lights that they look for.
+
+        shift: place of each ray within its stratum of the table of lights (n,), 0 to 1.
+        """
+        mi, dr = self._mi, self._dr
+        rounds = self._opaque(_SHADOW_RAYS)  # Dr.Jit would multiply by the rounded reciprocal of a constant
+
+        def add_ray(number: Any, lit: Any, full: Any) -> tuple[Any, Any, Any]:
+            stratum = (mi.Float(number) + shift) / rounds
+            chosen = dr.minimum(mi.UInt32(stratum * _LIGHTS), _LIGHTS - 1)
+            color = dr.gather(mi.Color3f, self._light_colors, chosen)
+            blocked = self._scene.ray_test(mi.Ray3f(places, dr.gather(mi.Vector3f, self._light_directions, chosen)))
+            return number + 1, lit + dr.select(blocked, 0.0, color), full + color
+
+        start = mi.UInt32(0), dr.zeros(mi.Color3f), dr.zeros(mi.Color3f)
+        _, lit, full = dr.while_loop(start, lambda number, lit, full: number < _SHADOW_RAYS, add_ray)
+        dr.eval(lit, full)
+        return lit, full
 
     def _what(self, shape: Any, triangle: Any) -> Any:
         """What rays hit (n,), as in first_hits, from the shapes and the numbers of their triangles."""
