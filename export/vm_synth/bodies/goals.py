@@ -7,7 +7,7 @@ import numpy as np
 from vm_embedded.arrays import Floats
 
 from .paints import Paint, hued, metal, white
-from .primitives import beam, cord, rod
+from .primitives import beam, cords, rod
 from .solids import Body, Point, Solid, body, distance
 
 _NET_SHARE = 0.6
@@ -66,23 +66,22 @@ def _net(random: np.random.Generator, side: float, top: float, depth: float, roo
         np.array([x, 0.0, z]) for x, z in ((-depth, 0.01), (-roof, top), (0.0, top), (0.0, 0.01))
     )
     left, right = np.array([0.0, -side, 0.0]), np.array([0.0, side, 0.0])
-    strands = _panel(ground + left, ridge + left, ground + right, ridge + right, spacing)
+    panels = [_panel(ground + left, ridge + left, ground + right, ridge + right, spacing)]
     if roof:
-        strands += _panel(ridge + left, bar + left, ridge + right, bar + right, spacing)
-    for edge in (left, right):
-        strands += _panel(ground + edge, ridge + edge, foot + edge, bar + edge, spacing)
-    for points in strands:
-        points[:, 0] += sag * np.sin(np.pi * points[:, 2] / top) * (points[:, 0] < -sag)
-    return body([cord(points, radius, sides=3).painted(paint) for points in strands], "environment", "goal net")
+        panels.append(_panel(ridge + left, bar + left, ridge + right, bar + right, spacing))
+    panels += [_panel(ground + edge, ridge + edge, foot + edge, bar + edge, spacing) for edge in (left, right)]
+    points = np.concatenate(panels)
+    points[..., 0] += sag * np.sin(np.pi * points[..., 2] / top) * (points[..., 0] < -sag)
+    return body([cords(points, radius, sides=3).painted(paint)], "environment", "goal net")
 
 
-def _panel(a: Floats, b: Floats, c: Floats, d: Floats, spacing: float) -> list[Floats]:
-    """Strands (5, 3) [m] of a net between the edges a-b and c-d, in both directions."""
+def _panel(a: Floats, b: Floats, c: Floats, d: Floats, spacing: float) -> Floats:
+    """Strands (n, 5, 3) [m] of a net between the edges a-b and c-d, in both directions."""
 
-    def strands(a: Floats, b: Floats, c: Floats, d: Floats) -> list[Floats]:
+    def strands(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
         count = max(int(distance(a + b, c + d) / 2.0 / spacing), 2)
         lows, highs = (np.linspace(start, end, count + 1) for start, end in ((a, c), (b, d)))
-        pairs = zip(lows, highs, strict=True)
-        return [np.linspace(low, high, 5) for low, high in pairs if distance(low, high) > 0.0]
+        apart = (lows != highs).any(axis=1)
+        return np.linspace(lows[apart], highs[apart], 5, axis=1)
 
-    return strands(a, b, c, d) + strands(a, c, b, d)
+    return np.concatenate([strands(a, b, c, d), strands(a, c, b, d)])

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats
 
-from .solids import Point, Solid, along, between, distance, rotation
+from .solids import Point, Solid, along_each, between, distance, rotation
 
 _SMOOTH = float(np.cos(np.radians(50.0)))
 """Cosine of the largest angle between faces of a profile that share a smooth normal."""
@@ -33,25 +33,23 @@ def rounded_box(x: float, y: float, z: float, radius: float) -> Solid:
 
 def lathe(profile: Sequence[tuple[float, float]], segments: int = 16) -> Solid:
     """A profile of points (radius, z) [m] rotated about z. It runs upward on the outside and inward on top."""
-    steps = [(a, b) for a, b in pairwise(profile) if a != b]
-    slopes = np.array([(b[1] - a[1], a[0] - b[0]) for a, b in steps])
+    steps = np.array([(a, b) for a, b in pairwise(profile) if a != b])
+    slopes = np.stack([steps[:, 1, 1] - steps[:, 0, 1], steps[:, 0, 0] - steps[:, 1, 0]], axis=1)
     slopes /= np.linalg.norm(slopes, axis=1, keepdims=True)
-    rows, leans = [], []
-    for k, (start, end) in enumerate(steps):
-        rows += [start, end]
-        leans += [_shared(slopes, k, k - 1), _shared(slopes, k, k + 1)]
+    leans = np.stack([slopes, slopes], axis=1)
+    both = slopes[:-1] + slopes[1:]
+    smooth = (slopes[:-1] * slopes[1:]).sum(axis=1) > _SMOOTH
+    shared = both[smooth] / np.linalg.norm(both[smooth], axis=1, keepdims=True)
+    leans[:-1, 1][smooth] = leans[1:, 0][smooth] = shared
     around = np.arange(segments) * (2.0 * np.pi / segments)
     circle = np.stack([np.cos(around), np.sin(around)], axis=1)
     here = np.arange(segments)
     there = (here + 1) % segments
-    triangles = []
-    for k, (start, end) in enumerate(steps):
-        low, high = 2 * k * segments, (2 * k + 1) * segments
-        if start[0] > 0.0:
-            triangles.append(np.stack([low + here, low + there, high + there], axis=1))
-        if end[0] > 0.0:
-            triangles.append(np.stack([low + here, high + there, high + here], axis=1))
-    return _solid(_swept(np.array(rows), circle), _swept(np.array(leans), circle), np.concatenate(triangles))
+    pair = np.stack([[here, there, segments + there], [here, segments + there, segments + here]]).transpose(0, 2, 1)
+    triangles = 2 * segments * np.arange(len(steps))[:, None, None, None] + pair
+    # A step that starts or ends on the axis has only one triangle per segment.
+    triangles = triangles[steps[:, :, 0] > 0.0].reshape(-1, 3)
+    return _solid(_swept(steps.reshape(-1, 2), circle), _swept(leans.reshape(-1, 2), circle), triangles)
 
 
 def cylinder(radius: float, height: float, segments: int = 16, top: float | None = None) -> Solid:
@@ -105,18 +103,25 @@ def axle(center: Point, radius: float, width: float, segments: int = 14) -> Soli
 
 def cord(points: Floats, radius: float, sides: int = 5) -> Solid:
     """A cord along points (k, 3) [m] with open ends."""
-    ahead = np.gradient(points, axis=0)
+    return cords(points[None], radius, sides)
+
+
+def cords(points: Floats, radius: float, sides: int = 5) -> Solid:
+    """Cords along n rows of points (n, k, 3) [m] with open ends."""
+    count, length = points.shape[:2]
+    ahead = np.gradient(points, axis=1).reshape(-1, 3)
     around = np.arange(sides) * (2.0 * np.pi / sides)
     circle = np.stack([np.cos(around), np.sin(around), np.zeros(sides)], axis=1)
-    normals = np.stack([circle @ along((0.0, 0.0, 0.0), step).T for step in list(ahead)])
+    normals = circle @ along_each(ahead).transpose(0, 2, 1)
     here = np.arange(sides)
     there = (here + 1) % sides
-    starts = (np.arange(len(points) - 1) * sides)[:, None, None]
+    starts = (np.arange(count)[:, None] * length + np.arange(length - 1)) * sides
     quads = np.concatenate(
         [np.stack([here, there, there + sides], 1), np.stack([here, there + sides, here + sides], 1)]
     )
-    vertices = points[:, None] + radius * normals
-    return _solid(vertices.reshape(-1, 3), normals.reshape(-1, 3), (starts + quads).reshape(-1, 3))
+    vertices = points.reshape(-1, 1, 3) + radius * normals
+    triangles = starts[:, :, None, None] + quads
+    return _solid(vertices.reshape(-1, 3), normals.reshape(-1, 3), triangles.reshape(-1, 3))
 
 
 def sheet(outline: Floats, thickness: float) -> Solid:
@@ -195,15 +200,6 @@ def _cube(grid: Floats, half: Floats, radius: float) -> Solid:
             normals.append(lean)
             triangles.append((face if sign > 0.0 else face[:, ::-1]) + len(triangles) * count * count)
     return _solid(np.concatenate(vertices), np.concatenate(normals), np.concatenate(triangles))
-
-
-def _shared(slopes: Floats, face: int, neighbor: int) -> tuple[float, float]:
-    """Normal (radius, z) of a face at its edge with a neighbor."""
-    normal = slopes[face]
-    if 0 <= neighbor < len(slopes) and normal @ slopes[neighbor] > _SMOOTH:
-        normal = normal + slopes[neighbor]
-        normal = normal / np.linalg.norm(normal)
-    return float(normal[0]), float(normal[1])
 
 
 def _swept(rows: Floats, circle: Floats) -> Floats:

@@ -58,13 +58,10 @@ class Solid:
 
     def painted(self, paint: Paint, where: Mask | None = None) -> Self:
         """The solid with a paint on all vertices, or on those of a mask (n,)."""
-        chosen = np.ones(len(self.vertices), dtype=np.bool_) if where is None else where
-        color = np.asarray(paint.color, dtype=np.float32)
-        return replace(
-            self,
-            colors=np.where(chosen[:, None], color, self.colors).astype(np.float32),
-            roughness=np.where(chosen, np.float32(paint.roughness), self.roughness).astype(np.float32),
-        )
+        chosen = slice(None) if where is None else where
+        colors, roughness = self.colors.copy(), self.roughness.copy()
+        colors[chosen], roughness[chosen] = paint.color, paint.roughness
+        return replace(self, colors=colors, roughness=roughness)
 
     def stained(self, random: np.random.Generator, depth: float, scale: float) -> Self:
         """The solid with smooth stains. depth: largest loss of brightness, 0 to 1. scale: size of the stains [m]."""
@@ -144,10 +141,15 @@ def rotation(roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Floats:
 
 def along(start: Point, end: Point) -> Floats:
     """Rotation (3, 3) that maps z to the direction from start to end, and x as close to forward as possible."""
-    up = _direction(np.subtract(end, start))
-    forward = np.array([1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 else np.array([0.0, 0.0, -1.0])
-    side = _direction(np.cross(up, forward))
-    return np.stack([np.cross(side, up), side, up], axis=1)
+    return np.asarray(along_each(np.subtract(end, start)[None])[0])
+
+
+def along_each(steps: Floats) -> Floats:
+    """Rotations (n, 3, 3) that map z to the directions of steps (n, 3), and x as close to forward as possible."""
+    up = _directions(steps)
+    steep = (np.abs(up[:, :1]) >= 0.9).astype(np.float64)
+    side = _directions(_cross(up, np.concatenate([1.0 - steep, np.zeros_like(steep), -steep], axis=1)))
+    return np.stack([_cross(side, up), side, up], axis=2)
 
 
 def between(solid: Solid, start: Point, end: Point) -> Solid:
@@ -167,8 +169,14 @@ def waves(random: np.random.Generator, points: Singles, scale: float) -> Singles
     return np.asarray(np.sin(points @ directions.T + phases).mean(axis=1) * 1.5).clip(-1.0, 1.0).astype(np.float32)
 
 
-def _direction(vector: Floats) -> Floats:
-    return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-12))
+def _directions(vectors: Floats) -> Floats:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12))
+
+
+def _cross(first: Floats, second: Floats) -> Floats:
+    """Cross products (n, 3) of vectors (n, 3), faster than those of NumPy if n is small."""
+    (a, b, c), (x, y, z) = first.T, second.T
+    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=1)
 
 
 def _unit(vectors: Singles) -> Singles:

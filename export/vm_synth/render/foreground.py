@@ -121,10 +121,10 @@ class _Buffers:
         rays = rays_through(scene, pixels).reshape(-1, 3)
         rays[~np.isfinite(rays[:, 0])] = (0.0, 0.0, 1.0)
         single = rays.astype(np.float32)
-        light = tracer.trace_light(scene.camera, single, len(offsets), scene.seed + side)
-        np.minimum(light, brightest, out=light)
-        what = tracer.first_hits(scene.camera, single)
         surfaces = tracer.first_surfaces(scene.camera, single)
+        what = surfaces.what
+        light = tracer.trace_light(scene.camera, single, what != NOTHING, len(offsets), scene.seed + side)
+        np.minimum(light, brightest, out=light)
         covered = (what != NOTHING).reshape(len(rows), -1, 1)
         depth = np.where(np.isfinite(surfaces.depth), surfaces.depth, 1.0)
         here = rows, columns

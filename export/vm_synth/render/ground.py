@@ -20,13 +20,15 @@ def paint_ground(field: Field, points: Floats, range_: Floats, pixel: float) -> 
     """
     seen = np.isfinite(points[..., 0])
     local = (np.where(seen[..., None], points, 1e6) - np.array(field.middle)) @ field.rotation
-    x, y = local[..., 0], local[..., 1]
+    x, y = np.ascontiguousarray(local[..., 0]), np.ascontiguousarray(local[..., 1])
+    ax, ay = np.abs(x), np.abs(y)
+    steps = _change_per_pixel(ax), _change_per_pixel(ay)
     if math.isinf(field.border):
         carpet = seen.astype(np.float32)
     else:
-        carpet = _share_inside(field.length / 2.0 + field.border - np.abs(x))
-        carpet *= _share_inside(field.width / 2.0 + field.border - np.abs(y)) * seen
-    lines = _line_shares(field, x, y) * seen
+        carpet = _share_inside(field.length / 2.0 + field.border - ax, steps[0])
+        carpet *= _share_inside(field.width / 2.0 + field.border - ay, steps[1]) * seen
+    lines = _line_shares(field, x, y, steps) * seen
     slow = color_patches(field.seed, points)
     if field.wear:
         lines = lines * (1.0 - np.clip(4.0 * (field.wear - 0.5 + 5.0 * slow[..., 1]), 0.0, 0.95))
@@ -55,44 +57,59 @@ def ground_light(points: Floats, seed: int) -> Singles:
     return np.asarray(sum(waves) / 3.0, dtype=np.float32)
 
 
-def _line_shares(field: Field, x: Floats, y: Floats) -> Singles:
+def _line_shares(field: Field, x: Floats, y: Floats, steps: tuple[Floats, Floats]) -> Singles:
     """Share (h, w) of each pixel covered by lines, at field coordinates x and y (h, w) [m].
 
-    The lines are the outline, halfway line, center circle, goal and penalty areas, and the center and penalty marks.
+    steps: changes per pixel (h, w) of |x| and |y|. The lines are the outline, halfway line, center circle, goal and
+    penalty areas, and the center and penalty marks.
     """
     half_length, half_width, line = field.length / 2.0, field.width / 2.0, field.line_width
     ax, ay = np.abs(x), np.abs(y)
-    lines = np.maximum(
-        _rectangle(ax, ay, half_length, half_width, line), _share_near(x, line) * _share_inside(half_width - ay)
-    )
+    lines = _rectangle(ax, ay, steps, half_length, half_width, line)
+    halfway = _share_near(x, _change_per_pixel(x), line) * _share_inside(half_width - ay, steps[1])
+    np.maximum(lines, halfway, out=lines)
     around = np.hypot(x, y)
-    np.maximum(lines, _share_near(around - field.length / 12.0, line), out=lines)
+    outward = _change_per_pixel(around)
+    np.maximum(lines, _share_near(around - field.length / 12.0, outward, line), out=lines)
     for depth, breadth in ((field.length / 9.0, field.width / 2.0), (field.length / 4.5, field.width / 1.2)):
         # The frame of an area; its outer side lies on the goal line.
-        area = _rectangle(np.abs(ax - half_length + depth / 2.0), ay, depth / 2.0, breadth / 2.0, line)
-        np.maximum(lines, area, out=lines)
-    for mark in (np.hypot(ax - half_length + field.length / 6.0, y), around):
-        np.maximum(lines, _share_inside(line - mark), out=lines)
+        across = np.abs(ax - half_length + depth / 2.0)
+        frame = _rectangle(across, ay, (_change_per_pixel(across), steps[1]), depth / 2.0, breadth / 2.0, line)
+        np.maximum(lines, frame, out=lines)
+    mark = np.hypot(ax - half_length + field.length / 6.0, y)
+    for distance, step in ((mark, _change_per_pixel(mark)), (around, outward)):
+        np.maximum(lines, _share_inside(line - distance, step), out=lines)
     return np.asarray(lines)
 
 
-def _rectangle(ax: Floats, ay: Floats, half_length: float, half_width: float, line: float) -> Singles:
-    """Share (h, w) of each pixel covered by the lines around a rectangle, from |x| and |y| (h, w) [m]."""
-    sides = _share_near(ax - half_length, line) * _share_inside(half_width + line / 2.0 - ay)
-    ends = _share_near(ay - half_width, line) * _share_inside(half_length + line / 2.0 - ax)
+def _rectangle(
+    ax: Floats, ay: Floats, steps: tuple[Floats, Floats], half_length: float, half_width: float, line: float
+) -> Singles:
+    """Share (h, w) of each pixel covered by the lines around a rectangle.
+
+    ax, ay: |x| and |y| (h, w) [m]. steps: their changes per pixel (h, w).
+    """
+    sides = _share_near(ax - half_length, steps[0], line) * _share_inside(half_width + line / 2.0 - ay, steps[1])
+    ends = _share_near(ay - half_width, steps[1], line) * _share_inside(half_length + line / 2.0 - ax, steps[0])
     return np.asarray(np.maximum(sides, ends))
 
 
-def _share_near(distance: Floats, width: float) -> Singles:
-    """Share (h, w) of each pixel covered by a line of this width [m]; distance: signed, to its middle (h, w)."""
-    half = np.minimum(_change_per_pixel(distance), 1e6) / 2.0
+def _share_near(distance: Floats, step: Floats, width: float) -> Singles:
+    """Share (h, w) of each pixel covered by a line of this width [m].
+
+    distance: signed, to its middle (h, w) [m]. step: its change per pixel (h, w).
+    """
+    half = np.minimum(step, 1e6) / 2.0
     over = np.minimum(distance + half, width / 2.0) - np.maximum(distance - half, -width / 2.0)
-    return np.asarray(np.clip(over, 0.0, None) / (2.0 * half), dtype=np.float32)
+    return np.asarray(np.maximum(over, 0.0) / (2.0 * half), dtype=np.float32)
 
 
-def _share_inside(distance: Floats) -> Singles:
-    """Share (h, w) of each pixel on the positive side of an edge, from the signed distances (h, w) to it [m]."""
-    return np.asarray(np.clip(0.5 + distance / _change_per_pixel(distance), 0.0, 1.0), dtype=np.float32)
+def _share_inside(distance: Floats, step: Floats) -> Singles:
+    """Share (h, w) of each pixel on the positive side of an edge.
+
+    distance: signed, to the edge (h, w) [m]. step: its change per pixel (h, w).
+    """
+    return np.asarray(np.clip(0.5 + distance / step, 0.0, 1.0), dtype=np.float32)
 
 
 def _change_per_pixel(distance: Floats) -> Floats:

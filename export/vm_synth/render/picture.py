@@ -72,6 +72,24 @@ def _background(
     safe = np.where(np.isfinite(rays), rays, up)
     radiance = environment.radiance_along(safe)
     classes = np.full(rays.shape[:2], CLASSES.index("environment"), dtype=np.uint8)
+    rows = np.flatnonzero((safe[..., 2] < -1e-4).any(axis=1))
+    if len(rows):
+        # One more row on each side: lines are drawn from differences between neighboring pixels.
+        part = slice(max(int(rows[0]) - 1, 0), int(rows[-1]) + 2)
+        _add_ground(scene, environment, safe[part], random, ground, radiance[part], classes[part])
+    return radiance, classes
+
+
+def _add_ground(
+    scene: Scene,
+    environment: Environment,
+    safe: Floats,
+    random: np.random.Generator,
+    ground: GroundRanges,
+    radiance: Singles,
+    classes: npt.NDArray[np.uint8],
+) -> None:
+    """Draw the ground into radiance (h, w, 3) and classes (h, w) where rays (h, w, 3) point down."""
     below = safe[..., 2] < -1e-4
     with np.errstate(divide="ignore"):
         distance = np.where(below, scene.orientation.height / -safe[..., 2], np.inf)
@@ -81,14 +99,13 @@ def _background(
         strength = uniform(random, ground.detail)
         grain = ground_noise(points, np.where(below, distance, 1.0) * pixel, scene.seed)
         radiance *= 1.0 + strength * grain * below[..., None]
-        return radiance, classes
+        return
     albedo, lines, carpet = paint_ground(scene.field, points, np.where(below, distance, 1e6), pixel)
     light = 1.0 + uniform(random, ground.light) * ground_light(points, scene.seed)
     lit = albedo * (environment.irradiance / np.pi).astype(np.float32) * light[..., None]
     radiance += carpet[..., None] * (lit - radiance)
     classes[carpet > 0.5] = CLASSES.index("field")
     classes[(lines * carpet) > 0.5] = CLASSES.index("line")
-    return radiance, classes
 
 
 def _shadows(scene: Scene, rays: Floats, below: Mask, tracer: Tracer, random: np.random.Generator) -> Singles:

@@ -1,8 +1,8 @@
 """Ray tracing with Mitsuba 3: which objects the camera's rays hit, the light they return, and shadows on the plane.
 
 The Mitsuba scene is built once: two textured spheres, one triangle mesh for all other objects, the plane and the
-environment. Each picture only refills its buffers. Dr.Jit compiles a program for each size of arrays, so all arrays
-have fixed sizes and are padded.
+environment. Each picture only refills its buffers. The buffers of the mesh have fixed sizes and are padded, because
+Dr.Jit compiles again for a mesh of another size.
 
 The module is long because all methods of its one class share these buffers.
 """
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from vm_embedded.arrays import Floats, Singles
+from vm_embedded.arrays import Floats, Mask, Singles
 from vm_embedded.errors import InputError
 
 from ..balls.texture import paint_texture
@@ -26,7 +26,7 @@ from .mitsuba import load_mitsuba
 _TEXTURE = 512  # rows of a ball's texture
 _LIGHT = (1024, 512)  # columns and rows of the environment that lights a scene
 _VERTICES, _TRIANGLES = 90_000, 60_000
-_BATCH = 1 << 17  # rays that are traced together
+_BATCH = 1 << 17  # largest number of rays that are traced together
 _LIGHTS = 1 << 15  # entries of the table of lights for shadows
 _SHADOW_RAYS = 48  # per point of the plane
 _BOUNCED = 0.1  # share of light in a full shadow, reflected by objects around
@@ -39,8 +39,12 @@ Hits = npt.NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Surfaces:
-    """The first surfaces that n rays hit: albedo (n, 3), normal (n, 3), and distance (n,) [m] or infinity."""
+    """The first surfaces that n rays hit: what (n,), albedo (n, 3), normal (n, 3), and distance (n,) [m] or infinity.
 
+    what: NOTHING, BALL, OTHER or the number of a triangle.
+    """
+
+    what: Hits
     albedo: Singles
     normal: Singles
     depth: Singles
@@ -143,8 +147,8 @@ class Tracer:
         weight = irradiance.sum(axis=1, dtype=np.float64)
         edges = np.cumsum(weight) / weight.sum()
         chosen = np.minimum(np.searchsorted(edges, (np.arange(_LIGHTS) + 0.5) / _LIGHTS), len(weight) - 1)
-        self._light_directions = np.ascontiguousarray(directions[chosen])
-        self._light_colors = (irradiance[chosen] / weight[chosen, None]).astype(np.float32)
+        self._light_directions = self._float(directions[chosen])
+        self._light_colors = self._float(irradiance[chosen] / weight[chosen, None])
 
     def first_hits(self, origin: Floats, rays: Singles) -> Hits:
         """What each ray (n, 3) from the origin (3,) hits first (n,): NOTHING, BALL, OTHER or a triangle's number."""
@@ -152,22 +156,14 @@ class Tracer:
         for part in _batches(len(rays)):
             ray = self._ray(origin, rays[part])
             hit = self._scene.ray_intersect_preliminary(ray, coherent=True)
-            shape = self._dr.reinterpret_array(self._mi.UInt32, hit.shape)
-            self._dr.eval(shape, hit.prim_index)
-            size = part.stop - part.start
-            shapes, triangles = _to_numpy(shape)[:size], _to_numpy(hit.prim_index)[:size]
-            what = np.full(size, NOTHING, dtype=np.int32)
-            for number, meaning in self._meanings.items():
-                if meaning != NOTHING:
-                    here = shapes == number
-                    what[here] = triangles[here] if meaning == 0 else meaning
-            found[part] = what
+            found[part] = _to_numpy(self._what(hit.shape, hit.prim_index))
         return found
 
-    def trace_light(self, origin: Floats, rays: Singles, per_pixel: int, seed: int) -> Singles:
+    def trace_light(self, origin: Floats, rays: Singles, wanted: Mask, per_pixel: int, seed: int) -> Singles:
         """Radiance (n, 3) that returns along rays (n, 3) from the origin (3,), one path per ray.
 
-        per_pixel: number of successive rays of the same pixel, a power of 4. Their paths are spread evenly.
+        wanted: which rays (n,) to trace; others return 0. per_pixel: number of successive rays of the same pixel, a
+        power of 4. Their paths are spread evenly.
         """
         mi = self._mi
         evenly = mi.load_dict({"type": "ldsampler", "sample_count": per_pixel})
@@ -175,59 +171,72 @@ class Tracer:
         found = np.empty((len(rays), 3), dtype=np.float32)
         for number, part in enumerate(_batches(len(rays))):
             sampler = evenly.clone()
-            sampler.seed(self._dr.opaque(mi.UInt32, (seed + 7919 * number) & 0xFFFFFFFF), _BATCH)
+            sampler.seed(self._dr.opaque(mi.UInt32, (seed + 7919 * number) & 0xFFFFFFFF), part.stop - part.start)
             ray = mi.RayDifferential3f(self._ray(origin, rays[part]))
-            light, _, _ = self._integrator.sample(self._scene, sampler, ray)
-            found[part] = _to_numpy(self._dr.ravel(light)).reshape(-1, 3)[: part.stop - part.start]
+            light, _, _ = self._integrator.sample(self._scene, sampler, ray, None, self._float(wanted[part]) > 0.0)
+            found[part] = _to_numpy(self._dr.ravel(light)).reshape(-1, 3)
         return np.nan_to_num(found, copy=False, posinf=0.0, neginf=0.0)
 
     def first_surfaces(self, origin: Floats, rays: Singles) -> Surfaces:
         """The first surfaces that rays (n, 3) from the origin (3,) hit."""
         mi, dr = self._mi, self._dr
+        what = np.empty(len(rays), np.int32)
         albedo, normal = np.empty((len(rays), 3), np.float32), np.empty((len(rays), 3), np.float32)
         depth = np.empty(len(rays), np.float32)
         for part in _batches(len(rays)):
             ray = mi.RayDifferential3f(self._ray(origin, rays[part]))
             met = self._scene.ray_intersect(ray)
             color = met.bsdf(ray).eval_diffuse_reflectance(met, met.is_valid())
-            dr.eval(color, met.n, met.t)
-            size = part.stop - part.start
-            albedo[part] = _to_numpy(dr.ravel(color)).reshape(-1, 3)[:size]
-            normal[part] = _to_numpy(dr.ravel(met.sh_frame.n)).reshape(-1, 3)[:size]
-            depth[part] = _to_numpy(met.t)[:size]
-        return Surfaces(albedo, normal, depth)
+            hit = self._what(met.shape, met.prim_index)
+            dr.eval(hit, color, met.sh_frame.n, met.t)
+            what[part] = _to_numpy(hit)
+            albedo[part] = _to_numpy(dr.ravel(color)).reshape(-1, 3)
+            normal[part] = _to_numpy(dr.ravel(met.sh_frame.n)).reshape(-1, 3)
+            depth[part] = _to_numpy(met.t)
+        return Surfaces(what, albedo, normal, depth)
 
     def unblocked_light(self, points: Floats, random: np.random.Generator) -> Singles:
         """Share (n, 3) of the environment's light that reaches points (n, 2) [m] of the plane past all objects."""
-        mi, dr = self._mi, self._dr
         result = np.empty((len(points), 3), dtype=np.float32)
         for part in _batches(len(points)):
-            size = part.stop - part.start
-            origin = np.zeros((_BATCH, 3), dtype=np.float32)
-            origin[:size, :2] = points[part]
-            origin[:, 2] = 1e-3
-            places = mi.Point3f(*(self._float(column) for column in origin.T))
-            lit, full = np.zeros((size, 3), np.float32), np.zeros((size, 3), np.float32)
-            shift = random.random(size, dtype=np.float32)
-            for number in range(_SHADOW_RAYS):
-                stratum = (number + shift) / _SHADOW_RAYS
-                chosen = np.minimum((stratum * _LIGHTS).astype(np.intp), _LIGHTS - 1)
-                direction = np.zeros((_BATCH, 3), dtype=np.float32)
-                direction[:, 2] = 1.0
-                direction[:size] = self._light_directions[chosen]
-                ray = mi.Ray3f(places, mi.Vector3f(*(self._float(column) for column in direction.T)))
-                blocked = self._scene.ray_test(ray)
-                dr.eval(blocked)
-                color = self._light_colors[chosen]
-                full += color
-                lit += color * ~_to_numpy(blocked)[:size, None]
+            places = self._mi.Point3f(*(self._float(column) for column in points[part].T), self._opaque(1e-3))
+            sums = self._sum_lights(places, self._float(random.random(part.stop - part.start, dtype=np.float32)))
+            lit, full = (_to_numpy(self._dr.ravel(each)).reshape(-1, 3) for each in sums)
             result[part] = lit / np.maximum(full, 1e-9)
         return _BOUNCED + (1.0 - _BOUNCED) * result
+
+    def _sum_lights(self, places: Any, shift: Any) -> tuple[Any, Any]:
+        """Sums (n, 3) of the lights that n places see, and of all lights that they look for.
+
+        shift: place of each ray within its stratum of the table of lights (n,), 0 to 1.
+        """
+        mi, dr = self._mi, self._dr
+        rounds = self._opaque(_SHADOW_RAYS)  # Dr.Jit would multiply by the rounded reciprocal of a constant
+
+        def add_ray(number: Any, lit: Any, full: Any) -> tuple[Any, Any, Any]:
+            stratum = (mi.Float(number) + shift) / rounds
+            chosen = dr.minimum(mi.UInt32(stratum * _LIGHTS), _LIGHTS - 1)
+            color = dr.gather(mi.Color3f, self._light_colors, chosen)
+            blocked = self._scene.ray_test(mi.Ray3f(places, dr.gather(mi.Vector3f, self._light_directions, chosen)))
+            return number + 1, lit + dr.select(blocked, 0.0, color), full + color
+
+        start = mi.UInt32(0), dr.zeros(mi.Color3f), dr.zeros(mi.Color3f)
+        _, lit, full = dr.while_loop(start, lambda number, lit, full: number < _SHADOW_RAYS, add_ray)
+        dr.eval(lit, full)
+        return lit, full
+
+    def _what(self, shape: Any, triangle: Any) -> Any:
+        """What rays hit (n,), as in first_hits, from the shapes and the numbers of their triangles."""
+        mi, dr = self._mi, self._dr
+        number, what = dr.reinterpret_array(mi.UInt32, shape), mi.Int32(NOTHING)
+        for each, meaning in self._meanings.items():
+            what = dr.select(number == each, mi.Int32(triangle) if meaning == 0 else meaning, what)
+        return what
 
     def _ray(self, origin: Floats, rays: Singles) -> Any:
         mi = self._mi
         place = mi.Point3f(*(self._opaque(float(each)) for each in origin))
-        return mi.Ray3f(place, mi.Vector3f(*(self._float(column) for column in _padded(rays, _BATCH, 1.0).T)))
+        return mi.Ray3f(place, mi.Vector3f(*(self._float(column) for column in rays.T)))
 
     def _float(self, array: npt.NDArray[Any]) -> Any:
         """A copy in Dr.Jit's own memory: NumPy's may have another alignment, for which Dr.Jit compiles again."""

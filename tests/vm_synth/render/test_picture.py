@@ -149,7 +149,7 @@ def test_traced_ground_is_as_bright_as_computed_ground(tracer, environment):
     tracer.load_scene(made, environment)
     ray = np.array([0.3, 0.2, -0.9], dtype=np.float32)
     rays = np.tile(ray / np.linalg.norm(ray), (1 << 14, 1))
-    light = tracer.trace_light(made.camera, rays, 16, seed=1).mean(axis=0)
+    light = tracer.trace_light(made.camera, rays, np.ones(len(rays), bool), 16, seed=1).mean(axis=0)
     assert light == pytest.approx(0.3 * environment.irradiance / np.pi, rel=0.02)
 
 
