@@ -1,6 +1,6 @@
 """The default settings of detection, chosen on the validation pictures of a training: `python -m benchmarks.threshold`.
 
-    python -m benchmarks.threshold build/networks/ball-best data/soccer
+    python -m benchmarks.threshold build/networks/ball-9x4 data/soccer
 
 Answers are computed once; each combination of settings then judges them. Prints recall, precision, F1 and false balls
 per picture, best F1 first, and the default settings last.

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from ..errors import InputError, unknown
 
-SHIPPED = ("ball-5x4", "ball-9x4", "ball-best")
+SHIPPED = ("ball-5x4", "ball-9x4")
 """Their names. The numbers are depth and width."""
 
-DEFAULT = "ball-best"
+DEFAULT = "ball-9x4"
 """The network to use if none is named."""
 
 _FOLDER = Path(__file__).parents[1] / "models"

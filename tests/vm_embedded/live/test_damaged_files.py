@@ -85,7 +85,7 @@ def test_a_damaged_configuration_ends_the_command_with_a_line_and_no_traceback(t
     path = tmp_path / "vm.toml"
     chance = random.Random(3)
     for _ in range(5):
-        path.write_bytes(damaged(chance, b'model = "ball-best"\n[camera]\nsource = 3\n', 4))
+        path.write_bytes(damaged(chance, b'model = "ball-9x4"\n[camera]\nsource = 3\n', 4))
         command = [COMMAND, "--config", path, "--check-config"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
         assert done.returncode == 1
