@@ -17,7 +17,7 @@ from vm_embedded.network.model_file import read_model
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "results.md"
 README = DOCS.parent / "README.md"
-COLORS = {"ball-5x4": "#7570b3", "ball-9x4": "#d95f02"}
+COLORS = {"ball": "#d95f02", "ball-small": "#7570b3"}
 
 
 def number(value: float | None, digits: int = 2, unit: float = 1.0) -> str:
