@@ -7,7 +7,7 @@ OUT ?= data/train
 COUNT ?= 8000
 SEED ?= 1
 SCENES ?= export/vm_synth/polyhaven.toml
-NETWORKS := ball-5x4 ball-9x4 ball-best
+NETWORKS := ball ball-small
 BUILD ?= build/networks
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
@@ -70,11 +70,9 @@ networks: .venv/dev ## train the networks of the package from their seeds: make 
 	$(MAKE) data OUT=data/soccer COUNT=4000 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 
-vm_embedded/models/ball-best.onnx: vm_embedded/models/ball-5x4.onnx
-vm_embedded/models/ball-best.onnx: LOOKS_FIRST = --first $(BUILD)/ball-5x4/model.pt
 vm_embedded/models/%.onnx: export/networks/%.toml
 	if test -e $(BUILD)/$*/run.json; then $(BIN)/vm-train resume $(BUILD)/$*; \
-		else $(BIN)/vm-train data/soccer -o $(BUILD)/$* --config $< --unpacked $(BUILD)/unpacked $(LOOKS_FIRST); fi
+		else $(BIN)/vm-train data/soccer -o $(BUILD)/$* --config $< --unpacked $(BUILD)/unpacked; fi
 	$(BIN)/vm-export $(BUILD)/$*/model.pt --layout runs -o $@
 
 test-data: .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)

@@ -44,7 +44,7 @@ CANDIDATES = Settings(threshold=0.2, min_inside=0.05, max_around=0.95)
 
 def evaluation(model: Path, folder: Path, settings: Settings) -> Evaluation:
     """Evaluation of a network on a folder of vm-synth; each picture gets a mesh for its own ball."""
-    table = tomllib.loads((NETWORKS / "ball-5x4.toml").read_text())["classes"]
+    table = tomllib.loads((NETWORKS / "ball-small.toml").read_text())["classes"]
     job = Job(model, settings, False, ClassTable.from_table(table).mask_classes(), Rules("scene"))
     subject = job.subject()
     return evaluate(job, subject, find_pictures(folder), len(os.sched_getaffinity(0)), lambda: None)

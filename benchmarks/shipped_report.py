@@ -17,7 +17,7 @@ from vm_embedded.network.model_file import read_model
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "results.md"
 README = DOCS.parent / "README.md"
-COLORS = {"ball-5x4": "#7570b3", "ball-9x4": "#d95f02", "ball-best": "#1b9e77"}
+COLORS = {"ball": "#d95f02", "ball-small": "#7570b3"}
 
 
 def number(value: float | None, digits: int = 2, unit: float = 1.0) -> str:
@@ -148,8 +148,6 @@ def card(found: dict[str, Any], name: str) -> str:
     configuration = tomllib.loads((NETWORKS / f"{name}.toml").read_text())
     depth, width = (configuration["network"][each] for each in ("depth", "width"))
     activation = configuration["network"]["activation"].upper()
-    other = " It runs only on points that `ball-5x4` does not classify as background."
-    first = other if "second_look" in configuration else ""
     scores, clutter = (found["networks"][name][each] for each in SETS)
     ranges = table(
         ["distance", "balls", "AP50", "AP75", "recall [%]"],
@@ -170,7 +168,7 @@ def card(found: dict[str, Any], name: str) -> str:
     size = " x ".join(map(str, scores["size"]))
     return f"""# {name}
 
-Finds balls on a soccer field.{first}
+Finds balls on a soccer field.
 {depth} graph convolutions of {width} channels, {activation}. The mesh is ring6 with k = {manifest.intersections:g} and
 reaches to {manifest.max_distance:g} m. It suits balls of any radius (`--object-radius`, default
 {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: ball, other.
@@ -203,7 +201,7 @@ def main() -> None:
     made = {
         "networks on fields": networks(found, "field"),
         "networks in clutter": networks(found, "clutter"),
-        **{f"{name} by distance": by_distance(found["networks"][name]["field"]) for name in ("ball-9x4", DEFAULT)},
+        f"{DEFAULT} by distance": by_distance(found["networks"][DEFAULT]["field"]),
     }
     if found["grid"]:
         made["grid"] = grid(found)

@@ -12,7 +12,6 @@ from vm_embedded.network.manifest import Manifest
 from .grid import VISUAL, Grid
 from .network import Network
 from .network_shape import NetworkShape
-from .second_look import Gate, SecondLook
 from .torch_files import load_values, save_values
 
 _FORMAT = "vm-embedded checkpoint 3"
@@ -22,7 +21,7 @@ _FORMAT = "vm-embedded checkpoint 3"
 class Checkpoint:
     """A trained network and the manifest of its model file, which has no self-test yet. Raises ModelError."""
 
-    network: Network | SecondLook
+    network: Network
     manifest: Manifest
     grid: Grid = VISUAL
 
@@ -37,23 +36,15 @@ class Checkpoint:
                 f"the network is for {shape.neighbors} neighbors, but mesh {manifest.mesh} has {manifest.neighbors}"
             )
 
-    @property
-    def last_network(self) -> Network:
-        """The network that answers last: the second one of a second look, else the only one."""
-        return self.network.second if isinstance(self.network, SecondLook) else self.network
-
     def save(self, path: str | Path) -> None:
         """Write the checkpoint. Raises InputError."""
         content = {
             "format": _FORMAT,
             "network": self.network.shape.as_dict(),
-            "first": None,
             "grid": asdict(self.grid),
             "manifest": json.loads(replace(self.manifest, self_test=None).as_json()),
             "state": self.network.state_dict(),
         }
-        if isinstance(self.network, SecondLook):
-            content["first"] = {"network": self.network.first.shape.as_dict(), "gate": asdict(self.network.gate)}
         save_values(path, content)
 
     @classmethod
@@ -62,11 +53,7 @@ class Checkpoint:
         content = load_values(path, "a checkpoint")
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
             raise InputError(f"{path} is not a checkpoint of format {_FORMAT!r}; train the network again")
-        last = Network(NetworkShape.from_dict(content["network"]))
-        network: Network | SecondLook = last
-        if content["first"] is not None:
-            first = Network(NetworkShape.from_dict(content["first"]["network"]))
-            network = SecondLook(first, last, Gate(**content["first"]["gate"]))
+        network = Network(NetworkShape.from_dict(content["network"]))
         try:
             network.load_state_dict(content["state"])
         except (RuntimeError, KeyError) as error:

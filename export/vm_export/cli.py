@@ -39,8 +39,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--layout",
         choices=LAYOUTS,
-        help="write one file, in this layout; default: the fastest layout, and NAME.plain.onnx for other ONNX runtimes "
-        "(a network with a second look has only the layout `runs`)",
+        help="write one file, in this layout; default: the fastest layout, and NAME.plain.onnx for other ONNX runtimes",
     )
     parser.add_argument(
         "--to-yaml", action="store_true", help="write the format of the reference implementation instead"
@@ -111,8 +110,7 @@ def _run(options: argparse.Namespace) -> int:
         print(f"{output}: written in the format of the reference implementation")
         return EXIT_OK
     layout = options.layout or fastest_layout(checkpoint)
-    both = options.layout is None and layout != "plain" and checkpoint.network is checkpoint.last_network
-    files = {portable: "plain"} if both else {}
+    files = {portable: "plain"} if options.layout is None and layout != "plain" else {}
     files[output] = layout
     for path, layout in files.items():
         _print_written(path, f"layout {layout}", look, export(checkpoint, path, layout, look))
@@ -161,19 +159,10 @@ def _description(checkpoint: Checkpoint) -> str:
     manifest = checkpoint.manifest
     classes = ", ".join(f"{each.name} ({each.kind})" for each in manifest.classes)
     return (
-        f"{_layers(checkpoint)}, {manifest.mesh}, {manifest.shape}\n"
+        f"{len(checkpoint.network.shape.layers)} layers, {manifest.mesh}, {manifest.shape}\n"
         f"  radius {manifest.radius:g} m, {manifest.intersections:g} intersections, to {manifest.max_distance:g} m\n"
         f"  object radius {manifest.object_radius:g} m, edge {manifest.edge}, classes: {classes}"
     )
-
-
-def _layers(checkpoint: Checkpoint) -> str:
-    from .second_look import SecondLook
-
-    network, layers = checkpoint.network, len(checkpoint.network.shape.layers)
-    if isinstance(network, SecondLook):
-        return f"{len(network.first.shape.layers)} layers, {layers} for a second look"
-    return f"{layers} layers"
 
 
 def _overrides(options: argparse.Namespace) -> Overrides:

@@ -58,14 +58,14 @@ _ACTIVATIONS = {
 }
 
 
-def write_layers(graph: OnnxGraph, network: Network, x: str, convolve: Convolve, prefix: str, output: str) -> str:
-    """Write all layers of a network; return `output`, the name of its probabilities (C, m), from x (3, m).
+def write_layers(graph: OnnxGraph, network: Network, convolve: Convolve) -> None:
+    """Write all layers of a network, from the input `points` (3, m) to the output `probabilities` (C, m).
 
-    Names of nodes begin with `prefix`; `convolve` writes the convolutions, which look at neighbors.
+    `convolve` writes the convolutions, which look at neighbors.
     """
-    before = _Activation()
+    x, before = "points", _Activation()
     for index, (spec, layer) in enumerate(zip(network.shape.layers, network.typed_layers, strict=True)):
-        name = f"{prefix}layer{index}"
+        name = f"layer{index}"
         last = index == len(network.shape.layers) - 1
         kernel, bias = _weights(layer)
         if last and spec.activation == "softmax" and spec.width == 2:
@@ -79,11 +79,10 @@ def write_layers(graph: OnnxGraph, network: Network, x: str, convolve: Convolve,
             sums = convolve(name, x, kernel)
         z = graph.node("Add", [sums, graph.constant(f"{name}.bias", bias[:, None])], f"{name}.linear")
         if last:
-            _write_head(graph, f"{prefix}head", spec.activation, spec.width, z, output)
+            _write_head(graph, spec.activation, spec.width, z)
         else:
             x = _write_activation(graph, name, spec.activation, z)
         before = activation
-    return output
 
 
 def _weights(layer: GraphLayer) -> tuple[Floats, Floats]:
@@ -107,14 +106,15 @@ def _write_activation(graph: OnnxGraph, name: str, activation: str, z: str) -> s
     return graph.node("Add", [straight, curved], f"{name}.activation")
 
 
-def _write_head(graph: OnnxGraph, name: str, activation: str, classes: int, logits: str, output: str) -> str:
-    """Write the head: probabilities (C, m) from logits (C, m), or from the difference (1, m) of two classes."""
+def _write_head(graph: OnnxGraph, activation: str, classes: int, logits: str) -> None:
+    """Write the head: `probabilities` (C, m) from logits (C, m), or from the difference (1, m) of two classes."""
     if activation == "sigmoid":
-        return graph.node("Sigmoid", [logits], output)
-    if classes == 2:
-        other = graph.node("Neg", [logits], f"{name}.other")
-        return graph.node("Sigmoid", [graph.node("Concat", [other, logits], f"{name}.both", axis=0)], output)
-    largest = graph.node("ReduceMax", [logits], f"{name}.largest", axes=[0])
-    powers = graph.node("Exp", [graph.node("Sub", [logits, largest], f"{name}.shifted")], f"{name}.powers")
-    total = graph.node("ReduceSum", [powers, graph.constant("first", [0])], f"{name}.total")
-    return graph.node("Div", [powers, total], output)
+        graph.node("Sigmoid", [logits], "probabilities")
+    elif classes == 2:
+        other = graph.node("Neg", [logits], "head.other")
+        graph.node("Sigmoid", [graph.node("Concat", [other, logits], "head.both", axis=0)], "probabilities")
+    else:
+        largest = graph.node("ReduceMax", [logits], "head.largest", axes=[0])
+        powers = graph.node("Exp", [graph.node("Sub", [logits, largest], "head.shifted")], "head.powers")
+        total = graph.node("ReduceSum", [powers, graph.constant("first", [0])], "head.total")
+        graph.node("Div", [powers, total], "probabilities")

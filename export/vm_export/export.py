@@ -27,8 +27,6 @@ from .look_checkpoint import LookCheckpoint
 from .network import Network
 from .plain_graph import plain_model
 from .runs_graph import runs_model
-from .second_look import SecondLook
-from .second_look_graph import second_look_model
 
 LARGEST_DIFFERENCE = 1e-4
 """Largest difference of an answer that is allowed between ONNX Runtime and torch."""
@@ -45,23 +43,17 @@ def fastest_layout(checkpoint: Checkpoint) -> str:
 
     The layout `runs` saves look-ups and costs multiplications. A convolution multiplies three slots for each group: for
     ring6, 9 places for 7 weights. A separable convolution becomes a full one. So the layout `runs` gains less for wider
-    layers. A second look has only the layout `runs`.
+    layers.
     """
-    if isinstance(checkpoint.network, SecondLook):
-        return "runs"
     narrow = all(layer.width <= _WIDEST[layer.kind] for layer in checkpoint.network.shape.layers)
     return "runs" if narrow and checkpoint.manifest.edge == "hard" else "plain"
 
 
-def onnx_model(network: Network | SecondLook, manifest: Manifest) -> bytes:
+def onnx_model(network: Network, manifest: Manifest) -> bytes:
     """The bytes of an ONNX model in the manifest's layout, of standard operators only.
 
-    Raises ModelError for a second look in another layout than `runs`, and for `lattice` with a mesh that has none.
+    Raises ModelError for `lattice` with a mesh that has none.
     """
-    if isinstance(network, SecondLook):
-        if manifest.layout != "runs":
-            raise ModelError(f"a network with a second look has only layout runs, not {manifest.layout}")
-        return second_look_model(network, manifest)
     models = {"plain": plain_model, "runs": runs_model, "lattice": lattice_model}
     return models[manifest.layout](network, manifest)
 
@@ -82,7 +74,7 @@ def export(
         checkpoint.manifest,
         look=None,
         layout=layout,
-        operations=network.operations,
+        operations=network.shape.operations,
         provenance=provenance,
         self_test=random_example(network, 12, 0, checkpoint.manifest.model.steps if layout == "lattice" else None),
     )
@@ -130,7 +122,7 @@ def _write(path: str | Path, content: bytes) -> None:
         part.write_bytes(content)
 
 
-def largest_difference(content: bytes, network: Network | SecondLook, manifest: Manifest) -> float:
+def largest_difference(content: bytes, network: Network, manifest: Manifest) -> float:
     """The largest difference of a probability between ONNX Runtime and torch, for graphs of different sizes.
 
     NaN if a probability is NaN.
@@ -142,7 +134,7 @@ def largest_difference(content: bytes, network: Network | SecondLook, manifest: 
 
 
 def random_example(
-    network: Network | SecondLook, points: int, seed: int, steps: tuple[tuple[int, int], ...] | None = None
+    network: Network, points: int, seed: int, steps: tuple[tuple[int, int], ...] | None = None
 ) -> SelfTest:
     """A random graph of `points` points with random colors, rounded as SelfTest.as_dict rounds, and torch's answer.
 

@@ -51,7 +51,7 @@ def lattice_model(network: Network, manifest: Manifest) -> bytes:
         sums = graph.node("Conv", [picture, weights], f"{name}.sums", kernel_shape=[3, 3], pads=[1, 1, 1, 1])
         return graph.node("Reshape", [sums, graph.constant(f"{name}.flat", [outputs, -1])], f"{name}.summed")
 
-    write_layers(graph, network, "points", convolve, "", "probabilities")
+    write_layers(graph, network, convolve)
     return graph.model(
         {"points": (FLOAT, [3, "places"]), "shown": (BOOL, ["rows", "columns"])},
         {"probabilities": (FLOAT, [network.shape.classes, "places"])},

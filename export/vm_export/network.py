@@ -78,11 +78,6 @@ class Network(nn.Module):
                 nn.init.zeros_(module.bias)
 
     @property
-    def operations(self) -> int:
-        """Multiplications and additions for each point."""
-        return self.shape.operations
-
-    @property
     def typed_layers(self) -> list[GraphLayer]:
         """The layers with their types."""
         return [layer for layer in self.layers if isinstance(layer, GraphLayer)]

@@ -26,7 +26,6 @@ from vm_embedded.network.manifest import Manifest, ObjectClass
 from .checkpoint import Checkpoint
 from .network import Dense, GraphConvolution, Network, SeparableConvolution
 from .network_shape import Layer, NetworkShape
-from .second_look import SecondLook
 
 DEFAULT_CLASSES = ("ball", "goal", "line", "field", "environment")
 """The classes of a file that has five outputs and no class_map: those of the reference's networks, in their order."""
@@ -183,8 +182,6 @@ def write_reference(checkpoint: Checkpoint, path: str | Path) -> None:
     that the format can't describe, or if the file can't be written.
     """
     network, manifest = checkpoint.network, checkpoint.manifest
-    if isinstance(network, SecondLook):
-        raise InputError("the format of the reference holds one network, but this one has a second look")
     if (manifest.sampling, manifest.colors) != ("bilinear", "absolute"):
         kind = f"{manifest.sampling} points and {manifest.colors} colors"
         raise InputError(f"networks of the reference take bilinear points and absolute colors; this one takes {kind}")

@@ -33,23 +33,18 @@ def runs_model(network: Network, manifest: Manifest) -> bytes:
     graph, groups = OnnxGraph(), manifest.model.groups
 
     def convolve(name: str, x: str, kernel: Floats) -> str:
-        return convolve_along_runs(graph, name, x, kernel, groups)
+        return _convolve_along_runs(graph, name, x, kernel, groups)
 
-    write_layers(graph, network, "points", convolve, "", "probabilities")
-    return finished_runs_model(graph, network.shape.classes, manifest)
-
-
-def finished_runs_model(graph: OnnxGraph, classes: int, manifest: Manifest) -> bytes:
-    """The bytes of a model whose graph has the inputs and the output of the layout `runs`."""
+    write_layers(graph, network, convolve)
     return graph.model(
-        {"points": (FLOAT, [3, "slots"]), "columns": (INT64, [len(manifest.model.groups), "slots"])},
-        {"probabilities": (FLOAT, [classes, "slots"])},
+        {"points": (FLOAT, [3, "slots"]), "columns": (INT64, [len(groups), "slots"])},
+        {"probabilities": (FLOAT, [network.shape.classes, "slots"])},
         {METADATA_KEY: manifest.as_json()},
         "Visual Mesh network, laid out in runs. The slots and their columns are prepared by vm_embedded.",
     )
 
 
-def convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, groups: Groups) -> str:
+def _convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, groups: Groups) -> str:
     """Write a convolution over the graph; return the name of its sums (outputs, m), from x (inputs, m)."""
     outputs, _, inputs = kernel.shape
     # All windows of three slots, without a copy of each. A row of `thrice` holds a channel of x twice, and a third time
@@ -62,7 +57,7 @@ def convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, gro
     window = graph.node("Reshape", [thrice, graph.constant(f"{name}.window.shape", [3 * inputs, -1])], f"{name}.window")
 
     taps = np.zeros((outputs, len(groups), inputs, 3))
-    for place, group, shift in kernel_places(groups):  # row 0 of a window is its right slot, shift +1
+    for place, group, shift in _kernel_places(groups):  # row 0 of a window is its right slot, shift +1
         taps[:, group, :, 1 - shift] = kernel[:, place]
     weights = graph.constant(f"{name}.kernel", taps.reshape(outputs * len(groups), 3 * inputs))
     sums = graph.node("MatMul", [weights, window], f"{name}.sums")
@@ -75,7 +70,7 @@ def convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, gro
     return graph.node("ReduceSum", [grouped, graph.constant("second", [1])], f"{name}.summed", keepdims=0)
 
 
-def kernel_places(groups: Groups) -> Iterator[tuple[int, int, int]]:
+def _kernel_places(groups: Groups) -> Iterator[tuple[int, int, int]]:
     """Each place of a kernel (the point itself is 0), its group, and its distance from the middle of the group."""
     for number, group in enumerate(groups):
         for shift, neighbor in zip(group_offsets(group), group, strict=True):

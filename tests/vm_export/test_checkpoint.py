@@ -32,5 +32,11 @@ def test_foreign_and_mismatched_checkpoints_are_refused(tmp_path):
         Checkpoint.load(tmp_path / "foreign.pt")
     with pytest.raises(InputError, match="can't read"):
         Checkpoint.load(tmp_path / "missing.pt")
+    checkpoint().save(tmp_path / "model.pt")
+    content = torch.load(tmp_path / "model.pt", weights_only=True)
+    state = {f"first.{name}": value for name, value in content["state"].items()}
+    torch.save(content | {"state": state}, tmp_path / "model.pt")
+    with pytest.raises(InputError, match="the weights do not fit the network"):
+        Checkpoint.load(tmp_path / "model.pt")
     with pytest.raises(ModelError, match="outputs"):
         Checkpoint(checkpoint().network, manifest(("ball", "line", "field")))

@@ -289,7 +289,7 @@ def test_networks_whose_answers_are_not_numbers_are_not_written(tmp_path):
     look, mesh = look_checkpoint(), ball_checkpoint()
     with torch.no_grad():
         look.network.answers.bias[2] = torch.nan
-        mesh.last_network.typed_layers[0].linear.bias[0] = torch.nan
+        mesh.network.typed_layers[0].linear.bias[0] = torch.nan
     with pytest.raises(ModelError, match="close look: its answers are NaN or infinite"):
         export.export(ball_checkpoint(), tmp_path / "model.onnx", look=look)
     with pytest.raises(ModelError, match="differ by nan"):

@@ -62,7 +62,7 @@ def test_command_attaches_a_look_to_a_model_file_and_removes_it(folder):
 
 
 def test_command_attaches_a_look_to_a_network_of_the_package(folder):
-    run("ball-5x4", "--look", folder / "look.pt", "-o", folder / "out.onnx")
+    run("ball-small", "--look", folder / "look.pt", "-o", folder / "out.onnx")
     assert has_look(folder / "out.onnx")
 
 

@@ -37,6 +37,13 @@ def test_reference_files_survive_a_round_trip(tmp_path):
     np.testing.assert_allclose(again.numpy(), test.probabilities, atol=1e-5)
 
 
+@pytest.mark.parametrize("facts", [{"sampling": "footprint"}, {"colors": "relative"}])
+def test_a_network_that_sees_other_colors_is_not_written(tmp_path, facts):
+    with pytest.raises(InputError, match="this one takes"):
+        write_reference(Checkpoint(checkpoint(9).network, manifest(**facts)), tmp_path / "model.yaml")
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_authors_file_survives_a_round_trip(shared, tmp_path):
     source = shared / "reference/model.yaml"
     write_reference(read_reference(source, Overrides(intersections=6.0)), tmp_path / "again.yaml")

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from ..errors import InputError, unknown
 
-SHIPPED = ("ball-5x4", "ball-9x4", "ball-best")
-"""Their names. The numbers are depth and width."""
+SHIPPED = ("ball", "ball-small")
+"""Their names. `ball-small` is for the slowest machines."""
 
-DEFAULT = "ball-best"
+DEFAULT = "ball"
 """The network to use if none is named."""
 
 _FOLDER = Path(__file__).parents[1] / "models"

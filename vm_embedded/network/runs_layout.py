@@ -37,7 +37,7 @@ from ..arrays import Indices, Mask, Singles, frozen
 from ..mesh.mesh import SELF, Groups, Mesh
 from .layout import OFF_SCREEN, Feeds, Layout
 
-GAP = 1
+_GAP = 1
 """The middle one of the three gaps that come first. All slots around it are gaps, as around the off-screen point."""
 
 _GAPS_BEFORE = 3
@@ -92,7 +92,7 @@ class RunsLayout(Layout):
         off_screen = ~on_screen
         np.copyto(points, OFF_SCREEN, where=off_screen)
         columns = self.columns.astype(np.int64)
-        np.copyto(columns, GAP + self._first_columns, where=off_screen)
+        np.copyto(columns, _GAP + self._first_columns, where=off_screen)
         return {"points": points, "columns": columns}
 
     def probabilities(self, output: Singles) -> Singles:
@@ -114,7 +114,7 @@ def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Position
     n = len(neighbors) - 1
     # A second gap at the end: a group of three may begin with the last point, with its other members off screen.
     runs = np.append(_in_runs(neighbors[:n, groups[0][0]], neighbors[:n, groups[0][-1]]), n)
-    slot = np.full(n + 1, GAP)  # of each point, and of the off-screen point
+    slot = np.full(n + 1, _GAP)  # of each point, and of the off-screen point
     filled = np.flatnonzero(runs < n)
     slot[runs[filled]] = filled
 
@@ -141,10 +141,10 @@ def _found_in_runs(
     """Where the group of each point lies in the runs, and whether the runs tear it apart.
 
     members: (group size, n) points of each point's group, n off screen. slot: (n + 1,) of each point. Returns the slots
-    of the groups' middles (n + 1,), GAP where no member is on screen, and a mask (n,) of the groups that are torn.
+    of the groups' middles (n + 1,), _GAP where no member is on screen, and a mask (n,) of the groups that are torn.
     """
     n = members.shape[1]
-    middle = np.full(n + 1, GAP)
+    middle = np.full(n + 1, _GAP)
     # In a whole group, each member on screen gives the same middle.
     for offset, points in zip(offsets, members, strict=True):
         np.copyto(middle[:n], slot[points] - offset, where=points < n)

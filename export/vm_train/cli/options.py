@@ -46,13 +46,6 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
     _add_configuration(made)
     made.add_argument(
-        "--first",
-        type=Path,
-        metavar="MODEL",
-        help="checkpoint (.pt) of a small network. It selects points; the new network trains and runs only on these. "
-        "See [second_look]. The model file contains both networks",
-    )
-    made.add_argument(
         "--teacher",
         type=Path,
         metavar="MODEL",

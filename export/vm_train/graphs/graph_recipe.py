@@ -21,7 +21,6 @@ from ..data.classes import Classes
 from ..data.picture_files import PictureFiles
 from ..data.pictures import Picture
 from .augmentation import Augmentation, perturb_camera, perturb_colors, perturb_sharpness
-from .frozen_network import FirstLook
 from .graph_augmentation import mirror_image, random_window
 from .labeled_graph import LabeledGraph, empty_graph, graph_of
 
@@ -31,8 +30,7 @@ class GraphRecipe:
     """Everything besides the picture that decides its graph.
 
     own_radius: build the mesh for the radius of each picture's own ball, from its sceneX.json. window: share of width
-    and height that examples are cut to. mirrored: share of examples that are mirror images. first: network that selects
-    the points of each graph; None keeps all points.
+    and height that examples are cut to. mirrored: share of examples that are mirror images.
     """
 
     classes: Classes
@@ -41,7 +39,6 @@ class GraphRecipe:
     augmentation: Augmentation = field(default_factory=Augmentation)
     own_radius: bool = False
     window: float = 1.0
-    first: FirstLook | None = None
     mirrored: float = 0.0
 
     def manifest_for(self, files: PictureFiles) -> Manifest:
@@ -51,7 +48,7 @@ class GraphRecipe:
     def make_graph(self, picture: Picture, manifest: Manifest, seed: tuple[int, ...] | None) -> LabeledGraph:
         """The graph of a picture: as it is without a seed, else augmented. Raises InputError."""
         if seed is None:
-            return self._select(self._whole_graph(picture, manifest))
+            return self._whole_graph(picture, manifest)
         random = np.random.default_rng(seed)
         return self.draw_example(self.draw_view(picture, manifest, random), random)
 
@@ -62,18 +59,13 @@ class GraphRecipe:
         return self._whole_graph(changed, replace(manifest, colors="absolute"))
 
     def draw_example(self, view: LabeledGraph, random: np.random.Generator) -> LabeledGraph:
-        """A random window of a view in a random tone, perhaps mirrored: the points that the first network selects."""
+        """A random window of a view in a random tone, perhaps mirrored."""
         objects = [at for at, each in enumerate(self.manifest.classes) if each.kind == "object"]
         colors = perturb_colors(view.points[:-1], self.augmentation, random)
         normalize_colors(colors, self.manifest.colors)
         colored = replace(view, points=np.concatenate([colors, view.points[-1:]]))
         seen = random_window(colored, self.window, objects, random)
-        if random.random() < self.mirrored:
-            seen = mirror_image(seen, self.manifest.model)
-        return self._select(seen)
-
-    def _select(self, graph: LabeledGraph) -> LabeledGraph:
-        return graph if self.first is None else self.first.selected_part(graph)
+        return mirror_image(seen, self.manifest.model) if random.random() < self.mirrored else seen
 
     def _whole_graph(self, picture: Picture, manifest: Manifest) -> LabeledGraph:
         try:

@@ -87,22 +87,6 @@ class NetworkSettings:
         check_entries(self)
 
 
-@dataclass(frozen=True)
-class SecondLookSettings:
-    """Section [second_look], for vm-train --first: points that the new network gets."""
-
-    above: float = number(
-        0.05,
-        "a point gets a second look if the first network's probability of an object is above this value",
-        "",
-        (0.0, 0.999),
-    )
-    rings: int = number(4, "points up to this many steps away from such a point also get a second look", "", (0, 100))
-
-    def __post_init__(self) -> None:
-        check_entries(self)
-
-
 HEADER = """Configuration of vm-train. `vm-train config` prints this file.
 Keep only the entries that you change: missing entries have their defaults.
 Each comment gives the meaning of the next entry, its unit in brackets, and its limits.
@@ -121,7 +105,6 @@ class TrainConfiguration:
     )
     mesh: MeshSettings = dataclasses.field(default_factory=MeshSettings)
     network: NetworkSettings = dataclasses.field(default_factory=NetworkSettings)
-    second_look: SecondLookSettings = dataclasses.field(default_factory=SecondLookSettings)
     training: Recipe = dataclasses.field(default_factory=Recipe)
     augmentation: Augmentation = dataclasses.field(default_factory=Augmentation)
 

@@ -210,8 +210,7 @@ class _Round:
             "torch": torch.__version__,
         }
         manifest = replace(run.configuration.manifest, provenance=provenance)
-        network = self._trainer.result if run.first is None else run.first.followed_by(self._trainer.result)
-        checkpoint = Checkpoint(network, manifest, run.configuration.grid)
+        checkpoint = Checkpoint(self._trainer.result, manifest, run.configuration.grid)
         checkpoint.save(run.round_path(progress.round))
         if is_best_ever:
             checkpoint.save(run.model_path)
@@ -222,10 +221,10 @@ def _round_trainer(run: TrainingRun, hardware: Hardware, progress: TrainingProgr
     recipe = run.configuration.training
     torch.manual_seed(int(np.random.default_rng([recipe.seed, progress.round]).integers(2**31)))
     network = Network(run.configuration.network_shape)
-    graders = [Checkpoint.load(run.round_path(each)).last_network for each in range(1, progress.round)]
+    graders = [Checkpoint.load(run.round_path(each)).network for each in range(1, progress.round)]
     total = recipe.epochs * steps_an_epoch(recipe.looks * run.data.pictures_per_epoch, recipe.batch)
     shares, weights = run.shares_and_weights(progress.round)
-    teacher = None if run.teacher is None else run.teacher.checkpoint.network
+    teacher = None if run.teacher is None else run.teacher.network
     trainer = Trainer(network, recipe, total, shares, weights, graders, teacher, hardware.device)
     if run.state_path.exists():
         state = read_state(run.state_path)

@@ -1,9 +1,9 @@
 """The folder of a training: what it was begun with, and what it has produced.
 
 train.toml: the configuration. pictures.json: the split of the pictures. run.json: where the pictures are, and the
-numbers of points of each class. first.pt, teacher.pt: copies of the networks of --first and --teacher. state.pt: the
-state to resume from. log.jsonl, tensorboard/: the record of each step. round1.pt, ...: the best network of each round.
-model.pt: the best network of all rounds, for vm-evaluate and vm-export.
+numbers of points of each class. teacher.pt: a copy of the network of --teacher. state.pt: the state to resume from.
+log.jsonl, tensorboard/: the record of each step. round1.pt, ...: the best network of each round. model.pt: the best
+network of all rounds, for vm-evaluate and vm-export.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from vm_embedded.errors import InputError
 from vm_embedded.files import atomic_write
 
 from ..data.split import read_split, write_split
-from ..graphs.frozen_network import FirstLook, FrozenNetwork
 from ..graphs.loading import PictureGraphs
 from ..graphs.streamed import StreamedGraphs, StreamSource
 from .configuration import TrainConfiguration
 from .selection import class_weights, selection_shares
+from .teacher import Teacher
 from .training_data import TrainingData
 
 _FORMAT = 3
-_FIRST, _TEACHER = "first.pt", "teacher.pt"
-_FILES = ("train.toml", "pictures.json", _FIRST, _TEACHER, "state.pt", "model.pt", "round1.pt", "log.jsonl")
+_TEACHER = "teacher.pt"
+_FILES = ("train.toml", "pictures.json", _TEACHER, "state.pt", "model.pt", "round1.pt", "log.jsonl")
 """Files that a new training would overwrite."""
 
 
@@ -45,16 +45,14 @@ _FILES = ("train.toml", "pictures.json", _FIRST, _TEACHER, "state.pt", "model.pt
 class TrainingRun:
     """A training as its folder describes it; `begin_run` and `read_run` make it.
 
-    counts (C,): points of each class in the pictures that data.counted counts. first, teacher: trained networks that
-    take part.
+    counts (C,): points of each class in the pictures that data.counted counts.
     """
 
     folder: Path
     data: TrainingData
     configuration: TrainConfiguration
     counts: npt.NDArray[np.int64]
-    first: FirstLook | None = None
-    teacher: FrozenNetwork | None = None
+    teacher: Teacher | None = None
 
     @property
     def state_path(self) -> Path:
@@ -95,11 +93,11 @@ class TrainingRun:
 
     def scheduled_graphs(self) -> PictureGraphs | StreamedGraphs:
         """The graphs of the training's batches. Raises InputError if a picture has left the folder."""
-        return self.data.scheduled_graphs(self.configuration, self.first)
+        return self.data.scheduled_graphs(self.configuration)
 
     def graphs(self, numbers: Sequence[str]) -> PictureGraphs:
         """The graphs of some pictures of the folder. Raises InputError if a picture is missing."""
-        return self.data.graphs(numbers, self.configuration, self.first)
+        return self.data.graphs(numbers, self.configuration)
 
     def provenance(self) -> dict[str, str]:
         """Where a network of this training comes from, for its manifest."""
@@ -123,36 +121,30 @@ class TrainingRun:
 
 
 def begin_run(
-    folder: Path,
-    data: TrainingData,
-    configuration: TrainConfiguration,
-    first: Path | None = None,
-    teacher: Path | None = None,
+    folder: Path, data: TrainingData, configuration: TrainConfiguration, teacher: Path | None = None
 ) -> TrainingRun:
     """Count the points of each class, and write the files of a new training.
 
-    first, teacher: checkpoints of the networks that take part. Raises InputError, also if the folder holds a training.
+    teacher: checkpoint of the teacher. Raises InputError, also if the folder holds a training.
     """
     check_unused(folder)
     data = replace(data, folder=data.folder.resolve())
-    first_look = None if first is None else _load_first(first, configuration)
-    frozen_teacher = None if teacher is None else _load_teacher(teacher, configuration)
+    loaded = None if teacher is None else _load_teacher(teacher, configuration)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
-    counts = data.count_points(configuration, first_look)
+    counts = data.count_points(configuration)
     if not counts.any():
         raise InputError(
             "no training picture has a labeled point: check that the lens files fit the pictures, and [mesh] the "
             "object (a camera below the top of a sphere or cylinder sees no point of its mesh)"
         )
-    run = TrainingRun(folder, data, configuration, counts, first_look, frozen_teacher)
+    run = TrainingRun(folder, data, configuration, counts, loaded)
     write_split(folder / "pictures.json", data.split)
-    for name, path in ((_FIRST, first), (_TEACHER, teacher)):
-        if path is not None:
-            with atomic_write(folder / name) as part:
-                part.write_bytes(path.read_bytes())
+    if teacher is not None:
+        with atomic_write(folder / _TEACHER) as part:
+            part.write_bytes(teacher.read_bytes())
     _write(folder / "train.toml", to_commented_toml(configuration))
     _write(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
     return run
@@ -167,22 +159,19 @@ def read_run(folder: Path) -> TrainingRun:
             raise InputError(f"{path} was written by another release: begin the training again")
         counts = np.array(list(content["points"].values()), dtype=np.int64)
         pictures, unpacked, described = Path(content["data"]), content["unpacked"], content["source"]
-        first_sha256, teacher_sha256 = content["first_sha256"], content["teacher_sha256"]
-        configuration_sha256 = content["configuration_sha256"]
+        configuration_sha256, teacher_sha256 = content["configuration_sha256"], content["teacher_sha256"]
         source = None if described is None else StreamSource(**(described | {"shards": tuple(described["shards"])}))
     except OSError as error:
         raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path} is damaged: {error}") from error
     configuration = read_sections(TrainConfiguration, folder / "train.toml")
-    first = None if first_sha256 is None else _load_first(folder / _FIRST, configuration)
     teacher = None if teacher_sha256 is None else _load_teacher(folder / _TEACHER, configuration)
     split = read_split(folder / "pictures.json")
     data = TrainingData(pictures, split, None if unpacked is None else folder / unpacked, source)
-    run = TrainingRun(folder, data, configuration, counts, first, teacher)
-    for name, network, before in ((_FIRST, first, first_sha256), (_TEACHER, teacher, teacher_sha256)):
-        if network is not None and network.sha256 != before:
-            raise InputError(f"{folder / name} was changed since the training began: begin another one")
+    run = TrainingRun(folder, data, configuration, counts, teacher)
+    if teacher is not None and teacher.sha256 != teacher_sha256:
+        raise InputError(f"{folder / _TEACHER} was changed since the training began: begin another one")
     if run.configuration_sha256 != configuration_sha256:
         raise InputError(
             f"{folder / 'train.toml'} or pictures.json was changed since the training began: "
@@ -223,19 +212,13 @@ def _description(run: TrainingRun) -> dict[str, Any]:
         "unpacked": None if data.unpacked is None else _relative(data.unpacked, run.folder),
         "configuration_sha256": run.configuration_sha256,
         "source": None if data.source is None else asdict(data.source),
-        "first_sha256": None if run.first is None else run.first.sha256,
         "teacher_sha256": None if run.teacher is None else run.teacher.sha256,
         "points": dict(zip(names, run.counts.tolist(), strict=True)),
     }
 
 
-def _load_first(path: Path, configuration: TrainConfiguration) -> FirstLook:
-    gate = configuration.second_look
-    return FirstLook.load(path, configuration.manifest, gate.above, gate.rings)
-
-
-def _load_teacher(path: Path, configuration: TrainConfiguration) -> FrozenNetwork:
-    return FrozenNetwork.load(path, configuration.manifest, configuration.grid)
+def _load_teacher(path: Path, configuration: TrainConfiguration) -> Teacher:
+    return Teacher.load(path, configuration.manifest, configuration.grid)
 
 
 def _relative(unpacked: Path, folder: Path) -> str:

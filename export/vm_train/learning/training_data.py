@@ -14,7 +14,6 @@ from vm_embedded.errors import InputError
 from ..data.decoded_cache import DecodedCache
 from ..data.pictures import find_pictures
 from ..data.split import Split
-from ..graphs.frozen_network import FirstLook
 from ..graphs.graph_cache import GraphCache
 from ..graphs.graph_recipe import GraphRecipe
 from ..graphs.loading import PictureGraphs
@@ -57,16 +56,12 @@ class TrainingData:
         batches = schedule(seed, recipe.epochs, recipe.batch, self.pictures_per_epoch, validation, recipe.looks)
         return batches if self.source is None else assign_lanes(batches, seed, self.source)
 
-    def scheduled_graphs(
-        self, configuration: TrainConfiguration, first: FirstLook | None
-    ) -> PictureGraphs | StreamedGraphs:
+    def scheduled_graphs(self, configuration: TrainConfiguration) -> PictureGraphs | StreamedGraphs:
         """The graphs of the items in `batches`. Raises InputError if a picture has left the folder."""
-        graphs = self.graphs((*self.split.training, *self.split.validation), configuration, first)
+        graphs = self.graphs((*self.split.training, *self.split.validation), configuration)
         return graphs if self.source is None else StreamedGraphs(self.source, graphs)
 
-    def graphs(
-        self, numbers: Sequence[str], configuration: TrainConfiguration, first: FirstLook | None
-    ) -> PictureGraphs:
+    def graphs(self, numbers: Sequence[str], configuration: TrainConfiguration) -> PictureGraphs:
         """The graphs of some pictures of the folder. Raises InputError if a picture is missing."""
         found = {each.number: each for each in find_pictures(self.folder)}
         missing = [number for number in numbers if number not in found]
@@ -74,7 +69,7 @@ class TrainingData:
             raise InputError(
                 f"{len(missing)} pictures of the training are missing in {self.folder}, for example {missing[0]}"
             )
-        recipe = _graph_recipe(configuration, first)
+        recipe = _graph_recipe(configuration)
         pictures = [found[number] for number in numbers]
         if self.unpacked is None:
             return PictureGraphs(pictures, recipe)
@@ -82,7 +77,7 @@ class TrainingData:
         views = GraphCache(self.unpacked, count, recipe) if count else None
         return PictureGraphs(pictures, recipe, DecodedCache(self.unpacked), views)
 
-    def count_points(self, configuration: TrainConfiguration, first: FirstLook | None) -> npt.NDArray[np.int64]:
+    def count_points(self, configuration: TrainConfiguration) -> npt.NDArray[np.int64]:
         """Number (C,) of each class's points in `counted` training pictures, without augmentation.
 
         These pictures are spread over the folder, or are the first ones of one lane of the stream. Raises InputError.
@@ -92,7 +87,7 @@ class TrainingData:
         else:
             order = (configuration.training.seed, 0)
             items = [StreamedItem(0, None, order, 0, place) for place in range(self.counted)]
-        graphs = self.scheduled_graphs(configuration, first)
+        graphs = self.scheduled_graphs(configuration)
         counts = np.zeros(len(configuration.classes.colors), dtype=np.int64)
         for item in items:
             labels = graphs[item].labels
@@ -100,7 +95,7 @@ class TrainingData:
         return counts
 
 
-def _graph_recipe(configuration: TrainConfiguration, first: FirstLook | None) -> GraphRecipe:
+def _graph_recipe(configuration: TrainConfiguration) -> GraphRecipe:
     return GraphRecipe(
         configuration.classes.mask_classes(),
         configuration.manifest,
@@ -108,6 +103,5 @@ def _graph_recipe(configuration: TrainConfiguration, first: FirstLook | None) ->
         configuration.augmentation,
         own_radius=configuration.mesh.radius_of == "scene",
         window=configuration.training.window,
-        first=first,
         mirrored=configuration.training.mirrored,
     )

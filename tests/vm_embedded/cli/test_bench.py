@@ -71,7 +71,7 @@ def test_tuned_settings_are_written_and_read_by_vm_detect(tmp_path):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--model", "ball-beast"), "did you mean 'ball-best'"),
+        (("--model", "ball-smaller"), "did you mean 'ball-small'"),
         (("--model", "nowhere.onnx"), "nowhere.onnx"),
         (("--model", MODEL, "--size", "640"), "1280x1024"),
         (("--model", MODEL, "--size", "\u00b2x\u00b2"), "1280x1024"),

@@ -104,7 +104,7 @@ def test_hangup_reads_the_configuration_again_and_keeps_the_old_one_if_it_is_bad
         assert "line 2" in refused[0]["reason"]
         before = len(found.frames)
         found.wait(lambda: len(found.frames) > before + 5)
-        path.write_text('model = "ball-5x4"\n[camera]\nsource = "synthetic"\n')
+        path.write_text('model = "ball-small"\n[camera]\nsource = "synthetic"\n')
         found.process.send_signal(signal.SIGHUP)
         found.wait(lambda: [each for each in found.events if each["event"] == "reloaded"])
         before = len(found.frames)

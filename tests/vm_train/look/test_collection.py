@@ -30,8 +30,8 @@ def begin(drawn, tiny, tmp_path):
     def begin_one(name="run", data=drawn, strict=False):
         split = split_by_seed([each.number for each in find_pictures(data)], 0.25, 0.0, 0)
         configuration = read_sections(LookConfiguration, tiny)
-        model = model_path("ball-5x4")
-        return begin_look_run(tmp_path / name, data, split, configuration, model, "ball-5x4", strict)
+        model = model_path("ball-small")
+        return begin_look_run(tmp_path / name, data, split, configuration, model, "ball-small", strict)
 
     return begin_one
 
@@ -134,7 +134,7 @@ def test_files_that_were_changed_since_the_beginning_are_refused(begin):
     run = begin()
     assert is_look_run(run.folder)
     mesh, toml = run.mesh.read_bytes(), (run.folder / "look.toml").read_text()
-    run.mesh.write_bytes(Path(model_path("ball-9x4")).read_bytes())
+    run.mesh.write_bytes(Path(model_path("ball")).read_bytes())
     with pytest.raises(InputError, match=r"mesh\.onnx was changed"):
         read_look_run(run.folder)
     run.mesh.write_bytes(mesh)

@@ -31,7 +31,7 @@ def look(drawn, tiny):
     """Runs vm-train look on the drawn pictures with one worker; more arguments override these."""
 
     def run_look(output, *arguments, **options):
-        given = ["--from", "ball-5x4", "--config", tiny, "--workers", 1, *arguments]
+        given = ["--from", "ball-small", "--config", tiny, "--workers", 1, *arguments]
         return run("look", drawn, "-o", output, *given, **options)
 
     return run_look
@@ -118,7 +118,7 @@ def assert_same(folder, expected):
 def test_what_is_stopped_at_any_moment_ends_with_the_same_bytes(how, steps, whole, drawn, tiny, tmp_path):
     """0 steps: while patches are collected, by two workers."""
     folder = tmp_path / "run"
-    arguments = ["look", drawn, "-o", folder, "--from", "ball-5x4", "--config", tiny, "--workers", 1 if steps else 2]
+    arguments = ["look", drawn, "-o", folder, "--from", "ball-small", "--config", tiny, "--workers", 1 if steps else 2]
     process = subprocess.Popen(
         [*COMMAND, *map(str, arguments)],
         stdout=subprocess.PIPE,
@@ -179,7 +179,7 @@ def complaint(drawn, tiny, tmp_path, capsys):
     """What vm-train look says about arguments that it can't use: one line."""
 
     def complain(*arguments):
-        given = ["look", drawn, "-o", tmp_path / "run", "--from", "ball-5x4", "--config", tiny, *arguments]
+        given = ["look", drawn, "-o", tmp_path / "run", "--from", "ball-small", "--config", tiny, *arguments]
         assert main([str(each) for each in given]) == 1
         (line,) = capsys.readouterr().err.splitlines()
         assert line.startswith("vm-train: ")
@@ -191,12 +191,12 @@ def complaint(drawn, tiny, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--from", "ball-5x5"], "unknown network 'ball-5x5'; did you mean 'ball-5x4'?"),
+        (["--from", "ball-smaller"], "unknown network 'ball-smaller'; did you mean 'ball-small'?"),
         (["--from", "none.onnx"], "none.onnx"),
         (["--from", "none.txt"], "a model must be a checkpoint (.pt) or a model file (.onnx)"),
         (["--from", str(CHECKPOINT), "--set", "patches.object_class=goal"], "unknown object of"),
         (["--set", "patches.size=1000"], "[patches] size must be a whole number from 8 to 128 px, not 1000"),
-        (["--set", "patches.object_class=goal"], "unknown object of ball-5x4 'goal'; did you mean 'ball'?"),
+        (["--set", "patches.object_class=goal"], "unknown object of ball-small 'goal'; did you mean 'ball'?"),
         (["--set", "data.validation=0"], "validation gets none of the 20 pictures"),
         (["--set", "classes=1"], "--set 'classes=1' must have the form SECTION.ENTRY=VALUE"),
         (["--config", "none.toml"], "can't read configuration none.toml"),
@@ -238,7 +238,7 @@ def test_pictures_without_the_object_end_in_one_line(drawn, tiny, tmp_path):
     folder = draw_set(tmp_path / "data", 12, seed=3)
     for path in folder.glob("scene*.json"):
         path.write_text(json.dumps(json.loads(path.read_text()) | {"ball": None}))
-    arguments = ["--from", "ball-5x4", "--config", tiny, "--workers", 1]
+    arguments = ["--from", "ball-small", "--config", tiny, "--workers", 1]
     done = run("look", folder, "-o", tmp_path / "run", *arguments, code=1)
     assert re.search(r"none of the \d+ patches for training show the object ball", done.stderr)
 
@@ -264,7 +264,7 @@ def test_a_short_training_tells_balls_from_everything_else(tmp_path):
     data = draw_set(tmp_path / "data", 80, seed=11)
     settings = ["data.validation=0.3", "patches.size=16", "network.channels=[8, 12, 16]", "training.batch=64"]
     options = [part for each in settings for part in ("--set", each)]
-    run("look", data, "--from", model_path("ball-9x4"), "-o", tmp_path / "run", *options, "--workers", 2)
+    run("look", data, "--from", model_path("ball"), "-o", tmp_path / "run", *options, "--workers", 2)
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert result["average_precision"] > 0.9
     assert result["calibration_error"] < 0.1
