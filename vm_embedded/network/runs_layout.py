@@ -6,7 +6,8 @@ The words that this file uses:
   nothing. An empty slot is a *gap* and has the off-screen point's value in every layer.
 - A *run* is a sequence of slots in which each point is followed by its right neighbor. A gap follows the last one.
 - A *group* is up to three neighbors of a point that should follow each other in a run (MeshModel.groups). The groups
-  of ring6 are left, the point itself and right; top left and top right; bottom left and bottom right.
+  of ring6 are left, the point itself and right; top left and top right; bottom left and bottom right. The first group
+  of every mesh is left, itself and right: it says which points a run joins.
 - The *middle* of a group is the second slot of a group of three, and the first slot of a shorter group.
 - A *column* is a position in a layer's table (vm_export/runs_graph.py). The table holds, for each group and each slot,
   a sum over the window of three slots around it. So a point looks up one value for each group, not for each neighbor.

@@ -63,7 +63,8 @@ class GraphRecipe:
         objects = [at for at, each in enumerate(self.manifest.classes) if each.kind == "object"]
         colors = perturb_colors(view.points[:-1], self.augmentation, random)
         normalize_colors(colors, self.manifest.colors)
-        colored = replace(view, points=np.concatenate([colors, view.points[-1:]]))
+        off_screen = view.points[-1:]  # the last row; its color is fixed
+        colored = replace(view, points=np.concatenate([colors, off_screen]))
         seen = random_window(colored, self.window, objects, random)
         return mirror_image(seen, self.manifest.model) if random.random() < self.mirrored else seen
 

@@ -234,7 +234,7 @@ def _round_trainer(run: TrainingRun, hardware: Hardware, progress: TrainingProgr
 
 
 def _remaining_batches(run: TrainingRun, training_round: int, done: int, validated: int) -> Iterator[Batch]:
-    """Batches of a round after so many steps and validated epochs."""
+    """Batches of a round after so many steps and validated epochs. A batch counts its epoch from 0, its step from 1."""
     for batch in run.data.batches(run.configuration.training, training_round):
         remains = batch.epoch >= validated if batch.validates else batch.step > done
         if remains:
