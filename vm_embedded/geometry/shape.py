@@ -103,7 +103,7 @@ def all_between(value: Number, low: float, high: float) -> bool:
 
 
 def tangents(axis: Floats) -> Floats:
-    """Two unit vectors (2, 3), orthogonal to the unit vector `axis` (3,) and to each other: a level one, then upwards."""
+    """Unit vectors (2, 3), orthogonal to the unit vector `axis` (3,) and to each other: a level one, then upwards."""
     x, y, z = (float(value) for value in axis)
     level = math.hypot(x, y)
     across_x, across_y = (-y / level, x / level) if level > 1e-9 else (1.0, 0.0)
