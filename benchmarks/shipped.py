@@ -18,7 +18,7 @@ import numpy as np
 
 from vm_embedded.detection.settings import Settings
 from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
-from vm_train.data.pictures import find_pictures
+from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.evaluation import Evaluation, Rules
 from vm_train.evaluation.workers import Job, evaluate
 from vm_train.evaluation.worst_errors import WorstError
@@ -31,6 +31,7 @@ RESULTS = HERE / "shipped.json"
 WORST = HERE.parent / "docs" / "worst.jpg"
 NETWORKS = HERE.parent / "export" / "networks"
 FRAMES_AN_HOUR = 30 * 3600
+CLASSES = ClassTable.from_table(tomllib.loads((NETWORKS / "ball.toml").read_text())["classes"]).mask_classes()
 RANGES = {"0.5 to 6 m": range(1, 12), "6 to 10 m": range(12, 20), "1 to 6 m": range(2, 12)}
 """Bins of half a meter."""
 
@@ -38,16 +39,19 @@ SETS = ("field", "clutter")
 """Test sets: a field with robots and people, and a field full of things that resemble a ball."""
 
 METERS = {f"{near} to {near + 1} m": range(2 * near, 2 * near + 2) for near in range(10)}
-CANDIDATES = Settings(threshold=0.2, min_inside=0.05, max_around=0.95)
-"""Settings that accept every candidate, for curves over all confidences."""
+CANDIDATES = Settings(min_confidence=0.01)
+"""Settings that accept nearly every proposal, for curves over all confidences."""
 
 
 def evaluation(model: Path, folder: Path, settings: Settings) -> Evaluation:
     """Evaluation of a network on a folder of vm-synth; each picture gets a mesh for its own ball."""
-    table = tomllib.loads((NETWORKS / "ball-small.toml").read_text())["classes"]
-    job = Job(model, settings, False, ClassTable.from_table(table).mask_classes(), Rules("scene"))
+    job = _job(model, settings)
     subject = job.subject()
     return evaluate(job, subject, find_pictures(folder), len(os.sched_getaffinity(0)), lambda: None)
+
+
+def _job(model: Path, settings: Settings) -> Job:
+    return Job(model, settings, False, CLASSES, Rules("scene"))
 
 
 def numbers(scores: ObjectScores, bins: range | None, overlap: float = 0.5) -> dict[str, Any]:
@@ -61,6 +65,7 @@ def numbers(scores: ObjectScores, bins: range | None, overlap: float = 0.5) -> d
         "precision": outcome.precision,
         "false_per_picture": outcome.false_per_picture,
         "distance_error": errors.relative_median,
+        "center_error": errors.center_median,
     }
     return {name: None if np.isnan(value) else round(float(value), 5) for name, value in found.items()}
 
@@ -75,6 +80,11 @@ def scores_of(model: Path, folder: Path) -> tuple[dict[str, Any], Evaluation]:
         "points_average_precision": round(used.points.ranking("ball").precision_recall.average_precision, 5),
         "all": numbers(ball, None),
         "false_an_hour": round(FRAMES_AN_HOUR * ball.ranking(0.5).at().false_per_picture),
+        "proposals": _proposals(used),
+        "calibration_error": {
+            kind: round(scores.ranking(0.5).reliability.error, 5)
+            for kind, scores in (("used", ball), ("ranked", curve))
+        },
     }
     for kind, scores in (("used", ball), ("ranked", curve)):
         for overlap in (0.5, 0.75):
@@ -83,6 +93,32 @@ def scores_of(model: Path, folder: Path) -> tuple[dict[str, Any], Evaluation]:
             }
     found["curve"] = _curve(curve)
     return found, used
+
+
+def _proposals(result: Evaluation) -> dict[str, Any]:
+    """Numbers of proposals, and the recall of balls of at least 3 px of which at least 60 % are visible."""
+    scores = result.proposals["ball"]
+    recall = scores.recall(min_radius=3.0, min_visible=0.6).as_dict()
+    return {"mean_count": round(scores.mean_count, 2), "largest_count": scores.largest_count, **recall}
+
+
+def wrong_sizes(model: Path, folder: Path) -> dict[str, dict[str, float]]:
+    """How many balls the network accepts that are half or twice as large as it expects, by that factor."""
+    subject = _job(model, Settings()).subject()
+    found: dict[str, dict[str, float]] = {}
+    for factor in (0.5, 2.0):
+        balls = accepted = 0
+        for files in find_pictures(folder):
+            scene = json.loads(files.image.with_name(f"scene{files.number}.json").read_text())
+            ball = scene["ball"]
+            if ball is None or ball["visible"] < 0.6 or ball["pixel_radius"] < 3.0:
+                continue
+            answer = subject.answer(read_picture(files, CLASSES), scene["ball_radius"] / factor)
+            offsets = [np.hypot(*(each.center - np.array(ball["pixel"]))) for each in answer.found]
+            balls += 1
+            accepted += min(offsets, default=np.inf) < ball["pixel_radius"]
+        found[f"{factor:g}"] = {"balls": balls, "accepted": int(accepted)}
+    return found
 
 
 def _size(folder: Path) -> list[int]:
@@ -134,6 +170,7 @@ def main() -> None:
         found["networks"][name] = {}
         for each in SETS:
             scores, used = scores_of(model_path(name), options.test / each)
+            scores["wrong_sizes"] = wrong_sizes(model_path(name), options.test / each)
             found["networks"][name][each] = scores
             print(name, each, json.dumps(scores["ranked 0.5"]), flush=True)
             if name == DEFAULT and each == "field":

@@ -121,9 +121,10 @@ class ProposalScores:
         """Largest number of proposals in a picture; 0 without pictures."""
         return max(self.counts, default=0)
 
-    def recall(self) -> ProposalRecall:
-        """The recall of all true objects."""
-        return _recall(self._table[:, 3])
+    def recall(self, min_radius: float = 0.0, min_visible: float = 0.0) -> ProposalRecall:
+        """The recall of the true objects with at least this radius [px] and visible share."""
+        _, radius, visible, offset = self._table.T
+        return _recall(offset[(radius >= min_radius) & (visible >= min_visible)])
 
     def recalls_by(self, measure: str) -> dict[str, ProposalRecall]:
         """The recall in each bin of a measure: distance [m], radius [px] or visible, by the name of the bin."""

@@ -166,3 +166,12 @@ def test_rules_that_make_no_sense_are_refused():
         ProposalScores(np.array([3.0, 1.0]))
     with pytest.raises(InputError, match="do not add up"):
         ProposalScores() + ProposalScores(min_radius=2.0)
+
+
+def test_a_recall_of_large_and_visible_objects_leaves_out_the_others():
+    large, small, hidden = Ball(1.0), Ball(1.0, bearing=1.0, radius=2.9), Ball(1.0, bearing=2.0, visible=0.5)
+    scores = ProposalScores()
+    scores.add([each.true() for each in (large, small, hidden)], np.array([large.off(0.1), hidden.off(0.2)]))
+    assert (scores.recall().truths, scores.recall().hits) == (3, (2, 2))
+    chosen = scores.recall(min_radius=3.0, min_visible=0.6)
+    assert (chosen.truths, chosen.hits) == (1, (1, 1))
