@@ -1,7 +1,8 @@
-"""Augmentation of patches: mirror images, and colors, blur, noise and compression as of other cameras and lights."""
+"""Augmentation of patches: mirror images, turns, zooms, shifts, and the colors, blur and noise of other cameras."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import cv2
@@ -18,21 +19,30 @@ _REACH = 3
 
 
 def augment(
-    patches: torch.Tensor, targets: torch.Tensor, settings: PatchAugmentation, random: torch.Generator
+    patches: torch.Tensor,
+    targets: torch.Tensor,
+    extent: float,
+    settings: PatchAugmentation,
+    random: torch.Generator,
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Changed copies of patches, uint8 (n, size, size, 3), as floats from 0 to 255, and their targets (n, 3).
 
-    An entry that is switched off leaves the random numbers of the others as they are.
+    extent: half the side of a patch [expected radii], the unit of targets. An entry that is switched off leaves the
+    random numbers of the others as they are.
     """
     count = len(patches)
     chance = torch.rand((6, count), generator=random)
     strength = torch.rand((3, count), generator=random)
-    normal = torch.randn((4, count), generator=random)
+    normal = torch.randn((6, count), generator=random)
+    offset = 2.0 * torch.rand((2, count), generator=random) - 1.0
     order = torch.rand((count, 3), generator=random).argsort(dim=1)
     x = patches.float() / 255.0
     x, targets = _mirrored(x, targets, chance[0] < settings.mirror)
+    if settings.rotation or settings.zoom or settings.shift:
+        angle, zoom = math.radians(settings.rotation) * normal[4], torch.exp(settings.zoom * normal[5])
+        x, targets = _moved(x, targets, angle, zoom, settings.shift * offset, extent)
     x = x.clamp_min(1e-4) ** _each(torch.exp(settings.gamma * normal[0]))
-    x = x * torch.exp(settings.gain * normal[1:].T)[:, None, None, :]
+    x = x * torch.exp(settings.gain * normal[1:4].T)[:, None, None, :]
     x = _where(chance[1] < settings.swap, lambda some, rows: _permuted(some, order[rows]), x)
     x = _where(chance[2] < settings.gray, lambda some, rows: some.mean(dim=3, keepdim=True).expand_as(some), x)
     low, high = settings.blur
@@ -64,6 +74,27 @@ def _mirrored(x: torch.Tensor, targets: torch.Tensor, chosen: torch.Tensor) -> t
     """Chosen patches (n,) as mirror images; their objects lie to the other side."""
     sides = torch.where(chosen[:, None], torch.tensor([-1.0, 1.0, 1.0]), torch.tensor(1.0))
     return torch.where(_each(chosen), x.flip(2), x), targets * sides
+
+
+def _moved(
+    x: torch.Tensor, targets: torch.Tensor, angle: torch.Tensor, zoom: torch.Tensor, shift: torch.Tensor, extent: float
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Patches shifted (2, n) [expected radii], then zoomed and turned [rad] around their middles, and their targets.
+
+    What comes in from outside repeats the border.
+    """
+    cosine, sine = torch.cos(angle), torch.sin(angle)
+    # From a place in the new patch to that in the old one, where the border is at 1; then objects the other way.
+    rows = [
+        torch.stack([cosine / zoom, -sine / zoom, -shift[0] / extent], dim=1),
+        torch.stack([sine / zoom, cosine / zoom, -shift[1] / extent], dim=1),
+    ]
+    planes = x.permute(0, 3, 1, 2)
+    grid = functional.affine_grid(torch.stack(rows, dim=1), list(planes.shape), align_corners=False)
+    planes = functional.grid_sample(planes, grid, padding_mode="border", align_corners=False)
+    right, down = targets[:, 0] + shift[0], targets[:, 1] + shift[1]
+    turned = [zoom * (cosine * right + sine * down), zoom * (cosine * down - sine * right)]
+    return planes.permute(0, 2, 3, 1), torch.stack([*turned, targets[:, 2] + torch.log(zoom)], dim=1)
 
 
 def _permuted(x: torch.Tensor, order: torch.Tensor) -> torch.Tensor:

@@ -45,14 +45,22 @@ class LookStep:
 
 
 class LookTrainer:
-    """A network that is trained for `total` steps on patches. Raises InputError if none shows an object, or all do."""
+    """A network that is trained for `total` steps on patches.
+
+    extent: half the side of a patch [expected radii]. Raises InputError if none shows an object, or all do."""
 
     def __init__(
-        self, network: LookNetwork, patches: PatchSet, recipe: LookRecipe, augmentation: PatchAugmentation, total: int
+        self,
+        network: LookNetwork,
+        patches: PatchSet,
+        extent: float,
+        recipe: LookRecipe,
+        augmentation: PatchAugmentation,
+        total: int,
     ) -> None:
         self.network = network.train()
         self.recipe, self.total, self.done = recipe, total, 0
-        self._augmentation, self._patches = augmentation, patches
+        self._augmentation, self._patches, self._extent = augmentation, patches, extent
         self._images, self._targets = torch.from_numpy(patches.patches), torch.from_numpy(patches.targets)
         self._with, self._without = (np.flatnonzero((patches.labels == OBJECT) == each) for each in (True, False))
         for chosen, what in ((self._with, "shows an object"), (self._without, "shows no object")):
@@ -79,7 +87,9 @@ class LookTrainer:
         rate = self._optimizer.rate
         chosen, shown = self._draw(np.random.default_rng([self.recipe.seed, 1, self.done]))
         random = torch.Generator().manual_seed(_seed(self.recipe.seed, 2, self.done))
-        patches, targets = augment(self._images[chosen], self._targets[chosen], self._augmentation, random)
+        patches, targets = augment(
+            self._images[chosen], self._targets[chosen], self._extent, self._augmentation, random
+        )
         answers = self.network.logits(patches)
         presence = functional.binary_cross_entropy_with_logits(answers[:, 0], shown)
         errors = functional.smooth_l1_loss(answers[:, 1:], targets, reduction="none", beta=_PRECISE).sum(dim=1)

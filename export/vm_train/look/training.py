@@ -77,7 +77,8 @@ class _Training:
         torch.manual_seed(recipe.seed)
         network = LookNetwork(run.configuration.shape)
         total = recipe.epochs * self._epoch_steps
-        self._trainer = LookTrainer(network, collected.training, recipe, run.configuration.augmentation, total)
+        extent, augmentation = run.configuration.patches.extent, run.configuration.augmentation
+        self._trainer = LookTrainer(network, collected.training, extent, recipe, augmentation, total)
         if state is not None:
             self._trainer.load(state)
         self._bar = ProgressBar(total, "vm-train", self._trainer.done)

@@ -1,5 +1,6 @@
 """Augmentation of patches."""
 
+import math
 from dataclasses import fields, replace
 
 import pytest
@@ -10,15 +11,17 @@ from hypothesis import strategies as st
 from vm_train.look.augmentation import augment
 from vm_train.look.configuration import PatchAugmentation
 
-OFF = PatchAugmentation(
-    mirror=0.0, gamma=0.0, gain=0.0, swap=0.0, gray=0.0, blur_share=0.0, noise_share=0.0, jpeg_share=0.0
+OFF = replace(
+    PatchAugmentation(),
+    **{each.name: 0.0 for each in fields(PatchAugmentation) if each.name not in ("blur", "noise", "jpeg")},
 )
+EXTENT = 2.0
 PATCHES = torch.randint(20, 230, (6, 16, 16, 3), generator=torch.Generator().manual_seed(1)).to(torch.uint8)
 TARGETS = torch.rand((6, 3), generator=torch.Generator().manual_seed(2)) - 0.5
 
 
 def augmented(wanted, seed=0, patches=PATCHES):
-    return augment(patches, TARGETS[: len(patches)], wanted, torch.Generator().manual_seed(seed))
+    return augment(patches, TARGETS[: len(patches)], EXTENT, wanted, torch.Generator().manual_seed(seed))
 
 
 def test_everything_switched_off_changes_nothing():
@@ -35,7 +38,7 @@ def test_a_mirror_image_has_its_object_on_the_other_side():
 
 @pytest.mark.parametrize("name", ["gamma", "gain", "swap", "gray", "blur_share", "noise_share", "jpeg_share"])
 def test_each_entry_changes_the_patches_and_leaves_the_targets(name):
-    patches, targets = augmented(replace(OFF, **{name: 1.0}))
+    patches, targets = augmented(replace(OFF, noise=0.1, **{name: 1.0}))
     assert (patches - PATCHES.float()).abs().amax(dim=(1, 2, 3)).median() > 2.0
     assert torch.equal(targets, TARGETS)
 
@@ -82,3 +85,30 @@ def test_compression_keeps_the_color_of_plain_patches():
     plain = torch.tensor([200, 40, 20], dtype=torch.uint8).expand(2, 16, 16, 3).contiguous()
     patches, _ = augmented(replace(OFF, jpeg_share=1.0), patches=plain)
     assert torch.allclose(patches, plain.float(), atol=8.0)
+
+
+def disk(right, down, radius):
+    """A patch with a bright disk at a place [expected radii]; all numbers are those of the patch's middles."""
+    at = (torch.arange(64) + 0.5) / 32.0 * EXTENT - EXTENT
+    inside = torch.hypot(at[None, :] - right, at[:, None] - down) < radius
+    return (200 * inside)[..., None].expand(64, 64, 3).to(torch.uint8)
+
+
+@given(
+    seed=st.integers(0, 2**40),
+    name=st.sampled_from(["rotation", "zoom", "shift"]),
+    right=st.floats(-0.6, 0.6),
+    down=st.floats(-0.6, 0.6),
+)
+def test_an_object_is_where_its_target_says_after_a_turn_zoom_or_shift(seed, name, right, down):
+    wanted = replace(OFF, **{name: {"rotation": 40.0, "zoom": 0.1, "shift": 0.4}[name]})
+    target = torch.tensor([[right, down, 0.1]])
+    patches, targets = augment(
+        disk(right, down, 0.6)[None], target, EXTENT, wanted, torch.Generator().manual_seed(seed)
+    )
+    at = (torch.arange(64) + 0.5) / 32.0 * EXTENT - EXTENT
+    weight = patches[0, ..., 0] / patches[0, ..., 0].sum()
+    found = (weight.sum(dim=0) @ at).item(), (weight.sum(dim=1) @ at).item()
+    assert found == pytest.approx(targets[0, :2].tolist(), abs=0.03)
+    area = (patches[0, ..., 0].sum() / 200.0 / 32.0**2 * EXTENT**2).item()
+    assert area == pytest.approx(math.pi * (0.6 * math.exp(targets[0, 2].item() - 0.1)) ** 2, rel=0.03)

@@ -35,7 +35,7 @@ def patch_set(count=60):
 def trainer(patches=None, recipe=RECIPE, total=40):
     torch.manual_seed(recipe.seed)
     network = LookNetwork(LookShape(SIZE, (4, 6, 8), 8))
-    return LookTrainer(network, patches or patch_set(), recipe, PatchAugmentation(), total)
+    return LookTrainer(network, patches or patch_set(), 1.75, recipe, PatchAugmentation(), total)
 
 
 def weights(made):
