@@ -163,19 +163,25 @@ def card(found: dict[str, Any], name: str) -> str:
         ],
     )
     made, used = manifest.provenance, scores["used 0.5"]["0.5 to 6 m"]
+    look = manifest.look
+    assert look is not None
+    channels = ", ".join(map(str, look.channels))
     hard = clutter["ranked 0.5"]["0.5 to 6 m"]
     kilobytes = model_path(name).stat().st_size / 1000
     size = " x ".join(map(str, scores["size"]))
     return f"""# {name}
 
 Finds balls on a soccer field.
-{depth} graph convolutions of {width} channels, {activation}. The mesh is ring6 with k = {manifest.intersections:g} and
-reaches to {manifest.max_distance:g} m. It suits balls of any radius (`--object-radius`, default
-{manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: ball, other.
+{depth} graph convolutions of {width} channels, {activation}, propose places. The mesh is ring6 with
+k = {manifest.intersections:g} and reaches to {manifest.max_distance:g} m. A close look with convolutions of {channels}
+channels decides on patches of {look.size} x {look.size} samples. Both suit balls of any radius (`--object-radius`,
+default {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: ball, other.
 
-- **Training data:** {made["training_pictures"]} rendered pictures under 30 panoramas (`export/vm_synth/soccer.toml`,
-  seed 1). Validation on {made["validation_pictures"]} other pictures chose epoch {made["epoch"]} of {made["epochs"]}.
-  Seed {made["seed"]}, configuration `export/networks/{name}.toml`.
+- **Training data of the mesh network:** {made["training_pictures"]} rendered pictures
+  (`export/vm_synth/soccer.toml`, seed 1). Validation on {made["validation_pictures"]} other pictures chose epoch
+  {made["epoch"]} of {made["epochs"]}. Seed {made["seed"]}, configuration `export/networks/{name}.toml`.
+- **Training data of the close look:** {look.provenance["training_pictures"]} of these pictures, which are lit by 55
+  panoramas. Seed {look.provenance["seed"]}, configuration `export/networks/{name}-look.toml`.
 - **To train it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
   {model.sha256}.
 
@@ -185,7 +191,9 @@ balls of 0.05 to 0.12 m radius:
 {ranges}
 
 With the default settings there are {number(scores["all"]["false_per_picture"], 3)} false balls per picture, and the
-median distance error of balls from 0.5 to 6 m is {number(used["distance_error"], 1, 100.0)} %. On
+median distance error of balls from 0.5 to 6 m is {number(used["distance_error"], 1, 100.0)} %. Of the balls of at least
+3 px of which 60 % are visible, {number(scores["proposals"]["recall_0.5"], 1, 100.0)} % have a proposal within half a
+radius; there are {scores["proposals"]["mean_count"]:.0f} proposals per picture on average. On
 {clutter["pictures"]} pictures full of things that look like balls, AP50 from 0.5 to 6 m is
 {number(hard["average_precision"], 3)}, with {number(clutter["all"]["false_per_picture"], 3)} false balls per picture.
 docs/results.md has more figures.

@@ -14,6 +14,9 @@ from .configuration import PatchAugmentation
 
 _Change = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 
+_HIDDEN = (0.1, 0.45)
+"""Shortest and longest side of a hidden rectangle, as a share of the patch's side."""
+
 _REACH = 3
 """Samples that the blur reaches to each side."""
 
@@ -31,16 +34,18 @@ def augment(
     random numbers of the others as they are.
     """
     count = len(patches)
-    chance = torch.rand((6, count), generator=random)
+    chance = torch.rand((7, count), generator=random)
     strength = torch.rand((3, count), generator=random)
     normal = torch.randn((6, count), generator=random)
     offset = 2.0 * torch.rand((2, count), generator=random) - 1.0
+    rectangle, color = torch.rand((4, count), generator=random), torch.rand((count, 3), generator=random)
     order = torch.rand((count, 3), generator=random).argsort(dim=1)
     x = patches.float() / 255.0
     x, targets = _mirrored(x, targets, chance[0] < settings.mirror)
     if settings.rotation or settings.zoom or settings.shift:
         angle, zoom = math.radians(settings.rotation) * normal[4], torch.exp(settings.zoom * normal[5])
         x, targets = _moved(x, targets, angle, zoom, settings.shift * offset, extent)
+    x = _where(chance[6] < settings.hidden, lambda some, rows: _hidden(some, rectangle[:, rows], color[rows]), x)
     x = x.clamp_min(1e-4) ** _each(torch.exp(settings.gamma * normal[0]))
     x = x * torch.exp(settings.gain * normal[1:4].T)[:, None, None, :]
     x = _where(chance[1] < settings.swap, lambda some, rows: _permuted(some, order[rows]), x)
@@ -95,6 +100,15 @@ def _moved(
     right, down = targets[:, 0] + shift[0], targets[:, 1] + shift[1]
     turned = [zoom * (cosine * right + sine * down), zoom * (cosine * down - sine * right)]
     return planes.permute(0, 2, 3, 1), torch.stack([*turned, targets[:, 2] + torch.log(zoom)], dim=1)
+
+
+def _hidden(x: torch.Tensor, rectangle: torch.Tensor, color: torch.Tensor) -> torch.Tensor:
+    """Patches behind rectangles of a color (n, 3); rectangle (4, n): place and size of each, all from 0 to 1."""
+    at = (torch.arange(x.shape[1]) + 0.5) / x.shape[1]
+    low, high = _HIDDEN
+    half = 0.5 * (low + (high - low) * rectangle[2:])
+    across, along = ((at - rectangle[axis][:, None]).abs() < half[axis][:, None] for axis in (0, 1))
+    return torch.where((along[:, :, None] & across[:, None, :])[..., None], color[:, None, None, :], x)
 
 
 def _permuted(x: torch.Tensor, order: torch.Tensor) -> torch.Tensor:

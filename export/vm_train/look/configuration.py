@@ -130,11 +130,12 @@ class PatchAugmentation:
     """Section [augmentation]: how strongly patches are changed. 0 switches an entry off. Raises InputError."""
 
     mirror: float = share(0.5, "share of the patches that are mirror images")
-    rotation: float = number(8.0, "standard deviation of the rotation", "deg", (0.0, 180.0))
-    zoom: float = number(0.08, "standard deviation of the logarithm of the zoom", "", (0.0, 0.5))
+    rotation: float = number(12.0, "standard deviation of the rotation", "deg", (0.0, 180.0))
+    zoom: float = number(0.12, "standard deviation of the logarithm of the zoom", "", (0.0, 0.5))
     shift: float = number(
-        0.15, "largest shift to the right or left, and up or down", "apparent radii of the object", (0.0, 1.0)
+        0.25, "largest shift to the right or left, and up or down", "apparent radii of the object", (0.0, 1.0)
     )
+    hidden: float = share(0.2, "share of the patches of which a rectangle is hidden")
     gamma: float = number(0.15, "standard deviation of the logarithm of the gamma exponent", "", (0.0, 2.0))
     gain: float = number(0.12, "standard deviation of the logarithm of each color channel's gain", "", (0.0, 2.0))
     swap: float = share(0.0, "share of the patches whose color channels are permuted")

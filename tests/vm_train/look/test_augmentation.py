@@ -36,7 +36,7 @@ def test_a_mirror_image_has_its_object_on_the_other_side():
     assert torch.equal(targets, TARGETS * torch.tensor([-1.0, 1.0, 1.0]))
 
 
-@pytest.mark.parametrize("name", ["gamma", "gain", "swap", "gray", "blur_share", "noise_share", "jpeg_share"])
+@pytest.mark.parametrize("name", ["hidden", "gamma", "gain", "swap", "gray", "blur_share", "noise_share", "jpeg_share"])
 def test_each_entry_changes_the_patches_and_leaves_the_targets(name):
     patches, targets = augmented(replace(OFF, noise=0.1, **{name: 1.0}))
     assert (patches - PATCHES.float()).abs().amax(dim=(1, 2, 3)).median() > 2.0
@@ -112,3 +112,14 @@ def test_an_object_is_where_its_target_says_after_a_turn_zoom_or_shift(seed, nam
     assert found == pytest.approx(targets[0, :2].tolist(), abs=0.03)
     area = (patches[0, ..., 0].sum() / 200.0 / 32.0**2 * EXTENT**2).item()
     assert area == pytest.approx(math.pi * (0.6 * math.exp(targets[0, 2].item() - 0.1)) ** 2, rel=0.03)
+
+
+def test_a_hidden_rectangle_has_one_color_and_leaves_the_rest():
+    patches, _ = augmented(replace(OFF, hidden=1.0))
+    changed = ((patches - PATCHES.float()).abs() > 1e-3).any(dim=3)
+    for patch, mask in zip(patches, changed, strict=True):
+        rows, columns = mask.any(dim=1).nonzero()[:, 0], mask.any(dim=0).nonzero()[:, 0]
+        inside = patch[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        assert torch.allclose(inside, inside[0, 0].expand_as(inside), atol=1e-3)
+        assert 1 <= len(rows) <= 0.5 * 16
+        assert 1 <= len(columns) <= 0.5 * 16
