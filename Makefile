@@ -12,7 +12,7 @@ BUILD ?= build/networks
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
 
-.PHONY: help setup demo test lint bundle deb deploy logs lock bench bench-synth bench-train data networks test-data score choices fixtures docs site clean
+.PHONY: help setup demo test lint bundle deb deploy logs lock bench bench-synth bench-train data networks test-data score choices look-choices fixtures docs site clean
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -93,6 +93,10 @@ bench-train: .venv/dev ## measure vm-train: make bench-train DATA=folder-of-pict
 choices: .venv/dev ## measure what each choice of a training is worth: make choices [TEST=data/test], after networks and test-data (hours)
 	$(BIN)/python -m benchmarks.choices data/soccer $(TEST)/field build/choices
 	$(BIN)/python -m benchmarks.choices_report
+
+look-choices: .venv/dev ## measure what each choice of a close look is worth: make look-choices [TEST=data/test], after networks and test-data (hours)
+	$(BIN)/python -m benchmarks.look_choices data/soccer $(TEST)/field build/look-choices
+	$(BIN)/python -m benchmarks.look_choices_report
 
 fixtures: .venv/dev ## draw the frames of the tests and train their network again (about 20 minutes)
 	$(BIN)/python -m tests.fixtures.make_drawn

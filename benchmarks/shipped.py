@@ -43,11 +43,17 @@ CANDIDATES = Settings(min_confidence=0.01)
 """Settings that accept nearly every proposal, for curves over all confidences."""
 
 
-def evaluation(model: Path, folder: Path, settings: Settings) -> Evaluation:
-    """Evaluation of a network on a folder of vm-synth; each picture gets a mesh for its own ball."""
+def evaluation(
+    model: Path, folder: Path, settings: Settings, count: int | None = None, workers: int | None = None
+) -> Evaluation:
+    """Evaluation of a network on a folder of vm-synth; each picture gets a mesh for its own ball.
+
+    count: number of its first pictures to use, or None for all. workers: processes, or None for one for each core.
+    """
     job = _job(model, settings)
     subject = job.subject()
-    return evaluate(job, subject, find_pictures(folder), len(os.sched_getaffinity(0)), lambda: None)
+    pictures = find_pictures(folder)[:count]
+    return evaluate(job, subject, pictures, workers or len(os.sched_getaffinity(0)), lambda: None)
 
 
 def _job(model: Path, settings: Settings) -> Job:

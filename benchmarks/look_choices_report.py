@@ -1,0 +1,76 @@
+"""Table and plot from benchmarks/look_choices.json: `python -m benchmarks.look_choices_report`."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from benchmarks.look_choices import RESULTS
+from benchmarks.report import fill, table
+from benchmarks.shipped_report import DOCS, PAGE
+
+NEAR, FAR = "0.5 to 6 m", "6 to 10 m"
+
+
+def spread(values: list[float | None], digits: int = 3, unit: float = 1.0) -> str:
+    """The mean of the seeds, and in parentheses the lowest and the highest value."""
+    known = [unit * each for each in values if each is not None]
+    if not known:
+        return "-"
+    low, high = min(known), max(known)
+    mean = f"{np.mean(known):.{digits}f}"
+    return mean if len(known) == 1 else f"{mean} ({low:.{digits}f} to {high:.{digits}f})"
+
+
+def choices(found: dict[str, Any]) -> str:
+    """A row for each variant: its scores over the seeds, and its time."""
+    rows = []
+    for name, seeds in found["scores"].items():
+        each = list(seeds.values())
+        rows.append(
+            [
+                name,
+                *(spread([scores["ap50"][bins] for scores in each]) for bins in (NEAR, FAR)),
+                spread([scores["ap75"][NEAR] for scores in each]),
+                spread([scores["used"][NEAR]["recall"] for scores in each], 1, 100.0),
+                spread([scores["all"]["false_per_picture"] for scores in each]),
+                spread([scores["calibration_error"] for scores in each]),
+                f"{found['milliseconds'][name]:.2f}",
+            ]
+        )
+    heads = ["look", "AP50, 0.5 to 6 m", "6 to 10 m", "AP75, 0.5 to 6 m", "found [%], 0.5 to 6 m", "false per picture"]
+    return table([*heads, "calibration error", "whole call [ms]"], rows)
+
+
+def plot(found: dict[str, Any]) -> None:
+    """AP50 over the time of a whole call, a dot for each variant."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
+    axes = figure.subplots()
+    for name, seeds in found["scores"].items():
+        values = [scores["ap50"][NEAR] for scores in seeds.values()]
+        time = found["milliseconds"][name]
+        color = "#d95f02" if name == "base" else "#7570b3"
+        axes.plot([time, time], [min(values), max(values)], color=color, alpha=0.4)
+        axes.plot(time, np.mean(values), "o", color=color)
+        axes.annotate(name, (time, float(np.mean(values))), xytext=(4, 3), textcoords="offset points", fontsize=7)
+    axes.set_xlabel("whole call, median [ms]")
+    axes.set_ylabel("AP50, 0.5 to 6 m (line: lowest and highest seed)")
+    axes.grid(alpha=0.25)
+    axes.spines[["top", "right"]].set_visible(False)
+    with matplotlib.rc_context({"svg.hashsalt": "look"}):
+        figure.savefig(DOCS / "look-choices.svg", metadata={"Date": None})
+
+
+def main() -> None:
+    found = json.loads(RESULTS.read_text())
+    fill(PAGE, {"look choices": choices(found)})
+    plot(found)
+
+
+if __name__ == "__main__":
+    main()
