@@ -68,6 +68,29 @@ def accuracy(found: dict[str, Any]) -> str:
     return table([*heads, "false per picture", "median distance error"], rows)
 
 
+def proposals(found: dict[str, Any]) -> str:
+    """Proposals, centers, calibration and balls of the wrong size, for each network and test set."""
+    rows = []
+    for name, sets in found["networks"].items():
+        for each in SETS:
+            scores = sets[each]
+            wrong = (scores["wrong_sizes"][factor] for factor in ("0.5", "2"))
+            rows.append(
+                [
+                    name,
+                    each,
+                    number(scores["proposals"]["recall_0.5"], 1, 100.0),
+                    f"{scores['proposals']['mean_count']:.0f}",
+                    number(scores["all"]["center_error"], 3),
+                    number(scores["calibration_error"]["ranked"], 3),
+                    number(scores["calibration_error"]["used"], 3),
+                    *(f"{factor['accepted']} of {factor['balls']}" for factor in wrong),
+                ]
+            )
+    heads = ["network", "test pictures", "proposed [%]", "proposals", "center error [radii]", "calibration error, all"]
+    return table([*heads, "reported", "accepted at half the radius", "at twice"], rows)
+
+
 def grid(found: dict[str, Any]) -> str:
     """The default network on each lens, size and height: balls found, and false ones.
 
@@ -211,6 +234,7 @@ def main() -> None:
         "networks in clutter": networks(found, "clutter"),
         f"{DEFAULT} by distance": by_distance(found["networks"][DEFAULT]["field"]),
     }
+    made["proposals"] = proposals(found)
     if found["grid"]:
         made["grid"] = grid(found)
     made["false an hour"] = table(
