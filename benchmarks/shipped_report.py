@@ -203,7 +203,7 @@ default {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: ball, other.
 - **Training data of the mesh network:** {made["training_pictures"]} rendered pictures
   (`export/vm_synth/soccer.toml`, seed 1). Validation on {made["validation_pictures"]} other pictures chose epoch
   {made["epoch"]} of {made["epochs"]}. Seed {made["seed"]}, configuration `export/networks/{name}.toml`.
-- **Training data of the close look:** {look.provenance["training_pictures"]} of these pictures, which are lit by 55
+- **Training data of the close look:** {look.provenance["training_pictures"]} pictures of the same kind, under 55
   panoramas. Seed {look.provenance["seed"]}, configuration `export/networks/{name}-look.toml`.
 - **To train it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
   {model.sha256}.
