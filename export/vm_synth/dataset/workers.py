@@ -55,7 +55,7 @@ def render_all(job: Job, indices: Sequence[int], workers: int, report: Callable[
     An interrupt waits for the pictures in progress. Raises VisualMeshError if a worker is killed, and errors of
     workers.
     """
-    _limit_threads()
+    _set_environment()
     with worker_pool(min(workers, max(len(indices), 1)), _start, (job,)) as pool:
         waiting = iter(indices)
         with interrupts_blocked():
@@ -69,9 +69,12 @@ def render_all(job: Job, indices: Sequence[int], workers: int, report: Callable[
             running |= {pool.submit(_render_one, index) for index in islice(waiting, len(finished))}
 
 
-def _limit_threads() -> None:
+def _set_environment() -> None:
+    """Make workers use one thread each, and keep freed memory: getting it from the system again takes time."""
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
+    os.environ["MALLOC_MMAP_THRESHOLD_"] = str(32 << 20)
+    os.environ["MALLOC_TRIM_THRESHOLD_"] = str(1 << 30)
 
 
 _worker: tuple[Job, Tracer] | None = None

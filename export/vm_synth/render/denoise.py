@@ -23,20 +23,36 @@ def denoise(light: Singles, albedo: Singles, normal: Singles, depth: Singles, sh
     color = _planes(albedo + np.float32(0.03))
     falling = _planes(light) / color
     guide = np.concatenate([_planes(normal) * np.float32(np.sqrt(_NORMALS)), (np.log(depth) * _DEPTHS)[None]])
-    guide = guide.astype(np.float32)
-    around = _padded(guide), _padded(share)
+    around = _padded(guide.astype(np.float32)), _padded(share)
     for step in _STEPS:
         total, weights = falling * share, share.copy()
         lit = _padded(falling)
+        alike = {way: _likeness(around[0], *way) for way in ((0, step), (step, -step), (step, 0), (step, step))}
         for down in (-step, 0, step):
             for right in (-step, 0, step):
                 if down or right:
-                    x, y, z, away = (_shifted(around[0], down, right) - guide) ** 2
-                    weight = cv2.exp(-((x + y) + (z + away))) * _shifted(around[1], down, right)
+                    # The likeness of two pixels is that of the opposite direction, seen from the other pixel.
+                    same = (
+                        _shifted(alike[down, right], 0, 0)
+                        if (down, right) in alike
+                        else _shifted(alike[-down, -right], down, right)
+                    )
+                    weight = same * _shifted(around[1], down, right)
                     total += _shifted(lit, down, right) * weight
                     weights += weight
         falling = total / np.maximum(weights, 1e-6)
     return np.where(share[..., None] > 0, np.moveaxis(falling * color, 0, -1), light)
+
+
+def _likeness(guide: Singles, down: int, right: int) -> Singles:
+    """How alike pixels of a padded guide (c, h, w) and those at (row + down, column + right) are (h, w), 0 to 1."""
+    height, width = guide.shape[1:]
+    rows, columns = height - down, slice(max(-right, 0), width - max(right, 0))
+    there = slice(columns.start + right, columns.stop + right)
+    x, y, z, away = (guide[:, down:, there] - guide[:, :rows, columns]) ** 2
+    alike = np.zeros((height, width), dtype=np.float32)
+    alike[:rows, columns] = cv2.exp(-((x + y) + (z + away)))
+    return alike
 
 
 def _planes(image: Singles) -> Singles:

@@ -18,12 +18,14 @@ from ..bodies.solids import LABELS
 from ..scene.configuration import CLASSES
 from ..scene.scene import PlacedBall, Scene
 from .denoise import denoise
-from .rays import pixel_angle, pixel_grid, rays_through
+from .rays import pixel_angle, rays_through
 from .tracer import BALL, NOTHING, OTHER, Tracer
 
 _PROBES = ((0.0, 0.0), (-0.25, -0.25), (0.25, 0.25))  # [px], offsets of the rays that find objects
 _INSIDE, _EDGE, _BALL = 2, 4, 8  # rays that shade a pixel, per row and column
 _SMALL = 2500  # [px], area below which a ball is shaded with most rays
+_TILES = 40  # tiles in a row of the picture, in which objects are sought
+_GROUP = 32  # successive triangles that share a bounding sphere
 
 
 @dataclass(frozen=True)
@@ -41,10 +43,12 @@ class Foreground:
 
     def classes_over(self, background: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
         """The class (h, w) that covers most of each pixel, in front of the background's classes (h, w)."""
-        shares = self.classes.copy()
-        rows, columns = np.ogrid[: background.shape[0], : background.shape[1]]
-        shares[rows, columns, background] += 1.0 - self.share
-        return np.asarray(shares.argmax(axis=-1), dtype=np.uint8)
+        classes = background.copy()
+        rows, columns = np.nonzero(self.share)
+        shares, behind = self.classes[rows, columns], background[rows, columns]
+        shares[np.arange(len(rows)), behind] += 1.0 - self.share[rows, columns]
+        classes[rows, columns] = shares.argmax(axis=-1)
+        return classes
 
 
 def trace_foreground(scene: Scene, tracer: Tracer, rays: Floats, brightest: float) -> Foreground:
@@ -79,23 +83,89 @@ def trace_foreground(scene: Scene, tracer: Tracer, rays: Floats, brightest: floa
 
 def _find_objects(scene: Scene, tracer: Tracer, rays: Floats) -> tuple[Mask, Mask]:
     """Pixels (h, w) where a ray hits an object, and those of them that are not at an edge."""
-    grid = pixel_grid(scene.size)
+    near = np.nonzero(_near_objects(scene, rays))  # (rows, columns)
+    pixels = np.stack(near[::-1], axis=-1).astype(np.float64)
     count = np.zeros(rays.shape[:2], dtype=np.uint8)
     for offset in _PROBES:
-        probes = (rays_through(scene, grid + offset) if any(offset) else rays).reshape(-1, 3)
-        good = np.flatnonzero(np.isfinite(probes[:, 0]))
-        count.reshape(-1)[good] += tracer.first_hits(scene.camera, probes[good].astype(np.float32)) != NOTHING
+        probes = rays_through(scene, pixels + offset) if any(offset) else rays[near]
+        good = np.isfinite(probes[:, 0])
+        count[near[0][good], near[1][good]] += (
+            tracer.first_hits(scene.camera, probes[good].astype(np.float32)) != NOTHING
+        )
     inside = cv2.erode((count == len(_PROBES)).astype(np.uint8), np.ones((3, 3), np.uint8))
     return count > 0, inside.astype(bool)
 
 
+def _near_objects(scene: Scene, rays: Floats) -> Mask:
+    """Pixels (h, w) in the tiles where rays (h, w, 3) may hit an object: most rays of a picture need no tracing.
+
+    A tile and a group of triangles are seen within two cones; they can meet where the cones overlap.
+    """
+    height, width = rays.shape[:2]
+    side = max(width // _TILES, 4)
+    down, right = -height % side, -width % side
+    tiles = np.pad(rays, ((0, down), (0, right), (0, 0)), mode="edge").astype(np.float32)
+    rows, columns = (height + down) // side, (width + right) // side
+    tiles = tiles.reshape(rows, side, columns, side, 3).swapaxes(1, 2).reshape(rows * columns, side**2, 3)
+    middle = tiles[:, side * (side // 2) + side // 2]
+    angle = 1.1 * np.arccos(np.clip((tiles @ middle[..., None]).min(axis=(1, 2)), -1.0, 1.0))
+    angle += pixel_angle(scene.lens, scene.size)
+    center, radius = _bounding_spheres(scene)
+    toward = center - scene.camera
+    distance = np.linalg.norm(toward, axis=1)
+    sine = np.minimum(radius / distance, 1.0)
+    cosine = np.sqrt(1.0 - sine**2)
+    # cos(angle between the axes) - cos(sum of the cones' angles), as one product of matrices
+    cones = np.column_stack([middle, -np.cos(angle), np.sin(angle)])
+    others = np.column_stack([toward / distance[:, None], cosine, sine])
+    meets = (cones.astype(np.float32) @ others.T.astype(np.float32)).max(axis=1, initial=-1.0) > -1e-5
+    # Tiles that are very wide, or partly outside of the lens's field of view, are traced always.
+    near = (meets | ~(angle < 1.5) | bool((distance <= radius).any())).reshape(rows, columns)
+    near = np.repeat(np.repeat(near, side, axis=0), side, axis=1)
+    return np.asarray(near[:height, :width])
+
+
+def _bounding_spheres(scene: Scene) -> tuple[Floats, Floats]:
+    """Centers (n, 3) and radii (n,) [m] of spheres that contain all objects.
+
+    Groups that are wide as the camera sees them, as those with triangles of two bodies, get a sphere per triangle, and
+    wide triangles get one for each of their quarters.
+    """
+    balls = [ball for ball in (scene.ball, scene.other) if ball is not None]
+    centers, radii = [ball.center[None] for ball in balls], [np.array([1.001 * ball.radius]) for ball in balls]
+    triangles = scene.mesh.triangles
+    if len(triangles):
+        triangles = np.pad(triangles, ((0, -len(triangles) % _GROUP), (0, 0)), mode="edge")
+        corners = scene.mesh.vertices[triangles].reshape(-1, 3 * _GROUP, 3)
+        for split in range(4):
+            center, radius = _spheres_around(corners)
+            wide = (radius > 0.2 * np.linalg.norm(center - scene.camera, axis=1)) & (split < 3)
+            centers.append(center[~wide])
+            radii.append(radius[~wide])
+            corners = corners[wide].reshape(-1, 3, 3)
+            if split:
+                between = (corners + np.roll(corners, -1, axis=1)) / 2.0
+                tips = np.stack([corners, between, np.roll(between, 1, axis=1)], axis=2)
+                corners = np.concatenate([tips.reshape(-1, 3, 3), between])
+    return np.concatenate([np.zeros((0, 3)), *centers]), np.concatenate([np.zeros(0), *radii])
+
+
+def _spheres_around(points: Singles) -> tuple[Floats, Floats]:
+    """Centers (n, 3) and radii (n,) of spheres that contain n groups of points (n, k, 3)."""
+    low, high = points.min(axis=1).astype(np.float64), points.max(axis=1).astype(np.float64)
+    return (low + high) / 2.0, 0.5001 * np.linalg.norm(high - low, axis=1)
+
+
 def _depth_in_outline(scene: Scene, rays: Floats, ball: PlacedBall) -> Floats:
-    """Distance (h, w) of the pixels from the outline of a ball [px], positive inside."""
+    """Distance (h, w) of the pixels from the outline of a ball [px], positive inside, and -1e9 far outside."""
     toward = ball.center - scene.camera
     distance = float(np.linalg.norm(toward))
-    limit = np.arcsin(min(ball.radius / distance, 1.0))
-    angle = np.arccos(np.clip(rays @ (toward / distance), -1.0, 1.0))
-    return np.asarray(np.nan_to_num((limit - angle) / pixel_angle(scene.lens, scene.size), nan=-1e9))
+    limit, pixel = np.arcsin(min(ball.radius / distance, 1.0)), pixel_angle(scene.lens, scene.size)
+    cosine = rays @ (toward / distance)
+    depth = np.full(rays.shape[:2], -1e9)
+    close = cosine > np.cos(min(limit + 4.0 * pixel, np.pi))
+    depth[close] = (limit - np.arccos(np.clip(cosine[close], -1.0, 1.0))) / pixel
+    return depth
 
 
 def _subpixel_offsets(side: int) -> Floats:
@@ -126,12 +196,13 @@ class _Buffers:
         light = tracer.trace_light(scene.camera, single, what != NOTHING, len(offsets), scene.seed + side)
         np.minimum(light, brightest, out=light)
         covered = (what != NOTHING).reshape(len(rows), -1, 1)
-        depth = np.where(np.isfinite(surfaces.depth), surfaces.depth, 1.0)
+        hit = covered[..., 0]
+        depth = np.where(hit, surfaces.depth.reshape(hit.shape), np.float32(0.0)).sum(axis=1)
         here = rows, columns
         self.light[here] = _mean(light, covered)
         self.albedo[here] = _mean(surfaces.albedo, covered)
         self.normal[here] = _mean(surfaces.normal, covered)
-        self.depth[here] = np.maximum(_mean(depth, covered)[:, 0], 1e-3)
+        self.depth[here] = np.maximum(depth / np.maximum(hit.sum(axis=1), 1), 1e-3)
         self.share[here] = covered.mean(axis=(1, 2), dtype=np.float32)
         what = what.reshape(len(rows), -1)
         self.coverage[here] = (what == BALL).mean(axis=1, dtype=np.float32)
@@ -150,7 +221,9 @@ class _Buffers:
 def _mean(values: Singles, covered: Mask) -> Singles:
     """Mean (n, c) of values (n k, c) over those of the k rays of each pixel that hit an object, covered (n, k, 1)."""
     values = values.reshape(*covered.shape[:2], -1)
-    total = np.where(covered, values, 0.0).sum(axis=1, dtype=np.float32)
+    total = np.zeros((len(values), values.shape[2]), dtype=np.float32)
+    for ray in range(values.shape[1]):  # NumPy is slow with sums over a short axis in the middle
+        total += np.where(covered[:, ray], values[:, ray], np.float32(0.0))
     return np.asarray(total / np.maximum(covered.sum(axis=1), 1), dtype=np.float32)
 
 

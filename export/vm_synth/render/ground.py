@@ -123,5 +123,9 @@ def _change_per_pixel(distance: Floats) -> Floats:
 
 def _smaller_step(distance: Floats) -> Floats:
     """The smaller difference to the neighbors above and below (h, w)."""
-    step = np.abs(np.diff(distance, axis=0))
-    return np.asarray(np.minimum(np.concatenate([step[:1], step]), np.concatenate([step, step[-1:]])))
+    step = np.empty_like(distance)
+    change = np.diff(distance, axis=0)
+    np.abs(change, out=change)
+    np.minimum(change[:-1], change[1:], out=step[1:-1])
+    step[0], step[-1] = change[0], change[-1]
+    return step

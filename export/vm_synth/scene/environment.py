@@ -134,19 +134,23 @@ class Environment:
         azimuth = 2.0 * np.pi * (0.5 - (np.arange(columns) + 0.5) / columns)
         luminance = sky.mean(axis=-1)
         row, column = np.unravel_index(int(np.argmax(luminance[: rows // 2])), luminance.shape)
-        sine, cosine = np.sin(polar)[:, None], np.cos(polar)[:, None]
-        near = sine * np.sin(polar[row]) * np.cos(azimuth - azimuth[column]) + cosine * np.cos(polar[row])
         limit = _SUN_CONTRAST * float(np.median(luminance[: rows // 2]))
-        bright = (near > math.cos(_SUN_RADIUS)) & (luminance > limit)
-        excess = np.where(bright[..., None], np.maximum(sky - np.float32(limit), 0.0), 0.0)
-        solid = sine * (2.0 * np.pi / columns) * (np.pi / rows)
-        toward = np.stack(
-            [sine * np.cos(azimuth), sine * np.sin(azimuth), np.broadcast_to(cosine, luminance.shape)], axis=-1
-        )
+        # Few pixels are that bright: only they need the geometry.
+        lines, places = np.nonzero(luminance > limit)
+        near = np.sin(polar[lines]) * np.sin(polar[row]) * np.cos(azimuth[places] - azimuth[column])
+        bright = near + np.cos(polar[lines]) * np.cos(polar[row]) > math.cos(_SUN_RADIUS)
+        lines, places = lines[bright], places[bright]
+        excess = np.maximum(sky[lines, places] - np.float32(limit), 0.0)
+        solid = np.sin(polar[lines]) * (2.0 * np.pi / columns) * (np.pi / rows)
         weight = excess.mean(axis=-1) * solid
-        middle = (toward * weight[..., None]).sum(axis=(0, 1))
+        middle = (_directions(polar[lines], azimuth[places]) * weight[:, None]).sum(axis=0)
         if np.linalg.norm(middle) == 0.0:
-            middle = toward[row, column]
-        return Lighting(
-            sky - excess, (excess * solid[..., None]).sum(axis=(0, 1)), middle / max(np.linalg.norm(middle), 1e-12)
-        )
+            middle = _directions(polar[row], azimuth[column])
+        sky = sky.copy()
+        sky[lines, places] -= excess
+        return Lighting(sky, (excess * solid[:, None]).sum(axis=0), middle / max(np.linalg.norm(middle), 1e-12))
+
+
+def _directions(polar: Floats, azimuth: Floats) -> Floats:
+    """Unit vectors (..., 3) with these polar and azimuth angles (...) [rad]."""
+    return np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=-1)
