@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(options)
     except ImportError as error:
-        missing = error.name or str(error)
+        missing = (error.name or str(error)).partition(".")[0]
         print(f"vm-export: {missing} is not installed; {install_extra('export')}", file=sys.stderr)
     except VisualMeshError as error:
         print(f"vm-export: {error}", file=sys.stderr)

@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 return run_points(points_parser().parse_args(given[1:]))
             return _evaluate(parser().parse_args(given))
     except ImportError as error:
-        missing = error.name or str(error)
+        missing = (error.name or str(error)).partition(".")[0]
         print(f"vm-evaluate: {missing} is not installed; {install_extra('train')}", file=sys.stderr)
     except VisualMeshError as error:
         print(f"vm-evaluate: {' '.join(str(error).split())}", file=sys.stderr)

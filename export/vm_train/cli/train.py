@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return run_training(options) if command is None else commands[command](options)
     except ImportError as error:
         if _is_leader():
-            missing = error.name or str(error)
+            missing = (error.name or str(error)).partition(".")[0]
             print(f"vm-train: {missing} is not installed; {install_extra('train')}", file=sys.stderr)
         return EXIT_FAILED
     except VisualMeshError as error:
