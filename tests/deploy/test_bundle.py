@@ -81,7 +81,7 @@ def test_a_configuration_brings_its_model_and_its_lens(tmp_path):
     [
         (["--target", "windows"], ["TARGET", "linux_x86_64-cp311", "'windows'"]),
         (["--target", "linux_x86_64-cp39"], ["TARGET", "Python 3.11 or newer"]),
-        (["--model", "ball-smaller"], ["'ball-smaller'", "ball-small"]),
+        (["--model", "ball-smaller"], ["'ball-smaller'", "did you mean 'ball-small'"]),
         (["--model", "missing.onnx"], ["missing.onnx"]),
         (["--config", "missing.toml"], ["missing.toml"]),
     ],
