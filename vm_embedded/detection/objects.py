@@ -89,7 +89,9 @@ def _describe_candidate(observation: Observation, candidate: Candidate) -> Detec
 def _describe_judgment(observation: Observation, class_name: str, judgment: Judgment) -> Detection:
     """What a close look saw, as a detection."""
     view = observation.view
-    covered = view.shape.covers(view.layout.rays, judgment.center[None], view.height)[0]
+    shown = np.flatnonzero(observation.projected.on_screen)
+    rays = view.layout.rays[shown]
+    covered = view.shape.covers(rays, judgment.center[None], view.height)[0]
     return _detection(
         observation,
         class_name,
@@ -97,8 +99,8 @@ def _describe_judgment(observation: Observation, class_name: str, judgment: Judg
         confidence=judgment.confidence,
         scale=judgment.scale,
         distances_agree=abs(judgment.scale - 1.0) <= _SAME_SIZE,
-        points=int((covered & observation.projected.on_screen).sum()),
-        around=observation.projected.pixels[[int(np.argmax(along(view.layout.rays, judgment.center)))]],
+        points=int(covered.sum()),
+        around=observation.projected.pixels[shown[[int(np.argmax(along(rays, judgment.center)))]]],
         reason=judgment.reason,
     )
 
