@@ -65,12 +65,12 @@ class OnnxModel:
         options.add_session_config_entry("session.intra_op.allow_spinning", "1" if spinning else "0")
         try:
             self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+            found = {
+                node.name: (node.type, [size for size in node.shape if isinstance(size, int)])
+                for node in (*self._session.get_inputs(), *self._session.get_outputs())
+            }
         except _RUNTIME_ERRORS as error:
             raise ModelError(f"{path}: ONNX Runtime can't load it: {one_line(error)}") from error
-        found = {
-            node.name: (node.type, [size for size in node.shape if isinstance(size, int)])
-            for node in (*self._session.get_inputs(), *self._session.get_outputs())
-        }
         if found != interface:
             raise ModelError(f"{path}: its inputs and outputs are {found}, its manifest asks for {interface}")
 

@@ -8,11 +8,13 @@ import pytest
 
 from tests.vm_embedded.live.running import COMMAND
 from tests.vm_embedded.live.test_faults import resident
+from tests.vm_export.looks import look_checkpoint
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.detection.detector import Detector
 from vm_embedded.errors import VisualMeshError
 from vm_embedded.live.configuration import Configuration, read_configuration
 from vm_embedded.network.bundled import model_path
+from vm_export.export import change_look
 
 WORDS = ["nan", "inf", "-1", "1e400", "true", '"x"', "[]", "{}", "[1, 2]", "'''", "\\u0000", "9" * 400, "1979-05-27"]
 
@@ -67,7 +69,8 @@ def test_ten_thousand_damaged_configurations_are_read_or_refused_in_a_line(tmp_p
 def test_ten_thousand_damaged_models_are_loaded_or_refused_in_a_line(tmp_path):
     chance = random.Random(2)
     path = tmp_path / "damaged.onnx"
-    whole = model_path("ball-small").read_bytes()
+    change_look(model_path("ball-small"), path, look_checkpoint())  # a small look, so that damage hits all parts
+    whole = path.read_bytes()
     outcomes = []
     started = time.monotonic()
     for at in range(10000):
