@@ -33,7 +33,7 @@ def test_a_network_runs_and_matches_its_card(name):
     assert detector.manifest.any_radius
     assert [each.name for each in detector.manifest.classes] == ["ball", "other"]
     assert detector.look is not None
-    assert path.stat().st_size < 500_000
+    assert path.stat().st_size < {"ball": 400_000, "ball-small": 200_000}[name]
     card = path.with_suffix(".md").read_text()
     assert read_model(path).sha256 in card
     assert re.search(r"AP50", card)

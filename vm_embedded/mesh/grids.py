@@ -170,7 +170,7 @@ def _solve_by_halving(coordinate: _Coordinate, u: Floats, v: Floats) -> tuple[Fl
     low, high = np.zeros(len(u)), coordinate(u, 0.0)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        # x and its image under both equations meet at the solution; beyond it, the image falls behind.
+        # The image of x is coordinate(u, coordinate(v, x)). It is larger than x below the solution, smaller above.
         too_large = coordinate(u, coordinate(v, middle)) < middle
         low, high = np.where(too_large, low, middle), np.where(too_large, middle, high)
     x = 0.5 * (low + high)
@@ -215,10 +215,10 @@ def _connected_to_nadir(n: Indices, m: Indices, neighbors: int) -> Mask:
     row = m - m.min()
     if neighbors == 6:
         # Pixels are half columns: neighbors in other rows touch at corners. Neighbors in a row are two pixels apart, so
-        # the pixel between them is set, too. Two more columns let the shifted copies below overlap at the right end.
+        # the pixel between them is set, too.
         column = 2 * n + m
         column = column - column.min()
-        present = np.zeros((row.max() + 1, column.max() + 3), dtype=np.uint8)
+        present = np.zeros((row.max() + 1, column.max() + 1), dtype=np.uint8)
         present[row, column] = 1
         present[:, 1:-1] |= present[:, :-2] & present[:, 2:]
     else:
