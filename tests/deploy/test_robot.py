@@ -295,7 +295,7 @@ def test_a_model_alone_is_exchanged_while_it_runs(team, bundle):
     team.check("1-first")
     before = team.status()
     network = team.robot.root / "opt/vm-embedded/current/venv/lib/python3.11/site-packages/vm_embedded/models"
-    status, said = _model_command(team, (network / "ball.onnx").read_bytes())
+    status, said = _model_command(team, (network / "ball-small.onnx").read_bytes())
     assert status == 0, said
     now = team.status()
     assert now["model_sha256"] != before["model_sha256"]
@@ -303,7 +303,7 @@ def test_a_model_alone_is_exchanged_while_it_runs(team, bundle):
     status, said = _model_command(team, b"no network")
     assert status == 1
     assert "nothing has changed" in said
-    team.robot.root.joinpath("var/tmp/new.onnx").write_bytes((network / "ball-small.onnx").read_bytes())
+    team.robot.root.joinpath("var/tmp/new.onnx").write_bytes((network / "ball.onnx").read_bytes())
     exchanged = f"while ! [ -e {CURRENT}/etc/.old.onnx ]; do sleep 0.01; done"
     interrupted = f"{DEPLOY} model /var/tmp/new.onnx & {exchanged}; kill -TERM $!; wait $!"
     assert "rolling back to the old model" in team.robot.run("sh", "-c", interrupted, check=False)[1]
