@@ -58,7 +58,7 @@ def _misfit(view: PreparedView, candidate: Candidate, settings: Settings) -> str
 
 
 def _repeats(view: PreparedView, candidate: Candidate, accepted: Sequence[Candidate]) -> str | None:
-    """Why the candidate is an object that was accepted before, whose outline its center is in, or None."""
+    """Why the candidate repeats an accepted object: its center is inside that object's outline. None if it does not."""
     ray = (candidate.center / np.linalg.norm(candidate.center))[None]
     for other in accepted:
         if view.shape.offset(ray, other.center[None], view.height)[0, 0] < 1.0:

@@ -35,7 +35,11 @@ class Look(Protocol):
     def contract(self) -> LookContract: ...
 
     def run(self, patches: Image) -> Singles:
-        """Answers (n, 4) to patches (n, size, size, 3), as `CloseLook.run` gives them."""
+        """Answers (n, 4) to patches (n, size, size, 3), RGB uint8.
+
+        They are the object's probability, the shift of its center to the right and down, in apparent radii, and the
+        logarithm of its apparent radius over the expected one. Raises ModelError.
+        """
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,10 +32,10 @@ class CameraView:
 class Sighting:
     """An object in the world frame.
 
-    camera: name of the camera with the most confident detection. plane: name of the plane of that detection.
-    detection: the most confident detection, in that plane's frame. position (3,) [m]: center of the object.
-    direction (3,): unit vector from that camera. also: further detections of the same object, those on the same plane
-    first.
+    plane: name of the plane it is on, that with the largest sum of confidences (`detect_views`). detection: the most
+    confident detection on this plane, in the plane's frame. camera: name of the camera of this detection. position (3,)
+    [m]: center of the object. direction (3,): unit vector from this camera. also: further detections of the same
+    object, those on the same plane first.
     """
 
     camera: str

@@ -38,6 +38,7 @@ class Tangents:
         axes = centers / distance[:, None]
         x, y, z = axes.T
         level = np.hypot(x, y)
+        # Straight below the camera every direction is level; "ahead" is that in which the mesh frame's x points.
         level, ahead, left = np.where(level > 1e-9, (level, x, y), ((1.0,), (1.0,), (0.0,)))
         right_x, right_y = left / level, -ahead / level
         right = np.stack([right_x, right_y, np.zeros_like(x)], axis=1)
@@ -73,7 +74,7 @@ def patch_nodes(view: PreparedView, tangents: Tangents, extent: float) -> Single
 def samples(nodes: Singles, size: int) -> Singles:
     """Pixels (2, c, size, size) of patches' samples, from those of their nodes (2, c, N, N).
 
-    The samples are in the middles of size x size squares, which cover the patch.
+    A patch is divided into `size` rows of `size` equal squares. Each sample is in the middle of a square.
     """
     weights = _node_weights(nodes.shape[2], size)
     return np.asarray(np.matmul(weights, np.ascontiguousarray(nodes) @ weights.T))

@@ -143,7 +143,7 @@ def read_configuration(path: str | Path) -> Configuration:
     path = Path(path)
     read = read_sections(Configuration, path)
     try:
-        lens: object = read.lens
+        lens: object = read.lens  # the sections leave the path of a lens file here
         if isinstance(lens, Path):
             read = replace(read, lens=read_lens_file(path.parent / lens))
         return replace(read, model=str(path.parent / model_path(read.model)))

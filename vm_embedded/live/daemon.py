@@ -1,8 +1,9 @@
 """The daemon of vm-detect: takes frames and poses, sends a message for each frame, and reports its own state.
 
-The event loop never blocks, because other threads read the camera and write files. It waits for the newest shot, has
-answering.py detect the objects in it, and sends the result. This module starts and stops the parts, handles signals,
-and tracks the state.
+Other threads read the camera and write files. The event loop waits for the newest shot, a frame with its time. It has
+answering.py detect the objects in it, and sends the result. Between shots it answers the status socket and HTTP, reads
+poses, and notifies systemd's watchdog. This module starts and stops these parts, handles the signals to stop, reload
+and record, and tracks the state.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ _TROUBLE_LASTS = 0.5
 
 _TIMED = 15
 """Number of frames whose median latency must be within the budget. Until there are as many, the state is `starting`:
-vm-deploy, which asks three times in two seconds, would else accept a slow network after its first five frames."""
+vm-deploy, which asks three times in two seconds, can't accept a network because of its first few frames."""
 
 
 @dataclass

@@ -47,16 +47,16 @@ do not settle (as with thin cylinders), and the relative change at which a point
 KINDS = ("xy", "xm", "nm")
 
 _Coordinate = Callable[[Floats, Floats | float], Floats]
-"""(n objects out (m,), distance d of the slice (m,) or a number [m]) -> coordinate (m,) [m]."""
+"""coordinate(n, d) for n (c,) objects out: (c,) [m]. The distance d [m] is (c,), or one number for all of them."""
 
 
 class Grid(MeshModel):
     """A lattice of one of KINDS, row by row: all points that links connect to the point below the camera.
 
-    A point has the column n and the row m, and its neighbors are `steps` away. With four or eight neighbors u = n / k
-    and v = m / k. With six neighbors each row is shifted by half a step, and rows are closer than columns:
-    u = (n + m / 2) / k and v = sqrt(3) / 2 m / k. In the code, half counts half steps along a row: 2 n, or 2 n + m with
-    six neighbors.
+    A point has a column and a row, and its neighbors are `steps` away. With four or eight neighbors u = column / k and
+    v = row / k. With six neighbors each row is shifted by half a step, and rows are closer than columns:
+    u = (column + row / 2) / k and v = sqrt(3) / 2 row / k. In the code, half counts half steps along a row: 2 column,
+    or 2 column + row with six neighbors.
     """
 
     steps: tuple[tuple[int, int], ...]
@@ -71,19 +71,19 @@ class Grid(MeshModel):
         shape.spacing(height)  # raises GeometryError for a height without a mesh
         x, y = self._quarter(shape, height, intersections, max_distance)
         last_row, last_half = (size - 1 for size in x.shape)
-        m, half = (each.astype(np.int32) for each in np.mgrid[-last_row : last_row + 1, -last_half : last_half + 1])
-        shown = np.isfinite(x[np.abs(m), np.abs(half)])
-        m, half = m[shown], half[shown]
-        n = (half - m) // 2 if self.neighbors == 6 else half // 2
-        linked = _connected_to_nadir(n, m, self.neighbors)
-        m, n, half = m[linked], n[linked], half[linked]
+        row, half = (each.astype(np.int32) for each in np.mgrid[-last_row : last_row + 1, -last_half : last_half + 1])
+        shown = np.isfinite(x[np.abs(row), np.abs(half)])
+        row, half = row[shown], half[shown]
+        column = (half - row) // 2 if self.neighbors == 6 else half // 2
+        linked = _connected_to_nadir(column, row, self.neighbors)
+        row, column, half = row[linked], column[linked], half[linked]
 
-        rays = np.empty((len(n), 3), order="F")
-        rays[:, 0] = np.sign(half) * x[np.abs(m), np.abs(half)]
-        rays[:, 1] = np.sign(m) * y[np.abs(m), np.abs(half)]
+        rays = np.empty((len(column), 3), order="F")
+        rays[:, 0] = np.sign(half) * x[np.abs(row), np.abs(half)]
+        rays[:, 1] = np.sign(row) * y[np.abs(row), np.abs(half)]
         rays[:, 2] = shape.center_height - height
         rays /= np.sqrt(rays[:, 0] ** 2 + rays[:, 1] ** 2 + rays[:, 2] ** 2)[:, None]
-        cells = np.stack([n - n.min(), m - m.min()], axis=1)
+        cells = np.stack([column - column.min(), row - row.min()], axis=1)
         return Mesh(frozen(rays), frozen(lattice_neighbors(cells, self.steps)), frozen(cells))
 
     def _quarter(self, shape: Shape, height: float, intersections: float, max_distance: float) -> tuple[Floats, Floats]:
@@ -99,10 +99,10 @@ class Grid(MeshModel):
         # From 0 to one beyond the border.
         rows = math.floor(v_most / row_step) + 2
         halves = math.floor(u_most / 0.5) + 2
-        m, half = (axis.reshape(-1) for axis in np.mgrid[:rows, :halves].astype(np.int32))
-        steps = np.stack([0.5 * half, row_step * m], axis=1)
-        # Points are where n is whole: half = 2 n, or 2 n + m with six neighbors.
-        tried = np.flatnonzero(((half - m if six else half) % 2 == 0) & _within(steps, border))
+        row, half = (axis.reshape(-1) for axis in np.mgrid[:rows, :halves].astype(np.int32))
+        steps = np.stack([0.5 * half, row_step * row], axis=1)
+        # Points are where the column is whole: half = 2 column, or 2 column + row with six neighbors.
+        tried = np.flatnonzero(((half - row if six else half) % 2 == 0) & _within(steps, border))
         u, v = (steps[tried] / intersections).T
         x, y = _positions(self.kind, u, v, shape, height)
         x[np.hypot(x, y) > max_distance] = np.nan
@@ -199,6 +199,7 @@ def _within(points: Floats, border: Floats) -> Mask:
     The border runs from the first axis to the second. It is drawn as a polygon, and each point looks up its pixel.
     """
     width, height = (math.ceil(each) + 3 for each in border.max(axis=0))
+    # With the origin, and the end of the border on the second axis, where rounding leaves it a little beside it.
     outline = np.concatenate([[[0.0, 0.0]], border, [[0.0, border[-1, 1]]]])
     inside = np.zeros((height, width), dtype=np.uint8)
     cv2.fillPoly(inside, [np.rint(outline).astype(np.int32)], 1)
@@ -207,27 +208,27 @@ def _within(points: Floats, border: Floats) -> Mask:
     return np.asarray(inside[nearest[:, 1], nearest[:, 0]] > 0)
 
 
-def _connected_to_nadir(n: Indices, m: Indices, neighbors: int) -> Mask:
-    """Which cells in columns n (c,) and rows m (c,) are connected to the cell (0, 0) by links to 4, 6 or 8 neighbors.
+def _connected_to_nadir(column: Indices, row: Indices, neighbors: int) -> Mask:
+    """Which cells in columns (c,) and rows (c,) are connected to the cell (0, 0) by links to 4, 6 or 8 neighbors.
 
     The cells become pixels, and OpenCV finds their connected components.
     """
-    row = m - m.min()
+    y = row - row.min()
     if neighbors == 6:
         # Pixels are half columns: neighbors in other rows touch at corners. Neighbors in a row are two pixels apart, so
         # the pixel between them is set, too.
-        column = 2 * n + m
-        column = column - column.min()
-        present = np.zeros((row.max() + 1, column.max() + 1), dtype=np.uint8)
-        present[row, column] = 1
+        x = 2 * column + row
+        x -= x.min()
+        present = np.zeros((y.max() + 1, x.max() + 1), dtype=np.uint8)
+        present[y, x] = 1
         present[:, 1:-1] |= present[:, :-2] & present[:, 2:]
     else:
-        column = n - n.min()
-        present = np.zeros((row.max() + 1, column.max() + 1), dtype=np.uint8)
-        present[row, column] = 1
+        x = column - column.min()
+        present = np.zeros((y.max() + 1, x.max() + 1), dtype=np.uint8)
+        present[y, x] = 1
     _, label = cv2.connectedComponents(present, connectivity=4 if neighbors == 4 else 8)
-    labels = label[row, column]
-    return np.asarray(labels == labels[(n == 0) & (m == 0)])
+    labels = label[y, x]
+    return np.asarray(labels == labels[(column == 0) & (row == 0)])
 
 
 def lattice_neighbors(cells: Indices, steps: tuple[tuple[int, int], ...]) -> Indices:

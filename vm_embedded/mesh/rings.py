@@ -82,9 +82,10 @@ def ring_counts(shape: Shape, height: float, intersections: float, rings: int) -
 
 
 def ring_places(counts: Indices) -> tuple[Indices, Indices]:
-    """The first point of each ring (rings + 1,), then the number n of points, and each point's place in its ring (n,).
+    """Where rings begin, and where points are in them.
 
-    counts: (rings,) number of points in each ring.
+    counts: (rings,) number of points in each ring. Returns the first point of each ring, with the number n of all
+    points at the end (rings + 1,), and each point's place in its ring (n,), from 0.
     """
     start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     return start, np.arange(start[-1], dtype=np.int32) - np.repeat(start[:-1], counts)
@@ -110,7 +111,8 @@ def ring_neighbors(counts: Indices, start: Indices, place: Indices, width: int, 
     neighbors.
 
     A point is linked to the two adjacent points of its ring, and to the points of the next rings at the same fraction
-    of the circle: the nearest two of them, the nearest one, or all three. The nadir's neighbors are spread evenly over
+    of the circle. In each of these rings, width 6 links the nearest two, and width 4 only the nearest one. Width 8
+    links the nearest two and, as top and bottom, the nearest one again. The nadir's neighbors are spread evenly over
     ring 1.
     """
     missing = int(start[-1])

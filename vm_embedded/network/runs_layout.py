@@ -22,8 +22,8 @@ Slots 3 to 5 and 7 to 10 are runs; - is a gap. The ring closes between 6 and 3, 
 there: the upper neighbors 6 3 of point 2, and 5 6 3 and 6 3 4 around points 6 and 3. Copies of these groups follow.
 
 Point 1 is in slot 4. Its first group, 0 1 2, has its middle in slot 4, and its second group, 4 5, in slot 8. Each group
-takes m - 1 = 22 columns of the table, and the sum around slot s is in column s + 1 of its group. So the columns of
-point 1 are 4 + 1 = 5 and 22 + 8 + 1 = 31.
+has m - 1 = 22 columns of the table. Column j of a group holds the sum over the slots j - 2, j - 1 and j, so the sum
+around slot s is in column s + 1. The columns of point 1 are 4 + 1 = 5 and 22 + 8 + 1 = 31.
 
 A copy looks up the same sums as its original, and a gap the same sums as the off-screen point. So both keep the right
 values in all layers, without masks or special cases.
@@ -113,42 +113,43 @@ def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Position
     the group's middle (G, m).
     """
     n = len(neighbors) - 1
-    # A second gap at the end: a group of three may begin with the last point, with its other members off screen.
+    # A second gap at the end: of a group whose first member is the last point, `_found_in_runs` reads two slots more.
     runs = np.append(_in_runs(neighbors[:n, groups[0][0]], neighbors[:n, groups[0][-1]]), n)
-    slot = np.full(n + 1, _GAP)  # of each point, and of the off-screen point
+    slot_of = np.full(n + 1, _GAP)  # each point, and the off-screen point
     filled = np.flatnonzero(runs < n)
-    slot[runs[filled]] = filled
+    slot_of[runs[filled]] = filled
 
     parts, middles, count = [runs], [], len(runs)
     for group in groups:
         members: npt.NDArray[np.integer] = np.stack(
             [np.arange(n) if each == SELF else neighbors[:n, each] for each in group]
         )
-        middle, torn = _found_in_runs(members, group_offsets(group), runs, slot)
+        middle, torn = _found_in_runs(members, group_offsets(group), runs, slot_of)
         copies, copy = np.unique(members[:, torn], axis=1, return_inverse=True)
-        # A torn group's copy begins at slot count + len(group) * copy. The first offset, negative or 0, leads from the
-        # middle back to this begin.
+        # The copy of a torn group begins at slot count + len(group) * copy. Its middle is as many slots later as the
+        # first offset, which is negative or 0, leads back.
         middle[:n][torn] = count + len(group) * copy.reshape(-1) - group_offsets(group)[0]
         parts.append(copies.T.reshape(-1))
         count += copies.size
         middles.append(middle)
-    slots = np.concatenate([*parts, np.full(_GAPS_BEHIND, n)])
-    return slots, slot[:n], np.stack([middle[slots] for middle in middles])
+    point_at = np.concatenate([*parts, np.full(_GAPS_BEHIND, n)])
+    return point_at, slot_of[:n], np.stack([middle[point_at] for middle in middles])
 
 
 def _found_in_runs(
-    members: npt.NDArray[np.integer], offsets: range, runs: _Positions, slot: _Positions
+    members: npt.NDArray[np.integer], offsets: range, runs: _Positions, slot_of: _Positions
 ) -> tuple[_Positions, Mask]:
     """Where the group of each point lies in the runs, and whether the runs tear it apart.
 
-    members: (group size, n) points of each point's group, n off screen. slot: (n + 1,) of each point. Returns the slots
-    of the groups' middles (n + 1,), _GAP where no member is on screen, and a mask (n,) of the groups that are torn.
+    members: (group size, n) points of each point's group, n off screen. runs: the point in each slot. slot_of: (n + 1,)
+    the slot of each point. Returns the slots of the groups' middles (n + 1,), _GAP where no member is on screen, and a
+    mask (n,) of the groups that are torn.
     """
     n = members.shape[1]
     middle = np.full(n + 1, _GAP)
-    # In a whole group, each member on screen gives the same middle.
+    # If the group is whole, each of its members on screen leads to the same middle.
     for offset, points in zip(offsets, members, strict=True):
-        np.copyto(middle[:n], slot[points] - offset, where=points < n)
+        np.copyto(middle[:n], slot_of[points] - offset, where=points < n)
     torn = np.zeros(n, dtype=bool)
     for offset, points in zip(offsets, members, strict=True):
         torn |= runs[middle[:n] + offset] != points

@@ -1,4 +1,8 @@
-"""The rounds of a training: one network after the other, each from its best epoch. Any of it can be resumed."""
+"""The rounds of a training.
+
+Each round trains a new network. After each epoch the validation pictures score it, and the round keeps its best epoch
+in a checkpoint. A stopped training continues from the state that it saves every few seconds.
+"""
 
 from __future__ import annotations
 
