@@ -81,7 +81,6 @@ def _describe_candidate(observation: Observation, candidate: Candidate) -> Detec
         scale=scale,
         distances_agree=abs(scale - 1.0) <= view.spacing,  # a ring more or less on each side
         points=len(inside),
-        around=observation.projected.pixels[candidate.near],
         reason=candidate.reason,
     )
 
@@ -89,9 +88,7 @@ def _describe_candidate(observation: Observation, candidate: Candidate) -> Detec
 def _describe_judgment(observation: Observation, class_name: str, judgment: Judgment) -> Detection:
     """What a close look saw, as a detection."""
     view = observation.view
-    shown = np.flatnonzero(observation.projected.on_screen)
-    rays = view.layout.rays[shown]
-    covered = view.shape.covers(rays, judgment.center[None], view.height)[0]
+    covered = view.shape.covers(view.layout.rays, judgment.center[None], view.height)[0]
     return _detection(
         observation,
         class_name,
@@ -99,8 +96,7 @@ def _describe_judgment(observation: Observation, class_name: str, judgment: Judg
         confidence=judgment.confidence,
         scale=judgment.scale,
         distances_agree=abs(judgment.scale - 1.0) <= _SAME_SIZE,
-        points=int(covered.sum()),
-        around=observation.projected.pixels[shown[[int(np.argmax(along(rays, judgment.center)))]]],
+        points=int(np.count_nonzero(covered & observation.projected.on_screen)),
         reason=judgment.reason,
     )
 
@@ -114,18 +110,17 @@ def _detection(
     scale: float,
     distances_agree: bool,
     points: int,
-    around: Floats,
     reason: str | None,
 ) -> Detection:
     """A detection in the plane's frame.
 
-    center (3,) [m]: relative to the camera in the mesh frame. scale: apparent size as a share of the expected one.
-    around (p, 2) [px]: stands for the outline of an object at the edge of the lens's view, which may have none in it.
+    center (3,) [m]: relative to the camera in the mesh frame. scale: apparent size as a share of the expected one. The
+    outline of an object at the edge of the lens's view may be out of it; then the nearest point on screen is its place.
     """
     view = observation.view
     distance = float(np.linalg.norm(center))
     outline = view.pixels(view.shape.outline(center, view.height))
-    middle, radius = _disk(outline if len(outline) > 2 else around)
+    middle, radius = _disk(outline) if len(outline) > 2 else (_nearest_pixel(observation, center / distance), 0.0)
     return Detection(
         class_name=class_name,
         confidence=confidence,
@@ -141,6 +136,13 @@ def _detection(
         points=points,
         reason=reason,
     )
+
+
+def _nearest_pixel(observation: Observation, direction: Floats) -> Floats:
+    """The pixel (2,) of the point on screen that is nearest to a direction (3,) in the mesh frame."""
+    seen = observation.projected
+    nearness = np.where(seen.on_screen, along(observation.layout.rays, direction), -np.inf)
+    return seen.pixels[int(np.argmax(nearness))]
 
 
 def _disk(outline: Floats) -> tuple[Floats, float]:

@@ -33,9 +33,9 @@ def propose_places(observation: Observation, probabilities: Singles, above: floa
     likely = likely[np.argsort(observation.layout.slots[likely])]  # the same digits for every layout
     rays, p = view.layout.rays[likely], probabilities[likely]
     centers = view.shape.center_along(rays, view.height)
-    offset = view.shape.offset(rays, centers, view.height)
-    near = offset < 1.0
-    chosen = _apart((offset < _CORE).astype(np.float32) @ p, near, most)
+    near = view.shape.covers(rays, centers, view.height)
+    core = view.shape.covers(rays, centers, view.height, _CORE)
+    chosen = _apart(core.astype(np.float32) @ p, near, most)
     # Once only: a second move would lead away to larger things near by, and fewer balls would be found.
     middle = (near[chosen] * p) @ rays
     return view.shape.center_along(middle / np.linalg.norm(middle, axis=1, keepdims=True), view.height)
