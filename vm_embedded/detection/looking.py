@@ -80,7 +80,8 @@ def look_closely(
 def look_at(observation: Observation, look: Look, centers: Floats) -> tuple[Floats, Singles]:
     """Look at places with centers (c, 3) [m] in the mesh frame, as often as the contract says.
 
-    Returns the centers (c, 3) that the network saw, and its answers (c, 4), as `CloseLook.run` gives them.
+    Each further look also looks at the patch's mirror image, and takes the mean of both. Returns the centers (c, 3) that
+    the network saw, and its answers (c, 4), as `CloseLook.run` gives them.
     """
     view, contract = observation.view, look.contract
     centers, answers = centers.copy(), np.zeros((len(centers), 4), dtype=np.float32)
@@ -104,8 +105,8 @@ def _mean_of_mirrored(look: Look, patches: Image) -> Singles:
     like one answer.
     """
     answers, mirrored = look.run(np.concatenate([patches, patches[:, :, ::-1]])).reshape(2, len(patches), -1)
-    mean = (answers + mirrored) / 2
-    mean[:, 1] = (answers[:, 1] - mirrored[:, 1]) / 2
+    mirrored[:, 1] *= -1
+    mean = 0.5 * answers + 0.5 * mirrored
     yes = np.sqrt(answers[:, 0] * mirrored[:, 0])
     no = np.sqrt((1 - answers[:, 0]) * (1 - mirrored[:, 0]))
     mean[:, 0] = yes / np.maximum(yes + no, np.finfo(np.float32).tiny)
