@@ -2,7 +2,7 @@
 
 The colors of a patch stay as they lie in memory: row by row, the three colors of a sample side by side. The first
 convolution takes that as a picture of one channel with three columns for each sample. So its kernel of 3 x 3 samples
-has 3 x 9 columns, its step of two samples is six columns, and no operator has to sort the colors into channels.
+has 3 rows and 9 columns, its step of two samples is six columns, and no operator has to sort the colors into channels.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ def look_model(network: LookNetwork) -> bytes:
         step, columns = layer.stride[0], 1
         if index == 0:
             kernel, columns = kernel.transpose(0, 2, 3, 1).reshape(-1, 1, 3, 9), 3
-        layout = {"kernel_shape": [3, 3 * columns], "pads": [1, columns] * 2, "strides": [step, columns * step]}
-        x = _write_layer(graph, "Conv", f"layer{index}", x, kernel, bias, **layout)
+        geometry = {"kernel_shape": [3, 3 * columns], "pads": [1, columns] * 2, "strides": [step, columns * step]}
+        x = _write_layer(graph, "Conv", f"layer{index}", x, kernel, bias, **geometry)
         x = graph.node("Relu", [x], f"layer{index}.activation")
     x = graph.node("Flatten", [x], "flat", axis=1)
     x = _write_layer(graph, "Gemm", "hidden", x, weights["hidden.weight"], weights["hidden.bias"], transB=1)
     x = graph.node("Relu", [x], "hidden.activation")
 
-    # The calibration of the probability's logit goes into its weights.
+    # The calibration, a scale and an offset of the probability's logit, becomes part of the last layer's weights.
     kernel, bias = weights["answers.weight"].copy(), weights["answers.bias"].copy()
     scale, offset = weights["calibration"]
     kernel[0], bias[0] = kernel[0] * scale, bias[0] * scale + offset
@@ -51,7 +51,7 @@ def look_model(network: LookNetwork) -> bytes:
 def _write_normalization(graph: OnnxGraph, size: int) -> str:
     """Write the function look_network.normalized; return the name of its result (n, 1, size, 3 * size).
 
-    ONNX Runtime pools faster than it reduces.
+    The means are GlobalAveragePool, because ONNX Runtime computes it faster than ReduceMean.
     """
     one_channel = graph.constant("input.shape", [0, 1, size, 3 * size])
     x = graph.node("Cast", [graph.node("Reshape", ["patches", one_channel], "input")], "input.colors", to=FLOAT)

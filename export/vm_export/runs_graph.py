@@ -71,7 +71,7 @@ def _convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, gr
 
 
 def _kernel_places(groups: Groups) -> Iterator[tuple[int, int, int]]:
-    """Each place of a kernel (the point itself is 0), its group, and its distance from the middle of the group."""
+    """For each place of a kernel (0 is the point itself): its group, and its offset from the group's middle."""
     for number, group in enumerate(groups):
         for shift, neighbor in zip(group_offsets(group), group, strict=True):
             yield (0 if neighbor == SELF else 1 + neighbor), number, shift

@@ -28,9 +28,9 @@ _MOST_LINKS = 200_000
 def figure_from_above(built: BuiltMesh, view: str, reach: float, objects: tuple[float, ...] = ()) -> Figure:
     """A figure of the mesh out to `reach` [m], with outlines of objects at some distances [m].
 
-    view: ground is from above, where the rays meet the height of the objects' centers. directions is by bearing around
-    the middle, with the inclination from straight below as the distance from it; it has room for points above the
-    horizon.
+    view: ground is from above, where the rays meet the height of the objects' centers (for cylinders, the
+    plane). directions is by bearing around the middle, with the inclination from straight below as the distance from
+    it; it has room for points above the horizon.
 
     The paper's fig:mesh_distance shows such rings.
     """

@@ -78,7 +78,9 @@ def parser() -> argparse.ArgumentParser:
         "--save-points", type=Path, metavar="DIR", help="write NAME.npz with pixels, rays and probabilities"
     )
     output.add_argument("--emit-points", metavar="CLASS,...", help="add the points of these classes to the JSON")
-    output.add_argument("--explain", action="store_true", help="add rejected clusters to the JSON, with reasons")
+    output.add_argument(
+        "--explain", action="store_true", help="add rejected proposals or clusters to the JSON, with reasons"
+    )
     add_settings(parser)
     add_live(parser)
     return parser

@@ -107,9 +107,9 @@ class MeshCache:
     def _prepare(self, height: float, pitch: int, roll: int, lens: Lens, size: Size) -> PreparedPoints:
         """The points that an orientation of this bucket can bring on screen.
 
-        Two turns together turn by at most the sum of their angles. From the bucket's middle that is half a step of
-        pitch and half a step of roll; from the middles of its quarters it is half as much. The quarters together
-        leave fewer superfluous points. The whole bucket goes first, because it leaves them less to test.
+        An orientation differs from the bucket's middle by at most half a step of pitch plus half a step of roll, and
+        from the middle of its quarter by half of that. So the quarters keep fewer points than the whole bucket, which
+        goes first only to leave fewer points to test.
         """
         mesh = self._look_up(height, lambda: self._build(height), counted=False)
         pitch_step, roll_step = self.settings.pitch_step, self.settings.roll_step

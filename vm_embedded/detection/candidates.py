@@ -31,7 +31,7 @@ class Candidate:
 
     center (3,): of the object, relative to the camera in the mesh frame [m]; the cluster's middle until `fit` improves
     it. near (p,): slots of the points up to three object radii around the cluster. probabilities, log_odds (p,): of
-    these points. reason: why it is not an object, or None while nothing speaks against it.
+    these points. reason: why it is not an object, or None if it is not rejected so far.
     """
 
     class_name: str
@@ -64,7 +64,7 @@ def propose(observation: Observation, class_name: str, probabilities: Singles, s
 def _on_screen(observation: Observation, chosen: Mask) -> Members:
     """The chosen slots (m,) that are on screen, in the order of the mesh.
 
-    Sums over them then have the same digits whatever layout the points have in memory.
+    In this order, sums over them have the same digits for every layout.
     """
     members = np.flatnonzero(chosen & observation.projected.on_screen)
     return members[np.argsort(observation.layout.slots[members])]
@@ -78,7 +78,7 @@ def _middle(observation: Observation, cluster: Members) -> Floats:
 
 
 def _around(observation: Observation, cluster: Members, center: Floats) -> Members:
-    """The points of a cluster in the direction of `center`, and those up to three object radii around it."""
+    """All points on screen as far from `center` as the cluster reaches, and up to three object radii farther."""
     rays, radius = observation.layout.rays, observation.view.shape.radius
     distance = float(np.linalg.norm(center))
     cosines = along(rays, center / distance)
@@ -97,7 +97,7 @@ def _wrong_size(
     view = observation.view
     rays = view.layout.rays
     expected = int((view.shape.offset(rays[near], center[None], view.height) < 1.0).sum())
-    # A filled object has more than half of its points in its cluster; half of that allows for a center that is off.
+    # A filled object has more than half of its points in its cluster. A quarter is enough, because `center` may be off.
     if len(cluster) < 0.25 * expected:
         return f"{len(cluster)} points, where an object there has {expected}"
     widest = math.ceil(settings.max_widths * view.rings)

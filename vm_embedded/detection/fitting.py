@@ -25,16 +25,16 @@ def fit(view: PreparedView, candidate: Candidate) -> Candidate:
     """The candidate with the center [m] of the object whose subgraph fits best.
 
     If points were independent, the likeliest object would have the largest sum of log-odds inside its outline. The
-    search takes the best of a grid of places, then of finer grids around it. The outline is half a ring spacing soft,
-    so the sum has no plateaus between points. Points off screen add nothing, so an object that the border cuts gets its
-    true center.
+    search takes the best of a grid of places, then of finer grids around it. Points near the outline count
+    in part, so the sum changes smoothly with the center. Points off screen add nothing, so an object that the border
+    cuts gets its true center.
     """
     center = candidate.center
     rays = np.ascontiguousarray(view.layout.rays[candidate.near])
     for reach in _REACHES:
         distance = float(np.linalg.norm(center))
         axis = center / distance
-        # The height of the center is half the height of a cylinder.
+        # center_height of a cylinder is half its height.
         across, up = view.shape.radius, max(view.shape.radius, view.shape.center_height)
         tried = axis + reach / distance * ((_GRID * (across, up)) @ tangents(axis))
         centers = view.shape.center_along(tried, view.height)
@@ -46,8 +46,8 @@ def fit(view: PreparedView, candidate: Candidate) -> Candidate:
 def best_scale(view: PreparedView, candidate: Candidate, offset: Floats) -> float:
     """The apparent size that fits best at the candidate's bearing, as a share of the one that the plane predicts.
 
-    The paper identifies objects by their scale (fig:ball_detection_images_3). This one rejects nothing: detections only
-    report it, as `distances_agree`.
+    The paper identifies objects by their scale (fig:ball_detection_images_3). This function rejects
+    nothing: detections only report the scale, as `angular_radius`, `distance_by_angle` and `distances_agree`.
 
     offset (p,): of the candidate's points from its center, as `Shape.offset` gives it.
     """

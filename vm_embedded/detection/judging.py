@@ -13,7 +13,7 @@ from .prepared_view import PreparedView
 from .settings import Settings
 
 _FARTHEST = 1e5
-"""Farther objects count as on the horizon, in camera heights."""
+"""Distance, in camera heights, beyond which an object counts as on the horizon."""
 
 _INSIDE_ENDS, _BAND_BEGINS, _BAND_ENDS = -0.25, 0.75, 2.25
 """Distances from the outline, in ring spacings: where the inside ends, and where the band around begins and ends."""

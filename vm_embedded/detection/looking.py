@@ -80,8 +80,8 @@ def look_closely(
 def look_at(observation: Observation, look: Look, centers: Floats) -> tuple[Floats, Singles]:
     """Look at places with centers (c, 3) [m] in the mesh frame, as often as the contract says.
 
-    Each further look also looks at the patch's mirror image, and takes the mean of both. Returns the centers (c, 3) that
-    the network saw, and its answers (c, 4), as `CloseLook.run` gives them.
+    From the second look on, the answers to a patch and to its mirror image are averaged. Returns the centers (c, 3)
+    that the network saw, and its answers (c, 4), as `CloseLook.run` gives them.
     """
     view, contract = observation.view, look.contract
     centers, answers = centers.copy(), np.zeros((len(centers), 4), dtype=np.float32)
@@ -99,10 +99,10 @@ def look_at(observation: Observation, look: Look, centers: Floats) -> tuple[Floa
 
 
 def _mean_of_mirrored(look: Look, patches: Image) -> Singles:
-    """Mean answers (n, 4) to patches and to their mirror images, which show the object as well.
+    """Mean answers (n, 4) to patches and to their mirror images, which show the same objects.
 
-    The two errors differ, so the mean has half of the false objects. It is a mean of log-odds, and so is calibrated
-    like one answer.
+    Their errors differ: on validation pictures the mean halved the false objects. Probabilities are averaged as
+    log-odds.
     """
     answers, mirrored = look.run(np.concatenate([patches, patches[:, :, ::-1]])).reshape(2, len(patches), -1)
     mirrored[:, 1] *= -1

@@ -32,7 +32,7 @@ class CameraView:
 class Sighting:
     """An object in the world frame.
 
-    plane: name of the plane it is on, that with the largest sum of confidences (`detect_views`). detection: the most
+    plane: name of its plane, the one with the largest sum of confidences (`detect_views`). detection: the most
     confident detection on this plane, in the plane's frame. camera: name of the camera of this detection. position (3,)
     [m]: center of the object. direction (3,): unit vector from this camera. also: further detections of the same
     object, those on the same plane first.
@@ -113,8 +113,8 @@ def _groups(found: Sequence[Sighting], diameter: float) -> list[list[Sighting]]:
 
 
 def _apart(one: Sighting, other: Sighting, diameter: float) -> float:
-    """Distance of two sightings, in units of the limit below which they are one object; infinite for pairs that never
-    are."""
+    """Distance of two sightings, in units of the limit below which they are one object; infinite if they can't
+    be one."""
     if one.detection.class_name != other.detection.class_name:
         return math.inf
     if one.camera != other.camera and one.plane == other.plane:
@@ -126,7 +126,7 @@ def _apart(one: Sighting, other: Sighting, diameter: float) -> float:
 
 
 def _join(group: Sequence[Sighting]) -> Sighting:
-    """One sighting of several of the same object: on the plane with the largest sum of confidences, the surest one."""
+    """Join sightings of one object: the most confident one on the plane with the largest sum of confidences stays."""
     sums: dict[str, float] = {}
     for each in group:
         sums[each.plane] = sums.get(each.plane, 0.0) + each.detection.confidence

@@ -36,7 +36,7 @@ def locate(
     look. Raises ModelError if the close look does not run.
     """
     objects: list[Detection] = []
-    reasons: list[Detection] = []
+    rejected: list[Detection] = []
     for object_class, probabilities in zip(observation.manifest.classes, observation.slot_probabilities.T, strict=True):
         name = object_class.name
         if object_class.kind != "object":
@@ -44,13 +44,13 @@ def locate(
         if look is not None and look.contract.object_class == name:
             judged = look_closely(observation, look, probabilities, settings, watch, explain)
             objects += [_describe_judgment(observation, name, each) for each in judged if each.reason is None]
-            reasons += [_describe_judgment(observation, name, each) for each in judged if each.reason]
+            rejected += [_describe_judgment(observation, name, each) for each in judged if each.reason]
         else:
             candidates = _candidates(observation, name, probabilities, settings)
             objects += [_describe_candidate(observation, each) for each in candidates if each.reason is None]
-            reasons += [_describe_candidate(observation, each) for each in candidates if explain and each.reason]
+            rejected += [_describe_candidate(observation, each) for each in candidates if explain and each.reason]
     watch.lap("cluster")
-    return tuple(sorted(objects, key=lambda each: -each.confidence)), tuple(reasons)
+    return tuple(sorted(objects, key=lambda each: -each.confidence)), tuple(rejected)
 
 
 def _candidates(
@@ -114,13 +114,16 @@ def _detection(
 ) -> Detection:
     """A detection in the plane's frame.
 
-    center (3,) [m]: relative to the camera in the mesh frame. scale: apparent size as a share of the expected one. The
-    outline of an object at the edge of the lens's view may be out of it; then the nearest point on screen is its place.
+    center (3,) [m]: relative to the camera in the mesh frame. scale: apparent size as a share of the expected one. If
+    the lens sees no outline, the detection's center is the pixel of the nearest point on screen, and its radius is 0.
     """
     view = observation.view
     distance = float(np.linalg.norm(center))
     outline = view.pixels(view.shape.outline(center, view.height))
-    middle, radius = _disk(outline) if len(outline) > 2 else (_nearest_pixel(observation, center / distance), 0.0)
+    if len(outline) > 2:
+        middle, radius = _disk(outline)
+    else:
+        middle, radius = _nearest_pixel(observation, center / distance), 0.0
     return Detection(
         class_name=class_name,
         confidence=confidence,
@@ -142,7 +145,7 @@ def _nearest_pixel(observation: Observation, direction: Floats) -> Floats:
     """The pixel (2,) of the point on screen that is nearest to a direction (3,) in the mesh frame."""
     seen = observation.projected
     nearness = np.where(seen.on_screen, along(observation.layout.rays, direction), -np.inf)
-    return seen.pixels[int(np.argmax(nearness))]
+    return np.asarray(seen.pixels[int(np.argmax(nearness))])
 
 
 def _disk(outline: Floats) -> tuple[Floats, float]:

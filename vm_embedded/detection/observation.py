@@ -80,8 +80,7 @@ def observe(
 ) -> Observation:
     """Project the view's points into the frame and classify them.
 
-    watch: gets the stages project, sample and infer. Raises ModelError if the
-    network does not run.
+    watch: gets the stages project, sample and infer. Raises ModelError if the network does not run.
     """
     projected = project(view.layout, view.rotation, view.lens, view.size)
     watch.lap("project")

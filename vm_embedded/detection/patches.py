@@ -23,8 +23,11 @@ _NODES = 4
 
 @dataclass(frozen=True, eq=False)
 class Tangents:
-    """The planes of c patches: unit vectors to their centers, to the right and down in them, each (c, 3), and the
-    object's radius in them (c,), as the tangent of an angle."""
+    """The planes of c patches, at the distance 1 from the camera.
+
+    axes (c, 3): unit vectors to the centers of the patches. right, down (c, 3): unit vectors along their sides. radius
+    (c,): the object's radius in the plane, the tangent of its angular radius.
+    """
 
     axes: Floats
     right: Floats

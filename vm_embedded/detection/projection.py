@@ -40,7 +40,7 @@ class Projection(Generic[G]):
         return Projection(self.graph.part(kept), self.pixels[kept], self.on_screen[kept])
 
     def only(self, chosen: Mask) -> Projection[G]:
-        """The same graph, with only those of the chosen points (n,) on screen that are on screen here."""
+        """The same graph; points outside of `chosen` (n,) count as off screen."""
         return Projection(self.graph, self.pixels, self.on_screen & chosen)
 
 
@@ -86,9 +86,9 @@ def project(graph: AnyGraph, rotation: Floats, lens: Lens, size: Size) -> Projec
 def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack: float) -> Mask:
     """The points (n,) that are on screen for a camera turned by up to `slack` [rad] from `rotation`.
 
-    It never leaves one out. A point that a turn brings on screen lies within the slack of the view that the picture
-    covers, and no pixel in that view moves faster than `_pixels_per_radian`. A point outside of the view is moved to
-    its edge first.
+    It may keep too many points, but never too few. A turn by `slack` moves a pixel by at most slack *
+    `_pixels_per_radian`, so points farther off the picture are left out. A point outside of the lens's view is first
+    moved to the edge of the view.
     """
     reach = _view_angle(lens, size)
     ahead = along(mesh.rays, rotation[:, 0])

@@ -2,7 +2,7 @@
 
 A likely place is one that an object would fill with likely points. Its score is the sum of their probabilities. The
 place with the highest score comes first; then the best place outside of the first object, and so on. In the end each
-place moves to the middle of the probability in it.
+place moves to the mean of the points in it, weighted by their probabilities.
 """
 
 from __future__ import annotations

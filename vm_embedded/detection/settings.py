@@ -13,7 +13,7 @@ from .sampling import SAMPLINGS
 class Settings:
     """Settings of a Detector. Each field's metadata holds its help text, unit, and limits or allowed values.
 
-    Raises EntryError for a value outside of its limits.
+    Raises EntryError, an InputError, for a value outside of its limits.
     """
 
     threads: int = number(1, "threads of the network, at most the cores that the process may use", "", (1, 256))
@@ -23,8 +23,8 @@ class Settings:
     height_tolerance: float = number(
         0.5,
         "a new camera height gets its own mesh if the number of rings across an object changes by more than this; "
-        "0 (as in the reference): each frame gets a mesh for its own height, and the mesh does not follow the "
-        "camera's yaw; this is slower",
+        "0, as in the reference: each frame gets a mesh for its exact height, with a fixed heading instead of the "
+        "camera's; slower",
         "rings",
         (0.0, 2.0),
     )

@@ -38,7 +38,7 @@ class Shape(ABC):
 
     @abstractmethod
     def spacing(self, height: Number) -> Number:
-        """The number s of a height [m]. The height changes phi only through s: phi depends only on n * s."""
+        """The spacing s for a camera height [m]. phi depends on the height only through n * s."""
 
     @abstractmethod
     def height_of(self, spacing: float) -> float:
@@ -46,7 +46,7 @@ class Shape(ABC):
 
     @abstractmethod
     def phi(self, n: Number, height: Number) -> Number:
-        """Angle [rad] from straight down to the ray, at the distance of n objects; the paper's phi in fig:geometry."""
+        """Angle [rad] between straight down and the ray to the end of a row of n objects (fig:geometry)."""
 
     @abstractmethod
     def n(self, phi: Number, height: Number) -> Number:

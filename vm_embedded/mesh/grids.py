@@ -3,9 +3,9 @@
 The camera is at the height h over the plane and the object's center at the height c; g = h - c. phi(n, h) is the
 inclination n objects out, seen from the height h (`Shape.phi`). The points have coordinates x and y at the height c.
 
-A *slice* is a plane through the camera that meets the height c in a line parallel to an axis. With the line at the
-distance d from the point below the camera, the camera is slant = sqrt(g^2 + d^2) away from the line. In the slice this
-takes the place of g. So n objects out, a point of the line has
+Take a line at the height c, parallel to an axis, at the distance d from the vertical through the camera. The plane
+through the line and the camera is a *slice*. In the slice the camera is slant = sqrt(g^2 + d^2) away from the line, as
+it is g above the height c straight below. So n objects out, a point of the line has
 
     coordinate(n, d) = slant tan(phi(n, slant + c)).
 
@@ -51,7 +51,7 @@ _Coordinate = Callable[[Floats, Floats | float], Floats]
 
 
 class Grid(MeshModel):
-    """A lattice of one of KINDS, row by row: all points that links connect to the point below the camera.
+    """A lattice of one of KINDS, row by row: the points that chains of links connect to the point below the camera.
 
     A point has a column and a row, and its neighbors are `steps` away. With four or eight neighbors u = column / k and
     v = row / k. With six neighbors each row is shifted by half a step, and rows are closer than columns:
@@ -170,7 +170,7 @@ def _solve_by_halving(coordinate: _Coordinate, u: Floats, v: Floats) -> tuple[Fl
     low, high = np.zeros(len(u)), coordinate(u, 0.0)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        # The image of x is coordinate(u, coordinate(v, x)). It is larger than x below the solution, smaller above.
+        # With F(x) = coordinate(u, coordinate(v, x)), the solution has F(x) = x. F is larger than a smaller x.
         too_large = coordinate(u, coordinate(v, middle)) < middle
         low, high = np.where(too_large, low, middle), np.where(too_large, middle, high)
     x = 0.5 * (low + high)
@@ -184,7 +184,7 @@ def _border(kind: str, shape: Shape, height: float, max_distance: float) -> Floa
     x, y = max_distance * np.cos(angle), max_distance * np.sin(angle)
 
     def objects_out(place: Floats, distance: Floats | float) -> Floats:
-        """The n of coordinate(n, distance) = place."""
+        """How many objects out `place` is in the slice at `distance`; inverse of `_Coordinate`."""
         slant = np.hypot(height - c, distance)
         return np.asarray(shape.n(np.arctan2(place, slant), slant + c))
 
@@ -194,12 +194,12 @@ def _border(kind: str, shape: Shape, height: float, max_distance: float) -> Floa
 
 
 def _within(points: Floats, border: Floats) -> Mask:
-    """Which points (n, 2) of a quarter lie within its border (m, 2) or up to two steps beyond it; in steps.
+    """Which points (n, 2) of a quarter lie within its border (m, 2) or up to two steps beyond it; both are in steps.
 
     The border runs from the first axis to the second. It is drawn as a polygon, and each point looks up its pixel.
     """
     width, height = (math.ceil(each) + 3 for each in border.max(axis=0))
-    # With the origin, and the end of the border on the second axis, where rounding leaves it a little beside it.
+    # The outline also has the origin, and the border's end moved onto the second axis, which rounding misses a little.
     outline = np.concatenate([[[0.0, 0.0]], border, [[0.0, border[-1, 1]]]])
     inside = np.zeros((height, width), dtype=np.uint8)
     cv2.fillPoly(inside, [np.rint(outline).astype(np.int32)], 1)
@@ -234,7 +234,7 @@ def _connected_to_nadir(column: Indices, row: Indices, neighbors: int) -> Mask:
 def lattice_neighbors(cells: Indices, steps: tuple[tuple[int, int], ...]) -> Indices:
     """Neighbors (n + 1, N) of cells (n, 2) at fixed steps (N, 2), each as (columns, rows)."""
     missing = len(cells)
-    width, height = cells.max(axis=0) + 3
+    width, height = cells.max(axis=0) + 3  # with an empty cell all around, so that no step leaves the table
     flat = (cells[:, 1] + 1) * width + cells[:, 0] + 1
     index = np.full(width * height, missing, dtype=np.int32)
     index[flat] = np.arange(missing, dtype=np.int32)

@@ -26,7 +26,7 @@ _GROUPS = {
     6: (("left", "itself", "right"), ("top left", "top right"), ("bottom left", "bottom right")),
     8: (("left", "itself", "right"), ("top left", "top right"), ("top",), ("bottom left", "bottom right"), ("bottom",)),
 }
-"""`MeshModel.groups` by name. With eight neighbors, top is top left or top right again, so it has its own group."""
+"""`MeshModel.groups` by name. With eight neighbors, top is also top left or top right, so it has its own group."""
 
 # Subtracted before rounding up, so that float noise above a whole number does not add a point to a ring.
 _CEIL_EPSILON = 1e-9
@@ -42,8 +42,8 @@ class Rings(MeshModel):
 
     def __init__(self, neighbors: int) -> None:
         self.neighbors = neighbors
-        place = {"itself": SELF} | {name: number for number, name in enumerate(_NEIGHBORS[neighbors])}
-        self.groups = tuple(tuple(place[name] for name in group) for group in _GROUPS[neighbors])
+        numbers = {"itself": SELF} | {name: number for number, name in enumerate(_NEIGHBORS[neighbors])}
+        self.groups = tuple(tuple(numbers[name] for name in group) for group in _GROUPS[neighbors])
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         phi = inclinations(shape, height, intersections, max_distance)
@@ -84,15 +84,16 @@ def ring_counts(shape: Shape, height: float, intersections: float, rings: int) -
 def ring_places(counts: Indices) -> tuple[Indices, Indices]:
     """Where rings begin, and where points are in them.
 
-    counts: (rings,) number of points in each ring. Returns the first point of each ring, with the number n of all
-    points at the end (rings + 1,), and each point's place in its ring (n,), from 0.
+    counts: (rings,) number of points in each ring. Returns two arrays. The first
+    (rings + 1,) has the first point of each ring, then the number n of all points. The second (n,) has each point's
+    place in its ring, from 0.
     """
     start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     return start, np.arange(start[-1], dtype=np.int32) - np.repeat(start[:-1], counts)
 
 
 class _Ring(NamedTuple):
-    """One ring for each point of the mesh: its first point (n,) and its number of points (n,)."""
+    """A ring for each point, its own or the next one: the ring's first point (n,) and number of points (n,)."""
 
     first: Indices
     size: Indices
@@ -106,9 +107,8 @@ def ring_neighbors(counts: Indices, start: Indices, place: Indices, width: int, 
     """Neighbors (n + 1, width) of points in rings (paper: section "Graph Structure of the Mesh").
 
     counts: (rings,) number of points in each ring. start, place: from `ring_places`. width: 4, 6 or 8 neighbors.
-    nudge: a shift of all places before rings are compared. Where the sizes of two rings have a common divisor, a point
-    may be at exactly the same fraction of the circle as a point of the other ring, and float noise would choose its
-    neighbors.
+    nudge: added to all places before rings are compared, so that float noise does not choose between two neighbors at
+    the same distance. That happens where the sizes of two rings have a common divisor; only cap6 needs it.
 
     A point is linked to the two adjacent points of its ring, and to the points of the next rings at the same fraction
     of the circle. In each of these rings, width 6 links the nearest two, and width 4 only the nearest one. Width 8

@@ -54,9 +54,9 @@ class LookContract:
     extent: half the side of a patch [expected radii], 0.5 to 8.
     above: probability above which a mesh point counts for a proposal, 0 to 0.99.
     passes: largest number of looks at a proposal, 1 to 4; each further look is where the one before saw the center.
-    channels: of the network's convolutions at each resolution, for people.
+    channels: of the network's convolutions at each resolution; the runtime does not use them.
     self_test: an example with its answers, which each loading of the model file runs.
-    provenance: origin of the network, for people.
+    provenance: origin of the network; the runtime does not use it.
 
     Raises ModelError for values out of range.
     """

@@ -87,7 +87,7 @@ class Manifest:
     sampling: one of POINT_SAMPLINGS.
     colors: one of POINT_COLORS.
     look: description of the look network, if the file has one; see close_look.py.
-    provenance: origin of the file, for people.
+    provenance: origin of the file; the runtime does not use it.
 
     Raises ModelError for unknown values.
     """

@@ -10,7 +10,8 @@ The words that this file uses:
   of every mesh is left, itself and right: it says which points a run joins.
 - The *middle* of a group is the second slot of a group of three, and the first slot of a shorter group.
 - A *column* is a position in a layer's table (vm_export/runs_graph.py). The table holds, for each group and each slot,
-  a sum over the window of three slots around it. So a point looks up one value for each group, not for each neighbor.
+  a sum over the window of three slots around it. (It leaves out the last slot, a gap.) So a point looks up one value
+  for each group, not for each neighbor.
 
 An example. Points 0 1 2 are a part of a ring, points 3 4 5 6 the whole next ring. The groups are left, self and right,
 and two upper neighbors: 3 4 above point 0, 4 5 above point 1, 6 3 above point 2. The m = 23 slots are:
@@ -70,7 +71,7 @@ class RunsLayout(Layout):
         self.columns = frozen(middles.astype(np.int32) + self._first_columns)
 
     def links(self, members: npt.NDArray[np.integer]) -> Indices:
-        places = np.append(self.places, np.int32(len(self)))
+        places = np.append(self.places, np.int32(len(self)))  # with m for the off-screen point
         found = np.empty((len(members), sum(map(len, self._groups)) - 1), dtype=np.int32)
         for group, columns, first in zip(self._groups, self.columns, self._first_columns, strict=True):
             middle = columns[members] - first
@@ -113,7 +114,8 @@ def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Position
     the group's middle (G, m).
     """
     n = len(neighbors) - 1
-    # A second gap at the end: of a group whose first member is the last point, `_found_in_runs` reads two slots more.
+    # A second gap at the end. `_found_in_runs` reads two slots after the last point, if that is the first of a
+    # group of three.
     runs = np.append(_in_runs(neighbors[:n, groups[0][0]], neighbors[:n, groups[0][-1]]), n)
     slot_of = np.full(n + 1, _GAP)  # each point, and the off-screen point
     filled = np.flatnonzero(runs < n)
@@ -126,8 +128,8 @@ def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Position
         )
         middle, torn = _found_in_runs(members, group_offsets(group), runs, slot_of)
         copies, copy = np.unique(members[:, torn], axis=1, return_inverse=True)
-        # The copy of a torn group begins at slot count + len(group) * copy. Its middle is as many slots later as the
-        # first offset, which is negative or 0, leads back.
+        # The copy of a torn group begins at slot count + len(group) * copy. Its middle is one slot later in a group of
+        # three, whose first offset is -1; it is the same slot in a shorter group.
         middle[:n][torn] = count + len(group) * copy.reshape(-1) - group_offsets(group)[0]
         parts.append(copies.T.reshape(-1))
         count += copies.size
@@ -157,10 +159,11 @@ def _found_in_runs(
 
 
 def _in_runs(left: Indices, right: Indices) -> _Positions:
-    """The points in runs (n in gaps), from their left and right neighbors (n,): three gaps, then runs with a gap each.
+    """The point in each slot of the runs; n in gaps. Three gaps come first, and one gap follows each run.
 
-    A *piece* is a sequence of points i, i + 1, ... each linked to the next. numpy finds all pieces at once, and a loop
-    only joins pieces to runs. A ring that the view cuts in two has two pieces.
+    left, right: neighbors (n,) of each point. A *piece* is a sequence of points i, i + 1, ... each linked to the
+    next. numpy finds all pieces at once, and a loop only joins pieces to runs. A ring that the view cuts in two
+    has two pieces.
     """
     n = len(left)
     points = np.arange(n)
@@ -171,12 +174,12 @@ def _in_runs(left: Indices, right: Indices) -> _Positions:
     piece_at = np.full(n + 1, -1)  # the piece that starts with a point
     piece_at[starts] = np.arange(len(starts))
     follower = piece_at[right[ends]]
-    # The follower must be linked back. -1, no follower, looks up the last piece; the result is -1 in either case.
+    # The follower must be linked back. A piece without a follower (-1) reads the last piece here, and stays at -1.
     follower[left[starts[follower]] != ends] = -1
 
     order, ends_run = _chained(follower)
     lengths = (ends - starts + 1)[order]
-    first_slot = _GAPS_BEFORE + np.cumsum(np.append(0, lengths + ends_run))  # of each piece, and of the end
+    first_slot = _GAPS_BEFORE + np.cumsum(np.append(0, lengths + ends_run))  # of each piece; last, the end
     runs = np.full(first_slot[-1], n)
     within = np.arange(n) - np.repeat(np.cumsum(lengths) - lengths, lengths)  # place of a point in its piece
     runs[np.repeat(first_slot[:-1], lengths) + within] = np.repeat(starts[order], lengths) + within

@@ -48,8 +48,8 @@ class PictureAnswer:
     """The answer to a picture: pixels (n, 2), distances (n,) on the plane [m] and probabilities (n, C) of its points,
     and the objects found, most confident first.
 
-    proposals: centers (c, 3) [m] of the proposals for the close look, by its class, relative to the camera in the frame
-    of the found objects' bearings. Empty without a close look.
+    proposals: for the close look's class, the centers (c, 3) [m] of its proposals, relative to the camera, in the frame
+    of `Detection.bearing`. Empty without a close look.
     """
 
     pixels: Floats

@@ -116,7 +116,7 @@ def _train_round(
 
 
 class _Round:
-    """A round in work: its batches are learned or scored, and its state and best network saved."""
+    """A round in progress: its batches are learned or scored, and its state and best network saved."""
 
     def __init__(
         self,
@@ -145,7 +145,7 @@ class _Round:
             self._bar.advance()
 
     def is_out_of_patience(self, batch: Batch) -> bool:
-        """Whether patience has run out: a validation ended, and that many in a row brought no better network."""
+        """Whether a validation has just ended, and the last `patience` of them found no better network."""
         patience = self._run.configuration.training.patience
         waited = self._progress.validated - self._progress.best_epoch
         return batch.validates and batch.last and 0 < patience <= waited
@@ -221,7 +221,7 @@ class _Round:
 
 
 def _round_trainer(run: TrainingRun, hardware: Hardware, progress: TrainingProgress) -> Trainer:
-    """The trainer of a round, at the state that is saved."""
+    """The trainer of a round, resumed from the saved state if that belongs to this round."""
     recipe = run.configuration.training
     torch.manual_seed(int(np.random.default_rng([recipe.seed, progress.round]).integers(2**31)))
     network = Network(run.configuration.network_shape)
@@ -238,7 +238,10 @@ def _round_trainer(run: TrainingRun, hardware: Hardware, progress: TrainingProgr
 
 
 def _remaining_batches(run: TrainingRun, training_round: int, done: int, validated: int) -> Iterator[Batch]:
-    """Batches of a round after so many steps and validated epochs. A batch counts its epoch from 0, its step from 1."""
+    """Batches of a round that are left after `done` steps and `validated` validated epochs.
+
+    A batch counts its epoch from 0, its step from 1.
+    """
     for batch in run.data.batches(run.configuration.training, training_round):
         remains = batch.epoch >= validated if batch.validates else batch.step > done
         if remains:

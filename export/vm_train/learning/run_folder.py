@@ -45,7 +45,7 @@ _FILES = ("train.toml", "pictures.json", _TEACHER, "state.pt", "model.pt", "roun
 class TrainingRun:
     """A training as its folder describes it; `begin_run` and `read_run` make it.
 
-    counts (C,): points of each class in the pictures that data.counted counts.
+    counts (C,): number of points of each class in the pictures that `data.counted` names.
     """
 
     folder: Path
@@ -70,7 +70,7 @@ class TrainingRun:
 
     @property
     def configuration_sha256(self) -> str:
-        """Digest of the configuration and of the split, despite its name, which run.json and models keep."""
+        """Digest of configuration and split. The name mentions only the first, but run.json and model files use it."""
         text = json.dumps([asdict(self.configuration), asdict(self.data.split)])
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -92,7 +92,7 @@ class TrainingRun:
         return float(shares @ self.counts) / self.data.counted
 
     def scheduled_graphs(self) -> PictureGraphs | StreamedGraphs:
-        """The graphs of the training's batches. Raises InputError if a picture has left the folder."""
+        """The graphs of the training's batches. Raises InputError if a picture is missing."""
         return self.data.scheduled_graphs(self.configuration)
 
     def graphs(self, numbers: Sequence[str]) -> PictureGraphs:
@@ -158,9 +158,9 @@ def read_run(folder: Path) -> TrainingRun:
         if content["format"] != _FORMAT:
             raise InputError(f"{path} was written by another release: begin the training again")
         counts = np.array(list(content["points"].values()), dtype=np.int64)
-        pictures, unpacked, described = Path(content["data"]), content["unpacked"], content["source"]
+        pictures, unpacked, stream = Path(content["data"]), content["unpacked"], content["source"]
         configuration_sha256, teacher_sha256 = content["configuration_sha256"], content["teacher_sha256"]
-        source = None if described is None else StreamSource(**(described | {"shards": tuple(described["shards"])}))
+        source = None if stream is None else StreamSource(**(stream | {"shards": tuple(stream["shards"])}))
     except OSError as error:
         raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -181,7 +181,7 @@ def read_run(folder: Path) -> TrainingRun:
 
 
 def check_unused(folder: Path, names: Sequence[str] = _FILES) -> None:
-    """Raise InputError if a folder holds a training, or one of the files `names`, which one would overwrite."""
+    """Raise InputError if a folder holds a training, or one of the files `names`, which a new one would overwrite."""
     if (folder / "run.json").exists():
         raise InputError(f"{folder} holds a training already: vm-train resume {folder}, or give another folder")
     if folder.exists() and not folder.is_dir():

@@ -57,7 +57,7 @@ class TrainingData:
         return batches if self.source is None else assign_lanes(batches, seed, self.source)
 
     def scheduled_graphs(self, configuration: TrainConfiguration) -> PictureGraphs | StreamedGraphs:
-        """The graphs of the items in `batches`. Raises InputError if a picture has left the folder."""
+        """The graphs of the items in `batches`. Raises InputError if a picture is missing."""
         graphs = self.graphs((*self.split.training, *self.split.validation), configuration)
         return graphs if self.source is None else StreamedGraphs(self.source, graphs)
 

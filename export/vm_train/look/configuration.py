@@ -44,7 +44,8 @@ class PatchSettings:
     )
     passes: int = number(
         2,
-        "on the robot: largest number of looks at a proposal; each further look is where the one before saw the center",
+        "on the robot: largest number of looks at a proposal; each further look cuts a new patch "
+        "around the center that the look before found",
         "",
         (1, 4),
     )
@@ -101,13 +102,17 @@ class LookRecipe:
     epochs: int = number(12, "epochs; the network is validated after each epoch", "", (1, 1e6))
     rounds: int = number(
         3,
-        "parts of the training; at the start of each part but the first, the network so far grades all patches without "
+        "rounds of the training; before each round except the first, the current network scores all patches without "
         "an object, and those with larger errors are then drawn more often; 1: all with the same chance",
         "",
         (1, 100),
     )
     floor: float = number(
-        0.05, "added to the error of each such patch; higher: easy ones are drawn more often", "", (1e-3, 100.0)
+        0.05,
+        "with rounds > 1, added to the error of each patch without an object; higher: patches with small errors are "
+        "drawn more often",
+        "",
+        (1e-3, 100.0),
     )
     batch: int = number(256, "patches in a step", "", (2, 1e5))
     positives: float = number(0.33, "share of each batch that shows an object", "", (0.01, 0.99))
