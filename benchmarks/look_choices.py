@@ -39,8 +39,8 @@ from vm_train.look.training import is_finished, train_look
 
 RESULTS = Path(__file__).with_name("look_choices.json")
 SEEDS = (0, 1, 2)
-TRAINING, VALIDATION = 2000, 300
-"""Pictures of each training."""
+TRAINING, VALIDATION, EPOCHS = 1000, 300, 8
+"""Pictures and epochs of each training, which is short, because it only compares choices."""
 
 TESTED = 200
 """Held-out pictures to score each look on."""
@@ -58,7 +58,7 @@ VARIANTS: dict[str, dict[str, dict[str, Any]]] = {
     "8, 16, 32 channels": {"network": {"channels": [8, 16, 32]}},
     "24, 48, 96 channels": {"network": {"channels": [24, 48, 96]}},
     "500 pictures": {"pictures": {"training": 500}},
-    "1000 pictures": {"pictures": {"training": 1000}},
+    "2000 pictures": {"pictures": {"training": 2000}},
     "4000 pictures": {"pictures": {"training": 4000}},
     "7500 pictures": {"pictures": {"training": 7500}},
     "points above 0.1": {"patches": {"above": 0.1}},
@@ -86,7 +86,7 @@ def configuration_of(name: str, seed: int) -> LookConfiguration:
     table = {section: dict(entries) for section, entries in VARIANTS[name].items()}
     for other in ("pictures", "mesh"):
         table.pop(other, None)
-    table.setdefault("training", {})["seed"] = seed
+    table["training"] = {"seed": seed, "epochs": EPOCHS} | table.get("training", {})
     return read_sections(LookConfiguration, NETWORKS / "ball-look.toml", table)
 
 
