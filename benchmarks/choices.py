@@ -30,7 +30,7 @@ from vm_train.data.split import Split
 from vm_train.learning.configuration import TrainConfiguration
 
 RESULTS = Path(__file__).with_name("choices.json")
-BASE = Path(__file__).parents[1] / "export" / "networks" / "ball-small.toml"
+BASE = Path(__file__).with_name("choices.toml")
 TRAINING, VALIDATION = 2000, 200
 """Pictures of each training."""
 
