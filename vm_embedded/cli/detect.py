@@ -39,8 +39,8 @@ def parser() -> argparse.ArgumentParser:
         "camera: 0, a signal such as Ctrl-C stopped it, or the played file has ended; 1, a second signal ended it at "
         "once, or the played file has ended and no frame could be processed; 75, reads of the camera hang, and a "
         "restart may help; 78, the configuration can't be used, and a restart would fail again. For --status: 0, the "
-        "state is ok; 1, the state is not ok, or nothing answers. Always: 2, the options can't be parsed. Without a "
-        "running live camera: 130, interrupted with Ctrl-C. " + ANGLES,
+        "state is ok; 1, the state is not ok, or nothing answers. Always: 2, the options can't be parsed; "
+        "130, Ctrl-C before a live camera runs, or without one. " + ANGLES,
     )
     parser.add_argument(
         "--camera",

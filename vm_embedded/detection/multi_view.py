@@ -57,6 +57,7 @@ def detect_views(
     - the cameras differ, the plane is the same, and the detections lie less than a diameter apart;
     - the camera is the same, the planes differ, and the angle between the detections' directions is less than the
       larger of their angular radii.
+
     The detections nearest to each other, relative to these limits, are joined first. An object has at most one
     detection of each camera on each plane. In the second case, only one plane can be right. For each plane, the
     confidences of all its detections of this object, from all cameras, are added. The largest sum wins. A camera behind

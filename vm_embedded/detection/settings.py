@@ -23,8 +23,8 @@ class Settings:
     height_tolerance: float = number(
         0.5,
         "a new camera height gets its own mesh if the number of rings across an object changes by more than this; "
-        "0, as in the reference: each frame gets a mesh for its exact height, with a fixed heading instead of the "
-        "camera's; slower",
+        "0: each frame gets a mesh for its exact height, and the mesh does not turn with the camera's yaw (as in the "
+        "reference; slower)",
         "rings",
         (0.0, 2.0),
     )
