@@ -40,7 +40,7 @@ def parser() -> argparse.ArgumentParser:
         "once, or the played file has ended and no frame could be processed; 75, reads of the camera hang, and a "
         "restart may help; 78, the configuration can't be used, and a restart would fail again. For --status: 0, the "
         "state is ok; 1, the state is not ok, or nothing answers. Always: 2, the options can't be parsed; "
-        "130, Ctrl-C before a live camera runs, or without one. " + ANGLES,
+        "130, Ctrl-C while files are processed, or before the live camera runs. " + ANGLES,
     )
     parser.add_argument(
         "--camera",
