@@ -51,20 +51,16 @@ def plot(found: dict[str, Any]) -> None:
 
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     axes = figure.subplots()
-    by_time = sorted(found["scores"].items(), key=lambda each: found["milliseconds"][each[0]])
-    for place, (name, seeds) in enumerate(by_time):
-        values = [scores["ap50"][NEAR] for scores in seeds.values()]
+    near = {name: [scores["ap50"][NEAR] for scores in seeds.values()] for name, seeds in found["scores"].items()}
+    for place, (name, values) in enumerate(sorted(near.items(), key=lambda each: np.mean(each[1]))):
         time = found["milliseconds"][name]
         color = "#d95f02" if name == "base" else "#7570b3"
         axes.plot([time, time], [min(values), max(values)], color=color, alpha=0.4)
         axes.plot(time, np.mean(values), "o", color=color)
-        axes.annotate(
-            name,
-            (time, float(np.mean(values))),
-            xytext=(4, 3 if place % 2 else -9),
-            textcoords="offset points",
-            fontsize=7,
-        )
+        side, offset = ("left", 5) if place % 2 else ("right", -5)  # names of equal height do not overlap
+        at = (time, float(np.mean(values)))
+        axes.annotate(name, at, xytext=(offset, -2), textcoords="offset points", fontsize=7, ha=side)
+    axes.margins(x=0.15)
     axes.set_xlabel("whole call, median [ms]")
     axes.set_ylabel("AP50, 0.5 to 6 m (line: lowest and highest seed)")
     axes.grid(alpha=0.25)
