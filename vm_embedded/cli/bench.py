@@ -45,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
         + ANGLES,
     )
     add_model(parser)
-    add_pose(parser, "the mean pose of the walking robot; a reference lens file can contain it")
+    add_pose(parser, "the mean pose of the walking robot; a lens file of the reference can contain it")
     work = parser.add_argument_group("work")
     work.add_argument("--image", type=Path, metavar="FILE", help="image to detect in; default: a drawn, empty field")
     work.add_argument(

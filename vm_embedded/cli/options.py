@@ -46,7 +46,9 @@ def add_model(parser: argparse.ArgumentParser) -> None:
 def add_pose(parser: argparse.ArgumentParser, description: str) -> None:
     """Add the options for lens and orientation. description: shown in the help."""
     pose = parser.add_argument_group("lens and orientation", description)
-    pose.add_argument("--lens", type=Path, metavar="FILE", help="lens file: reference or calibration YAML, or TOML")
+    pose.add_argument(
+        "--lens", type=Path, metavar="FILE", help="lens file: YAML of the reference or of a calibration, or TOML"
+    )
     pose.add_argument("--height", metavar="M", help="height of the camera above the ground plane [m]")
     pose.add_argument("--pitch", metavar="ANGLE", help="angle of the optical axis below the horizon [rad]; default 0")
     pose.add_argument("--roll", metavar="ANGLE", help="tilt of the camera to its right side [rad]; default 0")

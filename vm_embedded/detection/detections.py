@@ -26,11 +26,11 @@ class Detection:
     the same area as its outline. outline (m, 2) [px]: the part that the lens sees. bearing (3,): unit vector from the
     camera to its center. position (3,) [m]: its center: where the bearing meets the plane that is parallel to the
     observation plane, at the height of the object's center. distance [m]: from the camera to this center.
-    angular_radius [rad]: angle from its center to its outline; with a close look for the size that it saw, without one
-    for the size that fits the points best. distance_by_angle [m]: distance that follows from `angular_radius` and the
-    real radius. distances_agree: whether the two distances agree: they differ by at most 20 % with a close look,
-    otherwise by less than the mesh can resolve. points: number of mesh points inside its outline. reason: why it was
-    rejected, or None.
+    angular_radius [rad]: angle from its center to its outline. With a close look, it follows from the size that the
+    close look saw; without one, from the size that fits the points best. distance_by_angle [m]: distance that follows
+    from `angular_radius` and the real radius. distances_agree: whether the two distances agree: they differ by at most
+    20 % with a close look, otherwise by less than the mesh can resolve. points: number of mesh points inside its
+    outline. reason: why it was rejected, or None.
     """
 
     class_name: str

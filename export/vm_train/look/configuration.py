@@ -45,7 +45,7 @@ class PatchSettings:
     passes: int = number(
         2,
         "on the robot: largest number of looks at a proposal; each further look cuts a new patch "
-        "around the center that the look before found",
+        "around the center that the previous look found",
         "",
         (1, 4),
     )
