@@ -92,7 +92,7 @@ def proposals(found: dict[str, Any]) -> str:
 
 
 def grid(found: dict[str, Any]) -> str:
-    """The earlier `ball-best` on each lens, size and height: balls found, and false ones.
+    """A network on each lens, size and height: balls found, and false ones.
 
     The paper: with less information, the accuracy declines (section "Discussion and Conclusion").
     """

@@ -170,7 +170,7 @@ def _solve_by_halving(coordinate: _Coordinate, u: Floats, v: Floats) -> tuple[Fl
     low, high = np.zeros(len(u)), coordinate(u, 0.0)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        # With F(x) = coordinate(u, coordinate(v, x)), the solution has F(x) = x. F is larger than a smaller x.
+        # F(x) = coordinate(u, coordinate(v, x)) is larger than x if x is below the solution, smaller if x is above it.
         too_large = coordinate(u, coordinate(v, middle)) < middle
         low, high = np.where(too_large, low, middle), np.where(too_large, middle, high)
     x = 0.5 * (low + high)

@@ -84,9 +84,9 @@ def ring_counts(shape: Shape, height: float, intersections: float, rings: int) -
 def ring_places(counts: Indices) -> tuple[Indices, Indices]:
     """Where rings begin, and where points are in them.
 
-    counts: (rings,) number of points in each ring. Returns two arrays. The first
-    (rings + 1,) has the first point of each ring, then the number n of all points. The second (n,) has each point's
-    place in its ring, from 0.
+    counts: (rings,) number of points in each ring. Returns two arrays. The first (rings + 1,) has
+    the first point of each ring, then the number n of all points. The second (n,) has each point's place in its ring,
+    from 0.
     """
     start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     return start, np.arange(start[-1], dtype=np.int32) - np.repeat(start[:-1], counts)

@@ -24,8 +24,8 @@ OFF_SCREEN = np.float32(-1.0)
 class Layout(ABC):
     """The n points of a mesh, laid out in m slots.
 
-    A slot holds a point, a copy of a point, or nothing; an empty slot is a gap. Used as a
-    mesh.PointGraph, its points are the slots. All links lead to original points, never to copies.
+    A slot holds a point, a copy of a point, or nothing; an empty slot is a gap. Used as a mesh.PointGraph,
+    its points are the slots. All links lead to original points, never to copies.
 
     slots: (m,) point of each slot; n in gaps. places: (n,) slot of each point. original: (m,) True for the slots in
     `places`, False for gaps and copies. rays: (m, 3) of the slots' points, NaN in gaps.
