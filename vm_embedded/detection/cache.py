@@ -108,17 +108,21 @@ class MeshCache:
         """The points that an orientation of this bucket can bring on screen.
 
         An orientation differs from the bucket's middle by at most half a step of pitch plus half a step of roll, and
-        from the middle of its quarter by half of that. So the quarters keep fewer points than the whole bucket, which
-        goes first only to leave fewer points to test.
+        from the middle of its quarter by half of that. So testing the four quarters keeps fewer points than testing
+        the whole bucket. The whole bucket is tested first only to save time: it leaves fewer points for the four tests.
         """
         mesh = self._look_up(height, lambda: self._build(height), counted=False)
         pitch_step, roll_step = self.settings.pitch_step, self.settings.roll_step
 
-        def possible(part: Mesh, up: float, lean: float, share: float) -> Mask:
-            """The points for the bucket's part with this middle and share of its steps."""
+        def possible(points: Mesh, up: float, lean: float, half_width: float) -> Mask:
+            """Which points may be on screen in a piece of the bucket.
+
+            Its middle is `up` pitch steps and `lean` roll steps from the bucket's middle. It reaches `half_width` steps
+            to each side.
+            """
             middle = Orientation.from_roll_pitch(height, (roll + lean) * roll_step, (pitch + up) * pitch_step)
-            slack = share * (pitch_step + roll_step) + _ROUNDING
-            return may_be_on_screen(part, middle.rotation, lens, size, slack)
+            slack = half_width * (pitch_step + roll_step) + _ROUNDING
+            return may_be_on_screen(points, middle.rotation, lens, size, slack)
 
         part = mesh.part(np.flatnonzero(possible(mesh, 0.0, 0.0, 0.5)))
         quarters = [possible(part, up, lean, 0.25) for up in (-0.25, 0.25) for lean in (-0.25, 0.25)]

@@ -40,10 +40,10 @@ class Tangents:
         distance = np.linalg.norm(centers, axis=1)
         axes = centers / distance[:, None]
         x, y, z = axes.T
-        level = np.hypot(x, y)
-        # Straight below the camera every direction is level; "ahead" is that in which the mesh frame's x points.
-        level, ahead, left = np.where(level > 1e-9, (level, x, y), ((1.0,), (1.0,), (0.0,)))
-        right_x, right_y = left / level, -ahead / level
+        horizontal = np.hypot(x, y)
+        # Straight below the camera no horizontal direction is ahead of another, so the mesh frame's x axis is taken.
+        horizontal, ahead, left = np.where(horizontal > 1e-9, (horizontal, x, y), ((1.0,), (1.0,), (0.0,)))
+        right_x, right_y = left / horizontal, -ahead / horizontal
         right = np.stack([right_x, right_y, np.zeros_like(x)], axis=1)
         down = np.stack([-z * right_y, z * right_x, x * right_y - y * right_x], axis=1)  # axes x right
         radius = view.shape.radius / np.sqrt(np.maximum(distance**2 - view.shape.radius**2, 1e-12))

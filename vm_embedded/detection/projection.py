@@ -87,7 +87,8 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     """The points (n,) that are on screen for a camera turned by up to `slack` [rad] from `rotation`.
 
     It may keep too many points, but never too few. A turn by `slack` moves a pixel by at most slack *
-    `_pixels_per_radian`, so points farther off the picture are left out. A point outside of the lens's view is first
+    `_pixels_per_radian` (pi times as much if the view is wider than half a sphere). Points farther off the picture are
+    left out. A point outside of the lens's view is first
     moved to the edge of the view.
     """
     reach = _view_angle(lens, size)
@@ -102,7 +103,8 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     camera[:, 1] *= inward
     camera[:, 2] *= inward
     camera[:, 0] = cosine
-    # Within a view of more than half the sphere the way around the axis can be longer than the turn.
+    # If the view is wider than half a sphere, the shortest way of a turn may lead through directions behind the camera,
+    # out of the view. The way within the view is longer, at most pi times.
     detour = 1.0 if reach <= np.pi / 2 else np.pi
     margin = detour * slack * _pixels_per_radian(lens, size)
     possible = np.zeros(len(mesh), dtype=bool)

@@ -4,8 +4,8 @@ The camera is at the height h over the plane and the object's center at the heig
 inclination n objects out, seen from the height h (`Shape.phi`). The points have coordinates x and y at the height c.
 
 Take a line at the height c, parallel to an axis, at the distance d from the vertical through the camera. The plane
-through the line and the camera is a *slice*. In the slice the camera is slant = sqrt(g^2 + d^2) away from the line, as
-it is g above the height c straight below. So n objects out, a point of the line has
+through the line and the camera is a *slice*. In the slice, the camera is slant = sqrt(g^2 + d^2) away from the line.
+For d = 0 this is g; for any other d, slant takes the place of g. So n objects out, a point of the line has
 
     coordinate(n, d) = slant tan(phi(n, slant + c)).
 
@@ -199,7 +199,7 @@ def _within(points: Floats, border: Floats) -> Mask:
     The border runs from the first axis to the second. It is drawn as a polygon, and each point looks up its pixel.
     """
     width, height = (math.ceil(each) + 3 for each in border.max(axis=0))
-    # The outline also has the origin, and the border's end moved onto the second axis, which rounding misses a little.
+    # Rounding errors make the u of the border's last point slightly larger than 0, so the outline has it with 0 too.
     outline = np.concatenate([[[0.0, 0.0]], border, [[0.0, border[-1, 1]]]])
     inside = np.zeros((height, width), dtype=np.uint8)
     cv2.fillPoly(inside, [np.rint(outline).astype(np.int32)], 1)

@@ -9,9 +9,10 @@ The words that this file uses:
   of ring6 are left, the point itself and right; top left and top right; bottom left and bottom right. The first group
   of every mesh is left, itself and right: it says which points a run joins.
 - The *middle* of a group is the second slot of a group of three, and the first slot of a shorter group.
-- A *column* is a position in a layer's table (vm_export/runs_graph.py). The table holds, for each group and each slot,
-  a sum over the window of three slots around it. (It leaves out the last slot, a gap.) So a point looks up one value
-  for each group, not for each neighbor.
+- A *column* is a position in a layer's table (vm_export/runs_graph.py). The table holds, for each group, m - 1 sums
+  over windows of three adjacent slots. Column s + 1 is the window around slot s. The first two columns are not used,
+  and the last two slots, which are gaps, have no window. So a point looks up one value for each group, not for each
+  neighbor.
 
 An example. Points 0 1 2 are a part of a ring, points 3 4 5 6 the whole next ring. The groups are left, self and right,
 and two upper neighbors: 3 4 above point 0, 4 5 above point 1, 6 3 above point 2. The m = 23 slots are:
@@ -127,10 +128,10 @@ def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Position
             [np.arange(n) if each == SELF else neighbors[:n, each] for each in group]
         )
         middle, torn = _found_in_runs(members, group_offsets(group), runs, slot_of)
-        copies, copy = np.unique(members[:, torn], axis=1, return_inverse=True)
-        # The copy of a torn group begins at slot count + len(group) * copy. Its middle is one slot later in a group of
+        copies, copy_of = np.unique(members[:, torn], axis=1, return_inverse=True)
+        # The copy of a torn group begins at slot count + len(group) * its copy's number. Its middle is one slot later in a group of
         # three, whose first offset is -1; it is the same slot in a shorter group.
-        middle[:n][torn] = count + len(group) * copy.reshape(-1) - group_offsets(group)[0]
+        middle[:n][torn] = count + len(group) * copy_of.reshape(-1) - group_offsets(group)[0]
         parts.append(copies.T.reshape(-1))
         count += copies.size
         middles.append(middle)
@@ -162,8 +163,9 @@ def _in_runs(left: Indices, right: Indices) -> _Positions:
     """The point in each slot of the runs; n in gaps. Three gaps come first, and one gap follows each run.
 
     left, right: neighbors (n,) of each point. A *piece* is a sequence of points i, i + 1, ... each linked to the
-    next. numpy finds all pieces at once, and a loop only joins pieces to runs. A ring that the view cuts in two
-    has two pieces.
+    next. numpy finds all pieces at once, and a loop only joins pieces to runs. For example, a view
+    shows the first three and the last three points of a ring: two pieces. The ring's last point is linked to its
+    first, so the two pieces become one run.
     """
     n = len(left)
     points = np.arange(n)
