@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import onnx
@@ -14,9 +14,8 @@ from onnx import helper
 import vm_embedded
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.network.close_look import CloseLook
-from vm_embedded.network.look_contract import LOOK_KEY, LookTest
+from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY, LookContract, LookTest
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
-from vm_embedded.network.model_file import ModelFile
 
 from .look_checkpoint import LookCheckpoint
 from .look_graph import look_model
@@ -26,36 +25,42 @@ _CHECKED_PATCHES = (0, 1, 2, 7, 40)
 
 
 def attached(content: bytes, manifest: Manifest, look: LookCheckpoint) -> tuple[bytes, float]:
-    """A model file's bytes with a look network, and the largest difference of its answers to torch.
+    """A model file's bytes with a look network and its glance, and the largest difference of an answer to torch.
 
-    content, manifest: of the model file. A look network that it already has is replaced. The look's examples become its
-    self-test. Raises ModelError if the look judges another class than the file's objects.
+    content, manifest: of the model file. A look network that it already has is replaced. The examples become the
+    self-tests. Raises ModelError if the look judges another class than the file's objects.
     """
+    contract, look_content, difference = _exported(look)
+    files = {LOOK_KEY: look_content}
+    if look.glance is not None:
+        glance, files[GLANCE_KEY], glance_difference = _exported(look.glance)
+        contract, difference = replace(contract, glance=glance), float(np.maximum(difference, glance_difference))
+    return _with_metadata(content, replace(manifest, look=contract), files), difference
+
+
+def _exported(look: LookCheckpoint) -> tuple[LookContract, bytes, float]:
+    """The contract of a look network with its self-test, its ONNX file, and the largest difference to torch."""
     network = look.network.eval()
+    content = look_model(network)
     contract = replace(
         look.contract,
         self_test=LookTest(look.examples, _answers(network, look.examples)),
         provenance={**look.contract.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"},
     )
-    manifest = replace(manifest, look=contract)
-    look_content = look_model(network)
-    difference = largest_look_difference(look_content, look, manifest)
-    return _with_metadata(content, manifest, look_content), difference
+    return contract, content, largest_look_difference(content, look)
 
 
 def detached(content: bytes, manifest: Manifest) -> bytes:
     """A model file's bytes without its look network. content, manifest: of the model file."""
-    return _with_metadata(content, replace(manifest, look=None), None)
+    return _with_metadata(content, replace(manifest, look=None), {})
 
 
-def largest_look_difference(content: bytes, look: LookCheckpoint, manifest: Manifest) -> float:
+def largest_look_difference(content: bytes, look: LookCheckpoint) -> float:
     """The largest difference of an answer between ONNX Runtime and torch; NaN if there is an answer that is NaN.
 
-    content: the bytes of `look_model`. manifest: describes the look. The patches are random, plain, and the examples.
+    content: the bytes of `look_model`. The patches are random, plain, and the examples.
     """
-    assert manifest.look is not None
-    described = replace(manifest, look=replace(manifest.look, self_test=None))
-    session = CloseLook(ModelFile(Path("the new file"), b"", described, "", content))
+    session = CloseLook("the new close look", look.contract, content)
     random, size = np.random.default_rng(0), look.contract.size
     batches = [random.integers(0, 256, (count, size, size, 3), dtype=np.uint8) for count in _CHECKED_PATCHES]
     plain = np.broadcast_to(np.array([0, 1, 254, 255], dtype=np.uint8)[:, None, None, None], (4, size, size, 3))
@@ -71,12 +76,14 @@ def _answers(network: LookNetwork, patches: Image) -> Singles:
     return answers
 
 
-def _with_metadata(content: bytes, manifest: Manifest, look: bytes | None) -> bytes:
-    """A model file's bytes with another manifest and look network. The graph and other metadata stay as they are."""
+def _with_metadata(content: bytes, manifest: Manifest, files: Mapping[str, bytes]) -> bytes:
+    """A model file's bytes with another manifest and these inner files. The graph and other metadata stay as they are.
+
+    files: of the look network and its glance, by key.
+    """
     model = onnx.load_from_string(content)
-    metadata = {each.key: each.value for each in model.metadata_props if each.key != LOOK_KEY}
+    metadata = {each.key: each.value for each in model.metadata_props if each.key not in (LOOK_KEY, GLANCE_KEY)}
     metadata[METADATA_KEY] = manifest.as_json()
-    if look is not None:
-        metadata[LOOK_KEY] = base64.b64encode(look).decode()
+    metadata |= {key: base64.b64encode(file).decode() for key, file in files.items()}
     helper.set_model_props(model, metadata)
     return bytes(model.SerializeToString(deterministic=True))

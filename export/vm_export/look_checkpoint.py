@@ -1,9 +1,11 @@
-"""Checkpoints of look networks: weights, contract and examples in one .pt file of plain values and tensors."""
+"""Checkpoints of look networks: weights, contract, examples and glance in one .pt file of plain values and tensors."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -15,20 +17,22 @@ from vm_embedded.network.look_contract import LookContract
 from .look_network import LookNetwork, LookShape
 from .torch_files import load_values, save_values
 
-_FORMAT = "vm-embedded look 1"
+_FORMAT = "vm-embedded look 2"
 
 
 @dataclass(frozen=True, eq=False)
 class LookCheckpoint:
     """A trained look network, its contract, which has no self-test yet, and patches for that test.
 
-    examples: uint8 (k, size, size, 3), RGB, from validation pictures; at least one. Raises ModelError if the parts do
-    not fit each other.
+    examples: uint8 (k, size, size, 3), RGB, from validation pictures; at least one. glance: the checkpoint of the
+    network that goes before it, whose contract is also in `contract`. Raises ModelError if the parts do not fit each
+    other.
     """
 
     network: LookNetwork
     contract: LookContract
     examples: Image
+    glance: LookCheckpoint | None = None
 
     def __post_init__(self) -> None:
         shape, contract = self.network.shape, self.contract
@@ -43,17 +47,22 @@ class LookCheckpoint:
                 f"examples of a look network must be one or more uint8 patches of {sides}, not "
                 f"{self.examples.dtype} {self.examples.shape}"
             )
+        if contract.glance != (self.glance and self.glance.contract):
+            raise ModelError("the glance of the look network is not the one in its contract")
 
     def save(self, path: str | Path) -> None:
         """Write the checkpoint. Raises InputError."""
-        content = {
-            "format": _FORMAT,
+        save_values(path, {"format": _FORMAT} | self._as_dict())
+
+    def _as_dict(self) -> dict[str, Any]:
+        """Plain values and tensors. The contract of the glance is in the glance's own part."""
+        return {
             "network": self.network.shape.as_dict(),
-            "contract": replace(self.contract, self_test=None).as_dict(),
+            "contract": replace(self.contract, glance=None, self_test=None).as_dict(),
             "examples": torch.from_numpy(np.ascontiguousarray(self.examples)),
             "state": self.network.state_dict(),
+            "glance": None if self.glance is None else self.glance._as_dict(),
         }
-        save_values(path, content)
 
     @classmethod
     def load(cls, path: str | Path) -> LookCheckpoint:
@@ -63,10 +72,17 @@ class LookCheckpoint:
             found = content.get("format") if isinstance(content, dict) else None
             raise InputError(f"{path} is not a checkpoint of format {_FORMAT!r}; its format is {found!r}")
         try:
-            network = LookNetwork(LookShape.from_dict(content["network"]))
-            network.load_state_dict(content["state"])
-            return cls(network.eval(), LookContract.from_dict(content["contract"]), content["examples"].numpy())
+            return cls._from_dict(content)
         except (RuntimeError, KeyError, TypeError, AttributeError) as error:
             raise InputError(f"{path}: its parts do not fit each other: {one_line(error)}") from error
         except (InputError, ModelError) as error:
             raise type(error)(f"{path}: {error}") from error
+
+    @classmethod
+    def _from_dict(cls, content: Mapping[str, Any]) -> LookCheckpoint:
+        """Inverse of `_as_dict`."""
+        network = LookNetwork(LookShape.from_dict(content["network"]))
+        network.load_state_dict(content["state"])
+        glance = None if content["glance"] is None else cls._from_dict(content["glance"])
+        contract = replace(LookContract.from_dict(content["contract"]), glance=glance.contract if glance else None)
+        return cls(network.eval(), contract, content["examples"].numpy(), glance)

@@ -35,7 +35,7 @@ class Detector:
         self.settings = settings or Settings()
         self.manifest = model.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         self.session = Session(model, self.settings.threads, self.settings.spinning)
-        self.look = CloseLook(model, self.settings.threads, self.settings.spinning) if self.manifest.look else None
+        self.look = CloseLook.of(model, self.settings.threads, self.settings.spinning)
         self.cache = MeshCache(self.manifest, self.settings)
         self.shape = self.manifest.object_shape
 

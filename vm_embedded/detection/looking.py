@@ -1,7 +1,8 @@
 """The close look: a small network decides about each proposal of the mesh network.
 
 It sees a patch of the picture in which the proposed object would fill the same disk at every distance. It says how
-probable the object is, where its center is, and how large it is. Then it looks again, where it saw the center.
+probable the object is, where its center is, and how large it is. Then it looks again, where it saw the center. A
+still smaller network, the glance, may go before it and leave out what is clearly nothing.
 """
 
 from __future__ import annotations
@@ -33,6 +34,9 @@ class Look(Protocol):
 
     @property
     def contract(self) -> LookContract: ...
+
+    @property
+    def glance(self) -> Look | None: ...
 
     def run(self, patches: Image) -> Singles:
         """Answers (n, 4) to patches (n, size, size, 3), RGB uint8.
@@ -78,18 +82,19 @@ def look_closely(
 
 
 def look_at(observation: Observation, look: Look, centers: Floats) -> tuple[Floats, Singles]:
-    """Look at places with centers (c, 3) [m] in the mesh frame, as often as the contract says.
+    """Look at places with centers (c, 3) [m] in the mesh frame, as often as the contracts of look and glance say.
 
     From the second look on, the answers to a patch and to its mirror image are averaged. Returns the centers (c, 3)
-    that the network saw, and its answers (c, 4), as `CloseLook.run` gives them.
+    that the last network saw, and its answers (c, 4), as `CloseLook.run` gives them.
     """
-    view, contract = observation.view, look.contract
+    view = observation.view
+    networks = [each for each in (look.glance, look) if each for _ in range(each.contract.passes)]
     centers, answers = centers.copy(), np.zeros((len(centers), 4), dtype=np.float32)
     worth = np.arange(len(centers))
-    for number in range(contract.passes):
-        tangents = Tangents.at(view, centers[worth])
+    for number, network in enumerate(networks):
+        tangents, contract = Tangents.at(view, centers[worth]), network.contract
         patches = cut_patches(observation.pyramid, patch_nodes(view, tangents, contract.extent), contract.size)
-        answers[worth] = found = _mean_of_mirrored(look, patches) if number else look.run(patches)
+        answers[worth] = found = _mean_of_mirrored(network, patches) if number else network.run(patches)
         rays = tangents.rays(found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
         centers[worth] = view.shape.center_along(rays, view.height)
         worth = worth[(found[:, 0] > _WORTH) & (rays[:, 2] < 0.0)]

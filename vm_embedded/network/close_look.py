@@ -1,4 +1,8 @@
-"""The look network of a model file, ready to run. It judges each proposal of the mesh network."""
+"""The look network of a model file, ready to run. It judges each proposal of the mesh network.
+
+A smaller network, the glance, may judge the proposals first. Most of them are so clearly nothing that it can tell, and
+the look network has time for the rest.
+"""
 
 from __future__ import annotations
 
@@ -6,29 +10,44 @@ import numpy as np
 
 from ..arrays import Image, Singles
 from ..errors import ModelError
-from .look_contract import ANSWERS
+from .look_contract import ANSWERS, LookContract
 from .model_file import ModelFile
 from .onnx_model import OnnxModel
 
 
 class CloseLook:
-    """A loaded look network.
+    """A loaded look network, and its glance, if it has one.
 
-    threads, spinning: see OnnxModel. Loading runs the self-test. Raises ModelError if the model file has no look
-    network, or if it does not load, has other inputs and outputs than its manifest says, or fails the self-test.
+    name: for messages. content: its ONNX file. threads, spinning: see OnnxModel. Loading runs the self-test. Raises
+    ModelError if it does not load, has other inputs and outputs than its contract says, or fails the self-test.
     """
 
-    def __init__(self, model: ModelFile, threads: int = 1, spinning: bool = False) -> None:
-        if model.manifest.look is None or model.look is None:
-            raise ModelError(f"{model.path}: has no close look")
-        self.contract = model.manifest.look
-        size = self.contract.size
+    def __init__(
+        self,
+        name: str,
+        contract: LookContract,
+        content: bytes,
+        glance: CloseLook | None = None,
+        threads: int = 1,
+        spinning: bool = False,
+    ) -> None:
+        self.contract, self.glance = contract, glance
+        size = contract.size
         interface = {"patches": ("tensor(uint8)", [size, size, 3]), "answers": ("tensor(float)", [len(ANSWERS)])}
-        name = f"{model.path}, close look"
-        self.onnx = OnnxModel(name, model.look, interface, "answers", threads, spinning)
-        test = self.contract.self_test
+        self.onnx = OnnxModel(name, content, interface, "answers", threads, spinning)
+        test = contract.self_test
         if test is not None:
             self.onnx.check_answer(self.run(test.patches), test.answers)
+
+    @classmethod
+    def of(cls, model: ModelFile, threads: int = 1, spinning: bool = False) -> CloseLook | None:
+        """The look network of a model file, None if it has none. Raises ModelError."""
+        contract, glance = model.manifest.look, None
+        if contract is None or model.look is None:
+            return None
+        if contract.glance is not None and model.glance is not None:
+            glance = cls(f"{model.path}, glance", contract.glance, model.glance, None, threads, spinning)
+        return cls(f"{model.path}, close look", contract, model.look, glance, threads, spinning)
 
     def run(self, patches: Image) -> Singles:
         """Answers (n, 4) to patches (n, size, size, 3), RGB. Raises ModelError, also for answers that are not finite.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,9 @@ from ..errors import ModelError
 
 LOOK_KEY = "visual_mesh_look"
 """Key of the look network, an ONNX file as base64, in the metadata of a model file."""
+
+GLANCE_KEY = "visual_mesh_glance"
+"""Key of its glance, in the same form."""
 
 ANSWERS = ("probability", "right", "down", "size")
 """Outputs of a look network for a patch; see CloseLook.run."""
@@ -47,7 +50,7 @@ class LookTest:
 
 @dataclass(frozen=True, kw_only=True)
 class LookContract:
-    """What the runtime must know to cut patches for a look network.
+    """What the runtime must know to cut patches for a look network, or for the glance before it.
 
     object_class: name of the class that it judges.
     size: samples along each side of a patch, 8 to 128.
@@ -56,6 +59,8 @@ class LookContract:
     passes: largest number of looks at a proposal, 1 to 4; each further look judges a new patch around
         the center that the previous look found, and its mirror image.
     channels: of the network's convolutions at each resolution; the runtime does not use them.
+    glance: of a smaller look network for the same class, which judges each proposal first; this one judges only what
+        is left. A glance has none.
     self_test: an example with its answers, which each loading of the model file runs.
     provenance: origin of the network; the runtime does not use it.
 
@@ -68,6 +73,7 @@ class LookContract:
     above: float
     passes: int
     channels: tuple[int, ...] = ()
+    glance: LookContract | None = None
     self_test: LookTest | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)
 
@@ -85,12 +91,22 @@ class LookContract:
             if not right_kind or not low <= value <= high:
                 kind = "a whole number" if whole else "a number"
                 raise ModelError(f"{name} of the close look must be {kind} from {low} to {high}, not {value!r}")
+        if self.glance is None:
+            return
+        if self.glance.object_class != self.object_class:
+            raise ModelError(
+                f"the close look judges class {self.object_class!r}, its glance class {self.glance.object_class!r}; "
+                "both must judge the same one"
+            )
+        if self.glance.glance is not None:
+            raise ModelError("the glance of the close look has a glance, too; only a close look can have one")
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         data = {each.name: getattr(self, each.name) for each in fields(self)}
         return data | {
             "channels": list(self.channels),
+            "glance": None if self.glance is None else self.glance.as_dict(),
             "provenance": dict(self.provenance),
             "self_test": None if self.self_test is None else self.self_test.as_dict(),
         }
@@ -107,8 +123,8 @@ class LookContract:
             provenance = {str(key): str(value) for key, value in data["provenance"].items()}
         except (TypeError, ValueError, OverflowError, AttributeError) as error:
             raise ModelError(f"look in the model's manifest has malformed channels or provenance: {error}") from error
-        contract = cls(**data | {"channels": channels, "provenance": provenance, "self_test": None})
+        glance = None if data["glance"] is None else cls.from_dict(data["glance"])
+        contract = cls(**data | {"channels": channels, "glance": glance, "provenance": provenance, "self_test": None})
         if data["self_test"] is None:
             return contract
-        test = LookTest.from_dict(data["self_test"], contract.size)
-        return cls(**data | {"channels": channels, "provenance": provenance, "self_test": test})
+        return replace(contract, self_test=LookTest.from_dict(data["self_test"], contract.size))

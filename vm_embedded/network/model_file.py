@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import ModelError
-from .look_contract import LOOK_KEY
+from .look_contract import GLANCE_KEY, LOOK_KEY, LookContract
 from .manifest import METADATA_KEY, Manifest
 
 # Fields of a message that hold further messages, by the numbers of onnx.proto: every place that can hold a tensor.
@@ -35,13 +35,15 @@ _DEEPEST = 64
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A model file's bytes, its manifest, the SHA-256 of the bytes, and the ONNX file of its look network, if any."""
+    """A model file's bytes, its manifest, the SHA-256 of the bytes, and the ONNX files of its look network and of the
+    glance before it, if any."""
 
     path: Path
     content: bytes
     manifest: Manifest
     sha256: str
     look: bytes | None = None
+    glance: bytes | None = None
 
 
 def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
@@ -63,24 +65,26 @@ def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
         if METADATA_KEY not in metadata:
             raise ModelError("no Visual Mesh manifest in its metadata; was it written by vm-export?")
         manifest = Manifest.from_json(metadata[METADATA_KEY])
-        look = _look(metadata, manifest)
+        contract = manifest.look
+        look = _inner_file(metadata, LOOK_KEY, "close look", contract)
+        glance = _inner_file(metadata, GLANCE_KEY, "glance", contract and contract.glance)
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from error
-    return ModelFile(path, content, manifest, hashlib.sha256(content).hexdigest(), look)
+    return ModelFile(path, content, manifest, hashlib.sha256(content).hexdigest(), look, glance)
 
 
-def _look(metadata: dict[str, str], manifest: Manifest) -> bytes | None:
-    """The ONNX file of the look network, if the manifest describes one. Raises ModelError."""
-    if (LOOK_KEY in metadata) != (manifest.look is not None):
-        has, lacks = ("manifest", "metadata") if manifest.look else ("metadata", "manifest")
-        raise ModelError(f"its {has} has a close look, its {lacks} has none")
-    if manifest.look is None:
+def _inner_file(metadata: dict[str, str], key: str, name: str, contract: LookContract | None) -> bytes | None:
+    """The ONNX file under a key, if the manifest has a contract for it. name: for messages. Raises ModelError."""
+    if (key in metadata) != (contract is not None):
+        has, lacks = ("manifest", "metadata") if contract else ("metadata", "manifest")
+        raise ModelError(f"its {has} has a {name}, its {lacks} has none")
+    if contract is None:
         return None
     try:
-        content = base64.b64decode(metadata[LOOK_KEY], validate=True)
+        content = base64.b64decode(metadata[key], validate=True)
         _metadata(content)
     except (ModelError, binascii.Error, ValueError) as error:
-        raise ModelError(f"its close look can't be read: {error}") from error
+        raise ModelError(f"its {name} can't be read: {error}") from error
     return content
 
 

@@ -129,8 +129,8 @@ def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Position
         )
         middle, torn = _found_in_runs(members, group_offsets(group), runs, slot_of)
         copies, copy_of = np.unique(members[:, torn], axis=1, return_inverse=True)
-        # The copy of a torn group begins at slot count + len(group) * its copy's number. Its middle is one slot later in a group of
-        # three, whose first offset is -1; it is the same slot in a shorter group.
+        # The copy of a torn group begins at slot count + len(group) * its copy's number. Its middle is one slot later
+        # in a group of three, whose first offset is -1; it is the same slot in a shorter group.
         middle[:n][torn] = count + len(group) * copy_of.reshape(-1) - group_offsets(group)[0]
         parts.append(copies.T.reshape(-1))
         count += copies.size

@@ -38,6 +38,12 @@ def look_parser() -> argparse.ArgumentParser:
         help="mesh network whose proposals it judges: a checkpoint (.pt), a model file (.onnx), or a network of the "
         f"package ({', '.join(SHIPPED)})",
     )
+    made.add_argument(
+        "--glance",
+        type=Path,
+        metavar="LOOK",
+        help="small close look (look.pt) that goes first; the new one looks only at what it leaves, and contains it",
+    )
     made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
     made.add_argument(
         "--config", type=Path, metavar="FILE", help="configuration, look.toml; missing entries keep their defaults"
@@ -83,7 +89,8 @@ def run_look(options: argparse.Namespace) -> int:
     numbers = [each.number for each in find_pictures(options.data)]
     split = split_by_seed(numbers, configuration.data.validation, 0.0, configuration.data.split_seed)
     strict, threads = options.strict, options.threads or 1
-    run = begin_look_run(options.output, options.data, split, configuration, model, str(options.model), strict, threads)
+    name, glance = str(options.model), options.glance
+    run = begin_look_run(options.output, options.data, split, configuration, model, name, strict, threads, glance)
     count = len(split.training), len(split.validation)
     print(f"{options.data}: {len(numbers)} pictures: {count[0]} for training, {count[1]} for validation", flush=True)
     return _train(run.folder, None, options)

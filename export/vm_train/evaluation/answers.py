@@ -178,7 +178,7 @@ def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subj
         if as_robot:
             return RobotSubject(Detector(model, settings), model.sha256)
         session = Session(model, settings.threads, settings.spinning)
-        look = CloseLook(model, settings.threads, settings.spinning) if model.manifest.look else None
+        look = CloseLook.of(model, settings.threads, settings.spinning)
         return ExactSubject(model.manifest, VISUAL, model.sha256, settings, session, look)
     if kind != ".pt":
         raise InputError(f"{path}: a model must be a checkpoint (.pt) or a model file (.onnx), not {path.suffix!r}")

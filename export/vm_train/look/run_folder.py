@@ -1,9 +1,9 @@
 """The folder of a training of a close look: what it was begun with, and what it has produced.
 
 look.toml: the configuration. pictures.json: the split of the pictures. run.json: where the pictures are. mesh.onnx or
-mesh.pt: a copy of the mesh network. patches/: the patches, in chunks. state.pt: the state to resume from. log.jsonl,
-tensorboard/: the record of each step. look.pt: the network. result.json: what it finds in the validation
-pictures, and how often its probabilities are right.
+mesh.pt: a copy of the mesh network. glance.pt: a copy of the glance, if there is one. patches/: the patches, in chunks.
+state.pt: the state to resume from. log.jsonl, tensorboard/: the record of each step. look.pt: the network. result.json:
+what it finds in the validation pictures, and how often its probabilities are right.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.files import atomic_write
+from vm_export.look_checkpoint import LookCheckpoint
 
 from ..data.split import Split, read_split, write_split
 from ..evaluation.answers import ExactSubject, load_subject
@@ -27,12 +28,14 @@ from ..learning.run_folder import check_unused
 from .configuration import LookConfiguration
 
 KIND = "look"
-_FORMAT = 1
+_FORMAT = 2
+_GLANCE = "glance.pt"
 _FILES = (
     "look.toml",
     "pictures.json",
     "mesh.onnx",
     "mesh.pt",
+    "glance.pt",
     "patches",
     "state.pt",
     "log.jsonl",
@@ -46,9 +49,9 @@ _FILES = (
 class LookRun:
     """A training as its folder describes it; `begin_look_run` and `read_look_run` make it.
 
-    data: folder of the pictures. model: the mesh network as the user named it. mesh: its copy. object_class: class to
-    judge. strict: whether a picture that can't be used ends the training. threads: number of computing threads; a
-    resumed training takes the same.
+    data: folder of the pictures. model: the mesh network as the user named it. mesh: its copy. glance_sha256: digest of
+    the glance's checkpoint, None without one. object_class: class to judge. strict: whether a picture that can't be
+    used ends the training. threads: number of computing threads; a resumed training takes the same.
     """
 
     folder: Path
@@ -58,6 +61,7 @@ class LookRun:
     model: str
     mesh: Path
     mesh_sha256: str
+    glance_sha256: str | None
     object_class: str
     strict: bool
     threads: int
@@ -84,13 +88,17 @@ class LookRun:
 
     @property
     def configuration_sha256(self) -> str:
-        """Digest of the configuration, the split and the mesh network."""
-        text = json.dumps([asdict(self.configuration), asdict(self.split), self.mesh_sha256])
+        """Digest of the configuration, the split, the mesh network and the glance."""
+        text = json.dumps([asdict(self.configuration), asdict(self.split), self.mesh_sha256, self.glance_sha256])
         return hashlib.sha256(text.encode()).hexdigest()
 
     def subject(self) -> ExactSubject:
         """The mesh network. Raises InputError or ModelError."""
         return load_mesh(self.mesh)
+
+    def glance(self) -> LookCheckpoint | None:
+        """The network that judges the proposals first, if there is one. Raises InputError or ModelError."""
+        return None if self.glance_sha256 is None else load_glance(self.folder / _GLANCE, self.object_class)
 
 
 def load_mesh(path: Path) -> ExactSubject:
@@ -100,6 +108,18 @@ def load_mesh(path: Path) -> ExactSubject:
     if not subject.grid.is_visual:
         raise InputError(f"{path}: a close look needs a network on the Visual Mesh, not on a {subject.grid.kind} grid")
     return subject
+
+
+def load_glance(path: Path, object_class: str) -> LookCheckpoint:
+    """A look network for this class that can go before another one. Raises InputError or ModelError."""
+    glance = LookCheckpoint.load(path)
+    if glance.contract.object_class != object_class:
+        raise InputError(
+            f"{path} judges class {glance.contract.object_class!r}; a glance for class {object_class!r} is needed"
+        )
+    if glance.glance is not None:
+        raise InputError(f"{path} has a glance itself; a glance must be a single look network")
+    return glance
 
 
 def judged_class(configuration: LookConfiguration, subject: ExactSubject, model: str) -> str:
@@ -128,8 +148,10 @@ def begin_look_run(
     name: str,
     strict: bool = False,
     threads: int = 1,
+    glance: Path | None = None,
 ) -> LookRun:
-    """Write the files of a new training. model: file of the mesh network; name: as the user named it.
+    """Write the files of a new training. model: file of the mesh network; name: as the user named it. glance:
+    checkpoint of the network that goes before the new one.
 
     Raises InputError, also if the folder holds a training, and ModelError.
     """
@@ -137,16 +159,32 @@ def begin_look_run(
     _ = configuration.shape
     subject = load_mesh(model)
     object_class = judged_class(configuration, subject, name)
+    glance_sha256 = None
+    if glance is not None:
+        load_glance(glance, object_class)
+        glance_sha256 = _sha256(glance)
     try:
         (folder / "patches").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
     mesh = folder / f"mesh{model.suffix.lower()}"
     run = LookRun(
-        folder, data.resolve(), split, configuration, name, mesh, subject.sha256, object_class, strict, threads
+        folder,
+        data.resolve(),
+        split,
+        configuration,
+        name,
+        mesh,
+        subject.sha256,
+        glance_sha256,
+        object_class,
+        strict,
+        threads,
     )
-    with atomic_write(mesh) as part:
-        part.write_bytes(model.read_bytes())
+    for source, copy in ((model, mesh), (glance, folder / _GLANCE)):
+        if source is not None:
+            with atomic_write(copy) as part:
+                part.write_bytes(source.read_bytes())
     write_split(folder / "pictures.json", split)
     _write(folder / "look.toml", to_commented_toml(configuration))
     _write(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
@@ -177,6 +215,7 @@ def read_look_run(folder: Path) -> LookRun:
             str(content["model"]),
             folder / str(content["mesh"]),
             str(content["mesh_sha256"]),
+            None if content["glance_sha256"] is None else str(content["glance_sha256"]),
             str(content["object_class"]),
             bool(content["strict"]),
             int(content["threads"]),
@@ -193,6 +232,8 @@ def read_look_run(folder: Path) -> LookRun:
         )
     if run.subject().sha256 != run.mesh_sha256:
         raise InputError(f"{run.mesh} was changed since the training began: begin another one")
+    if run.glance_sha256 is not None and _sha256(folder / _GLANCE) != run.glance_sha256:
+        raise InputError(f"{folder / _GLANCE} was changed since the training began: begin another one")
     return run
 
 
@@ -206,11 +247,19 @@ def _description(run: LookRun) -> dict[str, Any]:
         "model": run.model,
         "mesh": run.mesh.name,
         "mesh_sha256": run.mesh_sha256,
+        "glance_sha256": run.glance_sha256,
         "object_class": run.object_class,
         "strict": run.strict,
         "threads": run.threads,
         "configuration_sha256": run.configuration_sha256,
     }
+
+
+def _sha256(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"can't read {path}: {error.strerror or error}") from error
 
 
 def _write(path: Path, text: str) -> None:

@@ -147,6 +147,7 @@ class _Training:
     def _finish(self, stop_requested: Callable[[], bool]) -> bool:
         """Calibrate the network on what it finds in the validation pictures, and write look.pt. False after a stop."""
         run, network, patches = self._run, self._trainer.network.eval(), self._run.configuration.patches
+        glance = run.glance()
         contract = LookContract(
             object_class=run.object_class,
             size=patches.size,
@@ -154,6 +155,7 @@ class _Training:
             above=patches.above,
             passes=patches.passes,
             channels=run.configuration.network.channels,
+            glance=None if glance is None else glance.contract,
         )
         found = self._judge(network, contract, stop_requested)
         if found is None:
@@ -164,7 +166,8 @@ class _Training:
         logits = self._validate()
         score = LookScore.of(logits, self._collected.validation)
         contract = replace(contract, provenance=self._provenance(score, result))
-        LookCheckpoint(network, contract, _examples(self._collected.validation, logits[:, 0])).save(run.look_path)
+        examples = _examples(self._collected.validation, logits[:, 0])
+        LookCheckpoint(network, contract, examples, glance).save(run.look_path)
         with atomic_write(run.folder / "result.json") as part:
             part.write_text(json.dumps(result.as_dict(), indent=1) + "\n", encoding="utf-8")
         print(f"{run.look_path}: {result}")
