@@ -21,7 +21,7 @@ from .look_contract import LookContract
 from .self_test import SelfTest
 
 METADATA_KEY = "visual_mesh"
-FORMAT_VERSION = 7
+FORMAT_VERSION = 6
 
 KINDS = ("object", "upright", "area", "background")
 """Kinds of classes. object: has the mesh's shape; the runtime locates it. upright, area: the runtime reports its points
