@@ -21,7 +21,7 @@ from .proposals import propose_places
 from .settings import Settings
 from .stopwatch import Stopwatch
 
-_WORTH = 0.02
+WORTH = 0.02
 """Probability above which a proposal is worth another look."""
 
 
@@ -97,7 +97,7 @@ def look_at(observation: Observation, look: Look, centers: Floats) -> tuple[Floa
         answers[worth] = found = _mean_of_mirrored(network, patches) if number else network.run(patches)
         rays = tangents.rays(found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
         centers[worth] = view.shape.center_along(rays, view.height)
-        worth = worth[(found[:, 0] > _WORTH) & (rays[:, 2] < 0.0)]
+        worth = worth[(found[:, 0] > WORTH) & (rays[:, 2] < 0.0)]
         if not len(worth):
             break
     return centers, answers

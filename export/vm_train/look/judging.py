@@ -8,36 +8,20 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import torch
 
-from vm_embedded.arrays import Floats, Image, Mask, Singles
+from vm_embedded.arrays import Floats, Mask
 from vm_embedded.detection.looking import look_closely
 from vm_embedded.detection.patches import Tangents
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.network.look_contract import LookContract
-from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_network import LookNetwork
 
 from .labels import OBJECT, UNLABELED, VISIBLE, label_places
 from .observing import Item, Observer, items_of, results_of
 from .run_folder import LookRun
-
-
-class TorchLook:
-    """A look network in torch in place of a CloseLook, on one thread."""
-
-    def __init__(self, network: LookNetwork, contract: LookContract, glance: LookCheckpoint | None) -> None:
-        torch.set_num_threads(1)
-        self._network, self.contract = network.eval(), contract
-        self.glance = None if glance is None else TorchLook(glance.network, glance.contract, None)
-
-    def run(self, patches: Image) -> Singles:
-        """Answers (n, 4) to patches (n, size, size, 3), as `CloseLook.run` gives them."""
-        with torch.inference_mode():
-            answers: Singles = self._network(torch.from_numpy(patches)).numpy()
-        return answers
+from .torch_look import TorchLook
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +59,7 @@ class Judge:
     def of(cls, run: LookRun, network: LookNetwork, contract: LookContract) -> Judge:
         """The judge of a run. network: not calibrated yet. Raises InputError or ModelError."""
         settings = Settings(max_proposals=run.configuration.patches.proposals, min_confidence=0.0)
-        return cls(Observer.of(run), TorchLook(network, contract, run.glance()), settings)
+        return cls(Observer.of(run), TorchLook(network, contract, TorchLook.of(run.glance())), settings)
 
     def __call__(self, item: Item) -> Found:
         """The objects in a picture; none if it can't be used."""

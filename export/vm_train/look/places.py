@@ -1,4 +1,7 @@
-"""The places that patches are cut at: proposals of the mesh network, places beside true objects, and random places."""
+"""The places that patches are cut at: proposals of the mesh network, places beside true objects, and random places.
+
+With a glance, the proposals are those that it leaves, at the centers that it found.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Image, Singles
+from vm_embedded.detection.looking import Look, look_at
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.patches import Tangents, cut_patches, patch_nodes
 from vm_embedded.detection.prepared_view import PreparedView
@@ -63,9 +67,18 @@ class Places:
         return cut_patches(observation.pyramid, nodes, settings.size)
 
 
-def proposed_places(observation: Observation, probabilities: Singles, settings: PatchSettings) -> Places:
-    """The proposals of a class from the slots' probabilities (m,), best first."""
-    return Places.of(PROPOSED, propose_places(observation, probabilities, settings.above, settings.proposals))
+def proposed_places(
+    observation: Observation, probabilities: Singles, settings: PatchSettings, glance: Look | None, above: float
+) -> Places:
+    """The proposals of a class from the slots' probabilities (m,), best first.
+
+    above: probability above which the glance leaves a proposal. Raises ModelError if the glance does not run.
+    """
+    centers = propose_places(observation, probabilities, settings.above, settings.proposals)
+    if glance is not None:
+        centers, answers = look_at(observation, glance, centers)
+        centers = centers[(answers[:, 0] > above) & (centers[:, 2] < 0.0)]
+    return Places.of(PROPOSED, centers)
 
 
 def jittered_places(view: PreparedView, truths: Truths, settings: PatchSettings, random: np.random.Generator) -> Places:
