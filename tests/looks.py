@@ -9,7 +9,7 @@ import numpy as np
 
 from tests.manifests import ball_manifest
 from vm_embedded.arrays import Image, Singles
-from vm_embedded.network.look_contract import ANSWERS, LOOK_KEY, LookContract
+from vm_embedded.network.look_contract import ANSWERS, GLANCE_KEY, LOOK_KEY, LookContract
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
 MIXTURE = np.array([[0.001, 0.002, 0.003, 0.0], [0.0, 0.001, -0.002, 0.004], [0.002, 0.0, 0.0, 0.001]])
@@ -43,14 +43,15 @@ def small_look(size: int = 8, width: int = len(ANSWERS)) -> bytes:
     return graph.model({"patches": (UINT8, ["n", size, size, 3])}, {"answers": (FLOAT, ["n", width])}, {}, "a test")
 
 
-def model_with(look: bytes | str | None, manifest: Manifest) -> bytes:
-    """A model file whose mesh network nobody runs, with these bytes or this text as its look network."""
+def model_with(look: bytes | str | None, manifest: Manifest, glance: bytes | str | None = None) -> bytes:
+    """A model file whose mesh network nobody runs, with these bytes or texts as its look network and its glance."""
     from vm_export.onnx_graph import FLOAT, OnnxGraph
 
     graph, metadata = OnnxGraph(), {METADATA_KEY: manifest.as_json()}
     graph.node("Identity", ["points"], "probabilities")
-    if look is not None:
-        metadata[LOOK_KEY] = look if isinstance(look, str) else base64.b64encode(look).decode()
+    for key, file in ((LOOK_KEY, look), (GLANCE_KEY, glance)):
+        if file is not None:
+            metadata[key] = file if isinstance(file, str) else base64.b64encode(file).decode()
     return graph.model({"points": (FLOAT, ["n", 3])}, {"probabilities": (FLOAT, ["n", 3])}, metadata, "a test")
 
 

@@ -1,5 +1,7 @@
 """Seeded look networks and their checkpoints."""
 
+from dataclasses import replace
+
 import torch
 
 from tests.looks import look_contract, random_patches
@@ -25,3 +27,9 @@ def look_checkpoint(seed=0, shape=SHAPE, **changes):
     """A checkpoint with three examples; changes: other entries of its contract."""
     contract = look_contract(**{"size": shape.size, "channels": shape.channels} | changes)
     return LookCheckpoint(look_network(seed, shape), contract, random_patches(3, shape.size, seed))
+
+
+def glancing_checkpoint(seed=0):
+    """A checkpoint with a glance of other weights and of 9 x 9 samples."""
+    glance, look = look_checkpoint(seed + 1, LookShape(size=9, channels=(4, 5, 6))), look_checkpoint(seed)
+    return replace(look, contract=replace(look.contract, glance=glance.contract), glance=glance)

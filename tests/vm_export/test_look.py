@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tests.looks import random_patches
 from tests.vm_export.checkpoints import checkpoint, manifest
-from tests.vm_export.looks import SHAPE, look_checkpoint, look_network
+from tests.vm_export.looks import SHAPE, glancing_checkpoint, look_checkpoint, look_network
 from vm_embedded.errors import InputError, ModelError
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
@@ -183,7 +183,7 @@ def test_a_broken_checkpoint_is_refused(tmp_path, content):
 
 def test_a_checkpoint_of_another_kind_is_refused(tmp_path):
     checkpoint().save(tmp_path / "model.pt")
-    with pytest.raises(InputError, match=r"model\.pt is not .* 'vm-embedded look 1'.* 'vm-embedded checkpoint"):
+    with pytest.raises(InputError, match=r"model\.pt is not .* 'vm-embedded look 2'.* 'vm-embedded checkpoint"):
         LookCheckpoint.load(tmp_path / "model.pt")
     look_checkpoint().save(tmp_path / "look.pt")
     with pytest.raises(InputError, match=r"look\.pt is not a checkpoint of format 'vm-embedded checkpoint"):
@@ -237,7 +237,8 @@ def test_a_model_file_holds_both_networks(tmp_path, layout):
     example = export.random_example(mesh.network, 50, 1)
     np.testing.assert_allclose(Session(read).answer(example), example.probabilities[:-1], atol=1e-5)
 
-    close = CloseLook(read)
+    close = CloseLook.of(read)
+    assert close.glance is None
     assert close.contract.provenance["trained_by"] == "a test"
     assert close.contract.provenance["exported_by"].startswith("vm-export")
     np.testing.assert_array_equal(close.contract.self_test.patches, look.examples)
@@ -261,6 +262,40 @@ def test_a_look_replaces_the_one_before(tmp_path):
     export.change_look(tmp_path / "model.onnx", tmp_path / "other.onnx", look_checkpoint(2))
     export.export(ball_checkpoint(), tmp_path / "expected.onnx", look=look_checkpoint(2))
     assert (tmp_path / "other.onnx").read_bytes() == (tmp_path / "expected.onnx").read_bytes()
+
+
+def test_a_model_file_holds_the_glance_too(tmp_path):
+    look = glancing_checkpoint()
+    export.export(ball_checkpoint(), tmp_path / "model.onnx", look=look)
+    close = CloseLook.of(read_model(tmp_path / "model.onnx"))
+    for loaded, made, size in ((close, look, 8), (close.glance, look.glance, 9)):
+        patches = random_patches(7, size, seed=4)
+        np.testing.assert_allclose(loaded.run(patches), torch_answers(made.network, patches), atol=1e-5)
+        np.testing.assert_array_equal(loaded.contract.self_test.patches, made.examples)
+        assert loaded.contract.provenance["exported_by"].startswith("vm-export")
+    export.export(ball_checkpoint(), tmp_path / "without.onnx")
+    export.change_look(tmp_path / "model.onnx", tmp_path / "removed.onnx", None)
+    assert (tmp_path / "removed.onnx").read_bytes() == (tmp_path / "without.onnx").read_bytes()
+
+
+def test_a_glance_that_differs_from_torch_is_not_written(tmp_path, monkeypatch):
+    other, right = look_model(look_network(5, LookShape(9, (4, 5, 6)))), look_model
+    monkeypatch.setattr(attach_look, "look_model", lambda network: other if network.shape.size == 9 else right(network))
+    with pytest.raises(ModelError, match=r"answers of the close look .* differ by"):
+        export.export(ball_checkpoint(), tmp_path / "new.onnx", look=glancing_checkpoint())
+
+
+def test_a_checkpoint_keeps_its_glance(tmp_path):
+    look = glancing_checkpoint()
+    look.save(tmp_path / "look.pt")
+    read = LookCheckpoint.load(tmp_path / "look.pt")
+    assert read.contract == look.contract
+    for found, expected in ((read, look), (read.glance, look.glance)):
+        np.testing.assert_array_equal(found.examples, expected.examples)
+        for name, value in expected.network.state_dict().items():
+            assert torch.equal(found.network.state_dict()[name], value), name
+    with pytest.raises(ModelError, match=r"glance .* is not the one in its contract"):
+        replace(look, glance=None)
 
 
 def test_other_metadata_of_a_model_file_stays(tmp_path):

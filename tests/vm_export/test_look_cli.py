@@ -25,7 +25,8 @@ def folder(tmp_path):
 def has_look(path):
     """Whether a model file has a close look that runs and passes its self-test."""
     read = read_model(path)
-    return read.look is not None and len(CloseLook(read).run(random_patches(2))) == 2
+    look = CloseLook.of(read)
+    return look is not None and len(look.run(random_patches(2))) == 2
 
 
 def test_command_attaches_a_look_to_both_files(folder):

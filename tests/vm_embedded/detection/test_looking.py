@@ -20,8 +20,9 @@ EXTENT = 1.75
 class BrightDisk:
     """Answers as a perfect look network does to a picture of white balls on black ground, by arithmetic."""
 
-    def __init__(self, passes=2):
+    def __init__(self, passes=2, glance=None):
         self.contract = LookContract(object_class="ball", size=32, extent=EXTENT, above=0.03, passes=passes)
+        self.glance = glance
         self.seen = []
 
     def run(self, patches):
@@ -92,6 +93,29 @@ def test_the_second_look_cancels_errors_to_one_side(scene):
     np.testing.assert_allclose(answers[:, 0], expected[:, 0], atol=0.002)
     once, _ = look_at(scene, Squinting(passes=1), centers)
     assert (np.linalg.norm(once - centers, axis=1) > 0.15 * scene.view.shape.radius).all()
+
+
+def test_a_look_sees_only_what_its_glance_leaves_where_it_saw_it(scene):
+    class Strict(BrightDisk):
+        """Gives no chance to what is not a ball."""
+
+        def run(self, patches):
+            answers = super().run(patches)
+            answers[answers[:, 0] < 0.5, 0] = 0.0
+            return answers
+
+    glance = Strict(passes=1)
+    look = BrightDisk(passes=1, glance=glance)
+    ball = true_centers(scene)[0]
+    nothing = center_at(scene.view, (560.0, 400.0))
+    beside = ball + np.array([0.0, 0.03, 0.0])
+    moved, answers = look_at(scene, look, np.stack([nothing, beside]))
+    assert (glance.seen, look.seen) == ([2], [2])  # the look sees one patch and its mirror image
+    assert answers[:, 0] == pytest.approx([0.0, 0.9])
+    assert np.linalg.norm(moved[1] - ball) < 0.2 * np.linalg.norm(beside - ball)
+    found, rejected = found_in(scene, BrightDisk(passes=1, glance=Strict(passes=1)))
+    assert len(found) == 2
+    assert all(each.reason for each in rejected)
 
 
 def test_only_proposals_with_a_chance_are_looked_at_again(scene):

@@ -30,16 +30,17 @@ LOOK = small_look()
 PATCHES = random_patches(3)
 TEST = LookTest(PATCHES, small_answers(PATCHES))
 MANIFEST = ball_manifest_with_look(self_test=TEST)
+GLANCING = ball_manifest_with_look(glance=look_contract(size=16))
 
 
 @pytest.fixture
 def load(tmp_path):
     """Write a model file, read it, and load its look network."""
 
-    def loaded(look=LOOK, manifest=MANIFEST):
+    def loaded(look=LOOK, manifest=MANIFEST, glance=None):
         path = tmp_path / "model.onnx"
-        path.write_bytes(model_with(look, manifest))
-        return CloseLook(read_model(path))
+        path.write_bytes(model_with(look, manifest, glance))
+        return CloseLook.of(read_model(path))
 
     return loaded
 
@@ -73,8 +74,36 @@ def test_a_look_without_a_self_test_is_run(load):
     assert load(manifest=ball_manifest_with_look()).run(PATCHES).shape == (3, 4)
 
 
-def test_a_model_without_a_look_says_so(load):
-    assert "has no close look" in refusal(load, None, ball_manifest())
+def test_a_model_without_a_look_has_none(load):
+    assert load(None, ball_manifest()) is None
+
+
+def test_a_glance_is_loaded_with_its_look(load):
+    look = load(LOOK, GLANCING, small_look(16))
+    assert look.glance.contract == GLANCING.look.glance
+    patches = random_patches(5, size=16)
+    np.testing.assert_allclose(look.glance.run(patches), small_answers(patches), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("manifest", "glance", "message"),
+    [
+        (MANIFEST, small_look(16), "its metadata has a glance, its manifest has none"),
+        (GLANCING, None, "its manifest has a glance, its metadata has none"),
+        (GLANCING, "@@@@", "glance can't be read"),
+        (GLANCING, small_look(8), "glance: its inputs and outputs are"),
+    ],
+    ids=str,
+)
+def test_a_glance_that_does_not_fit_is_refused(load, manifest, glance, message):
+    assert message in refusal(load, LOOK, manifest, glance)
+
+
+def test_a_glance_must_judge_the_same_class_and_have_no_glance():
+    with pytest.raises(ModelError, match="class 'ball', its glance class 'goal'"):
+        look_contract(glance=look_contract(object_class="goal"))
+    with pytest.raises(ModelError, match="has a glance, too"):
+        look_contract(glance=look_contract(glance=look_contract()))
 
 
 def test_the_self_test_catches_other_weights(load):

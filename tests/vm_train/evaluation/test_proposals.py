@@ -42,7 +42,7 @@ def test_a_model_without_a_close_look_has_no_proposals(files):
 
 
 def test_a_network_that_sees_colors_proposes_drawn_balls(files, looking):
-    subject = ExactSubject(MANIFEST, Grid(), "", Settings(), ByColor(), CloseLook(read_model(looking)))
+    subject = ExactSubject(MANIFEST, Grid(), "", Settings(), ByColor(), CloseLook.of(read_model(looking)))
     result = evaluate_pictures(subject, files, CLASSES, RULES)
     scores = result.proposals["ball"]
     assert len(scores.counts) == len(files)

@@ -16,6 +16,7 @@ from tests.drawn_scenes import CHECKPOINT
 from tests.vm_train.commands import COMMAND, environment, run, run_module
 from tests.vm_train.drawn import CLASSES, draw_set
 from vm_embedded.network.bundled import model_path
+from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
 from vm_export.checkpoint import Checkpoint
 from vm_export.grid import Grid
@@ -90,6 +91,22 @@ def test_the_next_command_attaches_it_to_its_mesh_network(whole):
     assert LookCheckpoint.load(folder / "look.pt").contract.provenance.items() <= found.provenance.items()
     assert found.self_test is not None
     (folder / "model.onnx").unlink()
+
+
+def test_a_look_learns_from_what_its_glance_leaves(whole, look, tmp_path):
+    glance = whole[0] / "look.pt"
+    folder = tmp_path / "run"
+    lines = look(folder, "--glance", glance).stdout.splitlines()
+    assert re.fullmatch(r"the glance leaves \d+ of \d+ visible objects \(\d+ %\)", lines[3])
+    fewer, all_proposals = (int(re.search(r"validation: (\d+)", each)[1]) for each in (lines[2], whole[1].stdout))
+    assert fewer < all_proposals
+    made = LookCheckpoint.load(folder / "look.pt")
+    assert made.contract.glance == LookCheckpoint.load(glance).contract
+    assert (folder / "glance.pt").read_bytes() == glance.read_bytes()
+    run_module("vm_export.cli", *lines[-1].removeprefix("next: vm-export ").split())
+    assert CloseLook.of(read_model(folder / "model.onnx")).glance is not None
+    (folder / "glance.pt").write_bytes(b"other")
+    assert "glance.pt was changed since" in run("resume", folder, code=1).stderr
 
 
 @pytest.mark.long
