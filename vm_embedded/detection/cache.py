@@ -107,9 +107,10 @@ class MeshCache:
     def _prepare(self, height: float, pitch: int, roll: int, lens: Lens, size: Size) -> PreparedPoints:
         """The points that an orientation of this bucket can bring on screen.
 
-        An orientation differs from the bucket's middle by at most half a step of pitch plus half a step of roll, and
-        from the middle of its quarter by half of that. So testing the four quarters keeps fewer points than testing
-        the whole bucket. The whole bucket is tested first only to save time: it leaves fewer points for the four tests.
+        The bucket is tested in four quarters. An orientation differs from the bucket's middle by at most half a step of
+        pitch plus half a step of roll, and from the middle of its quarter by half of that. So four tests of quarters
+        keep fewer points than one of the whole bucket. That one goes first only to save time: it leaves fewer points
+        for the others.
         """
         mesh = self._look_up(height, lambda: self._build(height), counted=False)
         pitch_step, roll_step = self.settings.pitch_step, self.settings.roll_step

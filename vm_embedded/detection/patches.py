@@ -42,10 +42,12 @@ class Tangents:
         x, y, z = axes.T
         horizontal = np.hypot(x, y)
         # Straight below the camera no horizontal direction is ahead of another, so the mesh frame's x axis is taken.
-        horizontal, ahead, left = np.where(horizontal > 1e-9, (horizontal, x, y), ((1.0,), (1.0,), (0.0,)))
-        right_x, right_y = left / horizontal, -ahead / horizontal
+        below = horizontal < 1e-9
+        length = np.where(below, 1.0, horizontal)
+        right_x, right_y = y / length, np.where(below, -1.0, -x / length)
         right = np.stack([right_x, right_y, np.zeros_like(x)], axis=1)
         down = np.stack([-z * right_y, z * right_x, x * right_y - y * right_x], axis=1)  # axes x right
+        # The camera may be inside of the object, where no tangent exists.
         radius = view.shape.radius / np.sqrt(np.maximum(distance**2 - view.shape.radius**2, 1e-12))
         return cls(axes, right, down, radius)
 

@@ -86,14 +86,14 @@ def project(graph: AnyGraph, rotation: Floats, lens: Lens, size: Size) -> Projec
 def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack: float) -> Mask:
     """The points (n,) that are on screen for a camera turned by up to `slack` [rad] from `rotation`.
 
-    It may keep too many points, but never too few. A turn by `slack` moves a pixel by at most slack *
-    `_pixels_per_radian` (pi times as much if the view is wider than half a sphere). Points farther off the picture are
-    left out. A point outside of the lens's view is first
-    moved to the edge of the view.
+    It may keep too many points, but never too few. A point outside of the lens's view is first moved to the edge of the
+    view. A turn by `slack` moves a pixel by at most slack * `_pixels_per_radian`, or pi times as much if the view is
+    wider than half a sphere. Points farther off the picture are left out.
     """
     reach = _view_angle(lens, size)
     ahead = along(mesh.rays, rotation[:, 0])
     # Rounding errors of a rotation may shorten rays by up to 5e-4, and the lens compares their x without normalizing.
+    # Twice as much is allowed here.
     near = np.flatnonzero(ahead > np.cos(min(reach + slack, np.pi)) - 1e-3)
     camera = to_camera(mesh.rays[near], rotation)
     cosine = np.maximum(camera[:, 0], np.cos(reach))
@@ -104,7 +104,8 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     camera[:, 2] *= inward
     camera[:, 0] = cosine
     # If the view is wider than half a sphere, the shortest way of a turn may lead through directions behind the camera,
-    # out of the view. The way within the view is longer, at most pi times.
+    # out of the view. Around the edge of the view the way is at most pi / 2 times as long, and at most twice as long
+    # again because of points that were moved to the edge.
     detour = 1.0 if reach <= np.pi / 2 else np.pi
     margin = detour * slack * _pixels_per_radian(lens, size)
     possible = np.zeros(len(mesh), dtype=bool)

@@ -1,11 +1,14 @@
-"""Meshes on a lattice: every neighbor is a fixed step away, and there are no rings to close. They are the reference's.
+"""Meshes on a lattice: every neighbor is a fixed step away, and there are no rings to close.
+
+They are those of the authors' implementation, the reference (docs/reference-networks.md).
 
 The camera is at the height h over the plane and the object's center at the height c; g = h - c. phi(n, h) is the
 inclination n objects out, seen from the height h (`Shape.phi`). The points have coordinates x and y at the height c.
 
 Take a line at the height c, parallel to an axis, at the distance d from the vertical through the camera. The plane
 through the line and the camera is a *slice*. In the slice, the camera is slant = sqrt(g^2 + d^2) away from the line.
-For d = 0 this is g; for any other d, slant takes the place of g. So n objects out, a point of the line has
+For d = 0 this is g; for any other d, slant takes the place of g, as if the camera were at the height slant + c. So n
+objects out, a point of the line has
 
     coordinate(n, d) = slant tan(phi(n, slant + c)).
 
@@ -196,15 +199,16 @@ def _border(kind: str, shape: Shape, height: float, max_distance: float) -> Floa
 def _within(points: Floats, border: Floats) -> Mask:
     """Which points (n, 2) of a quarter lie within its border (m, 2) or up to two steps beyond it; both are in steps.
 
-    The border runs from the first axis to the second. It is drawn as a polygon, and each point looks up its pixel.
+    This is a coarse filter, so that few points must be solved for; `_quarter` drops exactly those beyond the border.
+    The border runs from the first axis to the second. It is drawn as a polygon, and each point looks up its pixel. No
+    point may lie more than one step beyond the largest u and v of the border.
     """
     width, height = (math.ceil(each) + 3 for each in border.max(axis=0))
-    # Rounding errors make the u of the border's last point slightly larger than 0, so the outline has it with 0 too.
-    outline = np.concatenate([[[0.0, 0.0]], border, [[0.0, border[-1, 1]]]])
+    outline = np.concatenate([[[0.0, 0.0]], border])
     inside = np.zeros((height, width), dtype=np.uint8)
     cv2.fillPoly(inside, [np.rint(outline).astype(np.int32)], 1)
     inside = cv2.dilate(inside, np.ones((5, 5), dtype=np.uint8))
-    nearest = np.minimum(np.rint(points).astype(np.intp), (width - 1, height - 1))
+    nearest = np.rint(points).astype(np.intp)
     return np.asarray(inside[nearest[:, 1], nearest[:, 0]] > 0)
 
 

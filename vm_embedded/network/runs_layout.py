@@ -9,10 +9,10 @@ The words that this file uses:
   of ring6 are left, the point itself and right; top left and top right; bottom left and bottom right. The first group
   of every mesh is left, itself and right: it says which points a run joins.
 - The *middle* of a group is the second slot of a group of three, and the first slot of a shorter group.
-- A *column* is a position in a layer's table (vm_export/runs_graph.py). The table holds, for each group, m - 1 sums
-  over windows of three adjacent slots. Column s + 1 is the window around slot s. The first two columns are not used,
-  and the last two slots, which are gaps, have no window. So a point looks up one value for each group, not for each
-  neighbor.
+- A *column* is a position in a layer's table (vm_export/runs_graph.py). It holds, for each group, m - 1 weighted sums
+  over windows of three adjacent slots; slots outside of the group have the weight 0. Column s + 1 is the window around
+  slot s. The first two columns are not used, and the last two slots, which are gaps, have no window. So a point looks
+  up one value for each group, not for each neighbor.
 
 An example. Points 0 1 2 are a part of a ring, points 3 4 5 6 the whole next ring. The groups are left, self and right,
 and two upper neighbors: 3 4 above point 0, 4 5 above point 1, 6 3 above point 2. The m = 23 slots are:
@@ -45,8 +45,7 @@ _GAP = 1
 
 _GAPS_BEFORE = 3
 _GAPS_BEHIND = 2
-"""The table has no windows around the last two slots. The network makes the windows from three copies of the points,
-and the third copy lacks its last three slots (vm_export/runs_graph.py)."""
+"""The table has no windows around the last two slots; vm_export/runs_graph.py says why."""
 
 _Positions = npt.NDArray[np.int64]
 
@@ -111,8 +110,8 @@ def group_offsets(group: tuple[int, ...]) -> range:
 def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Positions, _Positions]:
     """Arranges a mesh's points in slots, from their neighbors (n + 1, N).
 
-    Returns the point in each slot (m,), n in gaps; the slot of each point (n,); and for each group and slot the slot in
-    the group's middle (G, m).
+    Returns the point in each slot (m,), n in gaps; the slot of each point (n,); and (G, m) for each group, and for the
+    point in each slot, the slot in its group's middle, which is _GAP for gaps.
     """
     n = len(neighbors) - 1
     # A second gap at the end. `_found_in_runs` reads two slots after the last point, if that is the first of a
@@ -162,18 +161,18 @@ def _found_in_runs(
 def _in_runs(left: Indices, right: Indices) -> _Positions:
     """The point in each slot of the runs; n in gaps. Three gaps come first, and one gap follows each run.
 
-    left, right: neighbors (n,) of each point. A *piece* is a sequence of points i, i + 1, ... each linked to the
-    next. numpy finds all pieces at once, and a loop only joins pieces to runs. For example, a view
-    shows the first three and the last three points of a ring: two pieces. The ring's last point is linked to its
-    first, so the two pieces become one run.
+    left, right: neighbors (n,) of each point. Two points are *linked* if they are each other's right and left neighbor.
+    A *piece* is a sequence of points i, i + 1, ... each linked to the next. numpy finds all pieces at once, and a loop
+    only joins pieces to runs. For example, a view shows the first three and the last three points of a ring: two
+    pieces. The ring's last point is linked to its first, so the two pieces become one run.
     """
     n = len(left)
     points = np.arange(n)
-    # A piece starts at i unless i - 1 and i are each other's right and left neighbors. The cuts [:n] and
-    # [: len(starts)] are for n = 0: without points there are no pieces.
+    # A piece starts at i unless i - 1 and i are linked. The cuts [:n] and [: len(starts)] are for n = 0: without points
+    # there are no pieces.
     starts = np.flatnonzero(np.append(True, (right[:-1] != points[1:]) | (left[1:] != points[:-1]))[:n])
     ends = np.append(starts[1:], n)[: len(starts)] - 1
-    piece_at = np.full(n + 1, -1)  # the piece that starts with a point
+    piece_at = np.full(n + 1, -1)  # the piece that starts with a point; none starts with a missing neighbor, n
     piece_at[starts] = np.arange(len(starts))
     follower = piece_at[right[ends]]
     # The follower must be linked back. A piece without a follower (-1) reads the last piece here, and stays at -1.
@@ -181,7 +180,8 @@ def _in_runs(left: Indices, right: Indices) -> _Positions:
 
     order, ends_run = _chained(follower)
     lengths = (ends - starts + 1)[order]
-    first_slot = _GAPS_BEFORE + np.cumsum(np.append(0, lengths + ends_run))  # of each piece; last, the end
+    # Of each piece, then the number of all slots. A gap follows each piece that ends a run.
+    first_slot = _GAPS_BEFORE + np.cumsum(np.append(0, lengths + ends_run))
     runs = np.full(first_slot[-1], n)
     within = np.arange(n) - np.repeat(np.cumsum(lengths) - lengths, lengths)  # place of a point in its piece
     runs[np.repeat(first_slot[:-1], lengths) + within] = np.repeat(starts[order], lengths) + within
