@@ -67,14 +67,17 @@ data: .venv/synth ## render a training set: make data HDRI=folder-of-maps [OUT=d
 	$(BIN)/vm-synth $(OUT) --count $(COUNT) --hdri $(HDRI) --seed $(SEED) --config $(SCENES)
 
 networks: .venv/dev ## train the networks of the package from their seeds: make networks HDRI=folder-of-maps (hours)
-	$(MAKE) data OUT=data/soccer COUNT=8000 SEED=1 SCENES=export/vm_synth/soccer.toml
+	$(MAKE) data OUT=data/soccer COUNT=16000 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 
-vm_embedded/models/%.onnx: export/networks/%.toml export/networks/%-look.toml
+vm_embedded/models/%.onnx: export/networks/%.toml export/networks/%-glance.toml export/networks/%-look.toml
 	if test -e $(BUILD)/$*/run.json; then $(BIN)/vm-train resume $(BUILD)/$*; \
 		else $(BIN)/vm-train data/soccer -o $(BUILD)/$* --config $< --unpacked $(BUILD)/unpacked; fi
+	if test -e $(BUILD)/$*-glance/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-glance; \
+		else $(BIN)/vm-train look data/soccer --from $(BUILD)/$*/model.pt -o $(BUILD)/$*-glance --config $(word 2,$^); fi
 	if test -e $(BUILD)/$*-look/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-look; \
-		else $(BIN)/vm-train look data/soccer --from $(BUILD)/$*/model.pt -o $(BUILD)/$*-look --config $(word 2,$^); fi
+		else $(BIN)/vm-train look data/soccer --from $(BUILD)/$*/model.pt --glance $(BUILD)/$*-glance/look.pt \
+			-o $(BUILD)/$*-look --config $(word 3,$^); fi
 	$(BIN)/vm-export $(BUILD)/$*/model.pt --look $(BUILD)/$*-look/look.pt --layout runs -o $@
 
 test-data: .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.frames import frames
-from benchmarks.shipped import CANDIDATES, METERS, NETWORKS, RANGES, evaluation, numbers
+from benchmarks.shipped import CANDIDATES, METERS, RANGES, evaluation, numbers
 from vm_embedded.config.sections import read_sections
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
@@ -37,6 +37,7 @@ from vm_train.look.configuration import LookConfiguration
 from vm_train.look.run_folder import LookRun, begin_look_run, read_look_run
 from vm_train.look.training import is_finished, train_look
 
+BASE = Path(__file__).with_name("look_choices.toml")
 RESULTS = Path(__file__).with_name("look_choices.json")
 SEEDS = (0, 1, 2)
 TRAINING, VALIDATION, EPOCHS = 1000, 300, 8
@@ -69,7 +70,7 @@ VARIANTS: dict[str, dict[str, dict[str, Any]]] = {
     "one round": {"training": {"rounds": 1}},
     "nothing moved or hidden": {"augmentation": {"rotation": 0.0, "zoom": 0.0, "shift": 0.0, "hidden": 0.0}},
 }
-"""Looks to compare, by name: the changes to export/networks/ball-look.toml. `pictures` and `mesh` are not sections of
+"""Looks to compare, by name: the changes to benchmarks/look_choices.toml. `pictures` and `mesh` are not sections of
 it: they say how many pictures a training has, and which network proposes."""
 
 Task = tuple[str, int, Path, Path, Path]
@@ -87,7 +88,7 @@ def configuration_of(name: str, seed: int) -> LookConfiguration:
     for other in ("pictures", "mesh"):
         table.pop(other, None)
     table["training"] = {"seed": seed, "epochs": EPOCHS} | table.get("training", {})
-    return read_sections(LookConfiguration, NETWORKS / "ball-look.toml", table)
+    return read_sections(LookConfiguration, BASE, table)
 
 
 def split_of(data: Path, count: int) -> Split:

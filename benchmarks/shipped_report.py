@@ -187,7 +187,7 @@ def card(found: dict[str, Any], name: str) -> str:
     )
     made, used = manifest.provenance, scores["used 0.5"]["0.5 to 6 m"]
     look = manifest.look
-    assert look is not None
+    assert look is not None and look.glance is not None
     channels = ", ".join(map(str, look.channels))
     hard = clutter["ranked 0.5"]["0.5 to 6 m"]
     kilobytes = model_path(name).stat().st_size / 1000
@@ -196,15 +196,17 @@ def card(found: dict[str, Any], name: str) -> str:
 
 Finds balls on a soccer field.
 {depth} graph convolutions of {width} channels, {activation}, propose places. The mesh is ring6 with
-k = {manifest.intersections:g} and reaches to {manifest.max_distance:g} m. A close look with convolutions of {channels}
-channels decides on patches of {look.size} x {look.size} samples. Both suit balls of any radius (`--object-radius`,
+k = {manifest.intersections:g} and reaches to {manifest.max_distance:g} m. A glance at {look.glance.size} x {look.glance.size} samples
+leaves out most of them. A close look with convolutions of {channels} channels decides on patches of
+{look.size} x {look.size} samples. All suit balls of any radius (`--object-radius`,
 default {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: ball, other.
 
 - **Training data of the mesh network:** {made["training_pictures"]} rendered pictures
   (`export/vm_synth/soccer.toml`, seed 1). Validation on {made["validation_pictures"]} other pictures chose epoch
   {made["epoch"]} of {made["epochs"]}. Seed {made["seed"]}, configuration `export/networks/{name}.toml`.
-- **Training data of the close look:** {look.provenance["training_pictures"]} pictures of the same kind, under 55
-  panoramas. Seed {look.provenance["seed"]}, configuration `export/networks/{name}-look.toml`.
+- **Training data of the glance and the close look:** {look.provenance["training_pictures"]} pictures of the same kind,
+  under 55 panoramas. Seed {look.provenance["seed"]}, configurations `export/networks/{name}-glance.toml` and
+  `export/networks/{name}-look.toml`.
 - **To train it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
   {model.sha256}.
 

@@ -37,7 +37,7 @@ def test_a_network_runs_and_matches_its_card(name):
     card = path.with_suffix(".md").read_text()
     assert read_model(path).sha256 in card
     assert re.search(r"AP50", card)
-    for recipe in (f"export/networks/{name}.toml", f"export/networks/{name}-look.toml"):
+    for recipe in (f"export/networks/{name}{part}.toml" for part in ("", "-glance", "-look")):
         assert recipe in card
         assert (TOP / recipe).exists()
 
