@@ -187,7 +187,8 @@ def card(found: dict[str, Any], name: str) -> str:
     )
     made, used = manifest.provenance, scores["used 0.5"]["0.5 to 6 m"]
     look = manifest.look
-    assert look is not None and look.glance is not None
+    assert look is not None
+    assert look.glance is not None
     channels = ", ".join(map(str, look.channels))
     hard = clutter["ranked 0.5"]["0.5 to 6 m"]
     kilobytes = model_path(name).stat().st_size / 1000
@@ -196,8 +197,8 @@ def card(found: dict[str, Any], name: str) -> str:
 
 Finds balls on a soccer field.
 {depth} graph convolutions of {width} channels, {activation}, propose places. The mesh is ring6 with
-k = {manifest.intersections:g} and reaches to {manifest.max_distance:g} m. A glance at {look.glance.size} x {look.glance.size} samples
-leaves out most of them. A close look with convolutions of {channels} channels decides on patches of
+k = {manifest.intersections:g} and reaches to {manifest.max_distance:g} m. A glance at {look.glance.size} x
+{look.glance.size} samples leaves out most of them. A close look with convolutions of {channels} channels decides on patches of
 {look.size} x {look.size} samples. All suit balls of any radius (`--object-radius`,
 default {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: ball, other.
 
