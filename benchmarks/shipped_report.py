@@ -198,8 +198,8 @@ def card(found: dict[str, Any], name: str) -> str:
 Finds balls on a soccer field.
 {depth} graph convolutions of {width} channels, {activation}, propose places. The mesh is ring6 with
 k = {manifest.intersections:g} and reaches to {manifest.max_distance:g} m. A glance at {look.glance.size} x
-{look.glance.size} samples leaves out most of them. A close look with convolutions of {channels} channels decides on patches of
-{look.size} x {look.size} samples. All suit balls of any radius (`--object-radius`,
+{look.glance.size} samples leaves out most of them. A close look with convolutions of {channels} channels
+decides on patches of {look.size} x {look.size} samples. All suit balls of any radius (`--object-radius`,
 default {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: ball, other.
 
 - **Training data of the mesh network:** {made["training_pictures"]} rendered pictures
