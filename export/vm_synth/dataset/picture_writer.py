@@ -23,6 +23,7 @@ from ..render.image_processing import encode_jpeg, process_image
 from ..render.picture import UNLABELED, Picture
 from ..scene.configuration import CLASSES
 from ..scene.scene import PlacedBall, Scene
+from ..scene.standing import standing_objects
 from .files import CLASS_COLORS, file_of
 
 
@@ -73,6 +74,7 @@ def scene_description(index: int, map_name: str, scene: Scene, picture: Picture)
         else {**_ball_position(scene.other), "label": scene.other_label, "design": asdict(scene.other.design)},
         "field": None if scene.field is None else _finite(asdict(scene.field)),
         "things": list(scene.names),
+        "standing": [asdict(each) for each in standing_objects(scene)],
         "sensor": asdict(scene.sensor),
         "seed": scene.seed,
     }
