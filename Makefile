@@ -70,15 +70,19 @@ networks: .venv/dev ## train the networks of the package from their seeds: make 
 	$(MAKE) data OUT=data/soccer COUNT=16000 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 
-vm_embedded/models/%.onnx: export/networks/%.toml export/networks/%-glance.toml export/networks/%-look.toml
-	if test -e $(BUILD)/$*/run.json; then $(BIN)/vm-train resume $(BUILD)/$*; \
-		else $(BIN)/vm-train data/soccer -o $(BUILD)/$* --config $< --unpacked $(BUILD)/unpacked; fi
-	if test -e $(BUILD)/$*-glance/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-glance; \
-		else $(BIN)/vm-train look data/soccer --from $(BUILD)/$*/model.pt -o $(BUILD)/$*-glance --config $(word 2,$^); fi
+$(BUILD)/mesh/model.pt: export/networks/mesh.toml
+	if test -e $(BUILD)/mesh/run.json; then $(BIN)/vm-train resume $(BUILD)/mesh; \
+		else $(BIN)/vm-train data/soccer -o $(BUILD)/mesh --config $< --unpacked $(BUILD)/unpacked; fi
+
+$(BUILD)/glance/look.pt: export/networks/glance.toml $(BUILD)/mesh/model.pt
+	if test -e $(BUILD)/glance/run.json; then $(BIN)/vm-train resume $(BUILD)/glance; \
+		else $(BIN)/vm-train look data/soccer --from $(BUILD)/mesh/model.pt -o $(BUILD)/glance --config $<; fi
+
+vm_embedded/models/%.onnx: export/networks/%-look.toml $(BUILD)/glance/look.pt
 	if test -e $(BUILD)/$*-look/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-look; \
-		else $(BIN)/vm-train look data/soccer --from $(BUILD)/$*/model.pt --glance $(BUILD)/$*-glance/look.pt \
-			-o $(BUILD)/$*-look --config $(word 3,$^); fi
-	$(BIN)/vm-export $(BUILD)/$*/model.pt --look $(BUILD)/$*-look/look.pt --layout runs -o $@
+		else $(BIN)/vm-train look data/soccer --from $(BUILD)/mesh/model.pt --glance $(BUILD)/glance/look.pt \
+			-o $(BUILD)/$*-look --config $<; fi
+	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $(BUILD)/$*-look/look.pt --layout runs -o $@
 
 test-data: .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
 	$(BIN)/python -m benchmarks.test_data $(HDRI) $(TEST)

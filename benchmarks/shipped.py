@@ -32,7 +32,7 @@ RESULTS = HERE / "shipped.json"
 WORST = HERE.parent / "docs" / "worst.jpg"
 NETWORKS = HERE.parent / "export" / "networks"
 FRAMES_AN_HOUR = 30 * 3600
-CLASSES = ClassTable.from_table(tomllib.loads((NETWORKS / "ball.toml").read_text())["classes"]).mask_classes()
+CLASSES = ClassTable.from_table(tomllib.loads((NETWORKS / "mesh.toml").read_text())["classes"]).mask_classes()
 RANGES = {"0.5 to 6 m": range(1, 12), "6 to 10 m": range(12, 20), "1 to 6 m": range(2, 12)}
 """Bins of half a meter."""
 

@@ -168,7 +168,7 @@ def card(found: dict[str, Any], name: str) -> str:
     """A network's model card: contents, training data, accuracy and limits."""
     model = read_model(model_path(name))
     manifest = model.manifest
-    configuration = tomllib.loads((NETWORKS / f"{name}.toml").read_text())
+    configuration = tomllib.loads((NETWORKS / "mesh.toml").read_text())
     depth, width = (configuration["network"][each] for each in ("depth", "width"))
     activation = configuration["network"]["activation"].upper()
     scores, clutter = (found["networks"][name][each] for each in SETS)
@@ -204,9 +204,9 @@ default {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: ball, other.
 
 - **Training data of the mesh network:** {made["training_pictures"]} rendered pictures
   (`export/vm_synth/soccer.toml`, seed 1). Validation on {made["validation_pictures"]} other pictures chose epoch
-  {made["epoch"]} of {made["epochs"]}. Seed {made["seed"]}, configuration `export/networks/{name}.toml`.
+  {made["epoch"]} of {made["epochs"]}. Seed {made["seed"]}, configuration `export/networks/mesh.toml`.
 - **Training data of the glance and the close look:** {look.provenance["training_pictures"]} pictures of the same kind,
-  under 55 panoramas. Seed {look.provenance["seed"]}, configurations `export/networks/{name}-glance.toml` and
+  under 55 panoramas. Seed {look.provenance["seed"]}, configurations `export/networks/glance.toml` and
   `export/networks/{name}-look.toml`.
 - **To train it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
   {model.sha256}.
