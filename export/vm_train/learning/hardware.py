@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, TypeVar
@@ -78,10 +79,18 @@ def set_up_hardware(device: str, workers: int | None, threads: int | None) -> It
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
     if gpu:
         torch.cuda.set_device(local)
-    if size > 1:
-        distributed.init_process_group("nccl" if gpu else "gloo", timeout=_PATIENCE)
-    try:
+    with process_group("nccl" if gpu else "gloo", timeout=_PATIENCE) if size > 1 else nullcontext():
         yield Hardware(f"cuda:{local}" if gpu else "cpu", rank, size, workers)
+
+
+@contextmanager
+def process_group(backend: str, **options: Any) -> Iterator[None]:
+    """Meet the other processes of this training. options: those of torch.distributed.init_process_group."""
+    # Optimizers import this module. If that happens while the group exists, the group's threads outlive it, and about
+    # one process in twenty aborts at its end.
+    importlib.import_module("torch._dynamo")
+    distributed.init_process_group(backend, **options)
+    try:
+        yield
     finally:
-        if size > 1:
-            distributed.destroy_process_group()
+        distributed.destroy_process_group()

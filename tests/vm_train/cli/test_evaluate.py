@@ -263,7 +263,7 @@ def test_an_interrupt_ends_it_with_130_and_writes_nothing(data, tmp_path):
     folder = draw_set(tmp_path / "set", 1)
     for name in ("image.jpg", "mask.png", "lens.yaml", "scene.json"):
         part, suffix = name.split(".")
-        for number in range(1, 400):
+        for number in range(1, 4000):
             (folder / f"{part}{number:04d}.{suffix}").hardlink_to(folder / f"{part}0000.{suffix}")
     command = [str(COMMAND), str(MODEL), str(folder), "-o", str(tmp_path / "out"), "--workers", "2"]
 
@@ -273,7 +273,10 @@ def test_an_interrupt_ends_it_with_130_and_writes_nothing(data, tmp_path):
     with subprocess.Popen(
         command, preexec_fn=heed_interrupts, start_new_session=True, stderr=subprocess.PIPE, text=True
     ) as process:
-        time.sleep(2.5)
+        while len(Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()) < 2:
+            assert process.poll() is None
+            time.sleep(0.1)
+        time.sleep(1)  # so that the workers evaluate pictures
         process.send_signal(signal.SIGINT)
         said = process.stderr.read()
     assert process.returncode == 130

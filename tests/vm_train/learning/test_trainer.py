@@ -11,6 +11,7 @@ from vm_export.network import Network
 from vm_export.network_shape import NetworkShape
 from vm_train.graphs.labeled_graph import LabeledGraph, empty_graph, join_graphs
 from vm_train.graphs.schedule import schedule
+from vm_train.learning.hardware import process_group
 from vm_train.learning.recipe import Recipe
 from vm_train.learning.trainer import Trainer, read_state
 
@@ -180,11 +181,12 @@ def test_a_state_of_another_network_is_refused(tmp_path):
 def _part(rank, size, folder, hard):
     """One of `size` processes that train together."""
     torch.set_num_threads(1)
-    torch.distributed.init_process_group("gloo", init_method=f"file://{folder}/meet", rank=rank, world_size=size)
-    made = training(Recipe(epochs=2, batch=4), [network(8)] if hard else ())
-    losses = run(made, rank=rank, size=size)
-    torch.save({"losses": losses, "network": weights(made)}, Path(folder) / f"rank{rank}.pt")
-    torch.distributed.destroy_process_group()
+    with process_group("gloo", init_method=f"file://{folder}/meet", rank=rank, world_size=size):
+        made = training(Recipe(epochs=2, batch=4), [network(8)] if hard else ())
+        losses = run(made, rank=rank, size=size)
+        torch.save({"losses": losses, "network": weights(made)}, Path(folder) / f"rank{rank}.pt")
+    threads = [each.read_text().strip() for each in Path("/proc/self/task").glob("*/comm")]
+    assert not [each for each in threads if "gloo" in each], "threads of the group outlive it and may abort the exit"
 
 
 @pytest.mark.slow
