@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats, Singles
+from ..field.features import FieldFeatures
 from ..network.manifest import Manifest
 from .observation import Observation
 
@@ -90,14 +91,16 @@ class Detections:
 
     objects: the accepted objects. rejected: the rejected candidates, each with its reason; empty unless `explain` was
     set. observation: the points. threshold: a point belongs to a class if its probability is above this. timing_ms:
-    time of each stage [ms].
+    time of each stage [ms]. field: goal posts, robots, lines and border of the field; None for a network without these
+    classes.
     """
 
     objects: tuple[Detection, ...]
     rejected: tuple[Detection, ...]
     observation: Observation
     threshold: float
-    timing_ms: dict[str, float] = field(default_factory=dict)
+    timing_ms: dict[str, float]
+    field: FieldFeatures | None = None
 
     def __len__(self) -> int:
         return len(self.objects)
