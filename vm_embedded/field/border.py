@@ -1,0 +1,128 @@
+"""The border of the field: where it ends in each direction, and the convex polyline through these places.
+
+Something that stands at the border hides it, so that the field seems to end nearer. A field is convex, therefore the
+hull of all places bridges such gaps. Grass-like ground outside makes the field seem to end farther away. Therefore
+hulls with fewer corners are tried, too, and the one that most places agree with is chosen. Reinhardt's
+"Kalibrierungsfreie Bildverarbeitungsalgorithmen" (HTWK Leipzig, 2011) found the border in a similar way.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ..arrays import Floats, Mask
+from .ground_points import GroundPoints, split
+
+_COLUMN = 0.04
+"""Width of a column of points [rad]."""
+
+_FEWEST = 2.0
+"""A column shows the border only if so many points behind it are outside, and so many in front are of the field."""
+
+_AGREES = 0.04
+"""A place agrees with a border if they differ by less than this share of the distance."""
+
+_MOST_REMOVED = 12
+"""Largest number of corners that are removed from the hull."""
+
+
+def find_border(points: GroundPoints) -> Floats:
+    """Corners (m, 2) [m] of the visible border, from right to left; none if the frame does not show it."""
+    places, ended = _ends_of_field(points)
+    if ended.sum() < 3:
+        return np.empty((0, 2))
+    best, most = np.empty((0, 2)), -1
+    left = places
+    for _ in range(_MOST_REMOVED):
+        corners = _hull(left)
+        agreeing = int((np.abs(_beyond(corners, places)) < _AGREES).sum())
+        if agreeing > most + 1:  # a hull with fewer corners must be better than by chance
+            best, most = corners, agreeing
+        if len(left) <= 3:
+            break
+        left = _without_farthest_corner(left, corners)
+    return _part_that_ends(best, places, ended)
+
+
+def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
+    """The farthest place of the field (c, 2) [m] in each column of points, from right to left, and whether something
+    else begins there (c,); otherwise the field may go on where the frame or the mesh ends."""
+    middle = _straight_ahead(points)
+    turned = np.remainder(points.azimuths - middle + np.pi, 2.0 * np.pi) - np.pi
+    columns = np.floor((turned + np.pi) / _COLUMN).astype(np.int64)
+    order = np.lexsort((points.ranges, columns))
+    inside = sum((points.classes[name] for name in ("field", "line") if name in points.classes), np.float32(0.0))
+    values = (inside - points.outside)[order]
+    columns, ranges = columns[order], points.ranges[order]
+    last, gain = split(columns, values)
+    ends = np.append(np.flatnonzero(np.diff(columns)), len(columns) - 1)
+    sums = np.cumsum(values)
+    outside = sums[last] - sums[ends]
+    seen = (last >= 0) & (gain >= _FEWEST)
+    ended = (outside >= _FEWEST)[seen]
+    last, ends = last[seen], ends[seen]
+    far = 0.5 * (ranges[last] + ranges[np.minimum(last + 1, ends)])
+    azimuth = (columns[last] + 0.5) * _COLUMN - np.pi + middle
+    return np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1) * far[:, None], ended
+
+
+def _straight_ahead(points: GroundPoints) -> float:
+    """Mean azimuth [rad] of the points, so that columns start and end behind the camera."""
+    return float(np.arctan2(np.sin(points.azimuths).sum(), np.cos(points.azimuths).sum()))
+
+
+def _hull(places: Floats) -> Floats:
+    """Corners of the convex hull of the places and the point below the camera, which is not among them."""
+    around = np.concatenate([places, np.zeros((1, 2))]).astype(np.float32)
+    numbers = cv2.convexHull(around, returnPoints=False, clockwise=False).ravel()
+    return places[np.sort(numbers[numbers < len(places)])]
+
+
+def _beyond(corners: Floats, places: Floats) -> Floats:
+    """How far places (c, 2) are beyond a polyline, as a share of the distance of the polyline in their directions."""
+    if len(corners) < 2:
+        return np.full(len(places), np.inf)
+    angle = np.arctan2(*(places @ _turn(corners[0])).T[::-1])
+    at = np.arctan2(*(corners @ _turn(corners[0])).T[::-1])
+    piece = np.clip(np.searchsorted(at, angle) - 1, 0, len(corners) - 2)
+    a, along = corners[piece], corners[piece + 1] - corners[piece]
+    # The ray t * place meets the line through a piece where the cross product of (t * place - a) and `along` is zero.
+    t = _cross(a, along) / _cross(places, along)
+    return np.asarray(1.0 / t - 1.0)
+
+
+def _turn(direction: Floats) -> Floats:
+    """The rotation (2, 2) that turns rows with this direction to the x axis."""
+    c, s = direction / np.hypot(*direction)
+    return np.array([[c, -s], [s, c]])
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def _without_farthest_corner(places: Floats, corners: Floats) -> Floats:
+    """The places without the corner that is farthest beyond the places beside it."""
+    inner = np.array([np.flatnonzero((places == each).all(axis=1))[0] for each in corners])
+    ranges = np.hypot(places[:, 0], places[:, 1])
+    beside = np.stack([ranges[np.maximum(inner - 1, 0)], ranges[np.minimum(inner + 1, len(places) - 1)]])
+    worst = inner[np.argmax(ranges[inner] / beside.mean(axis=0))]
+    return np.delete(places, worst, axis=0)
+
+
+def _part_that_ends(corners: Floats, places: Floats, ended: Mask) -> Floats:
+    """The longest part of a polyline along which the field ends, by the number of places that agree with it."""
+    if len(corners) < 2:
+        return np.empty((0, 2))
+    at = np.array([np.flatnonzero((places == each).all(axis=1))[0] for each in corners])
+    agrees = ended & (np.abs(_beyond(corners, places)) < _AGREES)
+    count = np.concatenate([[0], np.cumsum(agrees)])
+    agreeing = count[at[1:] + 1] - count[at[:-1]]
+    kept = (ended[at[1:]] & ended[at[:-1]]) | (agreeing > 0.5 * (at[1:] - at[:-1] + 1))
+    run = np.cumsum(np.diff(kept, prepend=False) != 0)
+    support = np.bincount(run, np.where(kept, agreeing, 0))
+    if support.max() < 3:
+        return np.empty((0, 2))
+    pieces = np.flatnonzero(run == np.argmax(support))
+    return np.asarray(corners[pieces[0] : pieces[-1] + 2])

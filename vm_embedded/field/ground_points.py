@@ -1,0 +1,66 @@
+"""Mesh points as places on the plane, with the probabilities of the classes of a soccer field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..arrays import Floats, Indices, Mask, Singles
+
+ROLES = ("goal", "robot", "line", "field")
+"""Names of the classes that field features are made of."""
+
+
+@dataclass(frozen=True, eq=False)
+class GroundPoints:
+    """The n points of a frame below the horizon.
+
+    positions (n, 2) [m]: where their rays meet the plane, relative to the point below the camera, in the frame of
+    Detection. A point on something that stands on the plane has the place behind it, where its ray would end. height:
+    of the camera over the plane [m]. across: distance between neighboring points across the ray [m]; the same
+    everywhere. classes: probabilities (n,) of each class of ROLES that the network has. outside: probability (n,) of
+    the classes that are neither the field nor anything on it.
+    """
+
+    positions: Floats
+    height: float
+    across: float
+    classes: dict[str, Singles]
+    outside: Singles
+
+    @cached_property
+    def ranges(self) -> Floats:
+        """Distance (n,) [m] on the plane from the point below the camera."""
+        return np.hypot(self.positions[:, 0], self.positions[:, 1])
+
+    @cached_property
+    def azimuths(self) -> Floats:
+        """Direction (n,) [rad] on the plane, from -pi to pi counterclockwise from the x axis."""
+        return np.arctan2(self.positions[:, 1], self.positions[:, 0])
+
+    def along(self, ranges: Floats) -> Floats:
+        """Distance [m] to the next ring of points, along the ray, at these ranges [m]."""
+        return np.asarray(self.across * np.hypot(ranges, self.height) / self.height)
+
+
+def split(columns: Indices, values: Floats) -> tuple[Indices, Floats]:
+    """For each column of points, sorted from near to far, the place that best parts positive from negative values.
+
+    columns (n,): number of each point's column, sorted. values (n,). Returns for each column that occurs the position
+    of the last point before the best split, or -1 if all values are better behind it, and the sum of the values there.
+    """
+    starts = np.flatnonzero(np.diff(columns, prepend=-1))
+    sums = np.cumsum(values)
+    before = (sums[starts] - values[starts])[np.cumsum(np.diff(columns, prepend=-1) > 0) - 1]
+    sums = sums - before
+    best = np.maximum.reduceat(sums, starts)
+    counts = np.diff(np.append(starts, len(values)))
+    last = np.maximum.reduceat(np.where(sums == np.repeat(best, counts), np.arange(len(values)), -1), starts)
+    return np.where(best > 0.0, last, -1), best
+
+
+def near(values: Floats, others: Floats, limit: float) -> Mask:
+    """Which values (n,) are within a limit of any of the others (m,)."""
+    return np.asarray((np.abs(values[:, None] - others) <= limit).any(axis=1))
