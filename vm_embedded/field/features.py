@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -149,5 +150,6 @@ class FieldFeatures:
         }
 
 
-def _rounded(values: Floats, digits: int) -> list[float]:
-    return [round(float(each), digits) for each in values]
+def _rounded(values: Floats, digits: int) -> list[float | None]:
+    """Rounded numbers; None, JSON's null, for NaN: the pixel of a place that the lens does not see."""
+    return [round(each, digits) if math.isfinite(each) else None for each in values.tolist()]

@@ -1,6 +1,6 @@
 """The channels that send messages: standard output, a file, UDP, and a Unix socket with any number of readers.
 
-A slow reader never blocks the detector: lines that exceed its backlog are dropped and counted.
+A slow reader never blocks the detector: messages that exceed its backlog are dropped whole, and counted.
 """
 
 from __future__ import annotations
@@ -18,10 +18,11 @@ from typing import Protocol
 from ..config.entries import check_entries, entry, number, one_of, switch, text_line
 from ..errors import InputError
 from ..sockets import UnixListener, checked_address, datagram_socket, parse_address
+from .binary_form import to_binary
 from .messages import Message, to_json_line, to_ros
 
 FORMATS = ("json", "ros")
-
+UNIX_FORMATS = ("lines", "binary")
 
 _UDP_EXAMPLE = "127.0.0.1:5600"
 """Address to send lines to, for error messages."""
@@ -29,7 +30,7 @@ _UDP_EXAMPLE = "127.0.0.1:5600"
 
 @dataclass(frozen=True, kw_only=True)
 class OutputSettings:
-    """Section [output]: the channels, the format of the lines, and the backlog of slow readers."""
+    """Section [output]: the channels, the format of their messages, and the backlog of slow readers."""
 
     stdout: bool = switch(True, "write lines to standard output")
     file: str = text_line("", "file to append lines to")
@@ -41,6 +42,9 @@ class OutputSettings:
     )
     unix: str = text_line("", "Unix socket to create; each reader gets every line")
     format: str = one_of(FORMATS, "json", "json, or ros for the field names of vision_msgs and geometry_msgs in ROS 2")
+    unix_format: str = one_of(
+        UNIX_FORMATS, "lines", "messages of the Unix socket: lines in the format above, or the compact binary form"
+    )
     frame_id: str = text_line("base_footprint", "ROS name of the frame on the ground below the camera")
     backlog_kib: int = number(256, "backlog after which a slow reader loses lines", "KiB", (1, 65536))
 
@@ -49,13 +53,13 @@ class OutputSettings:
 
 
 class Channel(Protocol):
-    """One channel. dropped: number of lines lost. failure: why the last line was lost; empty for slow readers."""
+    """One channel. dropped: number of messages lost. failure: why the last one was lost; empty for slow readers."""
 
     dropped: int
     failure: str
 
     def send(self, line: bytes) -> None:
-        """Send a line or drop it; never block."""
+        """Send a line, or a message in the binary form, or drop it; never block."""
 
     async def close(self) -> None:
         """Send the backlog if that is possible at once, and close."""
@@ -66,7 +70,8 @@ class Channels:
 
     def __init__(self, settings: OutputSettings) -> None:
         self.settings = settings
-        self._channels: list[Channel] = []
+        self._line_channels: list[Channel] = []
+        self._binary_channels: list[Channel] = []
 
     async def open(self) -> None:
         """Create sockets and open files. Raises InputError."""
@@ -75,38 +80,49 @@ class Channels:
             if settings.stdout:
                 if sys.stdout is None:
                     raise InputError("standard output is closed; use --no-output-stdout")
-                self._channels.append(DescriptorChannel(os.dup(sys.stdout.fileno()), backlog))
+                self._line_channels.append(DescriptorChannel(os.dup(sys.stdout.fileno()), backlog))
             if settings.file:
-                self._channels.append(DescriptorChannel(_open_to_append(settings.file), backlog))
+                self._line_channels.append(DescriptorChannel(_open_to_append(settings.file), backlog))
             for each in filter(None, settings.udp.split(",")):
-                self._channels.append(DatagramChannel(each))
+                self._line_channels.append(DatagramChannel(each))
             if settings.unix:
-                self._channels.append(await UnixChannel.open(settings.unix, backlog))
+                chosen = self._binary_channels if settings.unix_format == "binary" else self._line_channels
+                chosen.append(await UnixChannel.open(settings.unix, backlog))
         except InputError:
             await self.close()
             raise
 
     @property
     def dropped(self) -> int:
-        """Number of lines lost, over all channels."""
-        return sum(each.dropped for each in self._channels)
+        """Number of messages lost, over all channels."""
+        return sum(each.dropped for each in self._all)
 
     @property
     def failure(self) -> str:
-        """Why lines are lost; empty if none are, or only those of slow readers."""
-        return next((each.failure for each in self._channels if each.failure), "")
+        """Why messages are lost; empty if none are, or only those of slow readers."""
+        return next((each.failure for each in self._all if each.failure), "")
+
+    @property
+    def _all(self) -> list[Channel]:
+        return [*self._line_channels, *self._binary_channels]
 
     def send(self, message: Message) -> None:
         """Send a message on all channels."""
-        line = to_json_line(to_ros(message, self.settings.frame_id) if self.settings.format == "ros" else message)
-        for each in self._channels:
-            each.send(line)
+        if self._line_channels:
+            line = to_json_line(to_ros(message, self.settings.frame_id) if self.settings.format == "ros" else message)
+            for each in self._line_channels:
+                each.send(line)
+        if self._binary_channels:
+            encoded = to_binary(message)
+            for each in self._binary_channels:
+                each.send(encoded)
 
     async def close(self) -> None:
         """Close all channels."""
-        for each in self._channels:
+        for each in self._all:
             await each.close()
-        self._channels.clear()
+        self._line_channels.clear()
+        self._binary_channels.clear()
 
 
 def _open_to_append(path: str) -> int:
@@ -216,7 +232,7 @@ class UnixChannel:
             writer.close()
 
     def send(self, line: bytes) -> None:
-        """Send a line to all readers that keep up."""
+        """Send a line, or a message in the binary form, to all readers that keep up."""
         for writer in self._writers:
             if writer.transport.get_write_buffer_size() + len(line) > self._backlog:
                 self.dropped += 1

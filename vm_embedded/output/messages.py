@@ -23,12 +23,15 @@ Message = dict[str, Any]
 
 
 def frame_fields(detections: Detections, emit_points: Sequence[str] = (), explain: bool = False) -> Message:
-    """The result of a frame: number of mesh points, detections, and time of each stage [ms].
+    """The result of a frame: number of mesh points, detections, features of the field, and time of each stage [ms].
 
+    field: only for a network with classes of the field; without the points of the lines, so that a line stays short.
     emit_points: classes whose points are listed, with bearings (unit vectors in the plane's frame) and probabilities.
     explain: list rejected clusters too.
     """
     fields: Message = {"points": len(detections.pixels), "detections": [each.as_dict() for each in detections]}
+    if detections.field is not None:
+        fields["field"] = detections.field.as_dict()
     if emit_points:
         fields["class_points"] = {
             name: {
@@ -87,7 +90,8 @@ def to_json_line(message: Message) -> bytes:
 
 def to_ros(message: Message, frame_id: str) -> Message:
     """A message with the field names of ROS 2: a vision_msgs/Detection2DArray, and a geometry_msgs/PointStamped for
-    each detection, in the plane's frame `frame_id`. The state, which those types lack, is added."""
+    each detection, in the plane's frame `frame_id`. The state, which those types lack, is added. The features of the
+    field are left out: those types have no place for them."""
     seconds, rest = divmod(round(1e9 * message["wall"]), 10**9)
     header = {"stamp": {"sec": seconds, "nanosec": rest}, "frame_id": frame_id}
     detections = message.get("detections", [])

@@ -1,24 +1,27 @@
-"""Drawing mesh points and detections into images."""
+"""Drawing mesh points, detections and features of the field into images."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
 
-from ..arrays import Floats, Image
+from ..arrays import Image
 from ..detection.detections import Detection, Detections
-
-_Color = tuple[int, int, int]
+from .field_overlay import draw_field, label_field
+from .labels import INK, Color, Labels
 
 # Colors are BGR. Objects stand out; classes that cover areas are pale.
-_OBJECT, _REJECTED, _INK = (60, 220, 255), (90, 90, 255), (30, 30, 30)
+_OBJECT, _REJECTED = (60, 220, 255), (90, 90, 255)
 _UPRIGHT, _OTHER = (255, 120, 60), (140, 140, 140)
 _AREAS = ((255, 255, 255), (190, 255, 170), (230, 160, 230), (220, 220, 120))
 
+_FARTHEST = 1e4
+"""Largest pixel of an outline that is drawn: OpenCV cannot draw far outside of an image."""
+
 
 def draw_overlay(image: Image, detections: Detections) -> Image:
-    """A copy of a BGR, BGRA or gray image with mesh points in the color of their class, and objects with outline,
-    confidence and distance.
+    """A copy of a BGR, BGRA or gray image with mesh points in the color of their class, objects with outline,
+    confidence and distance, and the features of the field.
 
     The paper's fig:ball_detection_images has such pictures; there, the colors are confidences.
     """
@@ -26,10 +29,17 @@ def draw_overlay(image: Image, detections: Detections) -> Image:
     canvas = np.array(colors, dtype=np.uint8, order="C")
     scale = max(max(canvas.shape[:2]) / 1280.0, 0.8)
     _draw_points(canvas, detections)
-    for each in detections.rejected:
-        _draw_object(canvas, each, _REJECTED, scale)
-    for each in detections.objects:
-        _draw_object(canvas, each, _OBJECT, scale)
+    if detections.field is not None:
+        draw_field(canvas, detections.field, detections.observation.view, scale)
+    drawn = [(each, _OBJECT) for each in detections.objects] + [(each, _REJECTED) for each in detections.rejected]
+    drawn = [(each, color) for each, color in drawn if np.abs(each.outline).max(initial=0.0) < _FARTHEST]
+    for each, color in reversed(drawn):
+        _draw_outline(canvas, each, color, scale)
+    labels = Labels(canvas, scale)
+    for each, color in drawn:
+        _label(labels, each, color)
+    if detections.field is not None:
+        label_field(labels, detections.field)
     return canvas
 
 
@@ -48,34 +58,21 @@ def _draw_points(canvas: Image, detections: Detections) -> None:
                 _draw_pixels(canvas, chosen + shift, _OBJECT if each.kind == "object" else _UPRIGHT)
 
 
-def _draw_pixels(canvas: Image, pixels: np.ndarray, color: _Color) -> None:
+def _draw_pixels(canvas: Image, pixels: np.ndarray, color: Color) -> None:
     x = np.clip(pixels[:, 0], 0, canvas.shape[1] - 1)
     y = np.clip(pixels[:, 1], 0, canvas.shape[0] - 1)
     canvas[y, x] = color
 
 
-def _draw_object(canvas: Image, detection: Detection, color: _Color, scale: float) -> None:
-    if np.abs(detection.outline).max(initial=0.0) > 1e4:  # OpenCV cannot draw so far outside
-        return
+def _draw_outline(canvas: Image, detection: Detection, color: Color, scale: float) -> None:
     thickness = max(1, round(2 * scale))
     points = np.rint(detection.outline * 16).astype(np.int32).reshape(-1, 1, 2)
-    cv2.polylines(canvas, [points], True, _INK, thickness + 2, cv2.LINE_AA, shift=4)
+    cv2.polylines(canvas, [points], True, INK, thickness + 2, cv2.LINE_AA, shift=4)
     cv2.polylines(canvas, [points], True, color, thickness, cv2.LINE_AA, shift=4)
+
+
+def _label(labels: Labels, detection: Detection, color: Color) -> None:
     text = f"{detection.class_name} {detection.confidence:.2f}  {detection.distance:.2f} m"
     if detection.reason is not None:
         text = f"{detection.class_name}? {detection.confidence:.2f}"
-    _draw_label(canvas, text, detection.center, detection.radius, color, scale)
-
-
-def _draw_label(canvas: Image, text: str, center: Floats, radius: float, color: _Color, scale: float) -> None:
-    """Write a line of text beside an object, inside the image."""
-    font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.6 * scale, max(1, round(1.5 * scale))
-    (width, height), base = cv2.getTextSize(text, font, size, thickness)
-    pad = round(4 * scale)
-    x = center[0] + radius + 3 * pad
-    if x + width + pad > canvas.shape[1]:
-        x = center[0] - radius - 3 * pad - width
-    left = int(np.clip(x, pad, max(canvas.shape[1] - width - pad, pad)))
-    bottom = int(np.clip(center[1] + height / 2, height + pad, canvas.shape[0] - base - pad))
-    cv2.rectangle(canvas, (left - pad, bottom - height - pad), (left + width + pad, bottom + base), _INK, cv2.FILLED)
-    cv2.putText(canvas, text, (left, bottom), font, size, color, thickness, cv2.LINE_AA)
+    labels.write(text, detection.center, detection.radius, color)

@@ -1,0 +1,104 @@
+"""Drawing features of the field into images: lines, circle, crossings, border, goal posts and robots."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from ..arrays import Floats, Image
+from ..detection.prepared_view import PreparedView
+from ..detection.projection import to_camera
+from ..field.features import CenterCircle, FieldFeatures, Upright
+from .labels import INK, Color, Labels
+
+# Colors are BGR. Magenta shows on white lines and on grass.
+_LINE, _BORDER, _POST, _ROBOT = (255, 0, 255), (255, 210, 0), (255, 190, 90), (60, 150, 255)
+
+_PIECES = 16
+"""Pieces of a straight line on the plane; most lenses bend it."""
+
+_FARTHEST = 1e4
+"""Largest pixel that is drawn: OpenCV cannot draw far outside of an image."""
+
+
+def plane_pixels(view: PreparedView, points: Floats) -> Floats:
+    """Pixels (n, 2) of places (n, 2) [m] on the observation plane, in its frame; NaN where the lens sees nothing."""
+    toward = np.column_stack([points, np.full(len(points), -view.height)]) @ view.heading
+    camera = to_camera(toward / np.linalg.norm(toward, axis=1, keepdims=True), view.rotation)
+    pixels = view.lens.project(camera, view.size)
+    pixels[~view.lens.sees(camera)] = np.nan
+    return pixels
+
+
+def draw_field(canvas: Image, field: FieldFeatures, view: PreparedView, scale: float) -> None:
+    """Draw all features but their labels into a BGR image. scale: 1 for a picture of 1280 px."""
+    thin = max(1, round(1.5 * scale))
+    if field.border is not None:
+        _draw_paths(canvas, view, _in_pieces(field.border.points)[None], _BORDER, thin + 1)
+    if field.lines:
+        ends = np.stack([each.ends for each in field.lines])
+        _draw_paths(canvas, view, _in_pieces(ends.swapaxes(0, 1)).swapaxes(0, 1), _LINE, thin)
+    if field.circle is not None:
+        _draw_paths(canvas, view, _circle(field.circle)[None], _LINE, thin)
+    for left, right in field.goals:
+        ends = np.stack([field.posts[left].position, field.posts[right].position])
+        _draw_paths(canvas, view, _in_pieces(ends)[None], _POST, thin)
+    for each, color in _uprights(field):
+        _draw_paths(canvas, view, _base(each)[None], INK, 2 * thin + 3)
+        _draw_paths(canvas, view, _base(each)[None], color, 2 * thin + 1)
+    if field.crossings:
+        pixels = plane_pixels(view, np.stack([each.position for each in field.crossings]))
+        for crossing, pixel in zip(field.crossings, pixels, strict=True):
+            _draw_letter(canvas, crossing.kind, pixel, scale)
+
+
+def label_field(labels: Labels, field: FieldFeatures) -> None:
+    """Write class and distance beside posts and robots, the nearest first."""
+    for each, color in sorted(_uprights(field), key=lambda pair: pair[0].distance):
+        if np.isfinite(each.pixel).all():
+            labels.write(f"{each.class_name} {each.distance:.2f} m", each.pixel, 0.0, color, 0.85)
+
+
+def _uprights(field: FieldFeatures) -> list[tuple[Upright, Color]]:
+    return [*((each, _POST) for each in field.posts), *((each, _ROBOT) for each in field.robots)]
+
+
+def _in_pieces(points: Floats) -> Floats:
+    """Points (1 + _PIECES * (m - 1), ...) along the straight lines between points (m, ...)."""
+    places = np.linspace(0.0, len(points) - 1.0, 1 + _PIECES * (len(points) - 1))
+    whole = np.minimum(places.astype(np.intp), max(len(points) - 2, 0))
+    rest = (places - whole).reshape(-1, *[1] * (points.ndim - 1))
+    return np.asarray(points[whole] * (1.0 - rest) + points[np.minimum(whole + 1, len(points) - 1)] * rest)
+
+
+def _circle(circle: CenterCircle) -> Floats:
+    """Points (n, 2) [m] around a circle, the last as the first."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 97)
+    return np.asarray(circle.center + circle.radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+
+
+def _base(upright: Upright) -> Floats:
+    """Both ends (2, 2) [m] of the base, across the bearing."""
+    across = np.array([-upright.bearing[1], upright.bearing[0]])
+    across *= 0.5 * upright.width / max(float(np.hypot(*across)), 1e-9)
+    return np.stack([upright.position + across, upright.position - across])
+
+
+def _draw_paths(canvas: Image, view: PreparedView, paths: Floats, color: Color, thickness: int) -> None:
+    """Draw p lines through n places each (p, n, 2) [m]; what the lens does not see is left out."""
+    pixels = plane_pixels(view, paths.reshape(-1, 2)).reshape(paths.shape)
+    with np.errstate(invalid="ignore"):
+        seen = (np.abs(pixels) < _FARTHEST).all(axis=2)
+    pieces = np.stack([pixels[:, :-1], pixels[:, 1:]], axis=2)[seen[:, :-1] & seen[:, 1:]]
+    cv2.polylines(canvas, list(np.rint(pieces * 16).astype(np.int32)), False, color, thickness, cv2.LINE_AA, shift=4)
+
+
+def _draw_letter(canvas: Image, letter: str, pixel: Floats, scale: float) -> None:
+    """Write a letter in magenta with a white rim, its middle at a pixel (2,)."""
+    if not (np.abs(pixel) < _FARTHEST).all():
+        return
+    font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.6 * scale, max(1, round(2 * scale))
+    (width, height), _ = cv2.getTextSize(letter, font, size, thickness)
+    place = round(float(pixel[0]) - width / 2), round(float(pixel[1]) + height / 2)
+    cv2.putText(canvas, letter, place, font, size, (255, 255, 255), thickness + 4, cv2.LINE_AA)
+    cv2.putText(canvas, letter, place, font, size, _LINE, thickness, cv2.LINE_AA)
