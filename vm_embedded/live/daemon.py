@@ -155,7 +155,7 @@ class Daemon:
         status = self.configuration.status
         metrics = {"/metrics": lambda: Response("text/plain; version=0.0.4", self.metrics().encode())}
         if status.page:
-            pages = {"/": self.page.page, "/state": self.page.state, **metrics}
+            pages = {"/": self.page.page, "/state": self.page.state, "/map": self.page.map, **metrics}
             yield HttpServer(status.page, pages, {"/stream": self.page.stream})
         if status.metrics:
             yield HttpServer(status.metrics, metrics)

@@ -27,7 +27,7 @@ class Response:
 
 
 Write = Callable[[bytes], Awaitable[None]]
-Page = Callable[[], Response]
+Page = Callable[[], Awaitable[Response] | Response]
 Stream = Callable[[Write], Awaitable[None]]
 
 
@@ -82,7 +82,8 @@ class HttpServer:
         elif self._file is None and not _has_numeric_host(head):
             await write(_encode("403 Forbidden", Response("text/plain", b"use the IP address, not a host name\n")))
         elif path in self._pages:
-            await write(_encode("200 OK", self._pages[path]()))
+            response = self._pages[path]()
+            await write(_encode("200 OK", response if isinstance(response, Response) else await response))
         elif path in self._streams and len(self._tasks) <= _MOST_CONNECTIONS:
             await self._streams[path](write)
         else:

@@ -1,4 +1,4 @@
-"""The status page: state, counters, and the camera's images with the detections drawn into them."""
+"""The status page: state, counters, the camera's images with the detections drawn into them, and an overhead map."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from ..detection.detections import Detections
 from ..output.messages import Message
 from ..output.overlay import draw_overlay
 from .http_server import Response, Write
+from .overhead_map import overhead_map
 
 _PAGE = Path(__file__).with_name("status_page.html")
 _BOUNDARY = b"--picture"
@@ -27,7 +28,7 @@ _REPEAT = 2.0
 class StatusPage:
     """Pages and the video stream. state: returns the content of /state.
 
-    It draws images only while a browser is connected: in another thread, and once for all browsers.
+    It draws images and computes maps only while a browser asks for them: in another thread, and once for all browsers.
     """
 
     def __init__(self, fps: float, state: Callable[[], Message]) -> None:
@@ -35,8 +36,10 @@ class StatusPage:
         self._period = 1.0 / fps
         self._latest: tuple[Image, Detections] | None = None
         self._shown: tuple[Image, bytes] | None = None
+        self._mapped: tuple[Detections, bytes] | None = None
         self._changed = asyncio.Event()
         self._drawing = asyncio.Lock()
+        self._mapping = asyncio.Lock()
         self._page = _PAGE.read_bytes()
 
     def show(self, image: Image, detections: Detections) -> None:
@@ -51,6 +54,14 @@ class StatusPage:
     def state(self) -> Response:
         """State and counters as JSON."""
         return Response("application/json", json.dumps(self._state(), allow_nan=False).encode())
+
+    async def map(self) -> Response:
+        """The overhead map as JSON, see overhead_map.py; null before the first frame."""
+        async with self._mapping:
+            if self._latest is not None and (self._mapped is None or self._mapped[0] is not self._latest[1]):
+                detections = self._latest[1]
+                self._mapped = detections, await asyncio.to_thread(_map_json, detections)
+        return Response("application/json", b"null" if self._mapped is None else self._mapped[1])
 
     async def stream(self, write: Write) -> None:
         """Send Motion JPEG until the browser disconnects."""
@@ -80,3 +91,7 @@ class StatusPage:
 
 def _jpeg(image: Image, detections: Detections) -> bytes:
     return cv2.imencode(".jpg", draw_overlay(image, detections), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+
+
+def _map_json(detections: Detections) -> bytes:
+    return json.dumps(overhead_map(detections), allow_nan=False, separators=(",", ":")).encode()

@@ -34,7 +34,7 @@ def draw_field(canvas: Image, field: FieldFeatures, view: PreparedView, scale: f
     """Draw all features but their labels into a BGR image. scale: 1 for a picture of 1280 px."""
     thin = max(1, round(1.5 * scale))
     if field.border is not None:
-        _draw_paths(canvas, view, _in_pieces(field.border.points)[None], _BORDER, thin + 1)
+        _draw_paths(canvas, view, _in_pieces(field.border.points)[None], _BORDER, thin)
     if field.lines:
         ends = np.stack([each.ends for each in field.lines])
         _draw_paths(canvas, view, _in_pieces(ends.swapaxes(0, 1)).swapaxes(0, 1), _LINE, thin)
@@ -46,21 +46,28 @@ def draw_field(canvas: Image, field: FieldFeatures, view: PreparedView, scale: f
     for each, color in _uprights(field):
         _draw_paths(canvas, view, _base(each)[None], INK, 2 * thin + 3)
         _draw_paths(canvas, view, _base(each)[None], color, 2 * thin + 1)
-    if field.crossings:
-        pixels = plane_pixels(view, np.stack([each.position for each in field.crossings]))
-        for crossing, pixel in zip(field.crossings, pixels, strict=True):
-            _draw_letter(canvas, crossing.kind, pixel, scale)
+    for crossing, pixel in zip(field.crossings, _crossing_pixels(field, view), strict=True):
+        _draw_letter(canvas, crossing.kind, pixel, scale)
 
 
-def label_field(labels: Labels, field: FieldFeatures) -> None:
+def label_field(labels: Labels, field: FieldFeatures, view: PreparedView) -> None:
     """Write class and distance beside posts and robots, the nearest first."""
+    crossings = _crossing_pixels(field, view)
+    for pixel in crossings[np.isfinite(crossings).all(axis=1)]:
+        labels.avoid(pixel, 0.01 * view.size[0])
     for each, color in sorted(_uprights(field), key=lambda pair: pair[0].distance):
-        if np.isfinite(each.pixel).all():
-            labels.write(f"{each.class_name} {each.distance:.2f} m", each.pixel, 0.0, color, 0.85)
+        if ((each.pixel >= 0) & (each.pixel < view.size)).all():
+            half = 0.5 * view.lens.scale * each.width / each.distance
+            labels.write(f"{each.class_name} {each.distance:.2f} m", each.pixel, half, color, 0.85)
 
 
 def _uprights(field: FieldFeatures) -> list[tuple[Upright, Color]]:
     return [*((each, _POST) for each in field.posts), *((each, _ROBOT) for each in field.robots)]
+
+
+def _crossing_pixels(field: FieldFeatures, view: PreparedView) -> Floats:
+    """Pixels (c, 2) of the crossings; NaN where the lens sees nothing."""
+    return plane_pixels(view, np.array([each.position for each in field.crossings]).reshape(-1, 2))
 
 
 def _in_pieces(points: Floats) -> Floats:
@@ -94,11 +101,12 @@ def _draw_paths(canvas: Image, view: PreparedView, paths: Floats, color: Color, 
 
 
 def _draw_letter(canvas: Image, letter: str, pixel: Floats, scale: float) -> None:
-    """Write a letter in magenta with a white rim, its middle at a pixel (2,)."""
+    """Write a letter in magenta on a white disk, its middle at a pixel (2,)."""
     if not (np.abs(pixel) < _FARTHEST).all():
         return
-    font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.6 * scale, max(1, round(2 * scale))
+    font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.5 * scale, max(1, round(1.5 * scale))
     (width, height), _ = cv2.getTextSize(letter, font, size, thickness)
-    place = round(float(pixel[0]) - width / 2), round(float(pixel[1]) + height / 2)
-    cv2.putText(canvas, letter, place, font, size, (255, 255, 255), thickness + 4, cv2.LINE_AA)
+    x, y = np.rint(pixel).astype(int).tolist()
+    cv2.circle(canvas, (x, y), round(0.8 * height), (255, 255, 255), cv2.FILLED, cv2.LINE_AA)
+    place = round(x - width / 2), round(y + height / 2)
     cv2.putText(canvas, letter, place, font, size, _LINE, thickness, cv2.LINE_AA)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..arrays import Floats, Image
+from ..arrays import Floats, Image, Mask
 
 Color = tuple[int, int, int]
 """Blue, green, red."""
@@ -24,7 +24,12 @@ class Labels:
 
     def __init__(self, canvas: Image, scale: float) -> None:
         self._canvas, self._scale = canvas, scale
-        self._boxes: list[tuple[int, int, int, int]] = []
+        self._labels: list[tuple[float, ...]] = []  # boxes: left, top, right, bottom [px]
+        self._marks: list[tuple[float, ...]] = []
+
+    def avoid(self, place: Floats, radius: float) -> None:
+        """Cover a mark at a place (2,) [px] only if there is no other room."""
+        self._marks.append((*(place - radius).tolist(), *(place + radius).tolist()))
 
     def write(self, text: str, place: Floats, gap: float, color: Color, share: float = 1.0) -> None:
         """Write one line beside a place (2,) [px], at least `gap` [px] away. share: of the usual size of letters.
@@ -35,18 +40,24 @@ class Labels:
         (width, height), base = cv2.getTextSize(text, font, size, thickness)
         pad = round(4 * self._scale)
         box = np.array([width + 2 * pad, height + base + pad])
-        room = np.array(self._canvas.shape[1::-1]) - box
-        for side in np.array(_SIDES):
-            middle = place + side * (gap + 2 * pad + box / 2)
-            x, y = np.rint(np.clip(middle - box / 2, 0, np.maximum(room, 0))).astype(int).tolist()
-            if not self._overlaps(x, y, x + box[0], y + box[1]):
-                break
-        else:
+        wanted = place + np.array(_SIDES) * (gap + 2 * pad + box / 2) - box / 2
+        corners = np.rint(np.clip(wanted, 0, np.maximum(np.array(self._canvas.shape[1::-1]) - box, 0)))
+        # A label that the edge of the image pushes back may cover its place.
+        worse = (np.abs(corners - wanted).max(axis=1) > 1.0) | _overlap(corners, box, self._marks)
+        free = np.flatnonzero(~_overlap(corners, box, self._labels))
+        if not len(free):
             return
-        right, bottom = int(x + box[0]), int(y + box[1])
-        self._boxes.append((x, y, right, bottom))
-        cv2.rectangle(self._canvas, (x, y), (right, bottom), INK, cv2.FILLED)
-        cv2.putText(self._canvas, text, (x + pad, bottom - base), font, size, color, thickness, cv2.LINE_AA)
+        left, top = corners[free[np.argmin(worse[free])]].astype(int).tolist()
+        right, bottom = left + int(box[0]), top + int(box[1])
+        self._labels.append((left, top, right, bottom))
+        cv2.rectangle(self._canvas, (left, top), (right, bottom), INK, cv2.FILLED)
+        cv2.putText(self._canvas, text, (left + pad, bottom - base), font, size, color, thickness, cv2.LINE_AA)
 
-    def _overlaps(self, left: int, top: int, right: int, bottom: int) -> bool:
-        return any(left < r and l < right and top < b and t < bottom for l, t, r, b in self._boxes)
+
+def _overlap(corners: Floats, size: Floats, boxes: list[tuple[float, ...]]) -> Mask:
+    """Whether boxes of a size (2,), with their top left corners at (n, 2), overlap any of the others; (n,)."""
+    if not boxes:
+        return np.zeros(len(corners), dtype=bool)
+    others = np.array(boxes)
+    apart = (corners[:, None] >= others[:, 2:]) | (corners[:, None] + size <= others[:, :2])
+    return np.asarray(~apart.any(axis=2)).any(axis=1)

@@ -39,7 +39,7 @@ def draw_overlay(image: Image, detections: Detections) -> Image:
     for each, color in drawn:
         _label(labels, each, color)
     if detections.field is not None:
-        label_field(labels, detections.field)
+        label_field(labels, detections.field, detections.observation.view)
     return canvas
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -24,34 +25,43 @@ def demo_frame(number=0):
     return image, Detector.from_file("ball").detect(image, file.orientation, file.lens)
 
 
+def ahead(view, *places):
+    """Places (n, 2) [m], x ahead of the camera and y left, in the plane's frame."""
+    return np.array(places) @ view.heading[:2, :2].T
+
+
 def upright(view, name, x, y, width):
-    """Something that stands at a place (x, y) [m]."""
-    toward = np.array([x, y, -view.height])
+    """Something that stands at a place [m], x ahead of the camera and y left."""
+    position = ahead(view, (x, y))
+    toward = np.array([*position[0], -view.height])
     distance = float(np.linalg.norm(toward))
-    pixel = plane_pixels(view, np.array([[x, y]]))[0]
-    return Upright(name, np.array([x, y]), distance, toward / distance, pixel, width, 0.91)
+    pixel = plane_pixels(view, position)[0]
+    return Upright(name, position[0], distance, toward / distance, pixel, width, 0.91)
 
 
 def segment(view, *ends):
-    """The middle line between two places (x, y) [m]."""
-    return Segment(np.array(ends), plane_pixels(view, np.array(ends)), 0.88)
+    """The middle line between two places [m], x ahead of the camera and y left."""
+    places = ahead(view, *ends)
+    return Segment(places, plane_pixels(view, places), 0.88)
 
 
 def scene(view):
-    """Two goal posts, two robots, a penalty area, a center circle, three crossings and a border."""
+    """Two goal posts, two robots, a penalty area, a center circle, three crossings and a border, ahead of the camera."""
     posts = (upright(view, "post", 5.0, 1.3, 0.1), upright(view, "post", 5.0, -1.3, 0.12))
     robots = (upright(view, "robot", 2.2, -0.9, 0.35), upright(view, "robot", 3.6, 1.9, 0.4))
     corners = (5.0, 2.2), (3.2, 2.2), (3.2, -2.2), (5.0, -2.2)
-    lines = tuple(segment(view, *pair) for pair in zip(corners[:-1], corners[1:], strict=True))
-    crossings = (
-        Crossing("L", np.array([3.2, 2.2]), -0.8),
-        Crossing("T", np.array([5.0, -2.2]), math.pi),
-        Crossing("X", np.array([1.9, 0.6]), 0.3),
+    lines = tuple(segment(view, *pair) for pair in pairwise(corners))
+    center, *places = ahead(view, (1.9, 0.0), (3.2, 2.2), (5.0, -2.2), (1.9, 0.75))
+    yaw = math.atan2(view.heading[1, 0], view.heading[0, 0])
+    kinds = ("L", "T", "X"), (-math.pi / 4, math.pi, 0.0)
+    crossings = tuple(
+        Crossing(kind, place, math.remainder(heading + yaw, 2.0 * math.pi))
+        for kind, heading, place in zip(*kinds, places, strict=True)
     )
-    outer = np.array([(2.0, -3.4), (6.0, -3.2), (6.4, 3.2), (3.0, 3.6)])
+    outer = ahead(view, (2.0, -3.4), (6.0, -3.2), (6.4, 3.2), (3.0, 3.6))
     return FieldFeatures(
-        *(posts, ((0, 1),), robots, lines, CenterCircle(np.array([1.9, 0.0]), 0.75, 4.1, 0.8), crossings),
-        *(np.array([[3.2, 0.0]]), np.array([0.9], np.float32), Border(outer, plane_pixels(view, outer))),
+        *(posts, ((0, 1),), robots, lines, CenterCircle(center, 0.75, 4.1, 0.8), crossings),
+        *(ahead(view, (3.2, 0.0)), np.array([0.9], np.float32), Border(outer, plane_pixels(view, outer))),
     )
 
 

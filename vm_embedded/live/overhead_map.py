@@ -1,0 +1,89 @@
+"""The overhead map of a frame: what it shows of the plane, and where the camera looks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats, Mask
+from ..detection.detections import Detections
+from ..detection.prepared_view import PreparedView
+from ..detection.projection import to_camera
+from ..output.messages import Message
+
+REACH = 12.0
+"""Distance on the plane at which the field of view is cut [m]."""
+
+_AZIMUTHS, _STEPS, _HALVINGS = 360, 40, 8
+"""Directions around the camera, steps from straight down to `REACH`, and halvings of the step at an edge."""
+
+
+def overhead_map(detections: Detections) -> Message:
+    """The map of a frame, ready for JSON. Places are in the plane's frame, as in Detection.
+
+    yaw [rad]: direction of the camera, counterclockwise from the x axis. radius [m]: of the object that is sought.
+    view: polygons (m, 2) [m] around the part of the plane that the picture shows; fill them by the even-odd rule.
+    detections, field: as in messages; field is None for a network without its classes.
+    """
+    view = detections.observation.view
+    return {
+        "yaw": round(float(np.arctan2(view.heading[1, 0], view.heading[0, 0])), 4),
+        "radius": view.shape.radius,
+        "view": [np.round(each, 2).tolist() for each in field_of_view(view)],
+        "detections": [each.as_dict() for each in detections],
+        "field": None if detections.field is None else detections.field.as_dict(),
+    }
+
+
+def field_of_view(view: PreparedView, reach: float = REACH) -> list[Floats]:
+    """Polygons (m, 2) [m] around the part of the plane on screen, in its frame, up to a distance `reach` [m].
+
+    Usually there is one. There are two, one inside the other, if the picture shows all around but not the foot point.
+    For each direction, the nearest and the farthest visible place count: a gap between them is not shown.
+    """
+    azimuths = np.linspace(-np.pi, np.pi, _AZIMUTHS, endpoint=False)
+    tilts = np.linspace(0.0, np.arctan2(reach, view.height), _STEPS + 1)  # from straight down [rad]
+    grid = [each.ravel() for each in np.meshgrid(azimuths, tilts, indexing="ij")]
+    shown = _on_screen(view, *grid).reshape(_AZIMUTHS, _STEPS + 1)
+    found = shown.any(axis=1)
+    if not found.any():
+        return []
+    near = shown.argmax(axis=1)
+    far = _STEPS - shown[:, ::-1].argmax(axis=1)
+    inner = _edge(view, azimuths, tilts[near], tilts[np.maximum(near - 1, 0)])
+    outer = _edge(view, azimuths, tilts[far], tilts[np.minimum(far + 1, _STEPS)])
+    rings = [_places(view, azimuths, each) for each in (outer, inner)]
+    if found.all():
+        return [rings[0]] if shown[:, 0].all() else rings
+    # Begin each run of directions behind one that shows nothing.
+    order = np.roll(np.arange(_AZIMUTHS), -int(np.flatnonzero(~found)[0]))
+    runs = np.split(order, np.flatnonzero(np.diff(found[order])) + 1)
+    return [np.concatenate([rings[0][each], rings[1][each[::-1]]]) for each in runs if found[each[0]]]
+
+
+def _rays(azimuths: Floats, tilts: Floats) -> Floats:
+    """Unit vectors (n, 3) in the mesh frame. azimuths: from straight ahead. tilts: from straight down [rad]."""
+    sine = np.sin(tilts)
+    return np.column_stack([sine * np.cos(azimuths), sine * np.sin(azimuths), -np.cos(tilts)])
+
+
+def _on_screen(view: PreparedView, azimuths: Floats, tilts: Floats) -> Mask:
+    """Whether the picture shows these directions (n,)."""
+    camera = to_camera(_rays(azimuths, tilts), view.rotation)
+    pixels = view.lens.project(camera, view.size)
+    inside = ((pixels >= 0.0) & (pixels <= np.array(view.size) - 1.0)).all(axis=1)
+    return np.asarray(view.lens.sees(camera) & inside)
+
+
+def _edge(view: PreparedView, azimuths: Floats, shown: Floats, hidden: Floats) -> Floats:
+    """Tilts (n,) at the edge of the picture, between tilts that it shows and that it does not."""
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (shown + hidden)
+        seen = _on_screen(view, azimuths, middle)
+        shown, hidden = np.where(seen, middle, shown), np.where(seen, hidden, middle)
+    return shown
+
+
+def _places(view: PreparedView, azimuths: Floats, tilts: Floats) -> Floats:
+    """Where rays meet the plane (n, 2) [m], in its frame."""
+    rays = _rays(azimuths, tilts)
+    return np.asarray((view.height * rays / -rays[:, 2:] @ view.heading.T)[:, :2])
