@@ -1,6 +1,7 @@
 """The metrics of a real vm-detect over HTTP."""
 
 import asyncio
+import json
 import socket
 
 import pytest
@@ -43,6 +44,9 @@ def test_figures_are_given_by_address_only_and_nothing_else_is(tmp_path):
         assert float(figures['vm_stage_seconds_count{stage="infer"}']) == float(figures["vm_frames_total"])
         assert float(figures['vm_stage_seconds_bucket{stage="age",le="+Inf"}']) == float(figures["vm_frames_total"])
         assert float(figures["vm_resident_bytes"]) > 2e7
+        overhead = json.loads(asked(b"GET /map HTTP/1.1\r\nHost: localhost\r\n\r\n").split("\r\n\r\n")[1])
+        assert overhead["view"][0][0]
+        assert overhead["field"] is None
         assert asked(b"GET /metrics HTTP/1.1\r\nHost: robot.example\r\n\r\n").startswith("HTTP/1.1 403")
         assert asked(b"POST / HTTP/1.1\r\nHost: localhost\r\n\r\n").startswith("HTTP/1.1 405")
         assert asked(b"GET /etc/passwd HTTP/1.1\r\nHost: [::1]:1\r\n\r\n").startswith("HTTP/1.1 404")

@@ -74,6 +74,9 @@ def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_cam
         rate = float(text("now").split("frames answered")[1].split("/s")[0])
         assert rate > 5.0
         wait(lambda: "ball" in text("found"))
+        wait(lambda: browser.find_elements("css selector", "#map .ball"))
+        assert browser.find_elements("css selector", "#map path.view")
+        assert "in view" in text("legend")
         browser.save_screenshot(str(tmp_path / "page.png"))
         wait(lambda: text("state") == "camera_lost")
         assert "unplugged" in text("reason")

@@ -1,0 +1,92 @@
+"""The overhead map: the field of view on the plane, and what the page gets."""
+
+import asyncio
+import json
+import math
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.vm_embedded.output.features import demo_frame, scene
+from vm_embedded import Detector, Equidistant, Orientation, Rectilinear
+from vm_embedded.live import status_page
+from vm_embedded.live.overhead_map import REACH, field_of_view, overhead_map
+from vm_embedded.live.status_page import StatusPage
+from vm_embedded.output.field_overlay import plane_pixels
+
+
+def inside(polygons, places):
+    """Whether places (n, 2) are inside of polygons, by the even-odd rule."""
+    count = np.zeros(len(places), int)
+    for each in polygons:
+        contour = each.astype(np.float32)
+        count += [cv2.pointPolygonTest(contour, tuple(map(float, place)), False) > 0 for place in places]
+    return count % 2 == 1
+
+
+def view_of(orientation, lens):
+    image = np.full((480, 640, 3), 90, np.uint8)
+    return Detector.from_file("ball").detect(image, orientation, lens).observation.view
+
+
+VIEWS = {
+    "ahead": (Orientation.from_roll_pitch(0.8, 0.1, 0.4, 2.0), Rectilinear(focal_length=448, fov=1.75)),
+    "down": (Orientation.from_roll_pitch(0.8, 0.0, math.pi / 2), Rectilinear(focal_length=448, fov=1.75)),
+    "wide": (Orientation.from_roll_pitch(0.6, 0.0, 0.9), Equidistant(focal_length=140, fov=3.0)),
+    "up": (Orientation.from_roll_pitch(0.8, 0.0, -math.pi / 2), Equidistant(focal_length=120, fov=3.9)),
+}
+
+
+@pytest.mark.parametrize("name", [*VIEWS, *range(12)])
+def test_the_field_of_view_holds_what_the_picture_shows(name):
+    view = view_of(*VIEWS[name]) if name in VIEWS else demo_frame(name)[1].observation.view
+    places = np.random.default_rng(1).uniform(-1.0, 1.0, (1500, 2)) * np.geomspace(1.0, 12.0, 1500)[:, None]
+    distances = np.hypot(*places.T)
+    pixels = plane_pixels(view, places)
+    with np.errstate(invalid="ignore"):
+        slack = np.minimum(pixels, np.array(view.size) - 1 - pixels).min(axis=1)  # NaN for unseen ones
+    counts = inside(field_of_view(view), places)
+    sure = (distances < REACH - 0.1) & (np.isnan(slack) | (np.abs(slack) > 12.0))
+    seen = np.nan_to_num(slack, nan=-1.0) > 0
+    assert (counts == seen)[sure].mean() > 0.995
+    assert not counts[distances > REACH].any()
+
+
+def test_the_picture_of_a_camera_that_looks_up_shows_a_ring():
+    outer, inner = field_of_view(view_of(*VIEWS["up"]))
+    assert np.hypot(*outer.T).min() > np.hypot(*inner.T).max() > 1.0
+
+
+def test_the_sky_shows_nothing_of_the_plane():
+    view = view_of(Orientation.from_roll_pitch(0.8, 0.0, -1.2), Rectilinear(focal_length=448, fov=1.75))
+    assert field_of_view(view) == []
+
+
+def test_the_map_has_what_the_messages_have():
+    detections = demo_frame(6)[1]
+    view = detections.observation.view
+    made = json.loads(json.dumps(overhead_map(replace(detections, field=scene(view))), allow_nan=False))
+    assert made["field"] == scene(view).as_dict()
+    assert made["detections"] == [each.as_dict() for each in detections]
+    assert made["yaw"] == pytest.approx(math.atan2(view.heading[1, 0], view.heading[0, 0]), abs=1e-4)
+    assert overhead_map(detections)["field"] is None
+
+
+def test_maps_are_computed_when_asked_for_and_once_for_all(monkeypatch):
+    computed = []
+    monkeypatch.setattr(status_page, "overhead_map", lambda each: computed.append(each) or {"n": len(computed)})
+    page = StatusPage(10.0, dict)
+
+    async def ask():
+        assert (await page.map()).content == b"null"
+        image, detections = demo_frame(0)
+        page.show(image, detections)
+        assert computed == []
+        answers = await asyncio.gather(page.map(), page.map())
+        assert {each.content for each in answers} == {b'{"n":1}'}
+        page.show(image, replace(detections))
+        assert (await page.map()).content == b'{"n":2}'
+
+    asyncio.run(ask())
