@@ -13,6 +13,7 @@ from ..network.model_file import ModelFile, read_model
 from ..network.session import Session
 from .cache import MeshCache
 from .detections import Detections
+from .field_points import locate_features
 from .objects import locate
 from .observation import Observation, observe
 from .pixel_formats import checked_image
@@ -68,12 +69,15 @@ class Detector:
         return observe(Pyramid(image, self.settings.format), view, self.manifest, self.session, self.settings, watch)
 
     def locate(self, observation: Observation, explain: bool = False) -> Detections:
-        """Find objects among classified points: the second step of `detect`.
+        """Find objects and field features among classified points: the second step of `detect`.
 
         The result keeps the frame in memory. Raises ModelError if the close look does not run.
         """
         watch = Stopwatch()
         found, rejected = locate(observation, self.look, self.settings, watch, explain)
+        features = locate_features(observation) if self.settings.field_features else None
+        if features is not None:
+            watch.lap("field")
         timing = {**observation.timing_ms, **watch.stages}
         timing["total"] = sum(timing.values())
-        return Detections(found, rejected, observation, self.settings.threshold, timing)
+        return Detections(found, rejected, observation, self.settings.threshold, timing, features)

@@ -56,6 +56,9 @@ class Settings:
     )
     max_widths: float = number(2.0, "reject clusters wider than this", "object widths", (1.0, 100.0))
     min_visible: float = share(0.25, "reject objects with a smaller share of their points on screen")
+    field_features: bool = switch(
+        True, "find goal posts, robots, lines and the border, if the network has the classes goal, robot, line or field"
+    )
 
     def __post_init__(self) -> None:
         check_entries(self)

@@ -1,0 +1,53 @@
+"""From an observation to the features of the field."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats
+from ..field.features import FieldFeatures
+from ..field.find import find_features
+from ..field.ground_points import ROLES, GroundPoints
+from .observation import Observation
+from .prepared_view import PreparedView
+from .projection import to_camera
+
+_LOWEST = 1e-3
+"""Rays less steep than this do not meet the plane near enough to matter."""
+
+
+def locate_features(observation: Observation) -> FieldFeatures | None:
+    """Goal posts, robots, lines and border; None if the network has no class for any of them."""
+    names = [each.name for each in observation.manifest.classes]
+    if not set(ROLES) & set(names):
+        return None
+    view = observation.view
+    return find_features(ground_points(observation), lambda places: _pixels(view, places))
+
+
+def ground_points(observation: Observation) -> GroundPoints:
+    """The points of an observation on the plane."""
+    view, classes = observation.view, observation.manifest.classes
+    steep = np.flatnonzero(observation.rays[:, 2] < -_LOWEST)
+    rays, probabilities = observation.rays[steep], observation.probabilities[steep]
+    outside = np.zeros(len(steep), np.float32)
+    for column, each in enumerate(classes):
+        if each.kind == "background":
+            outside += probabilities[:, column]
+    return GroundPoints(
+        positions=rays[:, :2] * (-view.height / rays[:, 2:]),
+        height=view.height,
+        across=view.shape.radius * view.spacing,
+        classes={each.name: probabilities[:, number] for number, each in enumerate(classes) if each.name in ROLES},
+        outside=outside,
+    )
+
+
+def _pixels(view: PreparedView, places: Floats) -> Floats:
+    """Pixels (n, 2) of places (n, 2) [m] on the plane; NaN where the frame does not show them."""
+    toward = np.column_stack([places, np.full(len(places), -view.height)]) @ view.heading
+    toward /= np.linalg.norm(toward, axis=1, keepdims=True)
+    camera = to_camera(toward, view.rotation)
+    pixels = view.lens.project(camera, view.size)
+    inside = ((pixels >= 0.0) & (pixels <= np.array(view.size) - 1.0)).all(axis=1)
+    return np.where((view.lens.sees(camera) & inside)[:, None], pixels, np.nan)

@@ -1,0 +1,114 @@
+"""The center circle among the line points that are on no long straight line.
+
+Circles through three random points are tried (Fischler and Bolles, "Random sample consensus", 1981), always with the
+same seed. The one with the most points on it is fitted to them, if they cover enough of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Indices
+from .lines import LinePoints
+
+_TRIES = 150
+_RADII = (0.35, 1.7)
+"""Smallest and largest radius of a center circle [m]: children's fields to those of large robots."""
+
+_FEWEST = 14
+"""A circle has at least so many points."""
+
+_SECTORS = 24
+_LEAST_ARC = 0.35
+"""Share of the circle's sectors that have points on it, at least."""
+
+_LEAST_PURE = 0.6
+"""Share of the points in and around the circle's disk that are on the circle, at least: a disk of points is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class CirclePoints:
+    """A circle: center (2,) [m], radius [m], the share of its sectors that have points, and its points' numbers."""
+
+    center: Floats
+    radius: float
+    arc: float
+    members: Indices
+
+
+def find_circle(points: LinePoints, free: Indices) -> CirclePoints | None:
+    """The circle with the most points on it, if there is one.
+
+    free: numbers of the points to search. Its members may be any of the points.
+    """
+    if len(free) < _FEWEST:
+        return None
+    part = points.part(free)
+    triples = np.random.default_rng(0).integers(len(free), size=(_TRIES, 3))
+    centers, radii = _through(part.positions[triples])
+    possible = (radii > _RADII[0]) & (radii < _RADII[1])
+    if not possible.any():
+        return None
+    centers, radii = centers[possible], radii[possible]
+    away = part.positions[:, None] - centers
+    off = np.hypot(away[..., 0], away[..., 1]) - radii
+    support = part.weights @ (np.abs(off) < _tolerance(part)[:, None])
+    best = int(np.argmax(support))
+    center, radius = centers[best], float(radii[best])
+    for _ in range(3):
+        on = _on(part, center, radius)
+        if on.sum() < _FEWEST:
+            return None
+        center, radius = _fit(part.part(on), center, radius)
+    return _checked(points, center, radius)
+
+
+def _tolerance(points: LinePoints) -> Floats:
+    """How far (n,) [m] points may be from the circle's middle line."""
+    return 0.04 + 0.6 * points.blur
+
+
+def _on(points: LinePoints, center: Floats, radius: float) -> Indices:
+    away = points.positions - center
+    off = np.abs(np.hypot(away[:, 0], away[:, 1]) - radius)
+    normals = away / np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)[:, None]
+    return np.asarray(off < points.tolerance(normals))
+
+
+def _through(triples: Floats) -> tuple[Floats, Floats]:
+    """Centers (t, 2) and radii (t,) of the circles through three points each (t, 3, 2); infinite for points in a row."""
+    a, b = triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0]
+    cross = 2.0 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    cross[np.abs(cross) < 1e-6] = np.nan
+    aa, bb = (a**2).sum(axis=1), (b**2).sum(axis=1)
+    x = (b[:, 1] * aa - a[:, 1] * bb) / cross
+    y = (a[:, 0] * bb - b[:, 0] * aa) / cross
+    return triples[:, 0] + np.stack([x, y], axis=1), np.nan_to_num(np.hypot(x, y), nan=np.inf)
+
+
+def _fit(points: LinePoints, center: Floats, radius: float) -> tuple[Floats, float]:
+    """One step of Gauss and Newton towards the circle with the least squares of distances, weighted by precision."""
+    away = points.positions - center
+    length = np.hypot(away[:, 0], away[:, 1])
+    normals = away / length[:, None]
+    precision = np.sqrt(points.weights) / points.tolerance(normals)
+    slopes = np.column_stack([normals, np.ones(len(away))]) * precision[:, None]
+    step = np.linalg.lstsq(slopes, (length - radius) * precision, rcond=None)[0]
+    return center + step[:2], radius + float(step[2])
+
+
+def _checked(points: LinePoints, center: Floats, radius: float) -> CirclePoints | None:
+    """The circle with all its points, or None if it is too small, too large, or too little of it is seen."""
+    members = np.flatnonzero(_on(points, center, radius))
+    if not _RADII[0] < radius < _RADII[1] or len(members) < _FEWEST:
+        return None
+    away = points.positions - center
+    angles = np.arctan2(away[members, 1], away[members, 0])
+    sectors = np.bincount(((angles + np.pi) * (_SECTORS / (2.0 * np.pi))).astype(np.intp) % _SECTORS, minlength=_SECTORS)
+    arc = float((sectors > 0).mean())
+    around = np.abs(np.hypot(away[:, 0], away[:, 1]) - radius) < 0.5 * radius
+    if arc < _LEAST_ARC or len(members) < _LEAST_PURE * around.sum():
+        return None
+    return CirclePoints(center, radius, arc, members)

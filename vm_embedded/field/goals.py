@@ -1,0 +1,30 @@
+"""Goals: pairs of posts at a goal's distance from each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .features import Upright
+
+_WIDTHS = (1.2, 3.4)
+"""Smallest and largest distance of a goal's posts [m]: from children's robots to those of adult size."""
+
+
+def pair_posts(posts: Sequence[Upright]) -> tuple[tuple[int, int], ...]:
+    """Positions of the left and right post of each goal, nearest pairs first; each post belongs to one goal at most."""
+    pairs = []
+    for number, one in enumerate(posts):
+        for other in range(number):
+            apart = float(np.hypot(*(one.position - posts[other].position)))
+            if _WIDTHS[0] <= apart <= _WIDTHS[1]:
+                pairs.append((apart, other, number))
+    found: list[tuple[int, int]] = []
+    taken: set[int] = set()
+    for _, one, other in sorted(pairs):
+        if not taken & {one, other}:
+            taken |= {one, other}
+            (x, y), (u, v) = posts[one].position, posts[other].position
+            found.append((one, other) if u * y - v * x > 0.0 else (other, one))
+    return tuple(found)

@@ -1,0 +1,117 @@
+"""Things that stand on the plane: each has its base where its lowest points are.
+
+A point of something upright is seen against the plane behind the base, the farther the higher it is. So the nearest
+points in each direction are at the base.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Indices, Singles
+from .ground_points import GroundPoints
+
+
+@dataclass(frozen=True)
+class UprightRules:
+    """What things of one class look like.
+
+    least: points with a smaller probability are ignored. points: fewest points of a thing. jump: a thing ends in the
+    direction where the base would be farther by more than this share. beside [m]: everything of the class that is so
+    near beside a base belongs to it. depth [m]: from its front to the middle of its base. taller: height of a thing, as
+    a share of its width, at least.
+    """
+
+    least: float
+    points: int
+    jump: float
+    beside: float
+    depth: float
+    taller: float
+
+
+POST = UprightRules(least=0.5, points=4, jump=0.12, beside=0.12, depth=0.05, taller=1.0)
+ROBOT = UprightRules(least=0.5, points=8, jump=0.15, beside=0.3, depth=0.08, taller=0.0)
+
+_COLUMN = 0.012
+"""Width of a column of points [rad]."""
+
+_MOST = 20
+"""Largest number of things of a class."""
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """A thing on the plane: the middle of its base (2,) [m], its width across the ray [m], and the mean probability of
+    its points."""
+
+    position: Floats
+    width: float
+    confidence: float
+
+
+def find_uprights(points: GroundPoints, probabilities: Singles, rules: UprightRules) -> list[Base]:
+    """Things of a class with these probabilities (n,), nearest first."""
+    chosen = np.flatnonzero((probabilities > rules.least) & (points.ranges > 1e-3))
+    if len(chosen) < rules.points:
+        return []
+    azimuths, ranges, weights = points.azimuths[chosen], points.ranges[chosen], probabilities[chosen]
+    middle = float(np.arctan2(np.sin(azimuths).sum(), np.cos(azimuths).sum()))
+    turned = np.remainder(azimuths - middle + np.pi, 2.0 * np.pi) - np.pi
+    columns, fronts = _fronts(turned, ranges)
+    found: list[Base] = []
+    left = np.ones(len(chosen), dtype=bool)  # points that belong to no thing yet
+    order = np.argsort(fronts)
+    open_columns = np.ones(len(columns), dtype=bool)
+    for nearest in order:
+        if not open_columns[nearest] or len(found) >= _MOST:
+            continue
+        front = fronts[nearest]
+        low, high = _extent(columns, fronts, nearest, front * (1.0 + rules.jump), points.across / front)
+        side = rules.beside / front
+        own = left & (turned > low - side) & (turned < high + side)
+        open_columns &= (columns + 0.5 * _COLUMN < low - side) | (columns + 0.5 * _COLUMN > high + side)
+        left &= ~own
+        thing = _thing(points, turned[own], ranges[own], weights[own], rules)
+        if thing is not None:
+            azimuth, distance, width, confidence = thing
+            azimuth += middle
+            found.append(Base(distance * np.array([np.cos(azimuth), np.sin(azimuth)]), width, confidence))
+    return found
+
+
+def _fronts(azimuths: Floats, ranges: Floats) -> tuple[Floats, Floats]:
+    """Left edges [rad] of the columns that have points, and the nearest range [m] in each."""
+    numbers = np.floor(azimuths / _COLUMN).astype(np.intp)
+    order = np.lexsort((ranges, numbers))
+    starts = np.flatnonzero(np.diff(numbers[order], prepend=numbers.min() - 1))
+    return numbers[order][starts] * _COLUMN, ranges[order][starts]
+
+
+def _extent(columns: Floats, fronts: Floats, number: int, farthest: float, gap: float) -> tuple[float, float]:
+    """The directions [rad] between which the fronts beside a column are nearer than `farthest`, without wide gaps."""
+    near = np.flatnonzero(fronts <= farthest)
+    at = int(np.searchsorted(near, number))
+    wide = np.flatnonzero(np.diff(columns[near]) > _COLUMN + 1.6 * gap)
+    first = wide[wide < at].max(initial=-1) + 1
+    last = wide[wide >= at].min(initial=len(near) - 1)
+    return float(columns[near[first]]), float(columns[near[last]]) + _COLUMN
+
+
+def _thing(
+    points: GroundPoints, azimuths: Floats, ranges: Floats, weights: Singles, rules: UprightRules
+) -> tuple[float, float, float, float] | None:
+    """Azimuth [rad], range [m], width [m] and confidence of a thing with these points, or None if it is none."""
+    if len(ranges) < rules.points:
+        return None
+    step = float(points.along(ranges.min()))
+    front = float(np.sort(ranges)[min(1, len(ranges) - 1)]) - 0.5 * step if len(ranges) > 12 else float(ranges.min())
+    low = ranges < front * (1.0 + rules.jump) + step
+    azimuth = float(weights[low] @ azimuths[low] / weights[low].sum())
+    width = float(np.ptp(azimuths)) * front + points.across
+    tall = points.height * (1.0 - front / float(ranges.max()))  # at the distance of the front
+    if tall < rules.taller * min(width, 0.3):
+        return None
+    return azimuth, front + rules.depth, width, float(weights.mean())
