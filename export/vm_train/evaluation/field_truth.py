@@ -37,8 +37,12 @@ _NEAR = 2
 _FOOT = 0.2
 """Share of a robot's height that counts as its foot."""
 
-_FOOT_SHOWN = 0.15
-"""Share of the outline of a robot's foot that shows a robot, if the foot is visible. Between two legs is the field."""
+_FOOT_SHOWN = 0.05
+"""Least share of the outline of a robot's foot that shows a robot, if the foot is visible. Much of the outline is
+field: between two legs, and below the body of a robot that lies on the ground."""
+
+_FAR_OUTSIDE = 1e4
+"""Pixels of this size are too far outside of the picture to draw with them [px]."""
 
 _STEP = math.radians(2.0)
 """Angle between directions of the border."""
@@ -117,7 +121,7 @@ def _uprights(
         if visible and kind == "post":
             visible = _shown_at(by_name["goal"], view.pixels(base[None]))[0]
         elif visible:
-            visible = _share_in(by_name["robot"], _outline(view, each, _FOOT * each.height)) >= _FOOT_SHOWN
+            visible = _shows_foot(by_name, _outline(view, each, _FOOT * each.height))
         hidden = visible and any(_covers(view, other, each) for other in chosen)
         found.append(TrueUpright(base, each.width, bool(visible and not hidden)))
     return found
@@ -139,13 +143,17 @@ def _outline(view: GroundView, upright: Standing, height: float) -> Floats:
     return np.concatenate([view.pixels(ends), view.pixels(ends[::-1], height)])
 
 
-def _share_in(shown: Mask, outline: Floats) -> float:
-    """Share of the pixels in an outline (4, 2) that a mask (h, w) has; 0 if the picture has none of them."""
-    if not np.isfinite(outline).all() or np.abs(outline).max() > 1e4:
-        return 0.0
-    inside = np.zeros(shown.shape, dtype=np.uint8)
+def _shows_foot(by_name: dict[str, Mask], outline: Floats) -> bool:
+    """Whether the outline (4, 2) of a robot's foot shows more of the robot than of what may hide it.
+
+    Robots and the field's colors hide nothing there; a ball, a goal, a person or a thing does.
+    """
+    if not np.isfinite(outline).all() or np.abs(outline).max() > _FAR_OUTSIDE:
+        return False
+    inside = np.zeros(by_name["robot"].shape, dtype=np.uint8)
     cv2.fillConvexPoly(inside, np.rint(outline).astype(np.int32), 1)
-    return float(shown[inside > 0].mean()) if inside.any() else 0.0
+    robot, field, line = (float(by_name[name][inside > 0].mean()) for name in ("robot", "field", "line"))
+    return robot >= max(_FOOT_SHOWN, 1.0 - robot - field - line)
 
 
 def _covers(view: GroundView, other: Standing, upright: Standing) -> bool:
