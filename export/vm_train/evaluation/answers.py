@@ -26,6 +26,7 @@ from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import InputError
+from vm_embedded.field.features import FieldFeatures
 from vm_embedded.geometry.orientation import Orientation, rotation_z
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.close_look import CloseLook
@@ -49,7 +50,7 @@ class PictureAnswer:
     and the objects found, most confident first.
 
     proposals: for the close look's class, the centers (c, 3) [m] of its proposals, relative to the camera, in the frame
-    of `Detection.bearing`. Empty without a close look.
+    of `Detection.bearing`. Empty without a close look. features: of the field, or None if the network has none.
     """
 
     pixels: Floats
@@ -57,6 +58,7 @@ class PictureAnswer:
     probabilities: Singles
     found: tuple[Detection, ...]
     proposals: Mapping[str, Floats]
+    features: FieldFeatures | None = None
 
 
 class Subject(Protocol):
@@ -131,7 +133,8 @@ class RobotSubject:
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         assert radius is None  # a robot's network is for balls of one size
         seen = self.detector.detect(picture.image, _orientation(picture), picture.lens.lens)
-        return _answer(seen.observation, seen.objects, self.look, self.detector.settings)
+        answer = _answer(seen.observation, seen.objects, self.look, self.detector.settings)
+        return replace(answer, features=seen.field)
 
 
 def _answer(

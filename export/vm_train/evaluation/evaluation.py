@@ -1,4 +1,4 @@
-"""The result of an evaluation: scores of points, objects and proposals, the worst errors, and the skipped pictures.
+"""The result of an evaluation: scores of points, objects, proposals and field features, worst errors, skipped pictures.
 
 Results for parts of the pictures add up to the result for all of them.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -16,10 +17,12 @@ from vm_embedded.network.manifest import Manifest
 from ..data.classes import Classes
 from ..data.picture_files import PictureFault, PictureFiles
 from ..data.pictures import Picture, read_picture
+from ..scores.field_scores import FieldScores
 from ..scores.object_scores import ObjectScores
 from ..scores.point_scores import PointScores
 from ..scores.proposal_scores import ProposalScores
 from .answers import PictureAnswer, Subject
+from .field_truth import CLASSES, FieldScene, field_truth, read_field
 from .object_truth import SceneTruth, read_scene, true_objects
 from .worst_errors import WorstErrors, worst_errors_of
 
@@ -53,7 +56,8 @@ class Evaluation:
 
     objects: scores for each class of the kind object. proposals: scores for the class of the close look, if there is
     one. poses: of the evaluated pictures. radii: of the balls [m], one for each picture with a sceneX.json. faults: the
-    reason for each picture that was not evaluated, by path.
+    reason for each picture that was not evaluated, by path. features: scores of field features, for a Visual Mesh with
+    the classes for them.
     """
 
     points: PointScores
@@ -63,6 +67,7 @@ class Evaluation:
     radii: list[float] = field(default_factory=list)
     faults: dict[str, str] = field(default_factory=dict)
     worst: WorstErrors = field(default_factory=WorstErrors)
+    features: FieldScores | None = None
 
     @classmethod
     def empty(cls, subject: Subject, rules: Rules) -> Evaluation:
@@ -72,7 +77,9 @@ class Evaluation:
         scores = {name: ObjectScores(min_radius=rules.min_radius) for name in objects}
         looks = [] if subject.look is None else [subject.look.contract.object_class]
         proposals = {name: ProposalScores(min_radius=rules.min_radius) for name in looks if name in scores}
-        return cls(PointScores([each.name for each in classes]), scores, proposals)
+        names = {each.name for each in classes}
+        features = FieldScores() if subject.grid.is_visual and names.issuperset(CLASSES) else None
+        return cls(PointScores([each.name for each in classes]), scores, proposals, features=features)
 
     def __add__(self, other: Evaluation) -> Evaluation:
         """The result for the pictures of both. Raises InputError if their classes or rules differ."""
@@ -84,12 +91,22 @@ class Evaluation:
             self.radii + other.radii,
             self.faults | other.faults,
             self.worst + other.worst,
+            None if self.features is None or other.features is None else self.features + other.features,
         )
 
     def count(
-        self, files: PictureFiles, picture: Picture, scene: SceneTruth | None, answer: PictureAnswer, manifest: Manifest
+        self,
+        files: PictureFiles,
+        picture: Picture,
+        scene: SceneTruth | None,
+        answer: PictureAnswer,
+        manifest: Manifest,
+        stage: FieldScene | None = None,
     ) -> None:
-        """Add a network's answer on a picture. Raises ModelError for probabilities outside 0 to 1."""
+        """Add a network's answer on a picture. stage: what its scene file tells about the field.
+
+        Raises ModelError for probabilities outside 0 to 1.
+        """
         x, y = np.rint(answer.pixels).astype(np.intp).T
         self.points.add(answer.probabilities, picture.labels[y, x], answer.distances)
         for name, truths in true_objects(picture, scene, manifest).items():
@@ -99,6 +116,9 @@ class Evaluation:
                 self.worst += worst_errors_of(files, name, truths, found, mistakes)
             if name in self.proposals:
                 self.proposals[name].add(truths, answer.proposals[name])
+        if self.features is not None and answer.features is not None:
+            truth = field_truth(picture, stage, [each.name for each in manifest.classes])
+            self.features.add(truth, answer.features)
         if scene is not None:
             self.radii.append(scene.ball_radius)
         orientation = picture.lens.orientation
@@ -116,6 +136,7 @@ def evaluate_pictures(subject: Subject, pictures: Sequence[PictureFiles], classe
     for files in pictures:
         try:
             picture, scene = _read(files, classes, rules)
+            stage = None if result.features is None else read_field(_scene_file(files))
             answer = subject.answer(picture, scene.ball_radius if scene and rules.radius_of == "scene" else None)
         except (InputError, GeometryError) as error:
             if isinstance(error, PictureFault) and error.kind == "color":
@@ -125,13 +146,17 @@ def evaluate_pictures(subject: Subject, pictures: Sequence[PictureFiles], classe
                 raise InputError(f"{files.image}: {error}") from error
             result.faults[str(files.image)] = str(error)
         else:
-            result.count(files, picture, scene, answer, subject.manifest)
+            result.count(files, picture, scene, answer, subject.manifest, stage)
     return result
 
 
 def _read(files: PictureFiles, classes: Classes, rules: Rules) -> tuple[Picture, SceneTruth | None]:
     picture = read_picture(files, classes)
-    scene = read_scene(files.image.with_name(f"scene{files.number}.json"))
+    scene = read_scene(_scene_file(files))
     if scene is None and rules.radius_of == "scene":
         raise InputError(f"scene{files.number}.json: is missing, but --radius-of scene needs its ball radius")
     return picture, scene
+
+
+def _scene_file(files: PictureFiles) -> Path:
+    return files.image.with_name(f"scene{files.number}.json")

@@ -110,9 +110,7 @@ def field_truth(picture: Picture, scene: FieldScene | None, classes: Sequence[st
     return FieldTruth(uprights, field, view.shows)
 
 
-def _uprights(
-    view: GroundView, by_name: dict[str, Mask], standing: Iterable[Standing], kind: str
-) -> list[TrueUpright]:
+def _uprights(view: GroundView, by_name: dict[str, Mask], standing: Iterable[Standing], kind: str) -> list[TrueUpright]:
     chosen = [each for each in standing if each.kind == kind]
     found = []
     for each in chosen:

@@ -25,7 +25,7 @@ from .worst_pictures import draw_error
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_TABLES = ("points", "point_curves", "confusion", "objects", "object_curves", "calibration", "proposals")
+_TABLES = ("points", "point_curves", "confusion", "objects", "object_curves", "calibration", "proposals", "field")
 _PLOTS = (
     *("points_curves", "points_over_distance", "confusion", "points_on_object"),
     *("objects_curves", "objects_over_distance", "distance_error", "reliability", "proposals"),

@@ -14,6 +14,7 @@ from .summary import (
     as_percent,
     as_radii,
     calibration,
+    field_tables,
     object_table,
     point_table,
     proposal_counts,
@@ -87,6 +88,8 @@ def page(scores: Scores, plots: Mapping[str, bytes], strips: Mapping[str, Sequen
     for heading, pictures in strips.items():
         if pictures:
             parts.append(f"<h2>{escape(heading)}</h2>{_KEY}{_strip(pictures)}")
+    for name, each in field_tables(scores["field"]).items():
+        parts.append(f"<h2>{escape(name[0].upper() + name[1:])}</h2>{_table(*each)}")
     parts.append(f"<h2>Points</h2>{_table(*point_table(scores['points']))}")
     parts += [_plot(name, plots, about) for name in ("points_curves", "points_over_distance", "confusion")]
     if "points_on_object" in plots:

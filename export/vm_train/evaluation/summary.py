@@ -1,8 +1,8 @@
-"""The scores that people read first: tables of objects, proposals and points, for a terminal and for the report."""
+"""The scores that people read first, as tables for a terminal and for the report."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from vm_workstation.text_tables import aligned
@@ -24,6 +24,8 @@ def lines(scores: Scores) -> str:
         rows += ["", f"proposals for class {name}: {proposal_counts(found)}"]
         for heading, body in proposal_tables(found):
             rows += aligned([heading, *body])
+    for name, (heading, body) in field_tables(scores["field"]).items():
+        rows += ["", name, *aligned([heading, *body])]
     heading, body = point_table(scores["points"])
     return "\n".join([*rows, "", "points", *aligned([heading, *body])])
 
@@ -94,6 +96,65 @@ def proposal_tables(found: Scores) -> list[Table]:
     return tables
 
 
+def field_tables(found: Scores) -> dict[str, Table]:
+    """Tables of field features by heading, with a row for each distance bin that has any; none without features."""
+    return {f"{name} of the field": _FIELD_TABLES[name](each) for name, each in found.items() if each["pictures"]}
+
+
+def _upright_table(found: Scores) -> Table:
+    within, limit = as_percent(found["tolerance"], 0), found["limit"]
+    heading = ["distance [m]", "visible", f"within {within}", "error median", "median [m]"]
+    heading += ["reported", "false", "false/picture", "people"]
+    rows: list[Sequence[str]] = [
+        [
+            *(where, str(each["visible"]), as_percent(each["recall"])),
+            *(as_percent(each["relative_error_median"]), as_meters(each["error_median"])),
+            *(str(each["reported"]), str(each["false"]), as_number(each["false_per_picture"]), str(each["people"])),
+        ]
+        for where, each in _field_bins(found, f"0-{limit:g}", ("visible", "reported"))
+    ]
+    return heading, rows
+
+
+def _line_table(found: Scores) -> Table:
+    heading = ["distance [m]", "visible [m]", "found", "reported [m]", "wrong"]
+    rows: list[Sequence[str]] = [
+        [
+            *(where, as_number(each["visible"], 1), as_percent(each["recall"])),
+            *(as_number(each["reported"], 1), as_percent(each["wrong_share"])),
+        ]
+        for where, each in _field_bins(found, f"0-{found['limit']:g}", ("visible", "reported"))
+    ]
+    return heading, rows
+
+
+def _border_table(found: Scores) -> Table:
+    heading = ["distance [m]", "directions", "reported", "error median", "error 90 %"]
+    rows: list[Sequence[str]] = [
+        [
+            *(where, str(each["directions"]), as_percent(each["reported"])),
+            *(as_percent(each["error_median"]), as_percent(each["error_p90"])),
+        ]
+        for where, each in _field_bins(found, "", ("directions",))
+    ]
+    return heading, rows
+
+
+_FIELD_TABLES = {
+    "posts": _upright_table,
+    "robots": _upright_table,
+    "lines": _line_table,
+    "border": _border_table,
+}
+
+
+def _field_bins(found: Scores, near: str, counts: Sequence[str]) -> Iterator[tuple[str, Scores]]:
+    """The distance bins that have any of these counts, by name. near: name of the bin up to the limit."""
+    for where, each in found.items():
+        if isinstance(each, Mapping) and (where == "all" or any(each[key] for key in counts)):
+            yield near if where == "near" else where, each
+
+
 def point_table(points: Scores) -> Table:
     """A row for each class: the scores of its points over all distances."""
     names = ("precision", "recall", "f1", "mcc", "informedness", "markedness", "average_precision", "roc_auc")
@@ -108,9 +169,9 @@ def as_number(value: float | None, digits: int = 3) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def as_percent(value: float | None) -> str:
+def as_percent(value: float | None, digits: int = 1) -> str:
     """A share as a percentage, "-" for None."""
-    return "-" if value is None else f"{100.0 * value:.1f} %"
+    return "-" if value is None else f"{100.0 * value:.{digits}f} %"
 
 
 def as_radii(value: float | None) -> str:

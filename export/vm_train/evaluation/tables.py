@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..scores.distance_bins import named_bins
+from ..scores.field_scores import FieldScores
 from .evaluation import Evaluation
 
 
@@ -45,6 +46,7 @@ def as_json(evaluation: Evaluation, threshold: float) -> dict[str, Any]:
             name: {"min_visible": scores.min_visible, "min_radius": scores.min_radius, **scores.as_dict()}
             for name, scores in evaluation.proposals.items()
         },
+        "field": {} if evaluation.features is None else evaluation.features.as_dict(),
     }
 
 
@@ -60,6 +62,8 @@ def as_csv(evaluation: Evaluation, threshold: float) -> dict[str, str]:
         found["calibration"] = _text(_calibration_rows(evaluation))
     if evaluation.proposals:
         found["proposals"] = _text(_proposal_rows(evaluation))
+    if evaluation.features is not None:
+        found["field"] = _text(_field_rows(evaluation.features))
     return found
 
 
@@ -118,6 +122,16 @@ def _proposal_rows(evaluation: Evaluation) -> Iterable[dict[str, object]]:
         for measure in scores.edges:
             for place, recall in scores.recalls_by(measure).items():
                 yield {"class": name, "by": measure, "bin": place, **recall.as_dict()}
+
+
+def _field_rows(features: FieldScores) -> Iterable[dict[str, object]]:
+    rows = []
+    for name, scores in features.as_dict().items():
+        for where, row in scores.items():
+            if isinstance(row, dict):
+                rows.append({"feature": name, "distance": where, **row})
+    columns = {key: "" for row in rows for key in row}  # not every feature has all of them
+    return [columns | row for row in rows]
 
 
 def _short(value: float) -> str:

@@ -6,6 +6,7 @@ Distances are on the plane, from the camera's foot. Scores without a value are N
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -77,7 +78,7 @@ def distances_along(polyline: Floats, directions: Floats) -> Floats:
     """
     unit = np.stack([np.cos(directions), np.sin(directions)], axis=-1)
     farthest = np.full(len(directions), -np.inf)
-    for start, end in zip(polyline[:-1], polyline[1:], strict=True):
+    for start, end in pairwise(polyline):
         left, right = _cross(unit, start), _cross(unit, end)
         with np.errstate(divide="ignore", invalid="ignore"):
             share = left / (left - right)

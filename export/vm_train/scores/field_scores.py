@@ -72,8 +72,12 @@ class FieldScores:
 
     def as_dict(self) -> dict[str, Any]:
         """All numbers, for JSON."""
-        parts = {"posts": self.posts, "robots": self.robots, "lines": self.lines, "border": self.border}
-        return {name: each.as_dict() for name, each in parts.items()}
+        return {
+            "posts": self.posts.as_dict(),
+            "robots": self.robots.as_dict(),
+            "lines": self.lines.as_dict(),
+            "border": self.border.as_dict(),
+        }
 
 
 def reported_lines(found: FieldFeatures, shown: Callable[[Floats], Mask]) -> tuple[Lines, Floats]:

@@ -70,8 +70,8 @@ class PointScores:
         both._confusion = self._confusion + other._confusion
         return both
 
-    def ranking(self, class_name: str, distance_bin: int | None = None) -> PointRanking:
-        """The ranking by the probability of a class, of all points or of those in a distance bin, from 0.
+    def ranking(self, class_name: str, distance_bin: int | range | None = None) -> PointRanking:
+        """The ranking by the probability of a class, of all points or of those in one or several distance bins, from 0.
 
         Raises InputError for an unknown class.
         """
@@ -85,8 +85,10 @@ class PointScores:
         return _rows(self._confusion, distance_bin)
 
 
-def _rows(counts: Counts, distance_bin: int | None) -> Counts:
-    """Counts of one bin from counts (D + 1, ...), or their sum for None."""
+def _rows(counts: Counts, distance_bin: int | range | None) -> Counts:
+    """Counts of one or several bins from counts (D + 1, ...), or the sum of all for None."""
     if distance_bin is None:
         return np.asarray(counts.sum(axis=0))
+    if isinstance(distance_bin, range):
+        return np.asarray(counts[list(distance_bin)].sum(axis=0))
     return np.asarray(counts[range(len(counts) - 1)[distance_bin]])

@@ -57,9 +57,7 @@ class UprightScores:
         self._truths: list[tuple[float, float, bool]] = []  # distance, error [m] or NaN, found
         self._reports: list[tuple[float, int]] = []  # distance, outcome
 
-    def add(
-        self, truths: Sequence[TrueUpright], found: Sequence[Floats], people: Sequence[TrueUpright] = ()
-    ) -> None:
+    def add(self, truths: Sequence[TrueUpright], found: Sequence[Floats], people: Sequence[TrueUpright] = ()) -> None:
         """Add a picture: its true uprights, visible or not, the reported positions (2,) [m], and its people."""
         errors = _errors(truths, found)
         distances = np.array([_distance(each.position) for each in truths])
@@ -75,8 +73,8 @@ class UprightScores:
         outcomes[list(near.values())] = _NEAR
         outcomes[list(hits.values())] = _FOUND
         for number in np.flatnonzero(visible).tolist():
-            report = (hits | near).get(number)
-            error = math.nan if report is None else float(errors[number, report])
+            match = (hits | near).get(number)
+            error = math.nan if match is None else float(errors[number, match])
             self._truths.append((float(distances[number]), error, number in hits))
         self._reports += [(_distance(each), int(outcome)) for each, outcome in zip(found, outcomes, strict=True)]
         self.pictures += 1
