@@ -148,7 +148,7 @@ STRAIGHT = Lines(np.array([[(2.0, -1.0), (2.0, 1.0)]]))
 
 @pytest.mark.parametrize(("shift", "recall", "wrong"), [(0.0, 1.0, 0.0), (0.04, 1.0, 0.0), (0.2, 0.0, 1.0)])
 def test_lines_within_the_tolerance_are_found_and_not_wrong(shift, recall, wrong):
-    row = line_row(STRAIGHT, Lines(STRAIGHT.segments + (shift, 0.0)))
+    row = line_row(STRAIGHT, Lines(STRAIGHT.segments + np.array([shift, 0.0])))
     assert (row["recall"], row["wrong_share"]) == (recall, wrong)
     assert row["visible"] == row["reported"] == pytest.approx(2.0, abs=0.02)
 
