@@ -17,6 +17,7 @@ import numpy as np
 from vm_embedded.arrays import Floats, Mask, Singles
 from vm_embedded.detection.detections import Detection
 from vm_embedded.detection.detector import Detector
+from vm_embedded.detection.field_points import locate_features
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Network, Observation, classify
 from vm_embedded.detection.prepared_view import PreparedView
@@ -94,9 +95,11 @@ class ExactSubject:
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         observation = self.observe(picture, radius)
         found: tuple[Detection, ...] = ()
+        features = None
         if self.grid.is_visual:
             found, _ = locate(observation, self.look, self.settings, Stopwatch())
-        return _answer(observation, found, self.look, self.settings)
+            features = locate_features(observation) if self.settings.field_features else None
+        return _answer(observation, found, features, self.look, self.settings)
 
     def observe(self, picture: Picture, radius: float | None = None) -> Observation:
         """The points of a picture with their probabilities; see `Subject.answer`."""
@@ -133,16 +136,19 @@ class RobotSubject:
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         assert radius is None  # a robot's network is for balls of one size
         seen = self.detector.detect(picture.image, _orientation(picture), picture.lens.lens)
-        answer = _answer(seen.observation, seen.objects, self.look, self.detector.settings)
-        return replace(answer, features=seen.field)
+        return _answer(seen.observation, seen.objects, seen.field, self.look, self.detector.settings)
 
 
 def _answer(
-    observation: Observation, found: tuple[Detection, ...], look: CloseLook | None, settings: Settings
+    observation: Observation,
+    found: tuple[Detection, ...],
+    features: FieldFeatures | None,
+    look: CloseLook | None,
+    settings: Settings,
 ) -> PictureAnswer:
     distances = plane_distances(observation.rays, observation.view.height)
     proposals = {} if look is None else _proposals(observation, look, settings)
-    return PictureAnswer(observation.pixels, distances, observation.probabilities, found, proposals)
+    return PictureAnswer(observation.pixels, distances, observation.probabilities, found, proposals, features)
 
 
 def _proposals(observation: Observation, look: CloseLook, settings: Settings) -> dict[str, Floats]:
