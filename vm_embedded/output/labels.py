@@ -12,7 +12,10 @@ Color = tuple[int, int, int]
 
 INK: Color = (30, 30, 30)
 
-_SIDES = ((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, -1), (1, 1), (-1, 1), (0, -2), (0, 2), (1, -2), (-1, -2))
+_SIDES = (
+    *((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, -1), (1, 1), (-1, 1)),
+    *((0, -2), (0, 2), (1, -2), (-1, -2), (1, 2), (-1, 2), (0, -3), (0, 3)),
+)
 """Where a label may be beside its place, best first: steps to the right and down, in sizes of the label."""
 
 

@@ -46,7 +46,7 @@ def segment(view, *ends):
 
 
 def scene(view):
-    """Two goal posts, two robots, a penalty area, a center circle, three crossings and a border, ahead of the camera."""
+    """Two goal posts, two robots, a penalty area, a center circle, crossings and a border, ahead of the camera."""
     posts = (upright(view, "post", 5.0, 1.3, 0.1), upright(view, "post", 5.0, -1.3, 0.12))
     robots = (upright(view, "robot", 2.2, -0.9, 0.35), upright(view, "robot", 3.6, 1.9, 0.4))
     corners = (5.0, 2.2), (3.2, 2.2), (3.2, -2.2), (5.0, -2.2)

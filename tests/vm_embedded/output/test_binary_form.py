@@ -18,7 +18,9 @@ from vm_embedded.output.messages import STATES, live_message, state_message, to_
 
 PAGE = (Path(__file__).parents[3] / "docs" / "daemon.md").read_text()
 PATH = "/run/vm-detect/lines.sock"
-(READER,) = (each for each in re.findall(r"^```python\n(.*?)^```", PAGE, re.M | re.S) if "np.frombuffer" in each)
+(READER,) = (
+    each for each in re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL) if "np.frombuffer" in each
+)
 
 
 def reader(path):
@@ -93,7 +95,7 @@ def test_the_reader_of_the_documentation_reads_all_that_a_frame_has(tmp_path, ca
 
 
 def test_a_state_has_its_reason_and_no_records(tmp_path):
-    message = state_message("camera_lost", "no new frame for 1.0 s – 10 µs late")
+    message = state_message("camera_lost", "no new frame for 1.0 s - 10 µs late")
     got = read(tmp_path, message)
     assert (got["kind"], STATES[got["state"]], got["text"]) == (0, "camera_lost", message["reason"])
     assert (got["t"], got["wall"]) == (message["t"], message["wall"])
@@ -136,9 +138,9 @@ def test_the_tables_of_the_documentation_are_the_layout(tmp_path):
     assert VERSION == 1
     assert read(tmp_path, state_message("ok", ""))["TYPES"] == RECORDS
     section = PAGE.split("### Binary form")[1].split("\n## ")[0]
-    sizes = {name: int(size) for name, size in re.findall(r"^\| `(\w+)` \| (\d+) \|", section, re.M)}
+    sizes = {name: int(size) for name, size in re.findall(r"^\| `(\w+)` \| (\d+) \|", section, re.MULTILINE)}
     assert sizes == {name: dtype.itemsize for name, dtype in RECORDS.items()}
-    rows = re.findall(r"^\| (\d+) \| (\w+)(?: × (\d+))? \|", section, re.M)
+    rows = re.findall(r"^\| (\d+) \| (\w+)(?: x (\d+))? \|", section, re.MULTILINE)
     widths = {"u8": 1, "u16": 2, "u32": 4, "f32": 4, "f64": 8}
     offset = 0
     for at, kind, count in rows:
