@@ -33,7 +33,7 @@ from .configuration import Configuration, recording_toml
 from .control import REFUSED, ControlServer, default_socket_path
 from .counters import Counters
 from .health import Health
-from .http_server import HttpServer, Response
+from .http_server import HttpServer, Page, Response
 from .load_detector import load_checked_detector
 from .log import EventLog
 from .prometheus import resident_bytes
@@ -153,9 +153,9 @@ class Daemon:
 
     def _http_servers(self) -> Iterator[HttpServer]:
         status = self.configuration.status
-        metrics = {"/metrics": lambda: Response("text/plain; version=0.0.4", self.metrics().encode())}
+        metrics: dict[str, Page] = {"/metrics": lambda: Response("text/plain; version=0.0.4", self.metrics().encode())}
         if status.page:
-            pages = {"/": self.page.page, "/state": self.page.state, "/map": self.page.map, **metrics}
+            pages: dict[str, Page] = {"/": self.page.page, "/state": self.page.state, "/map": self.page.map, **metrics}
             yield HttpServer(status.page, pages, {"/stream": self.page.stream})
         if status.metrics:
             yield HttpServer(status.metrics, metrics)

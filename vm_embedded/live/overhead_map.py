@@ -44,11 +44,10 @@ def field_of_view(view: PreparedView, reach: float = REACH) -> list[Floats]:
     tilts = np.linspace(0.0, np.arctan2(reach, view.height), _STEPS + 1)  # from straight down [rad]
     grid = [each.ravel() for each in np.meshgrid(azimuths, tilts, indexing="ij")]
     shown = _on_screen(view, *grid).reshape(_AZIMUTHS, _STEPS + 1)
-    found = shown.any(axis=1)
+    found = np.asarray(shown.any(axis=1))
     if not found.any():
         return []
-    near = shown.argmax(axis=1)
-    far = _STEPS - shown[:, ::-1].argmax(axis=1)
+    near, far = shown.argmax(axis=1), _STEPS - shown[:, ::-1].argmax(axis=1)
     inner = _edge(view, azimuths, tilts[near], tilts[np.maximum(near - 1, 0)])
     outer = _edge(view, azimuths, tilts[far], tilts[np.minimum(far + 1, _STEPS)])
     rings = [_places(view, azimuths, each) for each in (outer, inner)]

@@ -23,28 +23,21 @@ HEADER = struct.Struct("<I4B2d2I3f10H")
 """Length of the rest, version, kind (0: state, 1: frame), state, whether there are features of the field (0 or 1), t,
 wall, frame, points, age_ms, latency_ms, total time [ms], the number of records of each kind, bytes of the text, 0."""
 
-_UPRIGHT = [
-    *(("class", "<u4"), ("confidence", "<f4"), ("position", "<f4", 2), ("distance", "<f4")),
-    *(("bearing", "<f4", 3), ("pixel", "<f4", 2), ("width", "<f4")),
-]
+_UPRIGHT = "class:<u4 confidence:<f4 position:(2,)<f4 distance:<f4 bearing:(3,)<f4 pixel:(2,)<f4 width:<f4"
 
-RECORDS: dict[str, np.dtype[np.void]] = {
-    name: np.dtype(fields)
-    for name, fields in {
-        "detections": [
-            *(("class", "<u4"), ("confidence", "<f4"), ("position", "<f4", 3), ("distance", "<f4")),
-            *(("bearing", "<f4", 3), ("center", "<f4", 2), ("radius", "<f4"), ("angular_radius", "<f4")),
-            *(("distance_by_angle", "<f4"), ("distances_agree", "<u4"), ("points", "<u4")),
-        ],
-        "posts": _UPRIGHT,
-        "goals": [("left", "<u4"), ("right", "<u4")],
-        "robots": _UPRIGHT,
-        "lines": [("ends", "<f4", (2, 2)), ("pixels", "<f4", (2, 2)), ("confidence", "<f4")],
-        "circle": [("center", "<f4", 2), ("radius", "<f4"), ("arc", "<f4"), ("confidence", "<f4")],
-        "crossings": [("kind", "<u4"), ("position", "<f4", 2), ("heading", "<f4")],
-        "border": [("point", "<f4", 2), ("pixel", "<f4", 2)],
-    }.items()
+_FIELDS = {
+    "detections": "class:<u4 confidence:<f4 position:(3,)<f4 distance:<f4 bearing:(3,)<f4 center:(2,)<f4 radius:<f4 "
+    "angular_radius:<f4 distance_by_angle:<f4 distances_agree:<u4 points:<u4",
+    "posts": _UPRIGHT,
+    "goals": "left:<u4 right:<u4",
+    "robots": _UPRIGHT,
+    "lines": "ends:(2,2)<f4 pixels:(2,2)<f4 confidence:<f4",
+    "circle": "center:(2,)<f4 radius:<f4 arc:<f4 confidence:<f4",
+    "crossings": "kind:<u4 position:(2,)<f4 heading:<f4",
+    "border": "point:(2,)<f4 pixel:(2,)<f4",
 }
+
+RECORDS = {name: np.dtype([tuple(each.split(":")) for each in text.split()]) for name, text in _FIELDS.items()}
 """The fields of each kind of record, with the names of the JSON form. class: line of the text, from 0. left, right:
 places in posts, from 0. kind of a crossing: the code of the letter L, T or X. circle: one record or none. border: one
 record per point."""

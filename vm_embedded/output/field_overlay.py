@@ -95,7 +95,7 @@ def _draw_paths(canvas: Image, view: PreparedView, paths: Floats, color: Color, 
     """Draw p lines through n places each (p, n, 2) [m]; what the lens does not see is left out."""
     pixels = plane_pixels(view, paths.reshape(-1, 2)).reshape(paths.shape)
     with np.errstate(invalid="ignore"):
-        seen = (np.abs(pixels) < _FARTHEST).all(axis=2)
+        seen = np.asarray((np.abs(pixels) < _FARTHEST).all(axis=2))
     pieces = np.stack([pixels[:, :-1], pixels[:, 1:]], axis=2)[seen[:, :-1] & seen[:, 1:]]
     cv2.polylines(canvas, list(np.rint(pieces * 16).astype(np.int32)), False, color, thickness, cv2.LINE_AA, shift=4)
 

@@ -63,4 +63,4 @@ def _overlap(corners: Floats, size: Floats, boxes: list[tuple[float, ...]]) -> M
         return np.zeros(len(corners), dtype=bool)
     others = np.array(boxes)
     apart = (corners[:, None] >= others[:, 2:]) | (corners[:, None] + size <= others[:, :2])
-    return np.asarray(~apart.any(axis=2)).any(axis=1)
+    return np.asarray((~np.asarray(apart.any(axis=2))).any(axis=1))
