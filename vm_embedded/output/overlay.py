@@ -36,6 +36,8 @@ def draw_overlay(image: Image, detections: Detections) -> Image:
     for each, color in reversed(drawn):
         _draw_outline(canvas, each, color, scale)
     labels = Labels(canvas, scale)
+    for each, _ in drawn:
+        labels.avoid(each.center, each.radius)
     for each, color in drawn:
         _label(labels, each, color)
     if detections.field is not None:

@@ -79,7 +79,7 @@ def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_cam
         assert "in view" in text("legend")
         browser.save_screenshot(str(tmp_path / "page.png"))
         wait(lambda: text("state") == "camera_lost")
-        assert "unplugged" in text("reason")
+        wait(lambda: "unplugged" in text("reason"))  # on a busy machine, it may first say that no frame comes
         wait(lambda: text("state") == "ok")
         assert moves()
         found.stop()
