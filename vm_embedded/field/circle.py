@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays import Floats, Indices
 from .lines import LinePoints
 
-_TRIES = 150
+_TRIES = 200
 _RADII = (0.35, 1.7)
 """Smallest and largest radius of a center circle [m]: children's fields to those of large robots."""
 
@@ -21,10 +21,10 @@ _FEWEST = 14
 """A circle has at least so many points."""
 
 _SECTORS = 24
-_LEAST_ARC = 0.35
+_LEAST_ARC = 0.42
 """Share of the circle's sectors that have points on it, at least."""
 
-_LEAST_PURE = 0.6
+_LEAST_PURE = 0.7
 """Share of the points in and around the circle's disk that are on the circle, at least: a disk of points is none."""
 
 
@@ -46,23 +46,35 @@ def find_circle(points: LinePoints, free: Indices) -> CirclePoints | None:
     if len(free) < _FEWEST:
         return None
     part = points.part(free)
-    triples = np.random.default_rng(0).integers(len(free), size=(_TRIES, 3))
-    centers, radii = _through(part.positions[triples])
+    centers, radii = _through(part.positions[_triples(part)])
     possible = (radii > _RADII[0]) & (radii < _RADII[1])
     if not possible.any():
         return None
     centers, radii = centers[possible], radii[possible]
     away = part.positions[:, None] - centers
     off = np.hypot(away[..., 0], away[..., 1]) - radii
-    support = part.weights @ (np.abs(off) < _tolerance(part)[:, None])
-    best = int(np.argmax(support))
+    on = part.weights @ (np.abs(off) < _tolerance(part)[:, None])
+    around = part.weights @ (np.abs(off) < 0.5 * radii)
+    best = int(np.argmax(2.0 * on - around))
     center, radius = centers[best], float(radii[best])
     for _ in range(3):
         on = _on(part, center, radius)
         if on.sum() < _FEWEST:
             return None
         center, radius = _fit(part.part(on), center, radius)
-    return _checked(points, center, radius)
+    return _checked(points, free, center, radius)
+
+
+def _triples(points: LinePoints) -> Indices:
+    """Numbers (t, 3) of points that may be on one circle: each is near the first of its triple."""
+    random = np.random.default_rng(0)
+    first = random.integers(len(points), size=_TRIES)
+    away = points.positions[first][:, None] - points.positions
+    near = (away**2).sum(axis=2) < (2.0 * _RADII[1]) ** 2
+    shares = np.cumsum(near, axis=1)
+    chosen = np.ceil(random.random((_TRIES, 2)) * shares[:, -1:])
+    others = [(shares < chosen[:, [column]]).sum(axis=1) for column in (0, 1)]
+    return np.column_stack([first, *others])
 
 
 def _tolerance(points: LinePoints) -> Floats:
@@ -99,7 +111,7 @@ def _fit(points: LinePoints, center: Floats, radius: float) -> tuple[Floats, flo
     return center + step[:2], radius + float(step[2])
 
 
-def _checked(points: LinePoints, center: Floats, radius: float) -> CirclePoints | None:
+def _checked(points: LinePoints, free: Indices, center: Floats, radius: float) -> CirclePoints | None:
     """The circle with all its points, or None if it is too small, too large, or too little of it is seen."""
     members = np.flatnonzero(_on(points, center, radius))
     if not _RADII[0] < radius < _RADII[1] or len(members) < _FEWEST:
@@ -109,6 +121,7 @@ def _checked(points: LinePoints, center: Floats, radius: float) -> CirclePoints 
     sectors = np.bincount(((angles + np.pi) * (_SECTORS / (2.0 * np.pi))).astype(np.intp) % _SECTORS, minlength=_SECTORS)
     arc = float((sectors > 0).mean())
     around = np.abs(np.hypot(away[:, 0], away[:, 1]) - radius) < 0.5 * radius
-    if arc < _LEAST_ARC or len(members) < _LEAST_PURE * around.sum():
+    pure = min(len(members) / around.sum(), len(np.intersect1d(members, free)) / len(members))
+    if arc < _LEAST_ARC or pure < _LEAST_PURE:
         return None
     return CirclePoints(center, radius, arc, members)

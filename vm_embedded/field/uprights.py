@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Indices, Singles
+from ..arrays import Floats, Mask, Singles
 from .ground_points import GroundPoints
 
 
@@ -20,7 +20,8 @@ class UprightRules:
 
     least: points with a smaller probability are ignored. points: fewest points of a thing. jump: a thing ends in the
     direction where the base would be farther by more than this share. beside [m]: everything of the class that is so
-    near beside a base belongs to it. depth [m]: from its front to the middle of its base. taller: height of a thing, as
+    near beside a base belongs to it. depth: from its front to the middle of its base,
+    as a share of its width. taller: height of a thing, as
     a share of its width, at least.
     """
 
@@ -30,11 +31,13 @@ class UprightRules:
     beside: float
     depth: float
     taller: float
+    foot: float
 
 
-POST = UprightRules(least=0.5, points=4, jump=0.12, beside=0.12, depth=0.05, taller=1.0)
-ROBOT = UprightRules(least=0.5, points=8, jump=0.15, beside=0.3, depth=0.08, taller=0.0)
+POST = UprightRules(least=0.5, points=4, jump=0.12, beside=0.12, depth=0.3, taller=1.0, foot=0.5)
+ROBOT = UprightRules(least=0.5, points=8, jump=0.15, beside=0.3, depth=0.25, taller=0.0, foot=0.25)
 
+DEBUG=None
 _COLUMN = 0.012
 """Width of a column of points [rad]."""
 
@@ -69,10 +72,11 @@ def find_uprights(points: GroundPoints, probabilities: Singles, rules: UprightRu
         if not open_columns[nearest] or len(found) >= _MOST:
             continue
         front = fronts[nearest]
-        low, high = _extent(columns, fronts, nearest, front * (1.0 + rules.jump), points.across / front)
-        side = rules.beside / front
-        own = left & (turned > low - side) & (turned < high + side)
-        open_columns &= (columns + 0.5 * _COLUMN < low - side) | (columns + 0.5 * _COLUMN > high + side)
+        gap = points.across / front
+        base = _extent(columns, nearest, fronts <= front * (1.0 + rules.jump), gap)
+        low, high = _extent(columns, nearest, np.abs(columns - np.clip(columns, *base)) < rules.beside / front, gap)
+        own = left & (turned >= low) & (turned < high)
+        open_columns &= (columns < low) | (columns >= high)
         left &= ~own
         thing = _thing(points, turned[own], ranges[own], weights[own], rules)
         if thing is not None:
@@ -90,9 +94,9 @@ def _fronts(azimuths: Floats, ranges: Floats) -> tuple[Floats, Floats]:
     return numbers[order][starts] * _COLUMN, ranges[order][starts]
 
 
-def _extent(columns: Floats, fronts: Floats, number: int, farthest: float, gap: float) -> tuple[float, float]:
-    """The directions [rad] between which the fronts beside a column are nearer than `farthest`, without wide gaps."""
-    near = np.flatnonzero(fronts <= farthest)
+def _extent(columns: Floats, number: int, allowed: Mask, gap: float) -> tuple[float, float]:
+    """The directions [rad] between which allowed columns lie around that of a number, without gaps."""
+    near = np.flatnonzero(allowed)
     at = int(np.searchsorted(near, number))
     wide = np.flatnonzero(np.diff(columns[near]) > _COLUMN + 1.6 * gap)
     first = wide[wide < at].max(initial=-1) + 1
@@ -106,12 +110,14 @@ def _thing(
     """Azimuth [rad], range [m], width [m] and confidence of a thing with these points, or None if it is none."""
     if len(ranges) < rules.points:
         return None
-    step = float(points.along(ranges.min()))
-    front = float(np.sort(ranges)[min(1, len(ranges) - 1)]) - 0.5 * step if len(ranges) > 12 else float(ranges.min())
-    low = ranges < front * (1.0 + rules.jump) + step
-    azimuth = float(weights[low] @ azimuths[low] / weights[low].sum())
+    front = float(ranges.min())
+    front -= 0.5 * float(points.along(front))  # it is somewhere between this ring and the one in front of it
+    heights = points.height * (1.0 - front / ranges)  # of the points, at the distance of the front
+    tall = float(heights.max())
+    low = heights <= max(rules.foot * tall, float(heights.min()) + 1e-9)
+    azimuth = 0.5 * float(azimuths[low].min() + azimuths[low].max())
     width = float(np.ptp(azimuths)) * front + points.across
-    tall = points.height * (1.0 - front / float(ranges.max()))  # at the distance of the front
     if tall < rules.taller * min(width, 0.3):
         return None
-    return azimuth, front + rules.depth, width, float(weights.mean())
+    if DEBUG is not None: DEBUG.append((front, azimuth, width, tall, float(np.ptp(azimuths[low]))*front, len(ranges), float((weights*azimuths)[low].sum()/weights[low].sum())))
+    return azimuth, front + rules.depth * width, width, float(weights.mean())
