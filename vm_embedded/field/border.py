@@ -11,7 +11,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..arrays import Floats, Mask
+from ..arrays import Floats, Indices, Mask
 from .ground_points import GroundPoints, split
 
 _COLUMN = 0.04
@@ -32,16 +32,16 @@ def find_border(points: GroundPoints) -> Floats:
     places, ended = _ends_of_field(points)
     if ended.sum() < 3:
         return np.empty((0, 2))
-    best, most = np.empty((0, 2)), -1
-    left = places
+    left = np.arange(len(places))
+    best, most = left, -1
     for _ in range(_MOST_REMOVED):
-        corners = _hull(left)
-        agreeing = int((np.abs(_beyond(corners, places)) < _AGREES).sum())
+        corners = left[_hull(places[left])]
+        agreeing = int(_agrees(places[corners], places).sum())
         if agreeing > most + 1:  # a hull with fewer corners must be better than by chance
             best, most = corners, agreeing
         if len(left) <= 3:
             break
-        left = _without_farthest_corner(left, corners)
+        left = left[left != _farthest(places, left, corners)]
     return _part_that_ends(best, places, ended)
 
 
@@ -72,11 +72,16 @@ def _straight_ahead(points: GroundPoints) -> float:
     return float(np.arctan2(np.sin(points.azimuths).sum(), np.cos(points.azimuths).sum()))
 
 
-def _hull(places: Floats) -> Floats:
-    """Corners of the convex hull of the places and the point below the camera, which is not among them."""
+def _hull(places: Floats) -> Indices:
+    """Corners of the convex hull of the places and the point below the camera: numbers of places, from right to left."""
     around = np.concatenate([places, np.zeros((1, 2))]).astype(np.float32)
     numbers = cv2.convexHull(around, returnPoints=False, clockwise=False).ravel()
-    return places[np.sort(numbers[numbers < len(places)])]
+    return np.sort(numbers[numbers < len(places)])
+
+
+def _agrees(corners: Floats, places: Floats) -> Mask:
+    """Which places (c, 2) are on the polyline through the corners."""
+    return np.asarray(np.abs(_beyond(corners, places)) < _AGREES)
 
 
 def _beyond(corners: Floats, places: Floats) -> Floats:
@@ -102,27 +107,25 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
-def _without_farthest_corner(places: Floats, corners: Floats) -> Floats:
-    """The places without the corner that is farthest beyond the places beside it."""
-    inner = np.array([np.flatnonzero((places == each).all(axis=1))[0] for each in corners])
-    ranges = np.hypot(places[:, 0], places[:, 1])
-    beside = np.stack([ranges[np.maximum(inner - 1, 0)], ranges[np.minimum(inner + 1, len(places) - 1)]])
-    worst = inner[np.argmax(ranges[inner] / beside.mean(axis=0))]
-    return np.delete(places, worst, axis=0)
+def _farthest(places: Floats, left: Indices, corners: Indices) -> int:
+    """The corner that is farthest beyond the places beside it, of those that are left."""
+    ranges = np.hypot(places[left, 0], places[left, 1])
+    at = np.searchsorted(left, corners)
+    beside = ranges[np.maximum(at - 1, 0)] + ranges[np.minimum(at + 1, len(left) - 1)]
+    return int(corners[np.argmax(ranges[at] / beside)])
 
 
-def _part_that_ends(corners: Floats, places: Floats, ended: Mask) -> Floats:
+def _part_that_ends(corners: Indices, places: Floats, ended: Mask) -> Floats:
     """The longest part of a polyline along which the field ends, by the number of places that agree with it."""
     if len(corners) < 2:
         return np.empty((0, 2))
-    at = np.array([np.flatnonzero((places == each).all(axis=1))[0] for each in corners])
-    agrees = ended & (np.abs(_beyond(corners, places)) < _AGREES)
-    count = np.concatenate([[0], np.cumsum(agrees)])
-    agreeing = count[at[1:] + 1] - count[at[:-1]]
-    kept = (ended[at[1:]] & ended[at[:-1]]) | (agreeing > 0.5 * (at[1:] - at[:-1] + 1))
+    agrees = np.concatenate([[0], np.cumsum(ended & _agrees(places[corners], places))])
+    agreeing = agrees[corners[1:] + 1] - agrees[corners[:-1]]
+    both = ended[corners[1:]] & ended[corners[:-1]]
+    kept = both | (agreeing > 0.5 * (corners[1:] - corners[:-1] + 1))
     run = np.cumsum(np.diff(kept, prepend=False) != 0)
     support = np.bincount(run, np.where(kept, agreeing, 0))
     if support.max() < 3:
         return np.empty((0, 2))
     pieces = np.flatnonzero(run == np.argmax(support))
-    return np.asarray(corners[pieces[0] : pieces[-1] + 2])
+    return places[corners[pieces[0] : pieces[-1] + 2]]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Mask
 from .features import Crossing, Segment
 
 _MARGIN = 0.25
@@ -21,50 +21,45 @@ _LARGER = 0.05
 _LEAST_SINE = 0.9
 """Sine of the angle between two lines that cross, at least."""
 
-Shown = Callable[[Floats], bool]
-"""Whether the frame shows a place (2,) [m] on the plane."""
+Shown = Callable[[Floats], Mask]
+"""Which places (n, 2) [m] on the plane the frame shows."""
 
 
-def find_crossings(lines: Sequence[Segment], shown: Shown) -> list[Crossing]:
+def find_crossings(lines: Sequence[Segment], shown: Shown) -> tuple[Crossing, ...]:
     """Crossings of all pairs of lines. Where the frame ends behind a line's end, the kind is unknown: no crossing."""
-    found = []
-    for number, one in enumerate(lines):
-        for other in lines[number + 1 :]:
-            crossing = _crossing(one, other, shown)
-            if crossing is not None:
-                found.append(crossing)
-    return found
+    if len(lines) < 2:
+        return ()
+    starts = np.array([each.ends[0] for each in lines])
+    lengths = np.array([each.length for each in lines])
+    ways = (np.array([each.ends[1] for each in lines]) - starts) / lengths[:, None]
+    sine = _cross(ways[:, None], ways)
+    sine[np.abs(sine) < _LEAST_SINE] = np.nan
+    along = _cross(starts - starts[:, None], ways) / sine  # (n, n): where line i meets line j, [m] from its start
+    places = starts[:, None] + along[..., None] * ways[:, None]
+    larger = _LARGER * np.hypot(places[..., 0], places[..., 1])
+    near = _MISSING + larger
+    meets = (along > -near) & (along < lengths[:, None] + near)
+    pairs = np.argwhere(np.triu(meets & meets.T, 1))
+    found, behind = [], []
+    for i, j in pairs:
+        beyond = _MARGIN + larger[i, j]
+        arms = [_arms(along[i, j], lengths[i], ways[i], beyond), _arms(along[j, i], lengths[j], ways[j], beyond)]
+        if all(arms):
+            found.append((places[i, j], arms))
+            behind.append([places[i, j] - (own[0] if len(own) == 1 else 0.0 * own[0]) * beyond for own in arms])
+    if not found:
+        return ()
+    complete = shown(np.array(behind).reshape(-1, 2)).reshape(-1, 2).all(axis=1)
+    return tuple(_described(*each) for each, whole in zip(found, complete, strict=True) if whole)
 
 
-def _crossing(one: Segment, other: Segment, shown: Shown) -> Crossing | None:
-    a, b = _direction(one), _direction(other)
-    sine = a[0] * b[1] - a[1] * b[0]
-    if abs(sine) < _LEAST_SINE:
-        return None
-    apart = other.ends[0] - one.ends[0]
-    t, s = (apart[0] * b[1] - apart[1] * b[0]) / sine, (apart[0] * a[1] - apart[1] * a[0]) / sine
-    place = one.ends[0] + t * a
-    larger = _LARGER * float(np.hypot(*place))
-    arms = _arms(t, one.length, larger), _arms(s, other.length, larger)
-    if not all(arms):
-        return None
-    beyond = _MARGIN + larger
-    for own, line in zip(arms, (a, b), strict=True):
-        if len(own) == 1 and not shown(place - own[0] * line * beyond):
-            return None
-    return _described(place, [[each * line for each in own] for own, line in zip(arms, (a, b), strict=True)])
+def _cross(a: Floats, b: Floats) -> Floats:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def _direction(line: Segment) -> Floats:
-    along = line.ends[1] - line.ends[0]
-    return np.asarray(along / np.hypot(*along))
-
-
-def _arms(t: float, length: float, larger: float) -> list[float]:
-    """Signs of the directions in which a line goes on from a crossing at t [m] along it; none if it does not meet it."""
-    if not -_MISSING - larger < t < length + _MISSING + larger:
-        return []
-    return [sign for sign, rest in ((1.0, length - t), (-1.0, t)) if rest > _MARGIN + larger]
+def _arms(t: float, length: float, way: Floats, beyond: float) -> list[Floats]:
+    """The directions in which a line goes on from a crossing at t [m] along it, by more than `beyond` [m]."""
+    return [sign * way for sign, rest in ((1.0, length - t), (-1.0, t)) if rest > beyond]
 
 
 def _described(place: Floats, arms: list[list[Floats]]) -> Crossing:

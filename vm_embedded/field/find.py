@@ -28,41 +28,37 @@ _CELL = 0.1
 
 def find_features(points: GroundPoints, to_pixels: ToPixels) -> FieldFeatures:
     """All field features among the points of a frame."""
-    posts = tuple(_uprights(points, "goal", to_pixels))
-    robots = tuple(_uprights(points, "robot", to_pixels))
-    lines: tuple[Segment, ...] = ()
-    circle, places, confidences = None, np.empty((0, 2)), np.empty(0, np.float32)
-    if "line" in points.classes:
-        candidates = line_points(points)
-        pieces, round_one = _straight_and_round(candidates)
-        lines = tuple(_segment(each, candidates, to_pixels) for each in pieces)
-        circle = None if round_one is None else _circle(round_one, candidates)
-        places, confidences = _thinned(candidates)
+    posts = find_uprights(points, points.classes["goal"], POST) if "goal" in points.classes else []
+    robots = find_uprights(points, points.classes["robot"], ROBOT) if "robot" in points.classes else []
+    candidates = line_points(points)
+    pieces, circle = _straight_and_round(candidates)
     border = find_border(points) if "field" in points.classes else np.empty((0, 2))
+    places = [each.position[None] for each in posts + robots] + [each.ends for each in pieces] + [border]
+    pixels = iter(np.split(to_pixels(np.concatenate(places)), np.cumsum([len(each) for each in places])[:-1]))
+    uprights = [
+        _upright(each, "goal" if number < len(posts) else "robot", points.height, next(pixels)[0])
+        for number, each in enumerate(posts + robots)
+    ]
+    lines = tuple(
+        Segment(each.ends, next(pixels), float(candidates.weights[each.members].mean())) for each in pieces
+    )
+    thinned, confidences = _thinned(candidates)
     return FieldFeatures(
-        posts=posts,
-        goals=pair_posts(posts),
-        robots=robots,
+        posts=tuple(uprights[: len(posts)]),
+        goals=pair_posts(uprights[: len(posts)]),
+        robots=tuple(uprights[len(posts) :]),
         lines=lines,
-        circle=circle,
-        crossings=tuple(find_crossings(lines, lambda place: bool(np.isfinite(to_pixels(place[None])).all()))),
-        line_points=places,
+        circle=None if circle is None else _circle(circle, candidates),
+        crossings=find_crossings(lines, lambda places: np.isfinite(to_pixels(places)).all(axis=1)),
+        line_points=thinned,
         line_confidences=confidences,
-        border=Border(border, to_pixels(border)) if len(border) else None,
+        border=Border(border, next(pixels)) if len(border) else None,
     )
 
 
-def _uprights(points: GroundPoints, name: str, to_pixels: ToPixels) -> list[Upright]:
-    if name not in points.classes:
-        return []
-    bases = find_uprights(points, points.classes[name], POST if name == "goal" else ROBOT)
-    return [_upright(each, name, points.height, to_pixels) for each in bases]
-
-
-def _upright(base: Base, name: str, height: float, to_pixels: ToPixels) -> Upright:
+def _upright(base: Base, name: str, height: float, pixel: Floats) -> Upright:
     toward = np.array([*base.position, -height])
     distance = float(np.linalg.norm(toward))
-    pixel = to_pixels(base.position[None])[0]
     return Upright(name, base.position, distance, toward / distance, pixel, base.width, base.confidence)
 
 
@@ -79,10 +75,6 @@ def _straight_and_round(points: LinePoints) -> tuple[list[Piece], CirclePoints |
         on[circle.members] = True
         pieces = [each for each in pieces if each.length >= 2.0 * circle.radius or on[each.members].mean() < 0.5]
     return pieces, circle
-
-
-def _segment(piece: Piece, points: LinePoints, to_pixels: ToPixels) -> Segment:
-    return Segment(piece.ends, to_pixels(piece.ends), float(points.weights[piece.members].mean()))
 
 
 def _circle(circle: CirclePoints, points: LinePoints) -> CenterCircle:

@@ -85,8 +85,8 @@ class Piece:
 
 
 def line_points(points: GroundPoints) -> LinePoints:
-    """The points that may be on lines."""
-    probabilities = points.classes["line"]
+    """The points that may be on lines; none if the network has no class line."""
+    probabilities = points.classes.get("line", np.zeros(len(points.ranges), np.float32))
     chosen = np.flatnonzero((probabilities > LEAST) & (points.ranges < FARTHEST) & (points.ranges > 1e-3))
     ranges, positions = points.ranges[chosen], points.positions[chosen]
     return LinePoints(
