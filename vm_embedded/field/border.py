@@ -20,8 +20,9 @@ _COLUMN = 0.04
 _FEWEST = 2.0
 """A column shows the border only if so many points behind it are outside, and so many in front are of the field."""
 
-_AGREES = 0.04
-"""A place agrees with a border if they differ by less than this share of the distance."""
+_AGREES = 0.03
+"""A place agrees with a border if they differ by less than this share of the distance, or by less than the mesh can
+resolve."""
 
 _MOST_REMOVED = 12
 """Largest number of corners that are removed from the hull."""
@@ -32,17 +33,18 @@ def find_border(points: GroundPoints) -> Floats:
     places, ended = _ends_of_field(points)
     if ended.sum() < 3:
         return np.empty((0, 2))
+    limit = max(_AGREES, points.across / points.height)
     left = np.arange(len(places))
     best, most = left, -1
     for _ in range(_MOST_REMOVED):
         corners = left[_hull(places[left])]
-        agreeing = int(_agrees(places[corners], places).sum())
+        agreeing = int(_agrees(places[corners], places, limit).sum())
         if agreeing > most + 1:  # a hull with fewer corners must be better than by chance
             best, most = corners, agreeing
         if len(left) <= 3:
             break
         left = left[left != _farthest(places, left, corners)]
-    return _part_that_ends(best, places, ended)
+    return _part_that_ends(best, places, ended, limit)
 
 
 def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
@@ -79,22 +81,23 @@ def _hull(places: Floats) -> Indices:
     return np.sort(numbers[numbers < len(places)])
 
 
-def _agrees(corners: Floats, places: Floats) -> Mask:
-    """Which places (c, 2) are on the polyline through the corners."""
-    return np.asarray(np.abs(_beyond(corners, places)) < _AGREES)
+def _agrees(corners: Floats, places: Floats, limit: float) -> Mask:
+    """Which places (c, 2) are on the polyline through the corners, up to a share of their distance."""
+    return np.asarray(np.abs(_beyond(corners, places)[0]) < limit)
 
 
-def _beyond(corners: Floats, places: Floats) -> Floats:
-    """How far places (c, 2) are beyond a polyline, as a share of the distance of the polyline in their directions."""
+def _beyond(corners: Floats, places: Floats) -> tuple[Floats, Indices]:
+    """How far places (c, 2) are beyond a polyline, as a share of the distance of the polyline in their directions, and
+    the number of the piece there."""
     if len(corners) < 2:
-        return np.full(len(places), np.inf)
+        return np.full(len(places), np.inf), np.zeros(len(places), np.intp)
     angle = np.arctan2(*(places @ _turn(corners[0])).T[::-1])
     at = np.arctan2(*(corners @ _turn(corners[0])).T[::-1])
     piece = np.clip(np.searchsorted(at, angle) - 1, 0, len(corners) - 2)
     a, along = corners[piece], corners[piece + 1] - corners[piece]
     # The ray t * place meets the line through a piece where the cross product of (t * place - a) and `along` is zero.
     t = _cross(a, along) / _cross(places, along)
-    return np.asarray(1.0 / t - 1.0)
+    return 1.0 / t - 1.0, piece
 
 
 def _turn(direction: Floats) -> Floats:
@@ -115,11 +118,11 @@ def _farthest(places: Floats, left: Indices, corners: Indices) -> int:
     return int(corners[np.argmax(ranges[at] / beside)])
 
 
-def _part_that_ends(corners: Indices, places: Floats, ended: Mask) -> Floats:
+def _part_that_ends(corners: Indices, places: Floats, ended: Mask, limit: float) -> Floats:
     """The longest part of a polyline along which the field ends, by the number of places that agree with it."""
     if len(corners) < 2:
         return np.empty((0, 2))
-    agrees = np.concatenate([[0], np.cumsum(ended & _agrees(places[corners], places))])
+    agrees = np.concatenate([[0], np.cumsum(ended & _agrees(places[corners], places, limit))])
     agreeing = agrees[corners[1:] + 1] - agrees[corners[:-1]]
     both = ended[corners[1:]] & ended[corners[:-1]]
     kept = both | (agreeing > 0.5 * (corners[1:] - corners[:-1] + 1))
@@ -128,4 +131,15 @@ def _part_that_ends(corners: Indices, places: Floats, ended: Mask) -> Floats:
     if support.max() < 3:
         return np.empty((0, 2))
     pieces = np.flatnonzero(run == np.argmax(support))
-    return places[corners[pieces[0] : pieces[-1] + 2]]
+    part = slice(pieces[0], pieces[-1] + 2)
+    return _without_margin(places[corners], places, ended, limit)[part]
+
+
+def _without_margin(corners: Floats, places: Floats, ended: Mask, limit: float) -> Floats:
+    """The corners moved from the outermost places to the middle of the places beside them."""
+    beyond, piece = _beyond(corners, places)
+    agrees = ended & (np.abs(beyond) < limit)
+    count = np.bincount(piece[agrees], minlength=len(corners) - 1)
+    total = np.bincount(piece[agrees], beyond[agrees], minlength=len(corners) - 1)
+    beside = np.convolve(total, [1.0, 1.0]) / np.maximum(np.convolve(count, [1.0, 1.0]), 1.0)
+    return np.asarray(corners * (1.0 + beside[:, None]))
