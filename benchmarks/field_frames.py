@@ -7,11 +7,14 @@ frame: class and edges `x0`, `y0`, `x1`, `y1` [px]. `reference`: images and `gol
 probabilities of the authors' network. The network under test never learned from either.
 
 The ray through the middle of a box's lower edge meets the plane at the front of the robot or post. Its base is half its
-width behind: the width between the rays through the ends of the lower edge. A report is right if it is within 15 % of the distance of a base, or if its pixel is inside the box's foot: the lowest fifth of the
-box, widened by a quarter of the box's width on each side and, because the edges are only good to some pixels, by 4 px
-in all directions. A base in the lowest 2 % of the picture's rows is cut off, and its place is not known: a report in
-its direction is neither found nor false. Reports beyond the distance of interest do not count, and neither do reports
-of bases beyond it. A report in a person's foot counts as `people`.
+width behind: the width between the rays through the ends of the lower edge. A report is right if it is within 15 % of
+the distance of a base, or if its pixel is inside the box's foot: the lowest fifth of the box, widened by a quarter of
+the box's width on each side and, because the edges are only good to some pixels, by 4 px in all directions.
+
+The place of a base is not known if it is in the lowest 2 % of the picture's rows, where the picture cuts it off, or if
+another box covers it that reaches further down. Such a base can't be missed, and a report in its direction is neither
+found nor false. Neither count bases and reports beyond the distance of interest. A report at a person counts as
+`people`.
 """
 
 from __future__ import annotations
@@ -40,6 +43,9 @@ KINDS = {"robots": "obstacle", "posts": "goal post"}
 
 PERSON = "human"
 
+NOT_IN_FRONT = ("parking", "goal post", "ball")
+"""Classes of boxes that hide little of what is behind them. A robot often has the ball at its foot."""
+
 TOLERANCE = 0.15
 """Largest error of a base, as a share of its distance."""
 
@@ -59,12 +65,12 @@ _SAME = math.radians(1.5)
 
 @dataclass(frozen=True)
 class Marked:
-    """A box of a frame. position (2,) [m] on the plane: of its base, or None if the base is above the horizon or cut
-    off by the picture."""
+    """A box of a frame. position (2,) [m] on the plane: of its base, or None if the base is above the horizon or
+    hidden. is_hidden: whether something in front or the edge of the picture hides it."""
 
     edges: tuple[float, float, float, float]
     position: Floats | None
-    is_cut: bool
+    is_hidden: bool
 
     @property
     def distance(self) -> float:
@@ -121,9 +127,16 @@ def marked(boxes: Sequence[Mapping[str, Any]], kind: str, lens: LensFile, size: 
         if each["class"] != kind:
             continue
         edges = (float(each["x0"]), float(each["y0"]), float(each["x1"]), float(each["y1"]))
-        cut = edges[3] >= _CUT * size[1]
-        found.append(Marked(edges, None if cut else _base(edges, lens, size), cut))
+        hidden = edges[3] >= _CUT * size[1] or any(_hides(other, edges) for other in boxes)
+        found.append(Marked(edges, None if hidden else _base(edges, lens, size), hidden))
     return found
+
+
+def _hides(other: Mapping[str, Any], edges: tuple[float, float, float, float]) -> bool:
+    """Whether a box covers the middle of the lower edge of another one, and reaches further down."""
+    x, y = (edges[0] + edges[2]) / 2.0, edges[3]
+    covers = other["x0"] <= x <= other["x1"] and other["y0"] <= y + _MARGIN
+    return bool(other["class"] not in NOT_IN_FRONT and covers and other["y1"] > y + _MARGIN)
 
 
 def _base(edges: tuple[float, float, float, float], lens: LensFile, size: tuple[int, int]) -> Floats | None:
@@ -156,7 +169,7 @@ def count_uprights(
     result.missed += [f"{name}: {_at(each.edges)}, {each.distance:.1f} m" for each in left if each.distance < near]
     for report in rest:
         where = math.hypot(*report.position)
-        if where >= near or any(each.is_cut and each.is_above(report) for each in true):
+        if where >= near or any(each.is_hidden and each.is_above(report) for each in true):
             continue
         text = f"{name}: at ({report.pixel[0]:.0f}, {report.pixel[1]:.0f}), {where:.1f} m, {report.confidence:.2f}"
         (result.people if any(each.is_same(report) for each in people) else result.false).append(text)

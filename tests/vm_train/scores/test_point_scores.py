@@ -51,6 +51,15 @@ def test_a_distance_bin_scores_the_points_between_its_edges_alone(given_points):
         assert alone.ranking("field").as_dict() == everywhere.ranking("field", place).as_dict()
 
 
+@given(points)
+def test_several_distance_bins_score_the_points_of_all_of_them(given_points):
+    probabilities, labels, distances = given_points
+    here = (distances >= EDGES[0]) & (distances < EDGES[2])
+    alone, everywhere = scored(probabilities[here], labels[here], distances[here]), scored(*given_points)
+    for name in CLASSES:
+        assert everywhere.ranking(name, range(2)).as_dict() == alone.ranking(name).as_dict()
+
+
 def test_distances_in_no_bin_get_the_number_after_the_last():
     assert bins_of(np.array([-0.1, 0.0, 1.0, 4.99, 5.0, np.inf, np.nan]), EDGES).tolist() == [3, 0, 1, 2, 3, 3, 3]
 
