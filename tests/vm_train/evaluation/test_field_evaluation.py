@@ -43,7 +43,7 @@ class Reporting:
     sha256 = ""
 
     def __init__(self, reported, manifest=MANIFEST, grid="visual"):
-        self.reported, self.manifest, self.grid = reported, manifest, Grid(grid) if grid != "visual" else Grid()
+        self.reported, self.manifest, self.grid = reported, manifest, Grid(grid)
 
     def answer(self, picture, radius=None):
         none = np.zeros((0, len(self.manifest.classes)), dtype=np.float32)
