@@ -132,7 +132,7 @@ def _border_table(found: Scores) -> Table:
     heading = ["distance [m]", "directions", "reported", "error median", "error 90 %"]
     rows: list[Sequence[str]] = [
         [
-            *(where, str(each["directions"]), as_percent(each["reported"])),
+            *(where, str(each["directions"]), as_percent(each["reported_share"])),
             *(as_percent(each["error_median"]), as_percent(each["error_p90"])),
         ]
         for where, each in _field_bins(found, "", ("directions",))

@@ -59,7 +59,7 @@ class BorderScores:
             table = table[_in_bin(table[:, 0], self.edges, distance_bin)]
         errors = table[:, 1][~np.isnan(table[:, 1])]
         values = {
-            "reported": ratio(len(errors), len(table)),
+            "reported_share": ratio(len(errors), len(table)),
             "error_median": float(np.median(errors)) if len(errors) else math.nan,
             "error_p90": float(np.quantile(errors, 0.9)) if len(errors) else math.nan,
         }

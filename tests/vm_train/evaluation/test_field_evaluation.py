@@ -70,7 +70,7 @@ def test_field_features_have_scores(result):
     assert (posts["visible"], posts["found"], posts["false_per_picture"]) == (6, 3, 0.0)
     assert (robots["visible"], robots["found"], robots["people"], robots["false"]) == (3, 3, 3, 0)
     assert found["lines"]["near"]["recall"] == 0.0
-    assert found["border"]["all"]["reported"] == 0.0
+    assert found["border"]["all"]["reported_share"] == 0.0
 
 
 def test_parts_add_up(files, result):

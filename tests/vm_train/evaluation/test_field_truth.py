@@ -108,7 +108,8 @@ def test_the_truth_fed_back_is_perfect(truth, scene):
         row = found[name]["all"]
         assert (row["visible"], row["found"], row["false"], row["error_median"]) == (count, count, 0, 0.0)
     assert (found["lines"]["all"]["recall"], found["lines"]["all"]["wrong_share"]) == (1.0, 0.0)
-    assert (found["border"]["all"]["reported"], found["border"]["all"]["error_median"]) == (1.0, pytest.approx(0.0))
+    border = found["border"]["all"]
+    assert (border["reported_share"], border["error_median"]) == (1.0, pytest.approx(0.0))
 
 
 def test_the_truth_fed_back_6_percent_too_far_is_not_found(truth, scene):

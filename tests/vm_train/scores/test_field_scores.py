@@ -199,14 +199,14 @@ def border_row(reported, directions=(0.0, 0.5, 1.0)):
 
 
 def test_a_border_of_the_wrong_size_has_its_error():
-    assert border_row(SQUARE) == {"directions": 3, "reported": 1.0, "error_median": 0.0, "error_p90": 0.0}
+    assert border_row(SQUARE) == {"directions": 3, "reported_share": 1.0, "error_median": 0.0, "error_p90": 0.0}
     assert border_row(SQUARE * 1.06)["error_median"] == pytest.approx(0.06)
     assert border_row(SQUARE * 0.98)["error_median"] == pytest.approx(0.02)
 
 
 def test_a_border_that_is_not_reported_has_no_error():
-    assert border_row(None) == {"directions": 3, "reported": 0.0, "error_median": None, "error_p90": None}
-    assert border_row(np.array([(2.0, -2.0), (2.0, 1.0)]))["reported"] == pytest.approx(1.0 / 3.0)
+    assert border_row(None) == {"directions": 3, "reported_share": 0.0, "error_median": None, "error_p90": None}
+    assert border_row(np.array([(2.0, -2.0), (2.0, 1.0)]))["reported_share"] == pytest.approx(1.0 / 3.0)
 
 
 def test_a_border_that_the_picture_does_not_show_is_counted():
@@ -250,4 +250,4 @@ def test_field_scores_add_up():
     other.add(truth(by_kind, lines), features(robots=[(2.0, 1.0)], lines=STRAIGHT.segments))
     both = (one + other).as_dict()
     assert [both[each]["all"]["recall"] for each in ("posts", "robots", "lines")] == [0.5, 0.5, 0.5]
-    assert both["border"]["all"]["reported"] == 0.5
+    assert both["border"]["all"]["reported_share"] == 0.5
