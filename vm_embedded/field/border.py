@@ -30,6 +30,8 @@ _MOST_REMOVED = 12
 
 def find_border(points: GroundPoints) -> Floats:
     """Corners (m, 2) [m] of the visible border, from right to left; none if the frame does not show it."""
+    if not len(points.ranges):
+        return np.empty((0, 2))
     places, ended = _ends_of_field(points)
     if ended.sum() < 3:
         return np.empty((0, 2))
@@ -75,7 +77,7 @@ def _straight_ahead(points: GroundPoints) -> float:
 
 
 def _hull(places: Floats) -> Indices:
-    """Corners of the convex hull of the places and the point below the camera: numbers of places, from right to left."""
+    """Numbers of the places that are corners of their hull with the point below the camera, from right to left."""
     around = np.concatenate([places, np.zeros((1, 2))]).astype(np.float32)
     numbers = cv2.convexHull(around, returnPoints=False, clockwise=False).ravel()
     return np.sort(numbers[numbers < len(places)])

@@ -90,7 +90,7 @@ def _on(points: LinePoints, center: Floats, radius: float) -> Indices:
 
 
 def _through(triples: Floats) -> tuple[Floats, Floats]:
-    """Centers (t, 2) and radii (t,) of the circles through three points each (t, 3, 2); infinite for points in a row."""
+    """Centers (t, 2) and radii (t,) of circles through three points each (t, 3, 2); infinite for points in a row."""
     a, b = triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0]
     cross = 2.0 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     cross[np.abs(cross) < 1e-6] = np.nan
@@ -118,7 +118,9 @@ def _checked(points: LinePoints, free: Indices, center: Floats, radius: float) -
         return None
     away = points.positions - center
     angles = np.arctan2(away[members, 1], away[members, 0])
-    sectors = np.bincount(((angles + np.pi) * (_SECTORS / (2.0 * np.pi))).astype(np.intp) % _SECTORS, minlength=_SECTORS)
+    sectors = np.bincount(
+        ((angles + np.pi) * (_SECTORS / (2.0 * np.pi))).astype(np.intp) % _SECTORS, minlength=_SECTORS
+    )
     arc = float((sectors > 0).mean())
     around = np.abs(np.hypot(away[:, 0], away[:, 1]) - radius) < 0.5 * radius
     pure = min(len(members) / around.sum(), len(np.intersect1d(members, free)) / len(members))

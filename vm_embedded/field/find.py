@@ -39,9 +39,7 @@ def find_features(points: GroundPoints, to_pixels: ToPixels) -> FieldFeatures:
         _upright(each, "goal" if number < len(posts) else "robot", points.height, next(pixels)[0])
         for number, each in enumerate(posts + robots)
     ]
-    lines = tuple(
-        Segment(each.ends, next(pixels), float(candidates.weights[each.members].mean())) for each in pieces
-    )
+    lines = tuple(Segment(each.ends, next(pixels), float(candidates.weights[each.members].mean())) for each in pieces)
     thinned, confidences = _thinned(candidates)
     return FieldFeatures(
         posts=tuple(uprights[: len(posts)]),

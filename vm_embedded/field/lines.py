@@ -1,7 +1,7 @@
 """Straight pieces of field lines among the points of the class line.
 
 All lines of a field are parallel or at right angles, except for its circle. A Hough transform of the line points finds
-the two directions. Then lines in these directions are taken one after the other, best first, and fitted to their points.
+the two directions. Lines in these directions are taken one after the other, best first, and fitted to their points.
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ def _fit(points: LinePoints, near: Mask, free: Mask, normal: Floats) -> tuple[In
         weights = part.weights / part.tolerance(normal) ** 2
         middle = weights @ part.positions / weights.sum()
         away = part.positions - middle
-        values, axes = np.linalg.eigh((away * weights[:, None]).T @ away)
+        _, axes = np.linalg.eigh((away * weights[:, None]).T @ away)
         turned = axes[:, 0] if axes[:, 0] @ first > 0.0 else -axes[:, 0]
         if turned @ first > np.cos(_TURN):
             normal = turned
@@ -171,7 +171,7 @@ def _cut(points: LinePoints, members: Indices, middle: Floats, direction: Floats
     t = (points.positions[members] - middle) @ direction
     order = np.argsort(t)
     t, members = t[order], members[order]
-    widest = np.maximum(_GAP, 2.5 * points.part(members).spacing(direction))
+    widest = np.maximum(_GAP, 2.0 * points.part(members).spacing(direction))
     ends = np.append(np.flatnonzero(np.diff(t) > np.minimum(widest[1:], widest[:-1])), len(t) - 1)
     starts = np.append(0, ends[:-1] + 1)
     return [

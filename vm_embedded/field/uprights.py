@@ -20,10 +20,9 @@ class UprightRules:
 
     least: points with a smaller probability are ignored. points: fewest points of a thing. jump: a thing ends in the
     direction where the base would be farther by more than this share. beside [m]: everything of the class that is so
-    near beside a base belongs to it. depth: from its front to the middle of its base,
-    as a share of its width. taller: height of a thing, as
-    a share of its width, at least.
-    """
+    near beside a base belongs to it. depth: from its front to the middle of its base, as a share of its width. taller:
+    height of a thing, as a share of its width, at least. foot: share of its height whose middle is its base. filled:
+    share of the points between its sides, its base and its top that are of its class, at least."""
 
     least: float
     points: int
@@ -32,12 +31,12 @@ class UprightRules:
     depth: float
     taller: float
     foot: float
+    filled: float
 
 
-POST = UprightRules(least=0.5, points=4, jump=0.12, beside=0.12, depth=0.3, taller=1.0, foot=0.5)
-ROBOT = UprightRules(least=0.5, points=8, jump=0.15, beside=0.3, depth=0.25, taller=0.0, foot=0.25)
+POST = UprightRules(least=0.5, points=4, jump=0.12, beside=0.12, depth=0.3, taller=1.0, foot=0.5, filled=0.3)
+ROBOT = UprightRules(least=0.5, points=8, jump=0.15, beside=0.3, depth=0.25, taller=0.0, foot=0.25, filled=0.08)
 
-DEBUG=None
 _COLUMN = 0.012
 """Width of a column of points [rad]."""
 
@@ -62,7 +61,8 @@ def find_uprights(points: GroundPoints, probabilities: Singles, rules: UprightRu
         return []
     azimuths, ranges, weights = points.azimuths[chosen], points.ranges[chosen], probabilities[chosen]
     middle = float(np.arctan2(np.sin(azimuths).sum(), np.cos(azimuths).sum()))
-    turned = np.remainder(azimuths - middle + np.pi, 2.0 * np.pi) - np.pi
+    every = np.remainder(points.azimuths - middle + np.pi, 2.0 * np.pi) - np.pi
+    turned = every[chosen]
     columns, fronts = _fronts(turned, ranges)
     found: list[Base] = []
     left = np.ones(len(chosen), dtype=bool)  # points that belong to no thing yet
@@ -79,7 +79,8 @@ def find_uprights(points: GroundPoints, probabilities: Singles, rules: UprightRu
         open_columns &= (columns < low) | (columns >= high)
         left &= ~own
         thing = _thing(points, turned[own], ranges[own], weights[own], rules)
-        if thing is not None:
+        within = (every >= low) & (every < high) & (points.ranges >= front) & (points.ranges <= ranges[own].max())
+        if thing is not None and own.sum() >= rules.filled * within.sum():
             azimuth, distance, width, confidence = thing
             azimuth += middle
             found.append(Base(distance * np.array([np.cos(azimuth), np.sin(azimuth)]), width, confidence))
@@ -119,5 +120,4 @@ def _thing(
     width = float(np.ptp(azimuths)) * front + points.across
     if tall < rules.taller * min(width, 0.3):
         return None
-    if DEBUG is not None: DEBUG.append((front, azimuth, width, tall, float(np.ptp(azimuths[low]))*front, len(ranges), float((weights*azimuths)[low].sum()/weights[low].sum())))
     return azimuth, front + rules.depth * width, width, float(weights.mean())

@@ -1,0 +1,77 @@
+"""Crossings have their kind, place and heading; goals are pairs of posts."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vm_embedded.field.crossings import find_crossings
+from vm_embedded.field.features import Segment, Upright
+from vm_embedded.field.goals import pair_posts
+
+from .ground import turned
+
+
+def line(start, end, angle=0.0):
+    return Segment(np.array([start, end], dtype=float) @ turned(angle), np.zeros((2, 2)), 0.9)
+
+
+def everywhere(places):
+    return np.ones(len(places), dtype=bool)
+
+
+ACROSS = ((2.0, -1.5), (2.0, 1.5))
+
+
+@pytest.mark.parametrize(
+    ("other", "kind", "heading"),
+    [
+        (((0.5, 0.0), (3.5, 0.0)), "X", 0.0),
+        (((2.0, 0.0), (4.0, 0.0)), "T", 0.0),
+        (((2.1, 0.5), (4.0, 0.5)), "T", 0.0),
+        (((0.5, 1.0), (2.0, 1.0)), "T", np.pi),
+        (((2.0, 1.5), (4.0, 1.5)), "L", -np.pi / 4.0),
+        (((2.0, -1.5), (0.5, -1.5)), "L", 3.0 * np.pi / 4.0),
+    ],
+)
+@given(angle=st.floats(-3.1, 3.1))
+def test_kind_and_heading(other, kind, heading, angle):
+    found = find_crossings([line(*ACROSS, angle), line(*other, angle)], everywhere)
+    assert [each.kind for each in found] == [kind]
+    turn = np.pi / 2.0 if kind == "X" else 2.0 * np.pi
+    off = (found[0].heading - heading - angle) % turn
+    assert min(off, turn - off) < 1e-6
+    assert found[0].position @ turned(-angle) == pytest.approx([2.0, other[0][1]], abs=1e-9)
+
+
+@pytest.mark.parametrize("other", [((3.0, 0.0), (5.0, 0.0)), ((2.5, -1.5), (2.5, 1.5)), ((2.0, 0.0), (4.0, 1.5))])
+def test_lines_that_do_not_meet_at_a_right_angle_have_none(other):
+    assert find_crossings([line(*ACROSS), line(*other)], everywhere) == ()
+
+
+def test_at_the_edge_of_the_frame_the_kind_is_unknown():
+    lines = [line(*ACROSS), line((2.0, 0.0), (4.0, 0.0))]
+    assert find_crossings(lines, lambda places: places[:, 0] > 1.9) == ()
+
+
+def test_one_line_has_no_crossing():
+    assert find_crossings([line(*ACROSS)], everywhere) == ()
+
+
+def post(x, y):
+    place = np.array([x, y], dtype=float)
+    return Upright("goal", place, float(np.hypot(*place)), np.array([1.0, 0.0, 0.0]), np.zeros(2), 0.1, 0.9)
+
+
+def test_posts_at_a_goals_width_are_a_goal_with_its_left_post_first():
+    posts = [post(4.0, -0.9), post(4.0, 0.9), post(-3.0, 0.0)]
+    assert pair_posts(posts) == ((1, 0),)
+
+
+def test_a_post_belongs_to_one_goal():
+    posts = [post(4.0, 0.0), post(4.0, 1.6), post(4.0, 3.4)]
+    assert pair_posts(posts) == ((1, 0),)
+
+
+def test_posts_too_near_or_too_far_apart_are_no_goal():
+    assert pair_posts([post(4.0, 0.0), post(4.0, 0.5), post(4.0, 5.0)]) == ()

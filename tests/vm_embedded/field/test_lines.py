@@ -1,0 +1,78 @@
+"""Straight lines, the circle and crossings of drawn fields are found where they are drawn."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vm_embedded.field.circle import find_circle
+from vm_embedded.field.lines import find_pieces, line_points
+
+from .ground import ground, mesh, near_segment, turned
+
+ANGLES = st.floats(-3.1, 3.1)
+
+
+def drawn(lines=(), circle=None, angle=0.0, seed=None):
+    """Line points of a field with straight lines (start, end) and a circle (center, radius), 8 cm wide."""
+    places = mesh()
+    off = np.full(len(places), np.inf)
+    for start, end in lines:
+        off = np.minimum(off, near_segment(places, start, end))
+    if circle is not None:
+        off = np.minimum(off, np.abs(np.hypot(*(places - circle[0]).T) - circle[1]))
+    # Between rings the mesh would miss a line; a network sees it from the blurred colors of the points beside it.
+    rings = 0.35 * 0.06 * np.hypot(np.hypot(*places.T), 0.9) / 0.9
+    labels = np.where(off < 0.04 + rings * np.abs(places[:, 0]) / np.hypot(*places.T), "line", "field")
+    if seed is not None:
+        labels[np.random.default_rng(seed).random(len(places)) < 0.01] = "line"
+    return line_points(ground(places @ turned(angle), labels))
+
+
+@given(angle=ANGLES, seed=st.integers(0, 100))
+def test_lines_at_right_angles_are_found_among_scattered_points(angle, seed):
+    lines = [((1.0, -2.0), (1.0, 2.0)), ((1.0, 1.0), (5.0, 1.0))]
+    pieces = find_pieces(drawn(lines, angle=angle, seed=seed))
+    for start, end in lines:
+        a, b = np.array([start, end]) @ turned(angle)
+        longer = 0.75 * (b - a) / np.hypot(*(b - a))  # two rings: a scattered point there prolongs it
+        best = min(pieces, key=lambda each: max(near_segment(each.ends, a - longer, b + longer)) - 0.1 * each.length)
+        assert max(near_segment(best.ends, a - longer, b + longer)) < 0.15
+        assert best.length > 0.7 * np.hypot(*(b - a))
+
+
+def test_a_gap_divides_a_line():
+    pieces = find_pieces(drawn([((1.5, -2.0), (1.5, -0.5)), ((1.5, 0.5), (1.5, 2.0))]))
+    assert sorted(round(each.length, 1) for each in pieces[:2]) == pytest.approx([1.5, 1.5], abs=0.2)
+
+
+def test_every_point_belongs_to_one_piece_at_most():
+    pieces = find_pieces(drawn([((1.0, -2.0), (1.0, 2.0)), ((1.0, 1.0), (5.0, 1.0))], seed=1))
+    members = np.concatenate([each.members for each in pieces])
+    assert len(np.unique(members)) == len(members)
+
+
+def test_a_field_without_lines_has_none():
+    assert find_pieces(drawn()) == []
+    assert find_circle(drawn(), np.arange(0)) is None
+
+
+@given(angle=ANGLES, x=st.floats(1.5, 3.5), y=st.floats(-0.5, 0.5), radius=st.floats(0.5, 1.2))
+def test_the_circle_is_found(angle, x, y, radius):
+    points = drawn(circle=(np.array([x, y]), radius), angle=angle)
+    found = find_circle(points, np.arange(len(points)))
+    assert found is not None
+    assert np.hypot(*(found.center @ turned(-angle) - (x, y))) < 0.06
+    assert found.radius == pytest.approx(radius, abs=0.05)
+
+
+def test_scattered_points_are_no_circle():
+    points = drawn(seed=3)
+    assert find_circle(points, np.arange(len(points))) is None
+
+
+def test_the_same_points_have_the_same_circle():
+    points = drawn([((2.0, -2.0), (2.0, 2.0))], circle=(np.array([2.0, 0.0]), 0.75))
+    one, other = (find_circle(points, np.arange(len(points))) for _ in range(2))
+    assert (one.center == other.center).all()
+    assert one.radius == other.radius
