@@ -16,6 +16,9 @@ Singles = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.int32]
 """Indices of points in a mesh."""
 
+Chosen = npt.NDArray[np.intp]
+"""Positions of chosen elements in another array."""
+
 Mask = npt.NDArray[np.bool_]
 
 Image = npt.NDArray[np.uint8]

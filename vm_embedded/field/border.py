@@ -11,7 +11,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..arrays import Floats, Indices, Mask
+from ..arrays import Chosen, Floats, Mask
 from .ground_points import GroundPoints, split
 
 _COLUMN = 0.04
@@ -57,7 +57,7 @@ def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
     columns = np.floor((turned + np.pi) / _COLUMN).astype(np.int64)
     order = np.lexsort((points.ranges, columns))
     inside = sum((points.classes[name] for name in ("field", "line") if name in points.classes), np.float32(0.0))
-    values = (inside - points.outside)[order]
+    values = np.asarray((inside - points.outside)[order], dtype=np.float64)
     columns, ranges = columns[order], points.ranges[order]
     last, gain = split(columns, values)
     ends = np.append(np.flatnonzero(np.diff(columns)), len(columns) - 1)
@@ -76,8 +76,8 @@ def _straight_ahead(points: GroundPoints) -> float:
     return float(np.arctan2(np.sin(points.azimuths).sum(), np.cos(points.azimuths).sum()))
 
 
-def _hull(places: Floats) -> Indices:
-    """Numbers of the places that are corners of their hull with the point below the camera, from right to left."""
+def _hull(places: Floats) -> Chosen:
+    """Chosen of the places that are corners of their hull with the point below the camera, from right to left."""
     around = np.concatenate([places, np.zeros((1, 2))]).astype(np.float32)
     numbers = cv2.convexHull(around, returnPoints=False, clockwise=False).ravel()
     return np.sort(numbers[numbers < len(places)])
@@ -88,7 +88,7 @@ def _agrees(corners: Floats, places: Floats, limit: float) -> Mask:
     return np.asarray(np.abs(_beyond(corners, places)[0]) < limit)
 
 
-def _beyond(corners: Floats, places: Floats) -> tuple[Floats, Indices]:
+def _beyond(corners: Floats, places: Floats) -> tuple[Floats, Chosen]:
     """How far places (c, 2) are beyond a polyline, as a share of the distance of the polyline in their directions, and
     the number of the piece there."""
     if len(corners) < 2:
@@ -99,7 +99,7 @@ def _beyond(corners: Floats, places: Floats) -> tuple[Floats, Indices]:
     a, along = corners[piece], corners[piece + 1] - corners[piece]
     # The ray t * place meets the line through a piece where the cross product of (t * place - a) and `along` is zero.
     t = _cross(a, along) / _cross(places, along)
-    return 1.0 / t - 1.0, piece
+    return np.asarray(1.0 / t - 1.0), np.asarray(piece)
 
 
 def _turn(direction: Floats) -> Floats:
@@ -112,7 +112,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
-def _farthest(places: Floats, left: Indices, corners: Indices) -> int:
+def _farthest(places: Floats, left: Chosen, corners: Chosen) -> int:
     """The corner that is farthest beyond the places beside it, of those that are left."""
     ranges = np.hypot(places[left, 0], places[left, 1])
     at = np.searchsorted(left, corners)
@@ -120,7 +120,7 @@ def _farthest(places: Floats, left: Indices, corners: Indices) -> int:
     return int(corners[np.argmax(ranges[at] / beside)])
 
 
-def _part_that_ends(corners: Indices, places: Floats, ended: Mask, limit: float) -> Floats:
+def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, limit: float) -> Floats:
     """The longest part of a polyline along which the field ends, by the number of places that agree with it."""
     if len(corners) < 2:
         return np.empty((0, 2))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Indices
+from ..arrays import Chosen, Floats, Mask
 from .lines import LinePoints
 
 _TRIES = 200
@@ -35,10 +35,10 @@ class CirclePoints:
     center: Floats
     radius: float
     arc: float
-    members: Indices
+    members: Chosen
 
 
-def find_circle(points: LinePoints, free: Indices) -> CirclePoints | None:
+def find_circle(points: LinePoints, free: Chosen) -> CirclePoints | None:
     """The circle with the most points on it, if there is one.
 
     free: numbers of the points to search. Its members may be any of the points.
@@ -53,9 +53,9 @@ def find_circle(points: LinePoints, free: Indices) -> CirclePoints | None:
     centers, radii = centers[possible], radii[possible]
     away = part.positions[:, None] - centers
     off = np.hypot(away[..., 0], away[..., 1]) - radii
-    on = part.weights @ (np.abs(off) < _tolerance(part)[:, None])
+    support = part.weights @ (np.abs(off) < _tolerance(part)[:, None])
     around = part.weights @ (np.abs(off) < 0.5 * radii)
-    best = int(np.argmax(2.0 * on - around))
+    best = int(np.argmax(2.0 * support - around))
     center, radius = centers[best], float(radii[best])
     for _ in range(3):
         on = _on(part, center, radius)
@@ -65,8 +65,8 @@ def find_circle(points: LinePoints, free: Indices) -> CirclePoints | None:
     return _checked(points, free, center, radius)
 
 
-def _triples(points: LinePoints) -> Indices:
-    """Numbers (t, 3) of points that may be on one circle: each is near the first of its triple."""
+def _triples(points: LinePoints) -> Chosen:
+    """Chosen (t, 3) of points that may be on one circle: each is near the first of its triple."""
     random = np.random.default_rng(0)
     first = random.integers(len(points), size=_TRIES)
     away = points.positions[first][:, None] - points.positions
@@ -82,7 +82,8 @@ def _tolerance(points: LinePoints) -> Floats:
     return 0.04 + 0.6 * points.blur
 
 
-def _on(points: LinePoints, center: Floats, radius: float) -> Indices:
+def _on(points: LinePoints, center: Floats, radius: float) -> Mask:
+    """Which points (n,) are on a circle."""
     away = points.positions - center
     off = np.abs(np.hypot(away[:, 0], away[:, 1]) - radius)
     normals = away / np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)[:, None]
@@ -111,7 +112,7 @@ def _fit(points: LinePoints, center: Floats, radius: float) -> tuple[Floats, flo
     return center + step[:2], radius + float(step[2])
 
 
-def _checked(points: LinePoints, free: Indices, center: Floats, radius: float) -> CirclePoints | None:
+def _checked(points: LinePoints, free: Chosen, center: Floats, radius: float) -> CirclePoints | None:
     """The circle with all its points, or None if it is too small, too large, or too little of it is seen."""
     members = np.flatnonzero(_on(points, center, radius))
     if not _RADII[0] < radius < _RADII[1] or len(members) < _FEWEST:

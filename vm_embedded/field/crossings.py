@@ -49,7 +49,7 @@ def find_crossings(lines: Sequence[Segment], shown: Shown) -> tuple[Crossing, ..
             behind.append([places[i, j] - (own[0] if len(own) == 1 else 0.0 * own[0]) * beyond for own in arms])
     if not found:
         return ()
-    complete = shown(np.array(behind).reshape(-1, 2)).reshape(-1, 2).all(axis=1)
+    complete: Mask = np.all(shown(np.array(behind).reshape(-1, 2)).reshape(-1, 2), axis=1)
     return tuple(_described(*each) for each, whole in zip(found, complete, strict=True) if whole)
 
 

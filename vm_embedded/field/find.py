@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Singles
 from .border import find_border
 from .circle import CirclePoints, find_circle
 from .crossings import find_crossings
@@ -47,7 +47,7 @@ def find_features(points: GroundPoints, to_pixels: ToPixels) -> FieldFeatures:
         robots=tuple(uprights[len(posts) :]),
         lines=lines,
         circle=None if circle is None else _circle(circle, candidates),
-        crossings=find_crossings(lines, lambda places: np.isfinite(to_pixels(places)).all(axis=1)),
+        crossings=find_crossings(lines, lambda places: np.asarray(np.isfinite(to_pixels(places)).all(axis=1))),
         line_points=thinned,
         line_confidences=confidences,
         border=Border(border, next(pixels)) if len(border) else None,
@@ -80,7 +80,7 @@ def _circle(circle: CirclePoints, points: LinePoints) -> CenterCircle:
     return CenterCircle(circle.center, circle.radius, 2.0 * np.pi * circle.arc, confidence)
 
 
-def _thinned(points: LinePoints) -> tuple[Floats, Floats]:
+def _thinned(points: LinePoints) -> tuple[Floats, Singles]:
     """Mean places (p, 2) [m] and probabilities (p,) of the line points in each square."""
     if not len(points):
         return np.empty((0, 2)), np.empty(0, np.float32)

@@ -16,15 +16,15 @@ def pair_posts(posts: Sequence[Upright]) -> tuple[tuple[int, int], ...]:
     """Positions of the left and right post of each goal, nearest pairs first; each post belongs to one goal at most."""
     pairs = []
     for number, one in enumerate(posts):
-        for other in range(number):
-            apart = float(np.hypot(*(one.position - posts[other].position)))
+        for before in range(number):
+            apart = float(np.hypot(*(one.position - posts[before].position)))
             if _WIDTHS[0] <= apart <= _WIDTHS[1]:
-                pairs.append((apart, other, number))
+                pairs.append((apart, before, number))
     found: list[tuple[int, int]] = []
     taken: set[int] = set()
-    for _, one, other in sorted(pairs):
-        if not taken & {one, other}:
-            taken |= {one, other}
-            (x, y), (u, v) = posts[one].position, posts[other].position
-            found.append((one, other) if u * y - v * x > 0.0 else (other, one))
+    for _, first, second in sorted(pairs):
+        if not taken & {first, second}:
+            taken |= {first, second}
+            (x, y), (u, v) = posts[first].position, posts[second].position
+            found.append((first, second) if u * y - v * x > 0.0 else (second, first))
     return tuple(found)

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Floats, Indices, Mask, Singles
+from ..arrays import Chosen, Floats, Singles
 
 ROLES = ("goal", "robot", "line", "field")
 """Names of the classes that field features are made of."""
@@ -45,7 +45,7 @@ class GroundPoints:
         return np.asarray(self.across * np.hypot(ranges, self.height) / self.height)
 
 
-def split(columns: Indices, values: Floats) -> tuple[Indices, Floats]:
+def split(columns: Chosen, values: Floats) -> tuple[Chosen, Floats]:
     """For each column of points, sorted from near to far, the place that best parts positive from negative values.
 
     columns (n,): number of each point's column, sorted. values (n,). Returns for each column that occurs the position
@@ -59,8 +59,3 @@ def split(columns: Indices, values: Floats) -> tuple[Indices, Floats]:
     counts = np.diff(np.append(starts, len(values)))
     last = np.maximum.reduceat(np.where(sums == np.repeat(best, counts), np.arange(len(values)), -1), starts)
     return np.where(best > 0.0, last, -1), best
-
-
-def near(values: Floats, others: Floats, limit: float) -> Mask:
-    """Which values (n,) are within a limit of any of the others (m,)."""
-    return np.asarray((np.abs(values[:, None] - others) <= limit).any(axis=1))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Indices, Mask, Singles
+from ..arrays import Chosen, Floats, Mask, Singles
 from .ground_points import GroundPoints
 
 LEAST = 0.4
@@ -64,7 +64,7 @@ class LinePoints:
         outward = np.abs(self.radial @ direction)
         return np.asarray(2.0 * (outward * self.blur + (1.0 - outward) * self.across))
 
-    def part(self, chosen: Mask | Indices) -> LinePoints:
+    def part(self, chosen: Mask | Chosen) -> LinePoints:
         """Some of the points."""
         return LinePoints(
             self.positions[chosen], self.weights[chosen], self.radial[chosen], self.blur[chosen], self.across
@@ -76,7 +76,7 @@ class Piece:
     """A straight piece of a line: its ends (2, 2) [m], and the numbers of its points."""
 
     ends: Floats
-    members: Indices
+    members: Chosen
 
     @property
     def length(self) -> float:
@@ -127,7 +127,7 @@ _REACH = np.arcsinh(FARTHEST)
 _COUNT = 2 * int(np.ceil(_REACH / _BIN)) + 2
 
 
-def _bins(offsets: Floats) -> Indices:
+def _bins(offsets: Floats) -> Chosen:
     """Bins of lines at these distances [m] from the camera: finer for near lines."""
     return np.asarray(np.floor((np.arcsinh(offsets) + _REACH) / _BIN), dtype=np.intp)
 
@@ -142,8 +142,8 @@ def _main_direction(points: LinePoints) -> float:
     return float(angles[np.argmax((votes**2).sum(axis=(0, 2)))])
 
 
-def _fit(points: LinePoints, near: Mask, free: Mask, normal: Floats) -> tuple[Indices, Floats, Floats]:
-    """Numbers of the free points on a line, a point of the line (2,) [m], and its direction (2,).
+def _fit(points: LinePoints, near: Mask, free: Mask, normal: Floats) -> tuple[Chosen, Floats, Floats]:
+    """Chosen of the free points on a line, a point of the line (2,) [m], and its direction (2,).
 
     near: the points to begin with. normal (2,): the line's normal; the fit does not turn it by more than a little.
     """
@@ -164,7 +164,7 @@ def _fit(points: LinePoints, near: Mask, free: Mask, normal: Floats) -> tuple[In
     return members, middle, np.array([-normal[1], normal[0]])
 
 
-def _cut(points: LinePoints, members: Indices, middle: Floats, direction: Floats) -> list[Piece]:
+def _cut(points: LinePoints, members: Chosen, middle: Floats, direction: Floats) -> list[Piece]:
     """The pieces of a line between its gaps."""
     if len(members) < _FEWEST:
         return []

@@ -92,7 +92,7 @@ def _fronts(azimuths: Floats, ranges: Floats) -> tuple[Floats, Floats]:
     numbers = np.floor(azimuths / _COLUMN).astype(np.intp)
     order = np.lexsort((ranges, numbers))
     starts = np.flatnonzero(np.diff(numbers[order], prepend=numbers.min() - 1))
-    return numbers[order][starts] * _COLUMN, ranges[order][starts]
+    return np.asarray(numbers[order][starts] * _COLUMN), ranges[order][starts]
 
 
 def _extent(columns: Floats, number: int, allowed: Mask, gap: float) -> tuple[float, float]:
@@ -112,7 +112,7 @@ def _thing(
     if len(ranges) < rules.points:
         return None
     front = float(ranges.min())
-    front -= 0.5 * float(points.along(front))  # it is somewhere between this ring and the one in front of it
+    front -= 0.5 * float(points.along(np.array(front)))  # it is somewhere between this ring and the one in front of it
     heights = points.height * (1.0 - front / ranges)  # of the points, at the distance of the front
     tall = float(heights.max())
     low = heights <= max(rules.foot * tall, float(heights.min()) + 1e-9)
