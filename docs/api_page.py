@@ -33,6 +33,14 @@ OTHERS: dict[str, type] = {
 
 GROUPS = {
     "Detect": ("Detector", "Settings", "Detections", "Detection", "ClassPoints", "Observation"),
+    "Features of the field": (
+        "FieldFeatures",
+        "Upright",
+        "Segment",
+        "CenterCircle",
+        "Crossing",
+        "Border",
+    ),
     "Camera pose": ("Orientation",),
     "Lenses": (
         *("read_lens_file", "LensFile", "Lens", "RadialLens", "Rectilinear", "Equisolid", "Equidistant"),

@@ -5,6 +5,7 @@ from .detection.detector import Detector
 from .detection.multi_view import CameraView, Sighting, detect_views
 from .detection.settings import Settings
 from .errors import GeometryError, InputError, ModelError, VisualMeshError
+from .field.features import Border, CenterCircle, Crossing, FieldFeatures, Segment, Upright
 from .geometry.calibrated_lenses import BrownLens, FisheyeLens
 from .geometry.circle import Circle
 from .geometry.cylinder import Cylinder
@@ -18,16 +19,20 @@ from .mesh.models import build_mesh
 
 __all__ = [
     "GROUND",
+    "Border",
     "BrownLens",
     "CameraView",
+    "CenterCircle",
     "Circle",
     "ClassPoints",
+    "Crossing",
     "Cylinder",
     "Detection",
     "Detections",
     "Detector",
     "Equidistant",
     "Equisolid",
+    "FieldFeatures",
     "FisheyeLens",
     "GeometryError",
     "InputError",
@@ -37,9 +42,11 @@ __all__ = [
     "Plane",
     "Pose",
     "Rectilinear",
+    "Segment",
     "Settings",
     "Sighting",
     "Sphere",
+    "Upright",
     "VisualMeshError",
     "build_mesh",
     "detect_views",

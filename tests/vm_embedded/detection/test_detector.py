@@ -149,7 +149,7 @@ def test_detections_iterate_and_have_a_length(detector):
     assert len(found) == len(list(found)) >= 1
     assert found[0] is next(iter(found))
     json.dumps([each.as_dict() for each in found], allow_nan=False)
-    assert set(found.timing_ms) == {"mesh", "project", "sample", "infer", "cluster", "total"}
+    assert set(found.timing_ms) == {"mesh", "project", "sample", "infer", "cluster", "field", "total"}
 
 
 def test_class_points_are_those_above_the_threshold(detector):
