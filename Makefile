@@ -7,7 +7,7 @@ OUT ?= data/train
 COUNT ?= 8000
 SEED ?= 1
 SCENES ?= export/vm_synth/polyhaven.toml
-NETWORKS := ball ball-small
+NETWORKS := ball ball-small soccer
 BUILD ?= build/networks
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
@@ -20,8 +20,8 @@ help: ## list the targets
 
 setup: .venv/dev ## install everything for development: runtime, torch, tests
 
-demo: .venv/runtime ## find the balls in the twelve test pictures
-	@$(BIN)/vm-detect --camera $(DEMO) --save-overlay demo-out
+demo: .venv/runtime ## find balls and field features in the twelve test pictures
+	@$(BIN)/vm-detect --model soccer --camera $(DEMO) --save-overlay demo-out
 	@echo "Annotated pictures: $(CURDIR)/demo-out/"
 
 test: lint ## lint and tests; LONG=1 adds tests that take minutes: 200 camera faults, a booted robot
@@ -70,9 +70,9 @@ networks: .venv/dev ## train the networks of the package from their seeds: make 
 	$(MAKE) data OUT=data/soccer COUNT=16000 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 
-$(BUILD)/mesh/model.pt: export/networks/mesh.toml
-	if test -e $(BUILD)/mesh/run.json; then $(BIN)/vm-train resume $(BUILD)/mesh; \
-		else $(BIN)/vm-train data/soccer -o $(BUILD)/mesh --config $< --unpacked $(BUILD)/unpacked; fi
+$(BUILD)/mesh/model.pt $(BUILD)/soccer/model.pt: $(BUILD)/%/model.pt: export/networks/%.toml
+	if test -e $(BUILD)/$*/run.json; then $(BIN)/vm-train resume $(BUILD)/$*; \
+		else $(BIN)/vm-train data/soccer -o $(BUILD)/$* --config $< --unpacked $(BUILD)/unpacked; fi
 
 $(BUILD)/glance/look.pt: export/networks/glance.toml $(BUILD)/mesh/model.pt
 	if test -e $(BUILD)/glance/run.json; then $(BIN)/vm-train resume $(BUILD)/glance; \
@@ -84,11 +84,15 @@ vm_embedded/models/%.onnx: export/networks/%-look.toml $(BUILD)/glance/look.pt
 			-o $(BUILD)/$*-look --config $<; fi
 	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $(BUILD)/$*-look/look.pt --layout runs -o $@
 
+vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx
+	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --layout runs -o $@
+
 test-data: .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
 	$(BIN)/python -m benchmarks.test_data $(HDRI) $(TEST)
 
 score: .venv/dev ## evaluate the networks of the package; write docs/results.md: make score [TEST=data/test] (10 minutes)
 	$(BIN)/python -m benchmarks.shipped $(TEST)
+	$(BIN)/python -m benchmarks.field $(TEST)
 	$(BIN)/python -m benchmarks.shipped_report
 
 bench-synth: .venv/synth ## measure vm-synth: make bench-synth HDRI=folder-of-maps (8 minutes)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +18,15 @@ import numpy as np
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import GeometryError
 from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
+from vm_embedded.network.model_file import read_model
+from vm_synth.dataset.files import CLASS_COLORS
+from vm_train.data.classes import Classes
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.evaluation import Evaluation, Rules
+from vm_train.evaluation.mask_colors import classes_with_colors
 from vm_train.evaluation.workers import Job, evaluate
 from vm_train.evaluation.worst_errors import WorstError
 from vm_train.evaluation.worst_pictures import draw_error
-from vm_train.learning.class_table import ClassTable
 from vm_train.scores.object_scores import ObjectScores
 
 HERE = Path(__file__).parent
@@ -32,7 +34,12 @@ RESULTS = HERE / "shipped.json"
 WORST = HERE.parent / "docs" / "worst.jpg"
 NETWORKS = HERE.parent / "export" / "networks"
 FRAMES_AN_HOUR = 30 * 3600
-CLASSES = ClassTable.from_table(tomllib.loads((NETWORKS / "mesh.toml").read_text())["classes"]).mask_classes()
+RECIPES = {
+    "ball": ("mesh", "glance", "ball-look"),
+    "ball-small": ("mesh", "glance", "ball-small-look"),
+    "soccer": ("soccer", "glance", "ball-look"),
+}
+"""The files in NETWORKS from which each network of the package was trained: mesh network, glance and look."""
 RANGES = {"0.5 to 6 m": range(1, 12), "6 to 10 m": range(12, 20), "1 to 6 m": range(2, 12)}
 """Bins of half a meter."""
 
@@ -58,7 +65,14 @@ def evaluation(
 
 
 def _job(model: Path, settings: Settings) -> Job:
-    return Job(model, settings, False, CLASSES, Rules("scene"))
+    return Job(model, settings, False, _classes(model), Rules("scene"))
+
+
+def _classes(model: Path) -> Classes:
+    """A network's classes with their colors in masks; the class other has those of all that is no ball."""
+    manifest = read_model(model).manifest
+    rest = tuple(color for name, color in CLASS_COLORS.items() if name != "ball")
+    return classes_with_colors(manifest, {name: (color,) for name, color in CLASS_COLORS.items()} | {"other": rest}, [])
 
 
 def numbers(scores: ObjectScores, bins: range | None, overlap: float = 0.5) -> dict[str, Any]:
@@ -111,7 +125,8 @@ def _proposals(result: Evaluation) -> dict[str, Any]:
 
 def wrong_sizes(model: Path, folder: Path) -> dict[str, dict[str, float]]:
     """How many balls the network accepts that are half or twice as large as it expects, by that factor."""
-    subject = _job(model, Settings()).subject()
+    job = _job(model, Settings())
+    subject = job.subject()
     found: dict[str, dict[str, float]] = {}
     for factor in (0.5, 2.0):
         balls = accepted = 0
@@ -121,7 +136,7 @@ def wrong_sizes(model: Path, folder: Path) -> dict[str, dict[str, float]]:
             if ball is None or ball["visible"] < 0.6 or ball["pixel_radius"] < 3.0:
                 continue
             try:
-                answer = subject.answer(read_picture(files, CLASSES), scene["ball_radius"] / factor)
+                answer = subject.answer(read_picture(files, job.classes), scene["ball_radius"] / factor)
             except GeometryError:  # the camera is too low for such a large ball
                 continue
             offsets = [np.hypot(*(each.center - np.array(ball["pixel"]))) for each in answer.found]

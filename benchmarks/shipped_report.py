@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.report import fill, table
-from benchmarks.shipped import METERS, NETWORKS, RANGES, RESULTS, SETS
+from benchmarks.shipped import METERS, NETWORKS, RANGES, RECIPES, RESULTS, SETS
 from vm_embedded.network.bundled import DEFAULT, model_path
 from vm_embedded.network.model_file import read_model
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "results.md"
 README = DOCS.parent / "README.md"
-COLORS = {"ball": "#d95f02", "ball-small": "#7570b3"}
+COLORS = {"ball": "#d95f02", "ball-small": "#7570b3", "soccer": "#1b9e77"}
 
 
 def number(value: float | None, digits: int = 2, unit: float = 1.0) -> str:
@@ -168,7 +168,8 @@ def card(found: dict[str, Any], name: str) -> str:
     """A network's model card: contents, training data, accuracy and limits."""
     model = read_model(model_path(name))
     manifest = model.manifest
-    configuration = tomllib.loads((NETWORKS / "mesh.toml").read_text())
+    mesh_recipe, glance_recipe, look_recipe = (f"export/networks/{each}.toml" for each in RECIPES[name])
+    configuration = tomllib.loads((NETWORKS / f"{RECIPES[name][0]}.toml").read_text())
     depth, width = (configuration["network"][each] for each in ("depth", "width"))
     activation = configuration["network"]["activation"].upper()
     scores, clutter = (found["networks"][name][each] for each in SETS)
@@ -195,19 +196,19 @@ def card(found: dict[str, Any], name: str) -> str:
     size = " x ".join(map(str, scores["size"]))
     return f"""# {name}
 
-Finds balls on a soccer field.
+Finds {"balls, goal posts, robots, lines and the border" if name == "soccer" else "balls"} on a soccer field.
 {depth} graph convolutions of {width} channels, {activation}, propose places. The mesh is ring6 with
 k = {manifest.intersections:g} and reaches to {manifest.max_distance:g} m. A glance at {look.glance.size} x
 {look.glance.size} samples leaves out most of them. A close look with convolutions of {channels} channels
 decides on patches of {look.size} x {look.size} samples. All suit balls of any radius (`--object-radius`,
-default {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: ball, other.
+default {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: {", ".join(each.name for each in manifest.classes)}.
 
 - **Training data of the mesh network:** {made["training_pictures"]} rendered pictures
   (`export/vm_synth/soccer.toml`, seed 1). Validation on {made["validation_pictures"]} other pictures chose epoch
-  {made["epoch"]} of {made["epochs"]}. Seed {made["seed"]}, configuration `export/networks/mesh.toml`.
+  {made["epoch"]} of {made["epochs"]}. Seed {made["seed"]}, configuration `{mesh_recipe}`.
 - **Training data of the glance and the close look:** {look.provenance["training_pictures"]} pictures of the same kind,
-  under 55 panoramas. Seed {look.provenance["seed"]}, configurations `export/networks/glance.toml` and
-  `export/networks/{name}-look.toml`.
+  under 55 panoramas. Seed {look.provenance["seed"]}, configurations `{glance_recipe}` and
+  `{look_recipe}`.
 - **To train it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
   {model.sha256}.
 
