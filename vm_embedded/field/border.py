@@ -24,6 +24,9 @@ _AGREES = 0.03
 """A place agrees with a border if they differ by less than this share of the distance, or by less than the mesh can
 resolve."""
 
+_ENOUGH = 0.95
+"""A hull that this share of the places agrees with is good enough."""
+
 _MOST_REMOVED = 12
 """Largest number of corners that are removed from the hull."""
 
@@ -40,10 +43,10 @@ def find_border(points: GroundPoints) -> Floats:
     best, most = left, -1
     for _ in range(_MOST_REMOVED):
         corners = left[_hull(places[left])]
-        agreeing = int(_agrees(places[corners], places, limit).sum())
+        agreeing = int((np.abs(_beyond(places, corners)) < limit).sum())
         if agreeing > most + 1:  # a hull with fewer corners must be better than by chance
             best, most = corners, agreeing
-        if len(left) <= 3:
+        if len(left) <= 3 or most > _ENOUGH * len(places):
             break
         left = left[left != _farthest(places, left, corners)]
     return _part_that_ends(best, places, ended, limit)
@@ -77,35 +80,26 @@ def _straight_ahead(points: GroundPoints) -> float:
 
 
 def _hull(places: Floats) -> Chosen:
-    """Chosen of the places that are corners of their hull with the point below the camera, from right to left."""
+    """Numbers of the places that are corners of their hull with the point below the camera, from right to left."""
     around = np.concatenate([places, np.zeros((1, 2))]).astype(np.float32)
     numbers = cv2.convexHull(around, returnPoints=False, clockwise=False).ravel()
     return np.sort(numbers[numbers < len(places)])
 
 
-def _agrees(corners: Floats, places: Floats, limit: float) -> Mask:
-    """Which places (c, 2) are on the polyline through the corners, up to a share of their distance."""
-    return np.asarray(np.abs(_beyond(corners, places)[0]) < limit)
-
-
-def _beyond(corners: Floats, places: Floats) -> tuple[Floats, Chosen]:
-    """How far places (c, 2) are beyond a polyline, as a share of the distance of the polyline in their directions, and
-    the number of the piece there."""
+def _beyond(places: Floats, corners: Chosen) -> Floats:
+    """How far places (c, 2) are beyond the polyline through some of them, as a share of its distance there."""
     if len(corners) < 2:
-        return np.full(len(places), np.inf), np.zeros(len(places), np.intp)
-    angle = np.arctan2(*(places @ _turn(corners[0])).T[::-1])
-    at = np.arctan2(*(corners @ _turn(corners[0])).T[::-1])
-    piece = np.clip(np.searchsorted(at, angle) - 1, 0, len(corners) - 2)
-    a, along = corners[piece], corners[piece + 1] - corners[piece]
+        return np.full(len(places), np.inf)
+    piece = _pieces(len(places), corners)
+    a = places[corners][piece]
+    along = np.diff(places[corners], axis=0)[piece]
     # The ray t * place meets the line through a piece where the cross product of (t * place - a) and `along` is zero.
-    t = _cross(a, along) / _cross(places, along)
-    return np.asarray(1.0 / t - 1.0), np.asarray(piece)
+    return np.asarray(_cross(places, along) / _cross(a, along) - 1.0)
 
 
-def _turn(direction: Floats) -> Floats:
-    """The rotation (2, 2) that turns rows with this direction to the x axis."""
-    c, s = direction / np.hypot(*direction)
-    return np.array([[c, -s], [s, c]])
+def _pieces(count: int, corners: Chosen) -> Chosen:
+    """The piece of a polyline through some of `count` places that is in the direction of each."""
+    return np.clip(np.searchsorted(corners, np.arange(count), side="right") - 1, 0, len(corners) - 2)
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
@@ -124,7 +118,7 @@ def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, limit: float) 
     """The longest part of a polyline along which the field ends, by the number of places that agree with it."""
     if len(corners) < 2:
         return np.empty((0, 2))
-    agrees = np.concatenate([[0], np.cumsum(ended & _agrees(places[corners], places, limit))])
+    agrees = np.concatenate([[0], np.cumsum(ended & (np.abs(_beyond(places, corners)) < limit))])
     agreeing = agrees[corners[1:] + 1] - agrees[corners[:-1]]
     both = ended[corners[1:]] & ended[corners[:-1]]
     kept = both | (agreeing > 0.5 * (corners[1:] - corners[:-1] + 1))
@@ -134,14 +128,14 @@ def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, limit: float) 
         return np.empty((0, 2))
     pieces = np.flatnonzero(run == np.argmax(support))
     part = slice(pieces[0], pieces[-1] + 2)
-    return _without_margin(places[corners], places, ended, limit)[part]
+    return _without_margin(places, corners, ended, limit)[part]
 
 
-def _without_margin(corners: Floats, places: Floats, ended: Mask, limit: float) -> Floats:
+def _without_margin(places: Floats, corners: Chosen, ended: Mask, limit: float) -> Floats:
     """The corners moved from the outermost places to the middle of the places beside them."""
-    beyond, piece = _beyond(corners, places)
+    beyond, piece = _beyond(places, corners), _pieces(len(places), corners)
     agrees = ended & (np.abs(beyond) < limit)
     count = np.bincount(piece[agrees], minlength=len(corners) - 1)
     total = np.bincount(piece[agrees], beyond[agrees], minlength=len(corners) - 1)
     beside = np.convolve(total, [1.0, 1.0]) / np.maximum(np.convolve(count, [1.0, 1.0]), 1.0)
-    return np.asarray(corners * (1.0 + beside[:, None]))
+    return np.asarray(places[corners] * (1.0 + beside[:, None]))

@@ -66,7 +66,7 @@ def find_circle(points: LinePoints, free: Chosen) -> CirclePoints | None:
 
 
 def _triples(points: LinePoints) -> Chosen:
-    """Chosen (t, 3) of points that may be on one circle: each is near the first of its triple."""
+    """Numbers (t, 3) of points that may be on one circle: each is near the first of its triple."""
     random = np.random.default_rng(0)
     first = random.integers(len(points), size=_TRIES)
     away = points.positions[first][:, None] - points.positions

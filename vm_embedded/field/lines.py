@@ -6,6 +6,7 @@ the two directions. Lines in these directions are taken one after the other, bes
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,9 @@ FARTHEST = 10.0
 
 _ANGLES = 45
 """Directions that the Hough transform tries, from 0 to a right angle."""
+
+_MOST_VOTERS = 400
+"""Largest number of points that choose the direction."""
 
 _BIN = 0.06
 """Width of a bin of the Hough transform [m], at the camera; it grows with the distance of the line."""
@@ -134,31 +138,34 @@ def _bins(offsets: Floats) -> Chosen:
 
 def _main_direction(points: LinePoints) -> float:
     """The direction [rad], from 0 to a right angle, in which most points share a line, or at a right angle to it."""
+    some = points.part(np.arange(0, len(points), -(-len(points) // _MOST_VOTERS)))
     angles = np.arange(_ANGLES) * (0.5 * np.pi / _ANGLES)
     normals = np.concatenate([[np.cos(angles), np.sin(angles)], [-np.sin(angles), np.cos(angles)]], axis=1)  # (2, 2A)
-    bins = _bins(points.positions @ normals) + _COUNT * np.arange(2 * _ANGLES)
-    weights = np.broadcast_to(points.weights[:, None], bins.shape)
+    bins = _bins(some.positions @ normals) + _COUNT * np.arange(2 * _ANGLES)
+    weights = np.broadcast_to(some.weights[:, None], bins.shape)
     votes = np.bincount(bins.ravel(), weights.ravel(), minlength=2 * _ANGLES * _COUNT).reshape(2, _ANGLES, _COUNT)
     return float(angles[np.argmax((votes**2).sum(axis=(0, 2)))])
 
 
 def _fit(points: LinePoints, near: Mask, free: Mask, normal: Floats) -> tuple[Chosen, Floats, Floats]:
-    """Chosen of the free points on a line, a point of the line (2,) [m], and its direction (2,).
+    """Numbers of the free points on a line, a point of the line (2,) [m], and its direction (2,).
 
     near: the points to begin with. normal (2,): the line's normal; the fit does not turn it by more than a little.
     """
     first, members = normal, np.flatnonzero(near)
+    tolerance = points.tolerance(normal)
+    weights = points.weights / tolerance**2
+    middle = points.positions[members[0]]
     for _ in range(3):
-        part = points.part(members)
-        weights = part.weights / part.tolerance(normal) ** 2
-        middle = weights @ part.positions / weights.sum()
-        away = part.positions - middle
-        _, axes = np.linalg.eigh((away * weights[:, None]).T @ away)
-        turned = axes[:, 0] if axes[:, 0] @ first > 0.0 else -axes[:, 0]
-        if turned @ first > np.cos(_TURN):
+        own = weights[members]
+        middle = own @ points.positions[members] / own.sum()
+        away = points.positions[members] - middle
+        (xx, xy), (_, yy) = (away * own[:, None]).T @ away
+        angle = 0.5 * math.atan2(2.0 * xy, xx - yy)  # of the longer axis
+        turned = np.array([-math.sin(angle), math.cos(angle)])
+        if abs(turned @ first) > math.cos(_TURN):
             normal = turned
-        fits = np.abs((points.positions - middle) @ normal) < points.tolerance(normal)
-        members = np.flatnonzero(fits & free)
+        members = np.flatnonzero((np.abs((points.positions - middle) @ normal) < tolerance) & free)
         if len(members) < 2:
             break
     return members, middle, np.array([-normal[1], normal[0]])
