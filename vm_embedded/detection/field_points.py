@@ -29,6 +29,7 @@ def ground_points(observation: Observation) -> GroundPoints:
     """The points of an observation on the plane."""
     view, classes = observation.view, observation.manifest.classes
     steep = np.flatnonzero(observation.rays[:, 2] < -_LOWEST)
+    steep = steep[np.argsort(observation.rays[steep, 2], kind="stable")]  # the mesh is nearly in this order
     rays, probabilities = observation.rays[steep], observation.probabilities[steep]
     outside = np.zeros(len(steep), np.float32)
     for column, each in enumerate(classes):

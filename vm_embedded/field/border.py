@@ -27,7 +27,7 @@ resolve."""
 _ENOUGH = 0.95
 """A hull that this share of the places agrees with is good enough."""
 
-_MOST_REMOVED = 12
+_MOST_REMOVED = 8
 """Largest number of corners that are removed from the hull."""
 
 
@@ -55,10 +55,8 @@ def find_border(points: GroundPoints) -> Floats:
 def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
     """The farthest place of the field (c, 2) [m] in each column of points, from right to left, and whether something
     else begins there (c,); otherwise the field may go on where the frame or the mesh ends."""
-    middle = _straight_ahead(points)
-    turned = np.remainder(points.azimuths - middle + np.pi, 2.0 * np.pi) - np.pi
-    columns = np.floor((turned + np.pi) / _COLUMN).astype(np.int64)
-    order = np.lexsort((points.ranges, columns))
+    columns = ((points.azimuths + np.pi) / _COLUMN).astype(np.int16)
+    order = np.argsort(columns, kind="stable")  # from near to far in each column, as the points are
     inside = sum((points.classes[name] for name in ("field", "line") if name in points.classes), np.float32(0.0))
     values = np.asarray((inside - points.outside)[order], dtype=np.float64)
     columns, ranges = columns[order], points.ranges[order]
@@ -70,13 +68,7 @@ def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
     ended = (outside >= _FEWEST)[seen]
     last, ends = last[seen], ends[seen]
     far = 0.5 * (ranges[last] + ranges[np.minimum(last + 1, ends)])
-    azimuth = (columns[last] + 0.5) * _COLUMN - np.pi + middle
-    return np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1) * far[:, None], ended
-
-
-def _straight_ahead(points: GroundPoints) -> float:
-    """Mean azimuth [rad] of the points, so that columns start and end behind the camera."""
-    return float(np.arctan2(np.sin(points.azimuths).sum(), np.cos(points.azimuths).sum()))
+    return points.directions((columns[last] + 0.5) * _COLUMN - np.pi) * far[:, None], ended
 
 
 def _hull(places: Floats) -> Chosen:

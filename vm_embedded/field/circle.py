@@ -13,18 +13,24 @@ import numpy as np
 from ..arrays import Chosen, Floats, Mask
 from .lines import LinePoints
 
-_TRIES = 200
+_TRIES = 120
 _RADII = (0.35, 1.7)
 """Smallest and largest radius of a center circle [m]: children's fields to those of large robots."""
 
-_FEWEST = 14
+_FEWEST = 12
 """A circle has at least so many points."""
 
 _SECTORS = 24
 _LEAST_ARC = 0.42
 """Share of the circle's sectors that have points on it, at least."""
 
-_LEAST_PURE = 0.7
+_AROUND = 0.4
+"""Width of the band on both sides of a circle, as a share of its radius, that must not hold much else."""
+
+_LEAST_OWN = 0.4
+"""Share of the circle's points that are on no long line, at least."""
+
+_LEAST_PURE = 0.75
 """Share of the points in and around the circle's disk that are on the circle, at least: a disk of points is none."""
 
 
@@ -123,8 +129,10 @@ def _checked(points: LinePoints, free: Chosen, center: Floats, radius: float) ->
         ((angles + np.pi) * (_SECTORS / (2.0 * np.pi))).astype(np.intp) % _SECTORS, minlength=_SECTORS
     )
     arc = float((sectors > 0).mean())
-    around = np.abs(np.hypot(away[:, 0], away[:, 1]) - radius) < 0.5 * radius
-    pure = min(len(members) / around.sum(), len(np.intersect1d(members, free)) / len(members))
-    if arc < _LEAST_ARC or pure < _LEAST_PURE:
+    around = np.abs(np.hypot(away[:, 0], away[:, 1]) - radius) < _AROUND * radius
+    weights = points.weights
+    total = float(weights[members].sum())
+    own = float(weights[np.intersect1d(members, free)].sum())
+    if arc < _LEAST_ARC or total < _LEAST_PURE * float(weights[around].sum()) or own < _LEAST_OWN * total:
         return None
     return CirclePoints(center, radius, arc, members)

@@ -19,8 +19,11 @@ from .uprights import POST, ROBOT, Base, find_uprights
 ToPixels = Callable[[Floats], Floats]
 """Pixels (n, 2) of places (n, 2) [m] on the plane; NaN where the lens does not see them."""
 
-_LONG = 1.2
+_LONG = 1.6
 """Straight pieces from this length [m] are lines, also if they touch the center circle."""
+
+_LIKELY = 0.2
+"""Probability of a line from which a point may suggest a circle."""
 
 _CELL = 0.1
 """At most one line point is reported in each square of this size [m]."""
@@ -63,7 +66,7 @@ def _upright(base: Base, name: str, height: float, pixel: Floats) -> Upright:
 def _straight_and_round(points: LinePoints) -> tuple[list[Piece], CirclePoints | None]:
     """Straight pieces and the center circle. A short piece that shares most points with the circle is part of it."""
     pieces = find_pieces(points)
-    free = np.ones(len(points), dtype=bool)
+    free = points.weights > _LIKELY
     for each in pieces:
         if each.length >= _LONG:
             free[each.members] = False

@@ -15,7 +15,7 @@ ROLES = ("goal", "robot", "line", "field")
 
 @dataclass(frozen=True, eq=False)
 class GroundPoints:
-    """The n points of a frame below the horizon.
+    """The n points of a frame below the horizon, from near to far.
 
     positions (n, 2) [m]: where their rays meet the plane, relative to the point below the camera, in the frame of
     Detection. A point on something that stands on the plane has the place behind it, where its ray would end. height:
@@ -36,9 +36,22 @@ class GroundPoints:
         return np.hypot(self.positions[:, 0], self.positions[:, 1])
 
     @cached_property
+    def ahead(self) -> Floats:
+        """Unit vector (2,) in the middle of the points' directions, so that they end behind the camera."""
+        middle = (self.positions / np.maximum(self.ranges, 1e-9)[:, None]).sum(axis=0)
+        length = float(np.hypot(*middle))
+        return np.asarray(middle / length) if length > 1e-9 else np.array([1.0, 0.0])
+
+    @cached_property
     def azimuths(self) -> Floats:
-        """Direction (n,) [rad] on the plane, from -pi to pi counterclockwise from the x axis."""
-        return np.arctan2(self.positions[:, 1], self.positions[:, 0])
+        """Direction (n,) [rad] on the plane, from -pi to pi counterclockwise from `ahead`."""
+        x, y = self.ahead
+        return np.arctan2(self.positions @ (-y, x), self.positions @ self.ahead)
+
+    def directions(self, azimuths: Floats) -> Floats:
+        """Unit vectors (m, 2) at azimuths (m,) [rad]."""
+        (x, y), c, s = self.ahead, np.cos(azimuths), np.sin(azimuths)
+        return np.stack([c * x - s * y, c * y + s * x], axis=-1)
 
     def along(self, ranges: Floats) -> Floats:
         """Distance [m] to the next ring of points, along the ray, at these ranges [m]."""

@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import Chosen, Floats, Mask, Singles
 from .ground_points import GroundPoints
 
-LEAST = 0.4
+LEAST = 0.1
 """Points with a smaller probability of the class line are ignored."""
 
 FARTHEST = 10.0
@@ -30,13 +30,16 @@ _BIN = 0.06
 """Width of a bin of the Hough transform [m], at the camera; it grows with the distance of the line."""
 
 _MOST_LINES = 14
-_SHORTEST = 0.3
+_LEAST_MEAN = 0.25
+"""The points of a line have at least this mean probability."""
+
+_SHORTEST = 0.2
 """Shorter pieces [m] are no lines."""
 
-_FEWEST = 5
+_FEWEST = 4
 """A line has at least so many points."""
 
-_GAP = 0.4
+_GAP = 1.0
 """Wider gaps [m] divide a line into pieces, unless the mesh is even coarser there."""
 
 _TURN = 0.15
@@ -184,5 +187,7 @@ def _cut(points: LinePoints, members: Chosen, middle: Floats, direction: Floats)
     return [
         Piece(middle + np.outer([t[a], t[b]], direction), members[a : b + 1])
         for a, b in zip(starts, ends, strict=True)
-        if b - a + 1 >= _FEWEST and t[b] - t[a] >= _SHORTEST
+        if b - a + 1 >= _FEWEST
+        and t[b] - t[a] >= _SHORTEST
+        and points.weights[members[a : b + 1]].mean() >= _LEAST_MEAN
     ]

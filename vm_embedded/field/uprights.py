@@ -60,10 +60,7 @@ def find_uprights(points: GroundPoints, probabilities: Singles, rules: UprightRu
     if len(chosen) < rules.points:
         return []
     azimuths, ranges, weights = points.azimuths[chosen], points.ranges[chosen], probabilities[chosen]
-    middle = float(np.arctan2(np.sin(azimuths).sum(), np.cos(azimuths).sum()))
-    every = np.remainder(points.azimuths - middle + np.pi, 2.0 * np.pi) - np.pi
-    turned = every[chosen]
-    columns, fronts = _fronts(turned, ranges)
+    columns, fronts = _fronts(azimuths, ranges)
     found: list[Base] = []
     left = np.ones(len(chosen), dtype=bool)  # points that belong to no thing yet
     order = np.argsort(fronts)
@@ -75,16 +72,21 @@ def find_uprights(points: GroundPoints, probabilities: Singles, rules: UprightRu
         gap = points.across / front
         base = _extent(columns, nearest, fronts <= front * (1.0 + rules.jump), gap)
         low, high = _extent(columns, nearest, np.abs(columns - np.clip(columns, *base)) < rules.beside / front, gap)
-        own = left & (turned >= low) & (turned < high)
+        own = left & (azimuths >= low) & (azimuths < high)
         open_columns &= (columns < low) | (columns >= high)
         left &= ~own
-        thing = _thing(points, turned[own], ranges[own], weights[own], rules)
-        within = (every >= low) & (every < high) & (points.ranges >= front) & (points.ranges <= ranges[own].max())
-        if thing is not None and own.sum() >= rules.filled * within.sum():
+        thing = _thing(points, azimuths[own], ranges[own], weights[own], rules)
+        if thing is not None and own.sum() >= rules.filled * _count(points, low, high, front, ranges[own].max()):
             azimuth, distance, width, confidence = thing
-            azimuth += middle
-            found.append(Base(distance * np.array([np.cos(azimuth), np.sin(azimuth)]), width, confidence))
+            found.append(Base(distance * points.directions(np.array(azimuth)), width, confidence))
     return found
+
+
+def _count(points: GroundPoints, low: float, high: float, nearest: float, farthest: float) -> int:
+    """Number of points between two azimuths [rad] and two ranges [m]."""
+    part = slice(*np.searchsorted(points.ranges, [nearest, farthest]))
+    azimuths = points.azimuths[part]
+    return int(np.count_nonzero((azimuths >= low) & (azimuths < high)))
 
 
 def _fronts(azimuths: Floats, ranges: Floats) -> tuple[Floats, Floats]:

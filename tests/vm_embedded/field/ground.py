@@ -25,7 +25,9 @@ def turned(angle):
 
 
 def ground(places, labels, height=HEIGHT, across=ACROSS, sure=0.95):
-    """Points with labels (n,) from goal, robot, line, field and outside; the rest of each probability is outside."""
+    """Points from near to far with labels (n,) from goal, robot, line, field and outside; the rest of each probability is outside."""
+    order = np.argsort(np.hypot(*places.T), kind="stable")
+    places, labels = places[order], labels[order]
     classes = {
         name: np.where(labels == name, sure, 0.0).astype(np.float32) for name in ("goal", "robot", "line", "field")
     }
