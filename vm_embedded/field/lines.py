@@ -66,10 +66,10 @@ class LinePoints:
         outward = np.abs((self.radial * normals).sum(axis=1))
         return np.asarray(0.04 + 0.7 * (outward * self.blur + (1.0 - outward) * self.across))
 
-    def spacing(self, direction: Floats) -> Floats:
-        """Distance (n,) [m] between neighboring points along a direction (2,)."""
-        outward = np.abs(self.radial @ direction)
-        return np.asarray(2.0 * (outward * self.blur + (1.0 - outward) * self.across))
+    def spacing(self, chosen: Chosen, direction: Floats) -> Floats:
+        """Distance (m,) [m] to the next point along a direction (2,), at chosen points (m,)."""
+        outward = np.abs(self.radial[chosen] @ direction)
+        return np.asarray(2.0 * (outward * self.blur[chosen] + (1.0 - outward) * self.across))
 
     def part(self, chosen: Mask | Chosen) -> LinePoints:
         """Some of the points."""
@@ -181,7 +181,7 @@ def _cut(points: LinePoints, members: Chosen, middle: Floats, direction: Floats)
     t = (points.positions[members] - middle) @ direction
     order = np.argsort(t)
     t, members = t[order], members[order]
-    widest = np.maximum(_GAP, 2.0 * points.part(members).spacing(direction))
+    widest = np.maximum(_GAP, 2.0 * points.spacing(members, direction))
     ends = np.append(np.flatnonzero(np.diff(t) > np.minimum(widest[1:], widest[:-1])), len(t) - 1)
     starts = np.append(0, ends[:-1] + 1)
     return [

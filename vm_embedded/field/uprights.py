@@ -34,8 +34,8 @@ class UprightRules:
     filled: float
 
 
-POST = UprightRules(least=0.5, points=4, jump=0.12, beside=0.12, depth=0.3, taller=1.0, foot=0.5, filled=0.3)
-ROBOT = UprightRules(least=0.5, points=8, jump=0.15, beside=0.3, depth=0.25, taller=0.0, foot=0.25, filled=0.08)
+POST = UprightRules(least=0.45, points=10, jump=0.2, beside=0.2, depth=0.3, taller=1.5, foot=0.5, filled=0.2)
+ROBOT = UprightRules(least=0.5, points=20, jump=0.35, beside=0.45, depth=0.25, taller=0.7, foot=0.25, filled=0.15)
 
 _COLUMN = 0.012
 """Width of a column of points [rad]."""
@@ -91,8 +91,8 @@ def _count(points: GroundPoints, low: float, high: float, nearest: float, farthe
 
 def _fronts(azimuths: Floats, ranges: Floats) -> tuple[Floats, Floats]:
     """Left edges [rad] of the columns that have points, and the nearest range [m] in each."""
-    numbers = np.floor(azimuths / _COLUMN).astype(np.intp)
-    order = np.lexsort((ranges, numbers))
+    numbers = np.floor(azimuths / _COLUMN).astype(np.int16)
+    order = np.argsort(numbers, kind="stable")  # from near to far in each column, as the points are
     starts = np.flatnonzero(np.diff(numbers[order], prepend=numbers.min() - 1))
     return np.asarray(numbers[order][starts] * _COLUMN), ranges[order][starts]
 
