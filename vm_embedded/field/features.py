@@ -15,7 +15,7 @@ from ..arrays import Floats, Singles
 class Upright:
     """Something that stands on the plane: a goal post, or a robot or another obstacle.
 
-    class_name: of its points. position (2,) [m]: its base, the middle of what touches the plane. distance [m]: from the
+    class_name: post or robot. position (2,) [m]: its base, the middle of what touches the plane. distance [m]: from the
     camera to the base. bearing (3,): unit vector from the camera to the base. pixel (2,) [px]: of the base. width [m]:
     across the bearing. confidence: mean probability of its points, 0 to 1.
     """

@@ -39,7 +39,7 @@ def find_features(points: GroundPoints, to_pixels: ToPixels) -> FieldFeatures:
     places = [each.position[None] for each in posts + robots] + [each.ends for each in pieces] + [border]
     pixels = iter(np.split(to_pixels(np.concatenate(places)), np.cumsum([len(each) for each in places])[:-1]))
     uprights = [
-        _upright(each, "goal" if number < len(posts) else "robot", points.height, next(pixels)[0])
+        _upright(each, "post" if number < len(posts) else "robot", points.height, next(pixels)[0])
         for number, each in enumerate(posts + robots)
     ]
     lines = tuple(Segment(each.ends, next(pixels), float(candidates.weights[each.members].mean())) for each in pieces)
