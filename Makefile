@@ -85,7 +85,7 @@ vm_embedded/models/%.onnx: export/networks/%-look.toml $(BUILD)/glance/look.pt
 	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $(BUILD)/$*-look/look.pt --layout runs -o $@
 
 vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx
-	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --layout runs -o $@
+	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --look-above 0.005 --layout runs -o $@
 
 test-data: .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
 	$(BIN)/python -m benchmarks.test_data $(HDRI) $(TEST)

@@ -49,6 +49,14 @@ def parser() -> argparse.ArgumentParser:
         "--look", type=Path, metavar="LOOK", help="checkpoint (.pt) of a close look to write into the model file"
     )
     looks.add_argument("--no-look", action="store_true", help="copy a model file (.onnx) without its close look")
+    parser.add_argument(
+        "--look-above",
+        type=float,
+        metavar="P",
+        help="probability of a mesh point from which it counts for a proposal, if this network needs another one than "
+        "the network that the look was trained with; a network of many classes is less sure of each; lower: more "
+        "proposals",
+    )
     facts = parser.add_argument_group("entries that the file lacks, or that you want to replace")
     facts.add_argument(
         "--intersections", type=float, metavar="K", help="rings of points across an object (the paper's k)"
@@ -99,6 +107,8 @@ def _run(options: argparse.Namespace) -> int:
             if path.resolve() == given.resolve():
                 raise InputError(f"{path} is the input and would be overwritten; give another file with --output")
     look = LookCheckpoint.load(options.look) if options.look else None
+    if look is not None and options.look_above is not None:
+        look = look.for_points_above(options.look_above)
     if _is_model_file(options.model):
         difference = change_look(options.model, output, look)
         _print_written(output, f"mesh network of {options.model}", look, difference)
@@ -123,6 +133,10 @@ def _is_model_file(path: Path) -> bool:
 
 def _check_options(options: argparse.Namespace) -> None:
     """Refuse options that do not fit each other or the kind of the input. Raises InputError."""
+    if options.look_above is not None and not options.look:
+        raise InputError("--look-above is for the look that --look attaches; add --look, or leave it out")
+    if options.look_above is not None and not 0.0 <= options.look_above <= 0.99:
+        raise InputError(f"--look-above must be from 0 to 0.99, not {options.look_above:g}")
     if options.to_yaml and (options.layout or options.look):
         option = "--layout" if options.layout else "--look"
         raise InputError(f"{option} is for ONNX files; leave it out with --to-yaml")

@@ -50,6 +50,15 @@ class LookCheckpoint:
         if contract.glance != (self.glance and self.glance.contract):
             raise ModelError("the glance of the look network is not the one in its contract")
 
+    def for_points_above(self, probability: float) -> LookCheckpoint:
+        """The same networks for a mesh network whose points count for a proposal above another probability.
+
+        Raises ModelError if it is out of range.
+        """
+        glance = None if self.glance is None else self.glance.for_points_above(probability)
+        contract = replace(self.contract, above=probability, glance=glance and glance.contract)
+        return LookCheckpoint(self.network, contract, self.examples, glance)
+
     def save(self, path: str | Path) -> None:
         """Write the checkpoint. Raises InputError."""
         save_values(path, {"format": _FORMAT} | self._as_dict())

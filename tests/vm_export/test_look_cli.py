@@ -50,6 +50,19 @@ def test_command_attaches_a_look_to_a_network_of_the_reference(folder):
     assert has_look(folder / "model.onnx")
 
 
+def test_command_changes_the_probability_from_which_points_count(folder):
+    run(folder / "model.pt", "--look", folder / "look.pt", "--look-above", "0.125", "-o", folder / "out.onnx")
+    look = CloseLook.of(read_model(folder / "out.onnx"))
+    assert look.contract.above == 0.125
+    assert has_look(folder / "out.onnx")
+
+
+@pytest.mark.parametrize("options", [("--look-above", "0.1"), ("--look", "look.pt", "--look-above", "1.5")])
+def test_a_probability_without_a_look_or_out_of_range_is_refused(folder, options):
+    given = [folder / each if each == "look.pt" else each for each in options]
+    assert "--look-above" in run(folder / "model.pt", *given, code=1).stderr
+
+
 def test_command_attaches_a_look_to_a_model_file_and_removes_it(folder):
     run(folder / "model.pt")
     before = (folder / "model.onnx").read_bytes()
