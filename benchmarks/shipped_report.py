@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.field import RESULTS as FIELD_RESULTS
+from benchmarks.field import figures
 from benchmarks.report import fill, table
 from benchmarks.shipped import METERS, NETWORKS, RANGES, RECIPES, RESULTS, SETS
 from vm_embedded.network.bundled import DEFAULT, model_path
@@ -112,6 +114,16 @@ def grid(found: dict[str, Any]) -> str:
             row.append(" / ".join(shown))
         rows.append(row)
     return table(["lens, picture [px]", *(f"{height} m" for height in heights)], rows)
+
+
+def field_features(found: dict[str, Any]) -> str:
+    """Points by class and features of the field, on each test set."""
+    columns = [list(figures(each["f1"], each["features"])) for each in found["sets"].values()]
+    rows = [
+        [same[0].name, *("-" if each.value is None else f"{each.value:.3f}" for each in same)]
+        for same in zip(*columns, strict=True)
+    ]
+    return table(["measure", *found["sets"]], rows)
 
 
 def by_distance(scores: dict[str, Any]) -> str:
@@ -239,6 +251,7 @@ def main() -> None:
         f"{DEFAULT} by distance": by_distance(found["networks"][DEFAULT]["field"]),
     }
     made["proposals"] = proposals(found)
+    made["features of the field"] = field_features(json.loads(FIELD_RESULTS.read_text()))
     if found["grid"]:
         made["grid"] = grid(found)
     made["false an hour"] = table(

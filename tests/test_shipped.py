@@ -80,8 +80,20 @@ def in_the_demo(*arguments):
     return len(lines), found, false
 
 
-def test_the_default_finds_the_balls_of_the_demo():
-    balls, found, false = in_the_demo()
+@pytest.mark.parametrize("name", [DEFAULT, "soccer"])
+def test_the_balls_of_the_demo_are_found(name):
+    balls, found, false = in_the_demo("--model", name)
     assert balls == 12
     assert found >= 11
     assert false <= 1
+
+
+def test_the_demo_shows_all_features_of_a_field():
+    seen = [line["field"] for line in detect("--camera", DEMO, "--model", "soccer")]
+    counts = {name: sum(len(each[name]) for each in seen) for name in ("posts", "robots", "lines", "crossings")}
+    assert counts["posts"] >= 2
+    assert counts["robots"] >= 6
+    assert counts["lines"] >= 20
+    assert counts["crossings"] >= 6
+    assert sum(each["circle"] is not None for each in seen) >= 2
+    assert sum(each["border"] is not None for each in seen) >= 5

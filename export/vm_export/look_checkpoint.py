@@ -56,7 +56,7 @@ class LookCheckpoint:
         Raises ModelError if it is out of range.
         """
         glance = None if self.glance is None else self.glance.for_points_above(probability)
-        contract = replace(self.contract, above=probability, glance=glance and glance.contract)
+        contract = replace(self.contract, above=probability, glance=None if glance is None else glance.contract)
         return LookCheckpoint(self.network, contract, self.examples, glance)
 
     def save(self, path: str | Path) -> None:

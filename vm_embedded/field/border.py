@@ -68,7 +68,8 @@ def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
     ended = (outside >= _FEWEST)[seen]
     last, ends = last[seen], ends[seen]
     far = 0.5 * (ranges[last] + ranges[np.minimum(last + 1, ends)])
-    return points.directions((columns[last] + 0.5) * _COLUMN - np.pi) * far[:, None], ended
+    azimuths = (columns[last].astype(np.float64) + 0.5) * _COLUMN - np.pi
+    return points.directions(azimuths) * far[:, None], ended
 
 
 def _hull(places: Floats) -> Chosen:

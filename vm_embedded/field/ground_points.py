@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ..arrays import Chosen, Floats, Singles
 
@@ -46,7 +48,7 @@ class GroundPoints:
     def azimuths(self) -> Floats:
         """Direction (n,) [rad] on the plane, from -pi to pi counterclockwise from `ahead`."""
         x, y = self.ahead
-        return np.arctan2(self.positions @ (-y, x), self.positions @ self.ahead)
+        return np.asarray(np.arctan2(self.positions @ (-y, x), self.positions @ self.ahead))
 
     def directions(self, azimuths: Floats) -> Floats:
         """Unit vectors (m, 2) at azimuths (m,) [rad]."""
@@ -58,7 +60,7 @@ class GroundPoints:
         return np.asarray(self.across * np.hypot(ranges, self.height) / self.height)
 
 
-def split(columns: Chosen, values: Floats) -> tuple[Chosen, Floats]:
+def split(columns: npt.NDArray[np.integer[Any]], values: Floats) -> tuple[Chosen, Floats]:
     """For each column of points, sorted from near to far, the place that best parts positive from negative values.
 
     columns (n,): number of each point's column, sorted. values (n,). Returns for each column that occurs the position

@@ -25,7 +25,10 @@ def turned(angle):
 
 
 def ground(places, labels, height=HEIGHT, across=ACROSS, sure=0.95):
-    """Points from near to far with labels (n,) from goal, robot, line, field and outside; the rest of each probability is outside."""
+    """Points from near to far with labels (n,): goal, robot, line, field or outside.
+
+    The rest of each probability is outside.
+    """
     order = np.argsort(np.hypot(*places.T), kind="stable")
     places, labels = places[order], labels[order]
     classes = {
