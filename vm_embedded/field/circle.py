@@ -58,7 +58,7 @@ def find_circle(points: LinePoints, free: Chosen) -> CirclePoints | None:
         return None
     centers, radii = centers[possible], radii[possible]
     away = part.positions[:, None] - centers
-    off = np.hypot(away[..., 0], away[..., 1]) - radii
+    off = np.sqrt(away[..., 0] ** 2 + away[..., 1] ** 2) - radii
     support = part.weights @ (np.abs(off) < _tolerance(part)[:, None])
     around = part.weights @ (np.abs(off) < 0.5 * radii)
     best = int(np.argmax(2.0 * support - around))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Mask, Singles
+from ..arrays import Chosen, Floats, Mask, Singles
 from .ground_points import GroundPoints
 
 
@@ -60,11 +60,11 @@ def find_uprights(points: GroundPoints, probabilities: Singles, rules: UprightRu
     if len(chosen) < rules.points:
         return []
     azimuths, ranges, weights = points.azimuths[chosen], points.ranges[chosen], probabilities[chosen]
-    columns, fronts = _fronts(azimuths, ranges)
+    columns, fronts, counts = _fronts(azimuths, ranges)
     found: list[Base] = []
     left = np.ones(len(chosen), dtype=bool)  # points that belong to no thing yet
     order = np.argsort(fronts)
-    open_columns = np.ones(len(columns), dtype=bool)
+    open_columns = _in_groups_of(columns, fronts, counts, points.across, rules.points)
     for nearest in order:
         if not open_columns[nearest] or len(found) >= _MOST:
             continue
@@ -89,12 +89,20 @@ def _count(points: GroundPoints, low: float, high: float, nearest: float, farthe
     return int(np.count_nonzero((azimuths >= low) & (azimuths < high)))
 
 
-def _fronts(azimuths: Floats, ranges: Floats) -> tuple[Floats, Floats]:
-    """Left edges [rad] of the columns that have points, and the nearest range [m] in each."""
+def _fronts(azimuths: Floats, ranges: Floats) -> tuple[Floats, Floats, Chosen]:
+    """Left edges [rad] of the columns that have points, the nearest range [m] and the number of points in each."""
     numbers = np.floor(azimuths / _COLUMN).astype(np.int16)
     order = np.argsort(numbers, kind="stable")  # from near to far in each column, as the points are
     starts = np.flatnonzero(np.diff(numbers[order], prepend=numbers.min() - 1))
-    return np.asarray(numbers[order][starts] * _COLUMN), ranges[order][starts]
+    counts = np.diff(np.append(starts, len(order)))
+    return np.asarray(numbers[order][starts] * _COLUMN), ranges[order][starts], counts
+
+
+def _in_groups_of(columns: Floats, fronts: Floats, counts: Chosen, across: float, least: int) -> Mask:
+    """Which columns are in groups, without gaps, of at least so many points: single points are not worth a search."""
+    gaps = np.diff(columns) > _COLUMN + 1.6 * across / np.minimum(fronts[1:], fronts[:-1])
+    group = np.concatenate([[0], np.cumsum(gaps)])
+    return np.asarray(np.bincount(group, counts)[group] >= least)
 
 
 def _extent(columns: Floats, number: int, allowed: Mask, gap: float) -> tuple[float, float]:
