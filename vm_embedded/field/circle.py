@@ -14,6 +14,9 @@ from ..arrays import Chosen, Floats, Mask
 from .lines import LinePoints
 
 _TRIES = 120
+_MOST_VOTERS = 150
+"""Largest number of points that suggest circles and vote for them."""
+
 _RADII = (0.35, 1.7)
 """Smallest and largest radius of a center circle [m]: children's fields to those of large robots."""
 
@@ -51,19 +54,20 @@ def find_circle(points: LinePoints, free: Chosen) -> CirclePoints | None:
     """
     if len(free) < _FEWEST:
         return None
-    part = points.part(free)
-    centers, radii = _through(part.positions[_triples(part)])
+    voters = points.part(free[:: -(-len(free) // _MOST_VOTERS)])
+    centers, radii = _through(voters.positions[_triples(voters)])
     possible = (radii > _RADII[0]) & (radii < _RADII[1])
     if not possible.any():
         return None
     centers, radii = centers[possible], radii[possible]
-    away = part.positions[:, None] - centers
+    away = voters.positions[:, None] - centers
     off = np.sqrt(away[..., 0] ** 2 + away[..., 1] ** 2) - radii
-    support = part.weights @ (np.abs(off) < _tolerance(part)[:, None])
-    around = part.weights @ (np.abs(off) < 0.5 * radii)
+    support = voters.weights @ (np.abs(off) < _tolerance(voters)[:, None])
+    around = voters.weights @ (np.abs(off) < 0.5 * radii)
     best = int(np.argmax(2.0 * support - around))
     center, radius = centers[best], float(radii[best])
-    for _ in range(3):
+    part = points.part(free)
+    for _ in range(2):
         on = _on(part, center, radius)
         if on.sum() < _FEWEST:
             return None

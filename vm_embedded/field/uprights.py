@@ -35,7 +35,7 @@ class UprightRules:
 
 
 POST = UprightRules(least=0.45, points=10, jump=0.2, beside=0.2, depth=0.3, taller=1.5, foot=0.5, filled=0.2)
-ROBOT = UprightRules(least=0.5, points=14, jump=0.35, beside=0.3, depth=0.25, taller=1.0, foot=0.25, filled=0.2)
+ROBOT = UprightRules(least=0.5, points=14, jump=0.35, beside=0.3, depth=0.3, taller=1.0, foot=0.4, filled=0.2)
 
 _COLUMN = 0.012
 """Width of a column of points [rad]."""
