@@ -80,14 +80,14 @@ def whole_calls(found: dict[str, Any]) -> str:
 
 
 def shipped(found: dict[str, Any]) -> str:
+    names = list(dict.fromkeys(stage for row in found["shipped"].values() for stage in row["stages_ms"]))
     rows = []
     for name, row in found["shipped"].items():
-        stages = [ms(value) for value in row["stages_ms"].values()]
+        stages = [ms(row["stages_ms"][each]) if each in row["stages_ms"] else "-" for each in names]
         rows.append(
             [name, str(row["points"]), str(row["found"]), *stages, ms(row["total"]["p50"]), ms(row["total"]["p99"])]
         )
-    stages = next(iter(found["shipped"].values()))["stages_ms"]
-    return table(["network", "points", "found", *stages, "whole call", "p99"], rows)
+    return table(["network", "points", "found", *names, "whole call", "p99"], rows)
 
 
 def speed(found: dict[str, Any]) -> str:
