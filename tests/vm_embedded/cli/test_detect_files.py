@@ -12,7 +12,7 @@ from tests.drawn_scenes import FOLDER, IMAGES, MODEL, TRUTH
 
 from .commands import detect, lines, one_complaint, run
 
-STAGES = ["mesh", "project", "sample", "infer", "cluster", "total"]
+STAGES = ["mesh", "project", "sample", "infer", "cluster", "field", "total"]
 
 
 def test_the_balls_of_the_drawn_frames_are_found():
@@ -34,7 +34,7 @@ def test_the_balls_of_the_drawn_frames_are_found():
 
 def test_a_line_has_what_the_documentation_says():
     (line,) = lines(detect(IMAGES[0]))
-    assert list(line) == ["frame", "source", "stamp", "points", "detections", "timing_ms"]
+    assert list(line) == ["frame", "source", "stamp", "points", "detections", "field", "timing_ms"]
     assert line["frame"] == 0
     assert line["source"] == IMAGES[0].name
     assert line["stamp"] is None

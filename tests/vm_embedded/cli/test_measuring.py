@@ -16,7 +16,7 @@ def test_detectors_are_measured_on_every_frame():
     assert [run.detector for run in runs] == detectors
     for each in runs:
         assert len(each.total) == len(each.points) == 7
-        assert set(each.stages) == {"mesh", "project", "sample", "infer", "cluster"}
+        assert set(each.stages) == {"mesh", "project", "sample", "infer", "cluster", "field"}
         assert (sum(each.stages.values()) <= each.total).all()
     np.testing.assert_array_equal(runs[0].points, runs[1].points)
 

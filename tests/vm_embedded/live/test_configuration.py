@@ -44,6 +44,7 @@ min_inside = 0.7
 max_around = 0.3
 max_widths = 3
 min_visible = 0.2
+field_features = false
 """
 
 
@@ -84,6 +85,7 @@ def test_a_full_configuration_is_read(write):
         "max_around": 0.3,
         "max_widths": 3,
         "min_visible": 0.2,
+        "field_features": False,
     }
 
 
