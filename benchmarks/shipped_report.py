@@ -22,6 +22,10 @@ README = DOCS.parent / "README.md"
 COLORS = {"ball": "#d95f02", "ball-small": "#7570b3", "soccer": "#1b9e77"}
 
 
+WEAK = """ Posts and robots are unreliable: docs/results.md has the figures of all features of the
+field."""
+
+
 def number(value: float | None, digits: int = 2, unit: float = 1.0) -> str:
     return "-" if value is None else f"{unit * value:.{digits}f}"
 
@@ -239,7 +243,7 @@ docs/results.md has more figures.
 
 **Limits.** It was trained on rendered pictures only. The balls were mostly white, orange, yellow or of other bright
 colors, and lay on the plane. Balls darker than the field, balls in the air, and cameras below 0.35 m or above 1.3 m
-were rare or absent.
+were rare or absent.{WEAK if name == "soccer" else ""}
 """
 
 

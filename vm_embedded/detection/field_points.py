@@ -41,6 +41,7 @@ def ground_points(observation: Observation) -> GroundPoints:
         across=view.shape.radius * view.spacing,
         classes={each.name: probabilities[:, number] for number, each in enumerate(classes) if each.name in ROLES},
         outside=outside,
+        ahead=view.heading[:2, 0],
     )
 
 

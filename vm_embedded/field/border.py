@@ -40,11 +40,11 @@ def find_border(points: GroundPoints) -> Floats:
         return np.empty((0, 2))
     limit = max(_AGREES, points.across / points.height)
     left = np.arange(len(places))
-    best, most = left, -1
+    best, most = left[:0], -1
     for _ in range(_MOST_REMOVED):
         corners = left[_hull(places[left])]
         agreeing = int((np.abs(_beyond(places, corners)) < limit).sum())
-        if agreeing > most + 1:  # a hull with fewer corners must be better than by chance
+        if agreeing > most + 1:  # one place more may agree by chance; then the hull with more corners stays
             best, most = corners, agreeing
         if len(left) <= 3 or most > _ENOUGH * len(places):
             break
@@ -73,7 +73,10 @@ def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
 
 
 def _hull(places: Floats) -> Chosen:
-    """Numbers of the places that are corners of their hull with the point below the camera, from right to left."""
+    """Numbers of the places that are corners of their hull, from right to left.
+
+    The point below the camera closes the hull, so only corners away from the camera are left.
+    """
     around = np.concatenate([places, np.zeros((1, 2))]).astype(np.float32)
     numbers = cv2.convexHull(around, returnPoints=False, clockwise=False).ravel()
     return np.sort(numbers[numbers < len(places)])
@@ -121,7 +124,9 @@ def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, limit: float) 
         return np.empty((0, 2))
     pieces = np.flatnonzero(run == np.argmax(support))
     part = slice(pieces[0], pieces[-1] + 2)
-    return _without_margin(places, corners, ended, limit)[part]
+    moved = _without_margin(places, corners, ended, limit)[part]
+    outer = _hull(moved)  # each corner moved on its own, so some may point inward now
+    return np.asarray(moved[outer] * (1.0 + _beyond(moved, outer).mean())) if len(outer) > 1 else moved[:0]
 
 
 def _without_margin(places: Floats, corners: Chosen, ended: Mask, limit: float) -> Floats:

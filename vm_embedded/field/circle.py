@@ -115,7 +115,7 @@ def _fit(points: LinePoints, center: Floats, radius: float) -> tuple[Floats, flo
     """One step of Gauss and Newton towards the circle with the least squares of distances, weighted by precision."""
     away = points.positions - center
     length = np.hypot(away[:, 0], away[:, 1])
-    normals = away / length[:, None]
+    normals = away / np.maximum(length, 1e-9)[:, None]
     precision = np.sqrt(points.weights) / points.tolerance(normals)
     slopes = np.column_stack([normals, np.ones(len(away))]) * precision[:, None]
     step = np.linalg.lstsq(slopes, (length - radius) * precision, rcond=None)[0]

@@ -26,7 +26,8 @@ Shown = Callable[[Floats], Mask]
 
 
 def find_crossings(lines: Sequence[Segment], shown: Shown) -> tuple[Crossing, ...]:
-    """Crossings of all pairs of lines. Where the frame ends behind a line's end, the kind is unknown: no crossing."""
+    """Crossings of all pairs of lines. There is none where its kind is not clear: where the frame ends behind
+    the end of a line, or where lines of several pieces meet."""
     if len(lines) < 2:
         return ()
     starts = np.array([each.ends[0] for each in lines])
@@ -40,17 +41,24 @@ def find_crossings(lines: Sequence[Segment], shown: Shown) -> tuple[Crossing, ..
     near = _MISSING + larger
     meets = (along > -near) & (along < lengths[:, None] + near)
     pairs = np.argwhere(np.triu(meets & meets.T, 1))
-    found, behind = [], []
+    found, behind = [], []  # behind: two places that the frame must show to be sure that a line ends
     for i, j in pairs:
         beyond = _MARGIN + larger[i, j]
         arms = [_arms(along[i, j], lengths[i], ways[i], beyond), _arms(along[j, i], lengths[j], ways[j], beyond)]
         if all(arms):
             found.append((places[i, j], arms))
-            behind.append([places[i, j] - (own[0] if len(own) == 1 else 0.0 * own[0]) * beyond for own in arms])
+            behind.append([places[i, j] - (own[0] * beyond if len(own) == 1 else 0.0) for own in arms])
     if not found:
         return ()
     complete: Mask = np.all(shown(np.array(behind).reshape(-1, 2)).reshape(-1, 2), axis=1)
-    return tuple(_described(*each) for each, whole in zip(found, complete, strict=True) if whole)
+    crossings = [_described(*each) for each, whole in zip(found, complete, strict=True) if whole]
+    return tuple(each for each in crossings if _is_alone(each, crossings))
+
+
+def _is_alone(crossing: Crossing, others: Sequence[Crossing]) -> bool:
+    """Whether no other crossing is at the same place. Of a line in two pieces, each makes one, and none is right."""
+    near = [np.hypot(*(each.position - crossing.position)) < 2.0 * _MARGIN for each in others]
+    return bool(sum(near) == 1)
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

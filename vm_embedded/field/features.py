@@ -16,8 +16,8 @@ class Upright:
     """Something that stands on the plane: a goal post, or a robot or another obstacle.
 
     class_name: post or robot. position (2,) [m]: its base, the middle of what touches the plane. distance [m]: from the
-    camera to the base. bearing (3,): unit vector from the camera to the base. pixel (2,) [px]: of the base. width [m]:
-    across the bearing. confidence: mean probability of its points, 0 to 1.
+    camera to the base. bearing (3,): unit vector from the camera to the base. pixel (2,) [px]: of the base; NaN outside
+    of the picture. width [m]: as seen from the camera. confidence: mean probability of its points, 0 to 1.
     """
 
     class_name: str
@@ -43,7 +43,8 @@ class Upright:
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """A straight piece of a field line: its middle line. ends (2, 2) [m]. pixels (2, 2) [px]: of the ends. confidence:
+    """A straight piece of a field line: its middle line. ends (2, 2) [m]. pixels (2, 2) [px]: of the ends; NaN outside
+    of the picture. confidence:
     mean probability of its points, 0 to 1."""
 
     ends: Floats
@@ -104,7 +105,8 @@ class Crossing:
 
 @dataclass(frozen=True, eq=False)
 class Border:
-    """The visible border of the field: a convex polyline from right to left. points (m, 2) [m]. pixels (m, 2) [px]."""
+    """The visible border of the field: a convex polyline from right to left; if parts of it are hidden or too far, the
+    longest part. points (m, 2) [m]. pixels (m, 2) [px]."""
 
     points: Floats
     pixels: Floats
@@ -121,7 +123,7 @@ class Border:
 class FieldFeatures:
     """All that a frame shows of the field; empty where the network has no class for it.
 
-    posts: goal posts, nearest first. goals: pairs of positions in `posts`, the left post of each goal first, as seen
+    posts: goal posts, nearest first. goals: pairs of indices in `posts`, the left post of each goal first, as seen
     from the camera. robots: robots and other obstacles, nearest first. lines: straight pieces of lines. circle: the
     center circle, or None. crossings: of lines. line_points (p, 2) [m]: thinned points on lines, with line_confidences
     (p,). border: None if the picture does not show it.

@@ -17,7 +17,7 @@ from .lines import LinePoints, Piece, find_pieces, line_points
 from .uprights import POST, ROBOT, Base, find_uprights
 
 ToPixels = Callable[[Floats], Floats]
-"""Pixels (n, 2) of places (n, 2) [m] on the plane; NaN where the lens does not see them."""
+"""Pixels (n, 2) of places (n, 2) [m] on the plane; NaN outside of the picture."""
 
 _LONG = 1.6
 """Straight pieces from this length [m] are lines, also if they touch the center circle."""

@@ -13,7 +13,7 @@ _WIDTHS = (1.2, 3.4)
 
 
 def pair_posts(posts: Sequence[Upright]) -> tuple[tuple[int, int], ...]:
-    """Positions of the left and right post of each goal, nearest pairs first; each post belongs to one goal at most."""
+    """Indices of the left and right post of each goal, narrowest first; each post belongs to one goal at most."""
     pairs = []
     for number, one in enumerate(posts):
         for before in range(number):

@@ -23,7 +23,7 @@ class GroundPoints:
     Detection. A point on something that stands on the plane has the place behind it, where its ray would end. height:
     of the camera over the plane [m]. across: distance between neighboring points across the ray [m]; the same
     everywhere. classes: probabilities (n,) of each class of ROLES that the network has. outside: probability (n,) of
-    the classes that are neither the field nor anything on it.
+    the classes that are neither the field nor anything on it. ahead (2,): unit vector in the camera's direction.
     """
 
     positions: Floats
@@ -31,6 +31,7 @@ class GroundPoints:
     across: float
     classes: dict[str, Singles]
     outside: Singles
+    ahead: Floats
 
     @cached_property
     def ranges(self) -> Floats:
@@ -38,15 +39,8 @@ class GroundPoints:
         return np.hypot(self.positions[:, 0], self.positions[:, 1])
 
     @cached_property
-    def ahead(self) -> Floats:
-        """Unit vector (2,) in the middle of the points' directions, so that they end behind the camera."""
-        middle = (self.positions / np.maximum(self.ranges, 1e-9)[:, None]).sum(axis=0)
-        length = float(np.hypot(*middle))
-        return np.asarray(middle / length) if length > 1e-9 else np.array([1.0, 0.0])
-
-    @cached_property
     def azimuths(self) -> Floats:
-        """Direction (n,) [rad] on the plane, from -pi to pi counterclockwise from `ahead`."""
+        """Direction (n,) [rad] on the plane, counterclockwise from `ahead`: -pi and pi are behind the camera."""
         x, y = self.ahead
         return np.asarray(np.arctan2(self.positions @ (-y, x), self.positions @ self.ahead))
 
@@ -65,6 +59,7 @@ def split(columns: npt.NDArray[np.integer[Any]], values: Floats) -> tuple[Chosen
 
     columns (n,): number of each point's column, sorted. values (n,). Returns for each column that occurs the position
     of the last point before the best split, or -1 if all values are better behind it, and the sum of the values there.
+    For one column with the values 1, 1, -1, -1 these are 1 and 2.
     """
     starts = np.flatnonzero(np.diff(columns, prepend=-1))
     sums = np.cumsum(values)

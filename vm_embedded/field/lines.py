@@ -29,7 +29,9 @@ _MOST_VOTERS = 400
 _BIN = 0.06
 """Width of a bin of the Hough transform [m], at the camera; it grows with the distance of the line."""
 
-_MOST_LINES = 14
+_MOST_ROUNDS = 14
+"""Largest number of searches for a line, which may have several pieces."""
+
 _LEAST_MEAN = 0.25
 """The points of a line have at least this mean probability."""
 
@@ -114,7 +116,7 @@ def find_pieces(points: LinePoints) -> list[Piece]:
     bins = _bins(points.positions @ normals.T)  # (n, 2): of lines across both directions
     free = np.ones(len(points), dtype=bool)
     pieces: list[Piece] = []
-    for _ in range(_MOST_LINES):
+    for _ in range(_MOST_ROUNDS):
         votes = [np.bincount(each[free], points.weights[free], minlength=_COUNT) for each in bins.T]
         sums = [each[:-1] + each[1:] for each in votes]  # a line may fall between two bins
         axis = int(sums[1].max() > sums[0].max())
@@ -158,7 +160,6 @@ def _fit(points: LinePoints, near: Mask, free: Mask, normal: Floats) -> tuple[Ch
     first, members = normal, np.flatnonzero(near)
     tolerance = points.tolerance(normal)
     weights = points.weights / tolerance**2
-    middle = points.positions[members[0]]
     for _ in range(3):
         own = weights[members]
         middle = own @ points.positions[members] / own.sum()

@@ -22,7 +22,9 @@ class UprightRules:
     direction where the base would be farther by more than this share. beside [m]: everything of the class that is so
     near beside a base belongs to it. depth: from its front to the middle of its base, as a share of its width. taller:
     height of a thing, as a share of its width, at least. foot: share of its height whose middle is its base. filled:
-    share of the points between its sides, its base and its top that are of its class, at least."""
+    share of the points between its sides, its base and its top that are of its class, at least. widest [m]: wider
+    things are something else.
+    """
 
     least: float
     points: int
@@ -32,10 +34,15 @@ class UprightRules:
     taller: float
     foot: float
     filled: float
+    widest: float
 
 
-POST = UprightRules(least=0.45, points=10, jump=0.2, beside=0.2, depth=0.3, taller=1.5, foot=0.5, filled=0.2)
-ROBOT = UprightRules(least=0.5, points=14, jump=0.35, beside=0.3, depth=0.3, taller=1.0, foot=0.4, filled=0.2)
+POST = UprightRules(
+    least=0.45, points=10, jump=0.2, beside=0.2, depth=0.3, taller=1.5, foot=0.5, filled=0.2, widest=0.5
+)
+ROBOT = UprightRules(
+    least=0.5, points=14, jump=0.35, beside=0.3, depth=0.3, taller=1.0, foot=0.4, filled=0.2, widest=2.0
+)
 
 _COLUMN = 0.012
 """Width of a column of points [rad]."""
@@ -79,12 +86,13 @@ def find_uprights(points: GroundPoints, probabilities: Singles, rules: UprightRu
         if thing is not None and own.sum() >= rules.filled * _count(points, low, high, front, ranges[own].max()):
             azimuth, distance, width, confidence = thing
             found.append(Base(distance * points.directions(np.array(azimuth)), width, confidence))
-    return found
+    return sorted(found, key=lambda each: float(np.hypot(*each.position)))
 
 
 def _count(points: GroundPoints, low: float, high: float, nearest: float, farthest: float) -> int:
     """Number of points between two azimuths [rad] and two ranges [m]."""
-    part = slice(*np.searchsorted(points.ranges, [nearest, farthest]))
+    first, last = np.searchsorted(points.ranges, nearest), np.searchsorted(points.ranges, farthest, side="right")
+    part = slice(int(first), int(last))
     azimuths = points.azimuths[part]
     return int(np.count_nonzero((azimuths >= low) & (azimuths < high)))
 
@@ -122,12 +130,13 @@ def _thing(
     if len(ranges) < rules.points:
         return None
     front = float(ranges.min())
-    front -= 0.5 * float(points.along(np.array(front)))  # it is somewhere between this ring and the one in front of it
+    # It is between this ring and the next nearer one.
+    front = max(front - 0.5 * float(points.along(np.array(front))), 1e-3)
     heights = points.height * (1.0 - front / ranges)  # of the points, at the distance of the front
     tall = float(heights.max())
     low = heights <= max(rules.foot * tall, float(heights.min()) + 1e-9)
     azimuth = 0.5 * float(azimuths[low].min() + azimuths[low].max())
     width = float(np.ptp(azimuths)) * front + points.across
-    if tall < rules.taller * min(width, 0.3):
+    if tall < rules.taller * min(width, 0.3) or width > rules.widest:
         return None
     return azimuth, front + rules.depth * width, width, float(weights.mean())

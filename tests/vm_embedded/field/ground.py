@@ -35,7 +35,8 @@ def ground(places, labels, height=HEIGHT, across=ACROSS, sure=0.95):
         name: np.where(labels == name, sure, 0.0).astype(np.float32) for name in ("goal", "robot", "line", "field")
     }
     outside = (1.0 - sum(classes.values())).astype(np.float32)
-    return GroundPoints(places, height, across, classes, outside)
+    middle = places.sum(axis=0) if len(places) else np.array([1.0, 0.0])
+    return GroundPoints(places, height, across, classes, outside, middle / np.hypot(*middle))
 
 
 def inside_of(places, corners):

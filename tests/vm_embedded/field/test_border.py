@@ -75,3 +75,14 @@ def test_things_on_an_endless_field_are_no_border():
 
 def test_no_points_have_no_border():
     assert len(find_border(ground(np.empty((0, 2)), np.empty(0, dtype="U8")))) == 0
+
+
+@given(noise=st.integers(0, 1000))
+def test_it_is_convex(noise):
+    places = mesh()
+    labels = labels_of(places, FIELD)
+    wrong = np.random.default_rng(noise).random(len(places)) < 0.1
+    labels[wrong] = np.where(labels[wrong] == "field", "outside", "field")
+    steps = np.diff(find_border(ground(places, labels)), axis=0)
+    turns = steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0]
+    assert (turns > -1e-6).all()

@@ -75,3 +75,8 @@ def test_a_post_belongs_to_one_goal():
 
 def test_posts_too_near_or_too_far_apart_are_no_goal():
     assert pair_posts([post(4.0, 0.0), post(4.0, 0.5), post(4.0, 5.0)]) == ()
+
+
+def test_a_line_in_two_pieces_makes_no_wrong_corners():
+    lines = [line((2.0, -1.5), (2.0, -0.2)), line((2.0, 0.2), (2.0, 1.5)), line((2.1, 0.0), (4.0, 0.0))]
+    assert find_crossings(lines, everywhere) == ()

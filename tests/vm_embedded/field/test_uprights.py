@@ -71,3 +71,14 @@ def test_a_frame_of_noise_has_a_limited_number():
     labels = np.random.default_rng(1).choice(["field", "robot"], len(places))
     points = ground(places, labels)
     assert len(find_uprights(points, points.classes["robot"], ROBOT)) <= 20
+
+
+def test_wide_near_things_keep_the_order():
+    found = found_among([((1.5, 0.0), 0.9, 0.8), ((1.6, -1.2), 0.2, 0.8)], "robot", ROBOT)
+    ranges = [float(np.hypot(*each.position)) for each in found]
+    assert ranges == sorted(ranges)
+    assert len(ranges) == 2
+
+
+def test_a_wall_is_no_robot():
+    assert found_among([((2.0, 0.0), 3.5, 0.8)], "robot", ROBOT) == []
