@@ -30,7 +30,8 @@ def ground_points(observation: Observation) -> GroundPoints:
     view, classes = observation.view, observation.manifest.classes
     steep = np.flatnonzero(observation.rays[:, 2] < -_LOWEST)
     steep = steep[np.argsort(observation.rays[steep, 2], kind="stable")]  # the mesh is nearly in this order
-    rays, probabilities = observation.rays[steep], observation.probabilities[steep]
+    rays = observation.rays[steep]
+    probabilities = np.nan_to_num(observation.probabilities[steep])  # one NaN would spoil the sums of all others
     outside = np.zeros(len(steep), np.float32)
     for column, each in enumerate(classes):
         if each.kind == "background":

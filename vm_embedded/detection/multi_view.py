@@ -14,6 +14,8 @@ from ..geometry.lens import Lens
 from ..geometry.planes import GROUND, Plane, Pose
 from .detections import Detection
 from .detector import Detector
+from .objects import locate
+from .stopwatch import Stopwatch
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +87,8 @@ def _sightings(detector: Detector, camera: str, view: CameraView, plane: Plane) 
         detector.cache.mesh_height(orientation.height)  # raises if the camera is too low
     except GeometryError:
         return
-    for each in detector.detect(view.image, orientation, view.lens):
+    observation = detector.observe(view.image, orientation, view.lens)
+    for each in locate(observation, detector.look, detector.settings, Stopwatch())[0]:  # without features of the field
         position = plane.to_world(each.position[None], view.pose)[0]
         away = position - view.pose.position
         yield Sighting(camera, plane.name, each, position, away / np.linalg.norm(away))

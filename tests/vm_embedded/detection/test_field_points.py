@@ -72,3 +72,12 @@ def test_they_can_be_switched_off(detector):
     quiet = Detector.from_file(MODEL, Settings(field_features=False)).detect(*frame)
     assert quiet.field is None
     assert "field" not in quiet.timing_ms
+
+
+def test_a_point_without_a_probability_spoils_nothing_else(detector):
+    seen = painted(detector, Orientation.from_roll_pitch(0.8, 0.0, 0.4))
+    broken = seen.slot_probabilities.copy()
+    broken[:: len(broken) // 7] = np.nan
+    found, whole = (locate_features(each) for each in (replace(seen, slot_probabilities=broken), seen))
+    assert len(found.border.points) == len(whole.border.points)
+    assert found.border.points == pytest.approx(whole.border.points, abs=0.2)
