@@ -10,7 +10,6 @@ from ..field.find import find_features
 from ..field.ground_points import ROLES, GroundPoints
 from .observation import Observation
 from .prepared_view import PreparedView
-from .projection import to_camera
 
 _LOWEST = 1e-3
 """Rays less steep than this do not meet the plane near enough to matter."""
@@ -48,9 +47,5 @@ def ground_points(observation: Observation) -> GroundPoints:
 
 def _pixels(view: PreparedView, places: Floats) -> Floats:
     """Pixels (n, 2) of places (n, 2) [m] on the plane; NaN where the frame does not show them."""
-    toward = np.column_stack([places, np.full(len(places), -view.height)]) @ view.heading
-    toward /= np.linalg.norm(toward, axis=1, keepdims=True)
-    camera = to_camera(toward, view.rotation)
-    pixels = view.lens.project(camera, view.size)
-    inside = ((pixels >= 0.0) & (pixels <= np.array(view.size) - 1.0)).all(axis=1)
-    return np.where((view.lens.sees(camera) & inside)[:, None], pixels, np.nan)
+    pixels = view.plane_pixels(places)
+    return np.where(view.in_picture(pixels)[:, None], pixels, np.nan)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..arrays import Floats
+import numpy as np
+
+from ..arrays import Floats, Mask
 from ..geometry.lens import Lens, Size
 from ..geometry.shape import Shape
 from ..network.layout import Layout
@@ -42,3 +44,17 @@ class PreparedView(NamedTuple):
         """Pixels (m, 2) of those of the rays (n, 3), in the mesh frame, that the lens sees, on screen or not."""
         camera = to_camera(rays, self.rotation)
         return self.lens.project(camera[self.lens.sees(camera)], self.size)
+
+    def ray_pixels(self, rays: Floats) -> Floats:
+        """Pixels (n, 2) of rays (n, 3) in the mesh frame; NaN where the lens sees nothing."""
+        camera = to_camera(rays, self.rotation)
+        return np.where(self.lens.sees(camera)[:, None], self.lens.project(camera, self.size), np.nan)
+
+    def plane_pixels(self, places: Floats) -> Floats:
+        """Pixels (n, 2) of places (n, 2) [m] on the plane, in its frame; NaN where the lens sees nothing."""
+        toward = np.column_stack([places, np.full(len(places), -self.height)]) @ self.heading
+        return self.ray_pixels(toward / np.linalg.norm(toward, axis=1, keepdims=True))
+
+    def in_picture(self, pixels: Floats) -> Mask:
+        """Which pixels (n, 2) are inside the picture; NaN is not."""
+        return np.asarray(((pixels >= 0.0) & (pixels <= np.array(self.size) - 1.0)).all(axis=1))

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Chosen, Floats, Mask
-from .ground_points import GroundPoints, split
+from .ground_points import GroundPoints, cross, split
 
 _COLUMN = 0.04
 """Width of a column of points [rad]."""
@@ -90,16 +90,12 @@ def _beyond(places: Floats, corners: Chosen) -> Floats:
     a = places[corners][piece]
     along = np.diff(places[corners], axis=0)[piece]
     # The ray t * place meets the line through a piece where the cross product of (t * place - a) and `along` is zero.
-    return np.asarray(_cross(places, along) / _cross(a, along) - 1.0)
+    return np.asarray(cross(places, along) / cross(a, along) - 1.0)
 
 
 def _pieces(count: int, corners: Chosen) -> Chosen:
     """The piece of a polyline through some of `count` places that is in the direction of each."""
     return np.clip(np.searchsorted(corners, np.arange(count), side="right") - 1, 0, len(corners) - 2)
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def _farthest(places: Floats, left: Chosen, corners: Chosen) -> int:

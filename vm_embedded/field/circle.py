@@ -1,7 +1,7 @@
 """The center circle among the line points that are on no long straight line.
 
-Circles through three random points are tried (Fischler and Bolles, "Random sample consensus", 1981), always with the
-same seed. The one with the most points on it is fitted to them, if they cover enough of it.
+Circles through three points near each other are tried (Fischler and Bolles, "Random sample consensus", 1981), always
+with the same seed. The one with the most points on it is fitted to them, if they cover enough of it.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from ..arrays import Chosen, Floats, Mask
 from .lines import LinePoints
 
 _TRIES = 120
+"""Number of circles that are tried."""
+
 _MOST_VOTERS = 150
 """Largest number of points that suggest circles and vote for them."""
 
@@ -24,6 +26,8 @@ _FEWEST = 12
 """A circle has at least so many points."""
 
 _SECTORS = 24
+"""Equal parts of a circle, to tell how much of it is seen."""
+
 _LEAST_ARC = 0.42
 """Share of the circle's sectors that have points on it, at least."""
 
@@ -34,7 +38,7 @@ _LEAST_OWN = 0.4
 """Share of the circle's points that are on no long line, at least."""
 
 _LEAST_PURE = 0.75
-"""Share of the points in and around the circle's disk that are on the circle, at least: a disk of points is none."""
+"""Share of the probability in this band that is on the circle, at least: a disk of points is no circle."""
 
 
 @dataclass(frozen=True, eq=False)

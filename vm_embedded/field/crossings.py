@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Floats, Mask
 from .features import Crossing, Segment
+from .ground_points import cross
 
 _MARGIN = 0.25
 """A line that goes on by less than this behind a crossing [m] ends there."""
@@ -33,9 +34,9 @@ def find_crossings(lines: Sequence[Segment], shown: Shown) -> tuple[Crossing, ..
     starts = np.array([each.ends[0] for each in lines])
     lengths = np.array([each.length for each in lines])
     ways = (np.array([each.ends[1] for each in lines]) - starts) / lengths[:, None]
-    sine = _cross(ways[:, None], ways)
+    sine = cross(ways[:, None], ways)
     sine[np.abs(sine) < _LEAST_SINE] = np.nan
-    along = _cross(starts - starts[:, None], ways) / sine  # (n, n): where line i meets line j, [m] from its start
+    along = cross(starts - starts[:, None], ways) / sine  # (n, n): where line i meets line j, [m] from its start
     places = starts[:, None] + along[..., None] * ways[:, None]
     larger = _LARGER * np.hypot(places[..., 0], places[..., 1])
     near = _MISSING + larger
@@ -59,10 +60,6 @@ def _is_alone(crossing: Crossing, others: Sequence[Crossing]) -> bool:
     """Whether no other crossing is at the same place. Of a line in two pieces, each makes one, and none is right."""
     near = [np.hypot(*(each.position - crossing.position)) < 2.0 * _MARGIN for each in others]
     return bool(sum(near) == 1)
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def _arms(t: float, length: float, way: Floats, beyond: float) -> list[Floats]:

@@ -44,8 +44,7 @@ class Upright:
 @dataclass(frozen=True, eq=False)
 class Segment:
     """A straight piece of a field line: its middle line. ends (2, 2) [m]. pixels (2, 2) [px]: of the ends; NaN outside
-    of the picture. confidence:
-    mean probability of its points, 0 to 1."""
+    of the picture. confidence: mean probability of its points, 0 to 1."""
 
     ends: Floats
     pixels: Floats
@@ -90,8 +89,8 @@ class Crossing:
     """Where two field lines meet at a right angle.
 
     kind: L, T or X. position (2,) [m]. heading [rad]: counterclockwise from the x axis; for T the direction of the line
-    that ends there, away from the crossing; for L the middle between its two lines; for X the direction of either line,
-    from 0 to a right angle.
+    that ends there, away from the crossing; for L halfway between its two lines, into the corner; for X the direction
+    of either line, from 0 to a right angle.
     """
 
     kind: str
@@ -153,5 +152,5 @@ class FieldFeatures:
 
 
 def _rounded(values: Floats, digits: int) -> list[float | None]:
-    """Rounded numbers; None, JSON's null, for NaN: the pixel of a place that the lens does not see."""
+    """Rounded numbers; None, JSON's null, for NaN: the pixel of a place outside of the picture."""
     return [round(each, digits) if math.isfinite(each) else None for each in values.tolist()]

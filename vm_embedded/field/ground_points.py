@@ -54,6 +54,11 @@ class GroundPoints:
         return np.asarray(self.across * np.hypot(ranges, self.height) / self.height)
 
 
+def cross(a: Floats, b: Floats) -> Floats:
+    """Cross product (...,) of vectors (..., 2) on the plane: positive if b is to the left of a."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
 def split(columns: npt.NDArray[np.integer[Any]], values: Floats) -> tuple[Chosen, Floats]:
     """For each column of points, sorted from near to far, the place that best parts positive from negative values.
 

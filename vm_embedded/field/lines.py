@@ -14,10 +14,10 @@ import numpy as np
 from ..arrays import Chosen, Floats, Mask, Singles
 from .ground_points import GroundPoints
 
-LEAST = 0.1
+_LEAST = 0.1
 """Points with a smaller probability of the class line are ignored."""
 
-FARTHEST = 10.0
+_FARTHEST = 10.0
 """Farther points [m] are ignored: a line there is narrower than a pixel of most cameras."""
 
 _ANGLES = 45
@@ -96,7 +96,7 @@ class Piece:
 def line_points(points: GroundPoints) -> LinePoints:
     """The points that may be on lines; none if the network has no class line."""
     probabilities = points.classes.get("line", np.zeros(len(points.ranges), np.float32))
-    chosen = np.flatnonzero((probabilities > LEAST) & (points.ranges < FARTHEST) & (points.ranges > 1e-3))
+    chosen = np.flatnonzero((probabilities > _LEAST) & (points.ranges < _FARTHEST) & (points.ranges > 1e-3))
     ranges, positions = points.ranges[chosen], points.positions[chosen]
     return LinePoints(
         positions,
@@ -132,7 +132,7 @@ def find_pieces(points: LinePoints) -> list[Piece]:
     return sorted(pieces, key=lambda each: -each.length)
 
 
-_REACH = np.arcsinh(FARTHEST)
+_REACH = np.arcsinh(_FARTHEST)
 _COUNT = 2 * int(np.ceil(_REACH / _BIN)) + 2
 
 

@@ -7,7 +7,6 @@ import numpy as np
 from ..arrays import Floats, Mask
 from ..detection.detections import Detections
 from ..detection.prepared_view import PreparedView
-from ..detection.projection import to_camera
 from ..output.messages import Message
 
 REACH = 12.0
@@ -67,10 +66,7 @@ def _rays(azimuths: Floats, tilts: Floats) -> Floats:
 
 def _on_screen(view: PreparedView, azimuths: Floats, tilts: Floats) -> Mask:
     """Whether the picture shows these directions (n,)."""
-    camera = to_camera(_rays(azimuths, tilts), view.rotation)
-    pixels = view.lens.project(camera, view.size)
-    inside = ((pixels >= 0.0) & (pixels <= np.array(view.size) - 1.0)).all(axis=1)
-    return np.asarray(view.lens.sees(camera) & inside)
+    return view.in_picture(view.ray_pixels(_rays(azimuths, tilts)))
 
 
 def _edge(view: PreparedView, azimuths: Floats, shown: Floats, hidden: Floats) -> Floats:

@@ -39,7 +39,7 @@ _FIELDS = {
 
 RECORDS = {name: np.dtype([tuple(each.split(":")) for each in text.split()]) for name, text in _FIELDS.items()}
 """The fields of each kind of record, with the names of the JSON form. class: line of the text, from 0. left, right:
-places in posts, from 0. kind of a crossing: the code of the letter L, T or X. circle: one record or none. border: one
+indices in posts, from 0. kind of a crossing: the code of the letter L, T or X. circle: one record or none. border: one
 record per point."""
 
 _MOST = 0xFFFF

@@ -7,7 +7,6 @@ import numpy as np
 
 from ..arrays import Floats, Image
 from ..detection.prepared_view import PreparedView
-from ..detection.projection import to_camera
 from ..field.features import CenterCircle, FieldFeatures, Upright
 from .labels import INK, Color, Labels
 
@@ -19,15 +18,6 @@ _PIECES = 16
 
 _FARTHEST = 1e4
 """Largest pixel that is drawn: OpenCV cannot draw far outside of an image."""
-
-
-def plane_pixels(view: PreparedView, points: Floats) -> Floats:
-    """Pixels (n, 2) of places (n, 2) [m] on the observation plane, in its frame; NaN where the lens sees nothing."""
-    toward = np.column_stack([points, np.full(len(points), -view.height)]) @ view.heading
-    camera = to_camera(toward / np.linalg.norm(toward, axis=1, keepdims=True), view.rotation)
-    pixels = view.lens.project(camera, view.size)
-    pixels[~view.lens.sees(camera)] = np.nan
-    return pixels
 
 
 def draw_field(canvas: Image, field: FieldFeatures, view: PreparedView, scale: float) -> None:
@@ -67,7 +57,7 @@ def _uprights(field: FieldFeatures) -> list[tuple[Upright, Color]]:
 
 def _crossing_pixels(field: FieldFeatures, view: PreparedView) -> Floats:
     """Pixels (c, 2) of the crossings; NaN where the lens sees nothing."""
-    return plane_pixels(view, np.array([each.position for each in field.crossings]).reshape(-1, 2))
+    return view.plane_pixels(np.array([each.position for each in field.crossings]).reshape(-1, 2))
 
 
 def _in_pieces(points: Floats) -> Floats:
@@ -93,7 +83,7 @@ def _base(upright: Upright) -> Floats:
 
 def _draw_paths(canvas: Image, view: PreparedView, paths: Floats, color: Color, thickness: int) -> None:
     """Draw p lines through n places each (p, n, 2) [m]; what the lens does not see is left out."""
-    pixels = plane_pixels(view, paths.reshape(-1, 2)).reshape(paths.shape)
+    pixels = view.plane_pixels(paths.reshape(-1, 2)).reshape(paths.shape)
     with np.errstate(invalid="ignore"):
         seen = np.asarray((np.abs(pixels) < _FARTHEST).all(axis=2))
     pieces = np.stack([pixels[:, :-1], pixels[:, 1:]], axis=2)[seen[:, :-1] & seen[:, 1:]]

@@ -14,7 +14,6 @@ from vm_embedded import Detector, Equidistant, Orientation, Rectilinear
 from vm_embedded.live import status_page
 from vm_embedded.live.overhead_map import REACH, field_of_view, overhead_map
 from vm_embedded.live.status_page import StatusPage
-from vm_embedded.output.field_overlay import plane_pixels
 
 
 def inside(polygons, places):
@@ -44,7 +43,7 @@ def test_the_field_of_view_holds_what_the_picture_shows(name):
     view = view_of(*VIEWS[name]) if name in VIEWS else demo_frame(name)[1].observation.view
     places = np.random.default_rng(1).uniform(-1.0, 1.0, (1500, 2)) * np.geomspace(1.0, 12.0, 1500)[:, None]
     distances = np.hypot(*places.T)
-    pixels = plane_pixels(view, places)
+    pixels = view.plane_pixels(places)
     with np.errstate(invalid="ignore"):
         slack = np.minimum(pixels, np.array(view.size) - 1 - pixels).min(axis=1)  # NaN for unseen ones
     counts = inside(field_of_view(view), places)

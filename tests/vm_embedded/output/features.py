@@ -10,7 +10,6 @@ import numpy as np
 from vm_embedded import Detector, read_lens_file
 from vm_embedded.cameras.image_files import open_source
 from vm_embedded.field.features import Border, CenterCircle, Crossing, FieldFeatures, Segment, Upright
-from vm_embedded.output.field_overlay import plane_pixels
 
 DEMO = Path(__file__).parents[2] / "fixtures" / "demo"
 
@@ -35,14 +34,14 @@ def upright(view, name, x, y, width):
     position = ahead(view, (x, y))
     toward = np.array([*position[0], -view.height])
     distance = float(np.linalg.norm(toward))
-    pixel = plane_pixels(view, position)[0]
+    pixel = view.plane_pixels(position)[0]
     return Upright(name, position[0], distance, toward / distance, pixel, width, 0.91)
 
 
 def segment(view, *ends):
     """The middle line between two places [m], x ahead of the camera and y left."""
     places = ahead(view, *ends)
-    return Segment(places, plane_pixels(view, places), 0.88)
+    return Segment(places, view.plane_pixels(places), 0.88)
 
 
 def scene(view):
@@ -61,7 +60,7 @@ def scene(view):
     outer = ahead(view, (2.0, -3.4), (6.0, -3.2), (6.4, 3.2), (3.0, 3.6))
     return FieldFeatures(
         *(posts, ((0, 1),), robots, lines, CenterCircle(center, 0.75, 4.1, 0.8), crossings),
-        *(ahead(view, (3.2, 0.0)), np.array([0.9], np.float32), Border(outer, plane_pixels(view, outer))),
+        *(ahead(view, (3.2, 0.0)), np.array([0.9], np.float32), Border(outer, view.plane_pixels(outer))),
     )
 
 

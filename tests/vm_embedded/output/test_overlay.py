@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tests.vm_embedded.output.features import demo_frame, full, scene
-from vm_embedded.output.field_overlay import plane_pixels
 from vm_embedded.output.labels import INK, Labels
 from vm_embedded.output.overlay import draw_overlay
 
@@ -25,9 +24,9 @@ def test_every_feature_is_drawn_where_it_is():
     middles = [each.ends.mean(axis=0) for each in field.lines] + [field.border.points[1:3].mean(axis=0)]
     places = [*middles, *(each.position for each in (*field.robots, *field.posts, *field.crossings))]
     places += [field.circle.center - (field.circle.radius, 0.0), field.circle.center - (0.0, field.circle.radius)]
-    for pixel in plane_pixels(view, np.array(places)):
+    for pixel in view.plane_pixels(np.array(places)):
         assert (colors_near(drawn, pixel) != colors_near(plain, pixel)).any(), pixel
-    magenta = colors_near(drawn, plane_pixels(view, middles[1][None])[0]).astype(int)
+    magenta = colors_near(drawn, view.plane_pixels(middles[1][None])[0]).astype(int)
     assert (magenta @ (1, -2, 1)).max() > 300
 
 
@@ -35,7 +34,7 @@ def test_plane_pixels_are_those_of_the_mesh_points():
     detections = demo_frame(0)[1]
     view = detections.observation.view
     rays = detections.rays[detections.rays[:, 2] < -0.02]
-    pixels = plane_pixels(view, view.height * rays[:, :2] / -rays[:, 2:])
+    pixels = view.plane_pixels(view.height * rays[:, :2] / -rays[:, 2:])
     expected = detections.pixels[detections.rays[:, 2] < -0.02]
     np.testing.assert_allclose(pixels, expected, atol=1e-3)
 
