@@ -31,7 +31,7 @@ OUTSIDE = {
     "vm_export": {"numpy", "torch", "onnx", "yaml"},
     "vm_synth": {"numpy", "cv2", "mitsuba", "drjit", "matplotlib"},
     "vm_mesh": {"numpy", "matplotlib"},
-    "vm_train": {"numpy", "cv2", "torch", "matplotlib"},
+    "vm_train": {"numpy", "cv2", "torch", "matplotlib", "yaml", "PIL"},
 }
 """Packages of others that each package may import."""
 

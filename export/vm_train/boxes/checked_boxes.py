@@ -1,0 +1,108 @@
+"""Boxes that fit their image: clipped at its border, each of them once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+
+from vm_embedded.errors import InputError
+from vm_embedded.geometry.lens import Size
+
+from .annotation import RawBox
+from .box import Box
+
+_SLIGHTLY = 2.0, 0.1
+"""How far a box may reach outside of the image: [px], or as a share of its own size. It is clipped there."""
+
+_ROUNDEST = 2.0
+"""Largest ratio of width and height of a round object that is inside the image."""
+
+_NEAR_BORDER = 3.0
+"""Boxes nearer to the border than this are cut by it, drawn by hand [px]."""
+
+_EQUAL = 0.9
+"""Intersection over union from which on two boxes of a class are the same."""
+
+
+def overlap(one: Box, other: Box) -> float:
+    """Intersection over union of two boxes, from 0 to 1."""
+    width = min(one.right, other.right) - max(one.left, other.left)
+    height = min(one.bottom, other.bottom) - max(one.top, other.top)
+    shared = max(width, 0.0) * max(height, 0.0)
+    total = one.width * one.height + other.width * other.height - shared
+    return shared / total if total > 0.0 else 0.0
+
+
+def is_cut(box: Box, size: Size) -> bool:
+    """Whether a box reaches to the border of an image of this width and height [px]: part of the object is outside."""
+    near = _NEAR_BORDER - 0.5
+    return box.left < near or box.top < near or box.right > size[0] - 1 - near or box.bottom > size[1] - 1 - near
+
+
+def is_round(box: Box) -> bool:
+    """Whether width and height of a box differ by less than a factor of 2, as those of a ball in full view."""
+    return max(box.width, box.height) <= _ROUNDEST * min(box.width, box.height)
+
+
+def checked_boxes(boxes: list[RawBox], size: Size, round_names: Collection[str]) -> tuple[list[Box], list[str]]:
+    """The good boxes [px] of an image of this width and height, and a line about each fault.
+
+    boxes: with edges in pixels from 0 to width and height. round_names: classes of which a long box is a fault; the box
+    stays, so that nothing else takes its place for background.
+    """
+    good: list[Box] = []
+    places: list[str] = []
+    faults = []
+    for raw in boxes:
+        try:
+            box = _inside(raw, size)
+        except InputError as error:
+            faults.append(f"{raw.place}: {error}; box not used")
+            continue
+        same = next((at for at, other in enumerate(good) if _same(box, other)), None)
+        if same is not None:
+            faults.append(f"{raw.place}: the same box of {box.name} as {_short(places[same])}; box not used")
+            continue
+        if box.name in round_names and not is_cut(box, size) and not is_round(box):
+            faults.append(
+                f"{raw.place}: {box.name} of {_by(box.width, box.height)} px, but width and height of a {box.name} "
+                f"in full view differ by a factor of {_ROUNDEST:g} at most; is it partly hidden? box kept"
+            )
+        good.append(box)
+        places.append(raw.place)
+    return good, faults
+
+
+def _inside(raw: RawBox, size: Size) -> Box:
+    """The box, clipped to the image. Raises InputError if it is not a box, or outside of the image."""
+    left, top, right, bottom = raw.edges
+    if not all(map(math.isfinite, raw.edges)):
+        raise InputError(f"edges must be finite numbers, not {', '.join(f'{each:g}' for each in raw.edges)}")
+    width, height = right - left, bottom - top
+    if width <= 0.0 or height <= 0.0:
+        raise InputError(f"size {_by(width, height)} px; width and height must be above 0")
+    for low, high, limit, extent in ((left, right, size[0], width), (top, bottom, size[1], height)):
+        allowed = max(_SLIGHTLY[0], _SLIGHTLY[1] * extent)
+        if max(-low, high - limit) > allowed or min(high, limit) <= max(low, 0.0):
+            shown = ", ".join(f"{each:.1f}" for each in raw.edges)
+            raise InputError(f"left, top, right, bottom {shown} px is outside of the image of {_by(*size)} px")
+    return Box(
+        raw.name,
+        max(left, 0.0) - 0.5,
+        max(top, 0.0) - 0.5,
+        min(right, float(size[0])) - 0.5,
+        min(bottom, float(size[1])) - 0.5,
+    )
+
+
+def _same(one: Box, other: Box) -> bool:
+    return one.name == other.name and overlap(one, other) >= _EQUAL
+
+
+def _by(width: float, height: float) -> str:
+    return f"{width:.4g} x {height:.4g}"
+
+
+def _short(place: str) -> str:
+    """A place without the name of its file."""
+    return " ".join(place.rsplit(" ", 2)[-2:])

@@ -1,0 +1,121 @@
+"""Reads a folder of annotated images in any of the formats, and checks all of it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from vm_embedded.cameras.image_files import lens_beside
+from vm_embedded.errors import InputError, unknown
+from vm_embedded.geometry.lens_files import read_lens_file
+
+from .annotation import Annotation, Annotations
+from .box import Box, BoxedPicture, BoxedSet
+from .checked_boxes import checked_boxes
+from .fit import fit
+from .folder_files import FolderFiles, find_files
+from .image_facts import UPRIGHT, ImageFacts, image_facts
+from .recordings import recordings
+from .yolo import is_yolo, read_yolo
+
+FORMATS = {"yolo": (is_yolo, read_yolo)}
+"""For each format: whether a folder has it, and its reader."""
+
+
+def read_boxes(
+    folder: Path,
+    format: str | None = None,
+    names: Mapping[str, str] | None = None,
+    round_names: Collection[str] = ("ball",),
+) -> BoxedSet:
+    """All images of a folder and its sub-folders that have good annotations, and one line for each fault.
+
+    format: one of FORMATS; None finds it out. names: for names of classes in the annotations, the names to use; others
+    stay as they are. round_names: classes, after this renaming, of which a long box is a fault. Raises InputError if
+    the folder has no images, no annotations, or those of several formats, and for an unknown format.
+    """
+    files = find_files(folder)
+    annotations = FORMATS[_format(files, format)][1](files)
+    pictures, faults = _checked(files, annotations, names or {}, round_names)
+    faults += _unmapped(annotations, names or {})
+    found = sorted({box.name for picture in pictures for box in picture.boxes})
+    return BoxedSet(tuple(pictures), tuple(faults), tuple(found))
+
+
+def _format(files: FolderFiles, format: str | None) -> str:
+    if format is not None:
+        if format not in FORMATS:
+            raise InputError(unknown("format", format, FORMATS))
+        return format
+    found = [name for name, (is_there, _) in FORMATS.items() if is_there(files)]
+    if not found:
+        raise InputError(
+            f"no annotations in {files.folder}: expected YOLO (NAME.txt), Pascal VOC (NAME.xml) or COCO (.json with "
+            "images, annotations and categories)"
+        )
+    if len(found) > 1:
+        raise InputError(f"{files.folder} has annotations in several formats, {', '.join(found)}: choose one of them")
+    return found[0]
+
+
+def _checked(
+    files: FolderFiles, annotations: Annotations, names: Mapping[str, str], round_names: Collection[str]
+) -> tuple[list[BoxedPicture], list[str]]:
+    """The good pictures in the order of their paths, and all faults."""
+    by_image = {each.image: each for each in annotations.found}
+    groups = recordings([path.relative_to(files.folder) for path in files.images])
+    pictures: list[BoxedPicture] = []
+    faults = list(annotations.faults)
+    first: dict[bytes, Path] = {}
+    for path, recording in zip(files.images, groups, strict=True):
+        if path in annotations.spoiled or (path not in by_image and not annotations.complete):
+            continue
+        try:
+            if path not in by_image:
+                raise InputError("no annotation names it; an image that shows nothing needs an empty one")
+            facts = image_facts(path)
+            same = first.setdefault(facts.digest, path)
+            if same != path:
+                raise InputError(f"the same image as {files.label(same)}")
+            boxes, wrong = _boxes(by_image[path], facts, files.label(path), names, round_names)
+        except InputError as error:
+            faults.append(f"{files.label(path)}: {error}; not used")
+            continue
+        lens, wrong_lens = _lens(files, path, facts)
+        pictures.append(BoxedPicture(path, facts.size, tuple(boxes), recording, lens))
+        faults += wrong + wrong_lens
+    return pictures, faults
+
+
+def _boxes(
+    annotation: Annotation, facts: ImageFacts, label: str, names: Mapping[str, str], round_names: Collection[str]
+) -> tuple[list[Box], list[str]]:
+    """The good boxes of an image in its upright pixels, and its faults. Raises InputError for a wrong size."""
+    raw, faults = fit(annotation, facts, label)
+    renamed = [replace(each, name=names.get(each.name, each.name)) for each in raw]
+    boxes, wrong = checked_boxes(renamed, facts.size, round_names)
+    return boxes, faults + wrong
+
+
+def _lens(files: FolderFiles, image: Path, facts: ImageFacts) -> tuple[Path | None, list[str]]:
+    """The good lens file beside an image, if there is one, and what is wrong with it."""
+    beside = (image.with_suffix(".yaml"), image.with_name(f"lens{image.stem}.yaml"), lens_beside(image))
+    path = next((each for each in beside if each is not None and each.is_file()), None)
+    if path is None:
+        return None, []
+    try:
+        if facts.orientation != UPRIGHT:
+            raise InputError(f"{image.name} is turned by its EXIF orientation {facts.orientation}, the lens is not")
+        read_lens_file(path).lens.for_image(facts.size)
+    except InputError as error:
+        return None, [f"{files.label(path)}: {error}; {files.label(image)} is used without lens"]
+    return path, []
+
+
+def _unmapped(annotations: Annotations, names: Mapping[str, str]) -> list[str]:
+    """A line for each name to map that no annotation has."""
+    there = sorted({box.name for each in annotations.found for box in each.boxes})
+    return [
+        f"no box to rename to {names[name]}: {unknown('class', name, there)}" for name in names if name not in there
+    ]
