@@ -52,13 +52,19 @@ def find_files(folder: Path) -> FolderFiles:
     return FolderFiles(folder, images, tuple(sorted(set(found) - set(images))))
 
 
-def read_text(path: Path) -> str:
-    """The text of an annotation file. Raises InputError without the file's name if it is unreadable."""
+def read_bytes(path: Path) -> bytes:
+    """The content of an annotation file. Raises InputError without the file's name if it is unreadable."""
     try:
         if path.stat().st_size > LARGEST:
             raise InputError(f"is too large; at most {LARGEST} bytes are allowed")
-        return path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError("is not UTF-8 text") from error
+        return path.read_bytes()
     except OSError as error:
         raise InputError(f"can't be read: {error.strerror or error}") from error
+
+
+def read_text(path: Path) -> str:
+    """The text of an annotation file. Raises InputError without the file's name if it is unreadable."""
+    try:
+        return read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError("is not UTF-8 text") from error

@@ -13,13 +13,15 @@ from vm_embedded.geometry.lens_files import read_lens_file
 from .annotation import Annotation, Annotations
 from .box import Box, BoxedPicture, BoxedSet
 from .checked_boxes import checked_boxes
+from .coco import is_coco, read_coco
 from .fit import fit
 from .folder_files import FolderFiles, find_files
 from .image_facts import UPRIGHT, ImageFacts, image_facts
 from .recordings import recordings
+from .voc import is_voc, read_voc
 from .yolo import is_yolo, read_yolo
 
-FORMATS = {"yolo": (is_yolo, read_yolo)}
+FORMATS = {"yolo": (is_yolo, read_yolo), "voc": (is_voc, read_voc), "coco": (is_coco, read_coco)}
 """For each format: whether a folder has it, and its reader."""
 
 
