@@ -40,7 +40,7 @@ def recording_of(stem: str) -> str:
     name = _NUMBERS.sub("", stem)
     if name == stem:
         name = stem.rstrip("0123456789").rstrip("_-. ")
-    if name.strip("0123456789_-. Tt"):
+    if name.strip("0123456789_-. "):
         return name
     date = _DATE.match(stem)
     return date[0] if date else ""

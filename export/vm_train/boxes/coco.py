@@ -1,0 +1,128 @@
+"""COCO: a JSON file with images, categories and annotations, whose boxes are left, top, width, height in pixels."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from pathlib import Path
+
+from vm_embedded.errors import InputError
+from vm_embedded.geometry.lens import Size
+
+from .annotation import Annotation, Annotations, RawBox
+from .coco_file import CocoFile, Entry, coco_files, is_id, number, parse_coco, shown
+from .folder_files import FolderFiles
+from .image_index import ImageIndex, image_folders, once_each
+
+
+def is_coco(files: FolderFiles) -> bool:
+    """Whether the folder has a JSON file that looks like COCO."""
+    return bool(coco_files(files))
+
+
+def read_coco(files: FolderFiles) -> Annotations:
+    """All annotations in COCO format. An image is found below the folder by its path or its name."""
+    index = ImageIndex(files)
+    found: list[Annotation] = []
+    faults: list[str] = []
+    spoiled: set[Path] = set()
+    complete = True
+    for path in coco_files(files):
+        try:
+            content = parse_coco(path)
+        except InputError as error:
+            faults.append(f"{files.label(path)}: {error}; file not used")
+            complete = False
+            continue
+        reader = _Reader(content, files.label(path), index, [*image_folders(path), files.folder])
+        found += reader.annotations()
+        faults += reader.faults
+        spoiled |= reader.spoiled
+    once = once_each(files, found)
+    return Annotations(once.found, (*faults, *once.faults), once.spoiled | spoiled, complete)
+
+
+class _Reader:
+    """Reads one file. faults: a line each. spoiled: images of bad entries."""
+
+    def __init__(self, content: CocoFile, label: str, index: ImageIndex, near: list[Path]) -> None:
+        self._content, self._label, self._index, self._near = content, label, index, near
+        self.faults: list[str] = []
+        self.spoiled: set[Path] = set()
+
+    def annotations(self) -> list[Annotation]:
+        """The images that can be used, with their boxes."""
+        images = self._images()
+        boxes: dict[int, list[RawBox]] = defaultdict(list)
+        known = {entry.get("id") for entry in self._content.images if is_id(entry.get("id"))}
+        for position, entry in enumerate(self._content.annotations):
+            name = shown(entry["id"]) if "id" in entry else f"at position {position}"
+            place = f"{self._label} annotation {name}"
+            try:
+                key = entry.get("image_id")
+                if not is_id(key) or key not in known:
+                    raise InputError(f"there is no image with id {shown(key)}")
+                boxes[key].append(_box(entry, place, self._content.categories))
+            except InputError as error:
+                self.faults.append(f"{place}: {error}; box not used")
+        return [
+            Annotation(path, self._label, tuple(boxes[key]), size)
+            for key, (path, size) in images.items()
+            if path not in self.spoiled
+        ]
+
+    def _images(self) -> dict[int, tuple[Path, Size | None]]:
+        """Image file and stated size [px] by id."""
+        found: dict[int, tuple[Path, Size | None]] = {}
+        keys: dict[Path, int] = {}
+        uses = Counter(shown(entry.get("id")) for entry in self._content.images)
+        for entry in self._content.images:
+            key = entry.get("id")
+            place = f"{self._label} image {shown(key)}"
+            try:
+                path = self._path(entry)
+            except InputError as error:
+                self.faults.append(f"{place}: {error}; not used")
+                continue
+            image = self._index.labels([path])
+            try:
+                if not is_id(key) or uses[shown(key)] > 1:
+                    raise InputError("its id must be a whole number that no other image has")
+                if path in keys:
+                    raise InputError(f"image {keys[path]} has the same name: two images with one name")
+                keys[path] = key
+                found[key] = (path, _size(entry))
+            except InputError as error:
+                self.faults.append(f"{place}: {error}; {image} not used")
+                self.spoiled.add(path)
+        return found
+
+    def _path(self, entry: Entry) -> Path:
+        """The file of an image. Raises InputError if there is none, or several."""
+        name = entry.get("file_name")
+        if not isinstance(name, str):
+            raise InputError(f"file_name {shown(name)} is not a text")
+        return self._index.named(name, self._near)
+
+
+def _size(entry: Entry) -> Size | None:
+    """The stated width and height [px]; None if they are missing or 0. Raises InputError for other values."""
+    values = [entry.get(name) or 0 for name in ("width", "height")]
+    try:
+        width, height = (int(number(value)) for value in values)
+    except (ValueError, OverflowError, InputError) as error:
+        raise InputError(f"size {' x '.join(map(shown, values))} is not a width and a height in pixels") from error
+    return (width, height) if width and height else None
+
+
+def _box(entry: Entry, place: str, categories: Mapping[int, str]) -> RawBox:
+    key, bbox = entry.get("category_id"), entry.get("bbox")
+    if not is_id(key) or key not in categories:
+        known = ", ".join(f"{each} {name}" for each, name in categories.items())
+        raise InputError(f"category {shown(key)} is unknown; categories has {known}"[:400])
+    if entry.get("iscrowd"):
+        raise InputError(f"marks a crowd of {categories[key]}, not a single one")
+    if not isinstance(bbox, list) or len(bbox) != 4:
+        raise InputError(f"bbox {shown(bbox)} is not a list of left, top, width and height")
+    left, top, width, height = (number(value) for value in bbox)
+    return RawBox(place, categories[key], (left, top, left + width, top + height))

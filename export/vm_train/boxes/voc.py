@@ -1,0 +1,136 @@
+"""Pascal VOC: an XML file for each image, with boxes in pixels from 0 at the left and upper edge."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+from vm_embedded.errors import InputError, one_line
+from vm_embedded.geometry.lens import Size
+
+from .annotation import Annotation, Annotations, RawBox
+from .folder_files import FolderFiles, read_bytes
+from .image_index import ImageIndex, image_folders, once_each
+
+_EDGES = ("xmin", "ymin", "xmax", "ymax")
+_HEAD = 4096  # bytes in which to look for the root
+
+
+class _NoDoctype(ElementTree.TreeBuilder):
+    """Builds a tree, and refuses the declarations in which entities are defined that expand to gigabytes."""
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        raise InputError("has a DOCTYPE, which is not allowed")
+
+
+def is_voc(files: FolderFiles) -> bool:
+    """Whether the folder has an XML file with an annotation."""
+    return bool(_xml_files(files))
+
+
+def read_voc(files: FolderFiles) -> Annotations:
+    """All annotations in Pascal VOC format. An image is found by the file's name, or else by its entry filename."""
+    index = ImageIndex(files)
+    found, faults, spoiled = [], [], set()
+    for path in _xml_files(files):
+        label = files.label(path)
+        images = index.of_stem(path)
+        try:
+            root = _parse(path)
+            image = _image(root, path, images, index)
+        except InputError as error:
+            spoiled.update(images)
+            names = f"; {index.labels(images)} not used" if images else ""
+            faults.append(f"{label}: {error}{names}")
+            continue
+        boxes, wrong = _boxes(root, label)
+        try:
+            found.append(Annotation(image, label, tuple(boxes), _size(root)))
+        except InputError as error:
+            spoiled.add(image)
+            faults.append(f"{label}: {error}; {files.label(image)} not used")
+            continue
+        faults += wrong
+    once = once_each(files, found)
+    return replace(once, faults=(*faults, *once.faults), spoiled=once.spoiled | spoiled)
+
+
+def _xml_files(files: FolderFiles) -> list[Path]:
+    return [path for path in files.with_suffix(".xml") if _has_annotation(path)]
+
+
+def _has_annotation(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return b"<annotation" in file.read(_HEAD).replace(b"\0", b"")
+    except OSError:
+        return True
+
+
+def _parse(path: Path) -> ElementTree.Element:
+    """The root of an annotation file. Raises InputError without its name."""
+    content = read_bytes(path)
+    parser = ElementTree.XMLParser(target=_NoDoctype())
+    try:
+        parser.feed(content)
+        root = parser.close()
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise InputError(f"is cut short or not XML ({one_line(error)})") from error
+    assert isinstance(root, ElementTree.Element)
+    if root.tag != "annotation":
+        raise InputError(f"begins with <{root.tag}>, not with <annotation>")
+    return root
+
+
+def _image(root: ElementTree.Element, path: Path, images: list[Path], index: ImageIndex) -> Path:
+    """The image of an annotation, given those with its stem. Raises InputError if there is none, or several."""
+    name = (root.findtext("filename") or "").strip()
+    if len(images) > 1:
+        images = [image for image in images if image.name == name] or images
+    if len(images) > 1:
+        raise InputError(f"may belong to {index.labels(images)}: two images with one name")
+    if images:
+        return images[0]
+    if not name:
+        raise InputError("there is no image for it")
+    return index.named(name, image_folders(path))
+
+
+def _size(root: ElementTree.Element) -> Size | None:
+    """The stated width and height [px]; None if they are missing or 0. Raises InputError for other texts."""
+    values = [(root.findtext(f"size/{name}") or "0").strip() for name in ("width", "height")]
+    try:
+        width, height = (int(float(value)) for value in values)
+    except (ValueError, OverflowError) as error:
+        raise InputError(f"size {' x '.join(values)[:60]} is not a width and a height in pixels") from error
+    return (width, height) if width and height else None
+
+
+def _boxes(root: ElementTree.Element, label: str) -> tuple[list[RawBox], list[str]]:
+    """The boxes of an annotation, and a line for each malformed one."""
+    boxes, faults = [], []
+    for number, element in enumerate(root.iterfind("object"), start=1):
+        place = f"{label} object {number}"
+        try:
+            boxes.append(_box(element, place))
+        except InputError as error:
+            faults.append(f"{place}: {error}; box not used")
+    return boxes, faults
+
+
+def _box(element: ElementTree.Element, place: str) -> RawBox:
+    name = " ".join((element.findtext("name") or "").split())
+    if not name:
+        raise InputError("class unknown: <name> is missing or empty")
+    if element.find("bndbox") is None:
+        raise InputError(f"{name} lacks <bndbox> with {', '.join(_EDGES)}")
+    values = []
+    for edge in _EDGES:
+        text = (element.findtext(f"bndbox/{edge}") or "").strip()
+        try:
+            values.append(float(text))
+        except ValueError as error:
+            raise InputError(f"{edge} {text[:20]!r} of {name} is not a number") from error
+    left, top, right, bottom = values
+    return RawBox(place, name, (left, top, right, bottom))
