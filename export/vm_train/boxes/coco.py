@@ -79,10 +79,15 @@ class _Reader:
         for entry in self._content.images:
             key = entry.get("id")
             place = f"{self._label} image {shown(key)}"
+            name = entry.get("file_name")
+            if not isinstance(name, str):
+                self.faults.append(f"{place}: file_name {shown(name)} is not a text; not used")
+                continue
             try:
-                path = self._path(entry)
+                path = self._index.named(name, self._near)
             except InputError as error:
                 self.faults.append(f"{place}: {error}; not used")
+                self.spoiled.update(self._index.of_name(name))
                 continue
             image = self._index.labels([path])
             try:
@@ -96,13 +101,6 @@ class _Reader:
                 self.faults.append(f"{place}: {error}; {image} not used")
                 self.spoiled.add(path)
         return found
-
-    def _path(self, entry: Entry) -> Path:
-        """The file of an image. Raises InputError if there is none, or several."""
-        name = entry.get("file_name")
-        if not isinstance(name, str):
-            raise InputError(f"file_name {shown(name)} is not a text")
-        return self._index.named(name, self._near)
 
 
 def _size(entry: Entry) -> Size | None:

@@ -39,8 +39,10 @@ class ImageFacts:
 
 def read_upright(path: Path) -> Image:
     """An image file as BGR (h, w, 3), turned as its EXIF entry says. Raises InputError if it is missing or broken."""
-    image = _decoded(path, _content(path))
-    return turned(image, _orientation(path))
+    try:
+        return turned(decode(_content(path)), _orientation(path))
+    except InputError as error:
+        raise InputError(f"{path} {error}") from error
 
 
 def turned(image: Image, orientation: int) -> Image:
@@ -55,9 +57,9 @@ def turned(image: Image, orientation: int) -> Image:
 
 
 def image_facts(path: Path) -> ImageFacts:
-    """Facts about an image file. Raises InputError that names it if it is missing or broken."""
+    """Facts about an image file. Raises InputError without its name if it is missing or broken."""
     content = _content(path)
-    height, width = _decoded(path, content).shape[:2]
+    height, width = decode(content).shape[:2]
     return ImageFacts((width, height), _orientation(path), hashlib.sha256(content).digest())
 
 
@@ -65,14 +67,7 @@ def _content(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise InputError(f"{path.name}: can't be read: {error.strerror or error}") from error
-
-
-def _decoded(path: Path, content: bytes) -> Image:
-    try:
-        return decode(content)
-    except InputError as error:
-        raise InputError(f"{path.name}: {error}") from error
+        raise InputError(f"can't be read: {error.strerror or error}") from error
 
 
 def _orientation(path: Path) -> int:

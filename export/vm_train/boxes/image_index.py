@@ -42,12 +42,17 @@ class ImageIndex:
         for folder in near:
             if (path := folder.joinpath(*parts)) in self._images:
                 return path
-        found = self._by_name.get(parts[-1], []) if parts else []
+        found = self.of_name(name)
         if not found:
             raise InputError(f"there is no image {name[:200]!r}")
         if len(found) > 1:
             raise InputError(f"{name!r} may be {self.labels(found)}: two images with one name")
         return found[0]
+
+    def of_name(self, name: str) -> list[Path]:
+        """All images of a name, in any folder."""
+        parts = _parts(name)
+        return self._by_name.get(parts[-1], []) if parts else []
 
     def labels(self, paths: Iterable[Path]) -> str:
         """Paths below the folder, joined, for messages."""

@@ -25,15 +25,15 @@ class _NoDoctype(ElementTree.TreeBuilder):
 
 
 def is_voc(files: FolderFiles) -> bool:
-    """Whether the folder has an XML file with an annotation."""
-    return bool(_xml_files(files))
+    """Whether the folder has an XML file with an annotation, or one for an image."""
+    return bool(_xml_files(files, ImageIndex(files)))
 
 
 def read_voc(files: FolderFiles) -> Annotations:
     """All annotations in Pascal VOC format. An image is found by the file's name, or else by its entry filename."""
     index = ImageIndex(files)
     found, faults, spoiled = [], [], set()
-    for path in _xml_files(files):
+    for path in _xml_files(files, index):
         label = files.label(path)
         images = index.of_stem(path)
         try:
@@ -56,8 +56,8 @@ def read_voc(files: FolderFiles) -> Annotations:
     return replace(once, faults=(*faults, *once.faults), spoiled=once.spoiled | spoiled)
 
 
-def _xml_files(files: FolderFiles) -> list[Path]:
-    return [path for path in files.with_suffix(".xml") if _has_annotation(path)]
+def _xml_files(files: FolderFiles, index: ImageIndex) -> list[Path]:
+    return [path for path in files.with_suffix(".xml") if index.of_stem(path) or _has_annotation(path)]
 
 
 def _has_annotation(path: Path) -> bool:

@@ -1,0 +1,361 @@
+"""Broken data sets in each format: one line for each fault, and the good part is used."""
+
+import json
+import math
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from vm_train.boxes.image_facts import read_upright
+from vm_train.boxes.read import read_boxes
+
+from .written import SIZE, WRITERS, coco_table, voc_text, write_coco, write_image, write_voc, write_yolo
+
+BALL = ("ball", 20.0, 30.0, 40.0, 50.0)
+GOAL = ("goal", 100.0, 10.0, 110.0, 90.0)
+GOOD = {"good1": [BALL], "good2": [BALL, GOAL], "good3": []}
+
+
+def cut(path, share=0.5):
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+
+
+def boxes_of(folder, **options):
+    """Boxes of the usable pictures, by the stem of the image, and all faults."""
+    found = read_boxes(folder, **options)
+    return {each.image.stem: each.boxes for each in found.pictures}, list(found.faults)
+
+
+def check(folder, faults, counts, **options):
+    """The exact faults, and the number of boxes of each usable picture."""
+    boxes, found = boxes_of(folder, **options)
+    assert found == faults
+    assert {name: len(each) for name, each in boxes.items()} == counts
+
+
+# Truncated files: of images, and of annotations.
+
+
+def test_yolo_files_cut_short(tmp_path):
+    write_yolo(tmp_path, {**GOOD, "a": [BALL], "b": [GOAL, BALL], "c": [BALL]})
+    cut(tmp_path / "a.jpg")
+    text = (tmp_path / "b.txt").read_text()
+    (tmp_path / "b.txt").write_text(text.rstrip().rpartition(" ")[0])
+    (tmp_path / "c.txt").write_bytes(b"0 0.5 \xff\xfe 0.1")
+    (tmp_path / "d.txt").write_text("0 0.5 0.5 0.1 0.1\n")
+    write_image(tmp_path / "e.jpg")
+    check(
+        tmp_path,
+        [
+            "b.txt line 2: has 4 entries, but a box has 5: class x y width height; box not used",
+            "c.txt: is not UTF-8 text; c.jpg not used",
+            "d.txt: there is no image for it",
+            "a.jpg: is cut short; not used",
+            "e.jpg: no annotation names it; an image that shows nothing needs an empty one; not used",
+        ],
+        {"b": 1, "good1": 1, "good2": 2, "good3": 0},
+    )
+
+
+def test_voc_files_cut_short(tmp_path):
+    write_voc(tmp_path, {**GOOD, "a": [BALL], "b": [GOAL, BALL], "c": [BALL]}, beside=False)
+    texts, images = tmp_path / "Annotations", tmp_path / "JPEGImages"
+    cut(images / "a.jpg")
+    cut(texts / "b.xml")
+    cut(texts / "c.xml", 0.0)
+    (texts / "d.xml").write_text(voc_text("d.jpg", [BALL]))
+    (texts / "e.xml").write_text(voc_text("e.jpg", []).replace("<filename>e.jpg</filename>", ""))
+    boxes, faults = boxes_of(tmp_path)
+    assert {name: len(each) for name, each in boxes.items()} == {"good1": 1, "good2": 2, "good3": 0}
+    assert faults[0].startswith("Annotations/b.xml: is cut short or not XML (")
+    assert faults[0].endswith("); JPEGImages/b.jpg not used")
+    assert faults[1:] == [
+        "Annotations/c.xml: is cut short or not XML (no element found: line 1, column 0); JPEGImages/c.jpg not used",
+        "Annotations/d.xml: there is no image 'd.jpg'",
+        "Annotations/e.xml: there is no image for it",
+        "JPEGImages/a.jpg: is cut short; not used",
+    ]
+
+
+def test_coco_files_cut_short(tmp_path):
+    write_coco(tmp_path, {**GOOD, "a": [BALL]}, beside=False)
+    cut(tmp_path / "images" / "a.jpg")
+    write_image(tmp_path / "images" / "other.jpg")
+    more = tmp_path / "annotations" / "more.json"
+    more.write_text(json.dumps(coco_table({"other": [BALL]})))
+    cut(more)
+    boxes, faults = boxes_of(tmp_path)
+    assert {name: len(each) for name, each in boxes.items()} == {"good1": 1, "good2": 2, "good3": 0}
+    assert len(faults) == 2
+    assert faults[0].startswith("annotations/more.json: is cut short or not JSON (")
+    assert faults[0].endswith("); file not used")
+    assert faults[1] == "images/a.jpg: is cut short; not used"
+
+
+# Wrong sizes: of images, and of boxes.
+
+
+def test_yolo_boxes_of_wrong_sizes(tmp_path):
+    lines = [
+        "0 0.5 0.5 0.1 0.1",
+        "0 0.5 0.5 0 0.1",
+        "0 0.5 0.5 -0.1 0.1",
+        "0 0.5 0.5 nan 0.1",
+        "0 0.98 0.5 0.1 0.1",
+        "0 80 60 20 20",
+        "0 0.5001 0.5 0.1 0.1",
+        "0 0.3 0.2 0.4 0.1",
+        "0 0.2 x 0.4 0.1",
+    ]
+    write_yolo(tmp_path, {**GOOD, "a": [BALL]})
+    (tmp_path / "a.txt").write_text("\n".join(lines))
+    check(
+        tmp_path,
+        [
+            "a.txt line 9: y 'x' is not a number; box not used",
+            "a.txt line 2: size 0 x 12 px; width and height must be above 0; box not used",
+            "a.txt line 3: size -16 x 12 px; width and height must be above 0; box not used",
+            "a.txt line 4: edges must be finite numbers, not nan, 54, nan, 66; box not used",
+            "a.txt line 5: left, top, right, bottom 148.8, 54.0, 164.8, 66.0 px is outside of the image of 160 x 120 "
+            "px; box not used",
+            "a.txt line 6: left, top, right, bottom 11200.0, 6000.0, 14400.0, 8400.0 px is outside of the image of "
+            "160 x 120 px; box not used",
+            "a.txt line 7: the same box of ball as line 1; box not used",
+            "a.txt line 8: ball of 64 x 12 px, but width and height of a ball in full view differ by a factor of 2 at "
+            "most; is it partly hidden? box kept",
+        ],
+        {"a": 2, "good1": 1, "good2": 2, "good3": 0},
+    )
+
+
+def test_voc_images_and_boxes_of_wrong_sizes(tmp_path):
+    write_voc(tmp_path, {**GOOD, "a": [BALL], "b": [BALL], "c": [BALL], "d": [BALL], "e": [BALL], "f": [BALL]})
+    (tmp_path / "a.xml").write_text(voc_text("a.jpg", [BALL], (120, 160)))
+    (tmp_path / "b.xml").write_text(voc_text("b.jpg", [BALL], (640, 480)))
+    (tmp_path / "c.xml").write_text(voc_text("c.jpg", [("ball", 40.0, 30.0, 20.0, 50.0), BALL]))
+    (tmp_path / "d.xml").write_text(voc_text("d.jpg", [BALL, BALL], None))
+    (tmp_path / "e.xml").write_text(voc_text("e.jpg", [BALL], ("wide", 120)))
+    (tmp_path / "f.xml").write_text(voc_text("f.jpg", [("ball", 30.0, 40.0, 50.0, 1e999)]))
+    check(
+        tmp_path,
+        [
+            "e.xml: size wide x 120 is not a width and a height in pixels; e.jpg not used",
+            "a.jpg: a.xml states a size of 120 x 160 px, but the image has 160 x 120 px; not used",
+            "b.jpg: b.xml states a size of 640 x 480 px, but the image has 160 x 120 px; not used",
+            "c.xml object 1: size -20 x 20 px; width and height must be above 0; box not used",
+            "d.xml object 2: the same box of ball as object 1; box not used",
+            "f.xml object 1: edges must be finite numbers, not 30, 40, 50, inf; box not used",
+        ],
+        {"c": 1, "d": 1, "f": 0, "good1": 1, "good2": 2, "good3": 0},
+    )
+
+
+def test_coco_images_and_boxes_of_wrong_sizes(tmp_path):
+    write_coco(tmp_path, {**GOOD, "a": [BALL], "b": [BALL] * 6, "c": [BALL], "d": [BALL]})
+    path = tmp_path / "instances.json"
+    table = json.loads(path.read_text())
+    images = {each["file_name"]: each for each in table["images"]}
+    images["a.jpg"]["width"] = 320
+    images["c.jpg"]["height"] = "120"
+    del images["d.jpg"]["width"]
+    bad = [each for each in table["annotations"] if each["image_id"] == images["b.jpg"]["id"]]
+    wrong = ([20, 30, 0, 20], [20, 30, math.nan, 20], [20, 30, 20], [20, "30", 20, 20], [-30, 30, 40, 20])
+    for entry, bbox in zip(bad, wrong, strict=False):
+        entry["bbox"] = bbox
+    path.write_text(json.dumps(table))
+    first = bad[0]["id"]
+    check(
+        tmp_path,
+        [
+            'instances.json image 15: size 160 x "120" is not a width and a height in pixels; c.jpg not used',
+            f"instances.json annotation {first + 2}: bbox [20, 30, 20] is not a list of left, top, width and height; "
+            "box not used",
+            f'instances.json annotation {first + 3}: "30" is not a number; box not used',
+            "a.jpg: instances.json states a size of 320 x 120 px, but the image has 160 x 120 px; not used",
+            f"instances.json annotation {first}: size 0 x 20 px; width and height must be above 0; box not used",
+            f"instances.json annotation {first + 1}: edges must be finite numbers, not 20, 30, nan, 50; box not used",
+            f"instances.json annotation {first + 4}: left, top, right, bottom -30.0, 30.0, 10.0, 50.0 px is outside of "
+            "the image of 160 x 120 px; box not used",
+        ],
+        {"b": 1, "d": 1, "good1": 1, "good2": 2, "good3": 0},
+    )
+
+
+# Unknown classes, and two images with one name.
+
+
+def test_yolo_classes_unknown_and_images_of_one_name(tmp_path):
+    write_yolo(tmp_path, {**GOOD, "a": [BALL], "b": [BALL], "z": [BALL]})
+    (tmp_path / "a.txt").write_text("7 0.5 0.5 0.1 0.1\nball 0.5 0.5 0.1 0.1\n-1 0.5 0.5 0.1 0.1\n1 0.2 0.2 0.1 0.1\n")
+    write_image(tmp_path / "b.png")
+    (tmp_path / "z.jpg").write_bytes((tmp_path / "good1.jpg").read_bytes())
+    check(
+        tmp_path,
+        [
+            "a.txt line 1: class 7 is unknown; the table of names has 0 to 1: ball, goal; box not used",
+            "a.txt line 2: class 'ball' is not a whole number from 0 up; box not used",
+            "a.txt line 3: class '-1' is not a whole number from 0 up; box not used",
+            "b.jpg and b.png: two images with one name; b.txt may belong to either; not used",
+            "z.jpg: the same image as good1.jpg; not used",
+        ],
+        {"a": 1, "good1": 1, "good2": 2, "good3": 0},
+    )
+
+
+def test_voc_classes_unknown_and_images_of_one_name(tmp_path):
+    write_voc(
+        tmp_path, {**GOOD, "a": [BALL, GOAL, ("goal", 50.0, 10.0, 60.0, 90.0)], "b": [BALL], "c": [BALL], "d": [BALL]}
+    )
+    text = (tmp_path / "a.xml").read_text().replace("<name>ball</name>", "<name> </name>")
+    (tmp_path / "a.xml").write_text(text.replace("<xmin>50.0", "<xmin>5O").replace("bndbox", "robndbox", 4))
+    (tmp_path / "b.xml").write_text(voc_text("b", [BALL]))
+    write_image(tmp_path / "b.png")
+    write_image(tmp_path / "c.png")
+    (tmp_path / "d2.xml").write_text(voc_text("d.jpg", [GOAL]))
+    (tmp_path / "e.xml").write_text(
+        '<!DOCTYPE a [<!ENTITY b "ball">]>\n<annotation><filename>e.jpg</filename></annotation>'
+    )
+    (tmp_path / "f.xml").write_text("<html><annotation/></html>")
+    check(
+        tmp_path,
+        [
+            "a.xml object 1: class unknown: <name> is missing or empty; box not used",
+            "a.xml object 2: goal lacks <bndbox> with xmin, ymin, xmax, ymax; box not used",
+            "a.xml object 3: xmin '5O' of goal is not a number; box not used",
+            "b.xml: may belong to b.jpg and b.png: two images with one name; b.jpg and b.png not used",
+            "e.xml: has a DOCTYPE, which is not allowed",
+            "f.xml: begins with <html>, not with <annotation>",
+            "d.jpg: annotated by d.xml and by d2.xml; not used",
+            "c.png: no annotation names it; an image that shows nothing needs an empty one; not used",
+        ],
+        {"a": 0, "c": 1, "good1": 1, "good2": 2, "good3": 0},
+    )
+
+
+def test_coco_classes_unknown_and_images_of_one_name(tmp_path):
+    write_coco(
+        tmp_path, {**GOOD, "a": [BALL, BALL, GOAL], "b": [BALL], "c": [BALL], "d": [BALL], "e": []}, beside=False
+    )
+    path = tmp_path / "annotations" / "instances.json"
+    table = json.loads(path.read_text())
+    images = {each["file_name"]: each for each in table["images"]}
+    first, second, third = (each for each in table["annotations"] if each["image_id"] == images["a.jpg"]["id"])
+    first["category_id"], second["iscrowd"], third["image_id"] = 99, 1, 500
+    write_image(tmp_path / "images" / "more" / "b.jpg")
+    images["b.jpg"]["file_name"] = "old/b.jpg"
+    images["d.jpg"]["file_name"] = "c.jpg"
+    images["e.jpg"]["file_name"] = "none.jpg"
+    path.write_text(json.dumps(table))
+    label = "annotations/instances.json"
+    unnamed = "no annotation names it; an image that shows nothing needs an empty one; not used"
+    check(
+        tmp_path,
+        [
+            f"{label} image 14: 'old/b.jpg' may be images/b.jpg and images/more/b.jpg: two images with one name; "
+            "not used",
+            f"{label} image 16: image 15 has the same name: two images with one name; images/c.jpg not used",
+            f"{label} image 17: there is no image 'none.jpg'; not used",
+            f"{label} annotation {first['id']}: category 99 is unknown; categories has 3 ball, 4 goal; box not used",
+            f"{label} annotation {second['id']}: marks a crowd of ball, not a single one; box not used",
+            f"{label} annotation {third['id']}: there is no image with id 500; box not used",
+            *(f"images/{name}.jpg: {unnamed}" for name in ("d", "e")),
+        ],
+        {"a": 0, "good1": 1, "good2": 2, "good3": 0},
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda table: table.pop("categories"), "lacks categories, a list of tables"),
+        (lambda table: table.update(images={}), "lacks images, a list of tables"),
+        (lambda table: table["categories"].append({"id": 3, "name": "cup"}), "category 3 has two names"),
+        (lambda table: table["categories"].append({"id": "3", "name": "cup"}), "needs a whole number id and a name"),
+    ],
+)
+def test_coco_files_of_wrong_structure_are_named(change, said, tmp_path):
+    write_coco(tmp_path, {"a": [BALL]})
+    path = tmp_path / "instances.json"
+    table = json.loads(path.read_text())
+    change(table)
+    path.write_text(json.dumps(table))
+    (line,) = read_boxes(tmp_path).faults
+    assert line.startswith("instances.json: ")
+    assert said in line
+
+
+# Images that their EXIF entry turns.
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_an_image_is_read_as_opencv_turns_it(orientation, tmp_path):
+    write_image(tmp_path / "a.png", orientation=orientation)
+    np.testing.assert_array_equal(read_upright(tmp_path / "a.png"), cv2.imread(str(tmp_path / "a.png")))
+
+
+def marked(path, box, orientation):
+    """A black image with a white box (class, left, top, right, bottom), stored upright."""
+    image = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
+    left, top, right, bottom = (int(each) for each in box[1:])
+    image[top:bottom, left:right] = 255
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    Image.fromarray(image).save(path, exif=exif)
+
+
+@pytest.mark.parametrize("orientation", range(2, 9))
+@pytest.mark.parametrize("format", ["voc", "coco"])
+def test_boxes_drawn_on_the_image_as_stored_are_turned_with_it(format, orientation, tmp_path):
+    WRITERS[format](tmp_path, {**GOOD, "a": [GOAL]})
+    marked(tmp_path / "a.jpg", GOAL, orientation)
+    boxes, (line,) = boxes_of(tmp_path)
+    file = {"voc": "a.xml", "coco": "instances.json"}[format]
+    assert list(boxes) == ["a", *GOOD]
+    if orientation < 5:
+        assert line == (
+            f"a.jpg: turned by its EXIF orientation {orientation}; {file} leaves open whether its boxes are: taken as "
+            "drawn on the turned image"
+        )
+        return
+    assert line == (
+        f"a.jpg: turned by its EXIF orientation {orientation}, but {file} states the size as stored, 160 x 120 px: "
+        "boxes turned"
+    )
+    (box,) = boxes["a"]
+    rows, columns = np.nonzero(read_upright(tmp_path / "a.jpg")[..., 0] > 127)
+    found = (columns.min() - 0.5, rows.min() - 0.5, columns.max() + 0.5, rows.max() + 0.5)
+    assert (box.left, box.top, box.right, box.bottom) == found
+
+
+@pytest.mark.parametrize("format", ["voc", "coco"])
+def test_boxes_drawn_on_the_turned_image_are_right_and_other_sizes_are_not(format, tmp_path):
+    WRITERS[format](tmp_path, {"a": [("goal", 10.0, 100.0, 90.0, 110.0)], "b": []}, size=(120, 160))
+    for name in ("a", "b"):
+        write_image(tmp_path / f"{name}.jpg", orientation=6)
+    boxes, faults = boxes_of(tmp_path)
+    assert faults == []
+    assert boxes["a"][0].bottom == 109.5
+    write_image(tmp_path / "a.jpg", size=(100, 80), orientation=6)
+    file = {"voc": "a.xml", "coco": "instances.json"}[format]
+    _, faults = boxes_of(tmp_path)
+    assert faults == [
+        f"a.jpg: {file} states a size of 120 x 160 px, but the image has 80 x 100 px, or 100 x 80 px without its EXIF "
+        "turn; not used"
+    ]
+
+
+def test_yolo_boxes_are_taken_as_drawn_on_the_turned_image(tmp_path):
+    write_yolo(tmp_path, {**GOOD, "a": [BALL]})
+    write_image(tmp_path / "a.jpg", orientation=6)
+    (tmp_path / "a.yaml").write_text("projection: RECTILINEAR\nfocal_length: 120.0\nfov: 1.5\n")
+    found = read_boxes(tmp_path)
+    assert found.pictures[0].size == (120, 160)
+    assert found.pictures[0].lens is None
+    assert found.faults == (
+        "a.jpg: turned by its EXIF orientation 6; a.txt does not state whether its boxes are: taken as drawn on the "
+        "turned image",
+        "a.yaml: a.jpg is turned by its EXIF orientation 6, the lens is not; a.jpg is used without lens",
+    )
