@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
-from ..arrays import Floats, Image, Singles
+from ..arrays import Floats, Image, Mask, Singles
 from ..network.look_contract import LookContract
 from .observation import Observation
 from .patches import Tangents, cut_patches, patch_nodes
@@ -46,6 +47,49 @@ class Look(Protocol):
         """
 
 
+class Places(Protocol):
+    """Places in a picture to look at."""
+
+    def __len__(self) -> int: ...
+
+    def cut(self, rows: npt.NDArray[np.intp], contract: LookContract) -> Image:
+        """Patches (k, size, size, 3), RGB, as a network needs them, at k of the places, by their numbers."""
+
+    def move(self, right: Floats, down: Floats) -> Mask:
+        """Move the k places that were cut last by shifts (k,) in expected radii. Returns which of them (k,) may hold an
+        object there."""
+
+
+class PlanePlaces:
+    """Places on the plane that a camera of known lens and pose sees.
+
+    centers (n, 3): of the objects that are expected there, relative to the camera in the mesh frame [m]; a copy is
+    moved.
+    """
+
+    def __init__(self, observation: Observation, centers: Floats) -> None:
+        self.centers = centers.copy()
+        self._observation = observation
+        self._cut: tuple[npt.NDArray[np.intp], Tangents]
+
+    def __len__(self) -> int:
+        return len(self.centers)
+
+    def cut(self, rows: npt.NDArray[np.intp], contract: LookContract) -> Image:
+        """See Places."""
+        view = self._observation.view
+        tangents = Tangents.at(view, self.centers[rows])
+        self._cut = rows, tangents
+        return cut_patches(self._observation.pyramid, patch_nodes(view, tangents, contract.extent), contract.size)
+
+    def move(self, right: Floats, down: Floats) -> Mask:
+        """See Places. A place that moves to the horizon or above it can't hold an object."""
+        view, (rows, tangents) = self._observation.view, self._cut
+        rays = tangents.rays(right, down)
+        self.centers[rows] = view.shape.center_along(rays, view.height)
+        return np.asarray(rays[:, 2] < 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Judgment:
     """A proposal after the close look.
@@ -75,32 +119,30 @@ def look_closely(
     """
     centers = propose_places(observation, probabilities, look.contract.above, settings.max_proposals)
     watch.lap("propose")
-    centers, answers = look_at(observation, look, centers)
-    judged = _judged(observation, centers, answers, settings, explain)
+    places = PlanePlaces(observation, centers)
+    answers = look_at(places, look)
+    judged = _judged(observation, places.centers, answers, settings, explain)
     watch.lap("look")
     return judged
 
 
-def look_at(observation: Observation, look: Look, centers: Floats) -> tuple[Floats, Singles]:
-    """Look at places with centers (c, 3) [m] in the mesh frame, as often as the contracts of look and glance say.
+def look_at(places: Places, look: Look) -> Singles:
+    """Look at n places, as often as the contracts of look and glance say, and move them to where an object was seen.
 
-    From the second look on, the answers to a patch and to its mirror image are averaged. Returns the centers (c, 3)
-    that the last network saw, and its answers (c, 4), as `CloseLook.run` gives them.
+    From the second look on, the answers to a patch and to its mirror image are averaged. Returns the last answers
+    (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError if a network does not run.
     """
-    view = observation.view
     networks = [each for each in (look.glance, look) if each for _ in range(each.contract.passes)]
-    centers, answers = centers.copy(), np.zeros((len(centers), 4), dtype=np.float32)
-    worth = np.arange(len(centers))
+    answers = np.zeros((len(places), 4), dtype=np.float32)
+    worth = np.arange(len(places))
     for number, network in enumerate(networks):
-        tangents, contract = Tangents.at(view, centers[worth]), network.contract
-        patches = cut_patches(observation.pyramid, patch_nodes(view, tangents, contract.extent), contract.size)
+        patches = places.cut(worth, network.contract)
         answers[worth] = found = _mean_of_mirrored(network, patches) if number else network.run(patches)
-        rays = tangents.rays(found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
-        centers[worth] = view.shape.center_along(rays, view.height)
-        worth = worth[(found[:, 0] > WORTH) & (rays[:, 2] < 0.0)]
+        possible = places.move(found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
+        worth = worth[(found[:, 0] > WORTH) & possible]
         if not len(worth):
             break
-    return centers, answers
+    return answers
 
 
 def _mean_of_mirrored(look: Look, patches: Image) -> Singles:

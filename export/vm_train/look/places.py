@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Image, Singles
-from vm_embedded.detection.looking import Look, look_at
+from vm_embedded.detection.looking import Look, PlanePlaces, look_at
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.patches import Tangents, cut_patches, patch_nodes
 from vm_embedded.detection.prepared_view import PreparedView
@@ -76,7 +76,8 @@ def proposed_places(
     """
     centers = propose_places(observation, probabilities, settings.above, settings.proposals)
     if glance is not None:
-        centers, answers = look_at(observation, glance, centers)
+        places = PlanePlaces(observation, centers)
+        answers, centers = look_at(places, glance), places.centers
         centers = centers[(answers[:, 0] > above) & (centers[:, 2] < 0.0)]
     return Places.of(PROPOSED, centers)
 

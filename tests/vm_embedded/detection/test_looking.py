@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vm_embedded.detection.looking import look_at
+from vm_embedded.detection.looking import PlanePlaces, look_at
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
@@ -54,6 +54,13 @@ def true_centers(scene):
     return center_at(scene.view, (200.0, 380.0)), center_at(scene.view, (430.0, 260.0))
 
 
+def looked_at(observation, look, centers):
+    """The centers of places after all looks, and the answers."""
+    places = PlanePlaces(observation, centers)
+    answers = look_at(places, look)
+    return places.centers, answers
+
+
 def test_each_ball_is_found_once_where_it_is_and_as_large_as_it_is(scene):
     found, _ = found_in(scene, BrightDisk())
     assert len(found) == 2
@@ -70,7 +77,7 @@ def test_each_ball_is_found_once_where_it_is_and_as_large_as_it_is(scene):
 def test_looks_move_to_the_center_even_from_a_place_beside_it(scene):
     center = true_centers(scene)[0]
     beside = center + np.array([0.0, 0.05, 0.0])
-    moved, answers = look_at(scene, BrightDisk(passes=3), beside[None])
+    moved, answers = looked_at(scene, BrightDisk(passes=3), beside[None])
     assert np.linalg.norm(moved[0] - center) < 0.2 * np.linalg.norm(beside - center)
     assert answers[0, 0] == pytest.approx(0.9)
 
@@ -87,11 +94,11 @@ def test_the_second_look_cancels_errors_to_one_side(scene):
             return answers
 
     centers = np.stack(true_centers(scene))
-    moved, answers = look_at(scene, Squinting(passes=2), centers)
-    straight, expected = look_at(scene, BrightDisk(passes=2), centers)
+    moved, answers = looked_at(scene, Squinting(passes=2), centers)
+    straight, expected = looked_at(scene, BrightDisk(passes=2), centers)
     np.testing.assert_allclose(moved, straight, atol=0.01 * scene.view.shape.radius)
     np.testing.assert_allclose(answers[:, 0], expected[:, 0], atol=0.002)
-    once, _ = look_at(scene, Squinting(passes=1), centers)
+    once, _ = looked_at(scene, Squinting(passes=1), centers)
     assert (np.linalg.norm(once - centers, axis=1) > 0.15 * scene.view.shape.radius).all()
 
 
@@ -109,7 +116,7 @@ def test_a_look_sees_only_what_its_glance_leaves_where_it_saw_it(scene):
     ball = true_centers(scene)[0]
     nothing = center_at(scene.view, (560.0, 400.0))
     beside = ball + np.array([0.0, 0.03, 0.0])
-    moved, answers = look_at(scene, look, np.stack([nothing, beside]))
+    moved, answers = looked_at(scene, look, np.stack([nothing, beside]))
     assert (glance.seen, look.seen) == ([2], [2])  # the look sees one patch and its mirror image
     assert answers[:, 0] == pytest.approx([0.0, 0.9])
     assert np.linalg.norm(moved[1] - ball) < 0.2 * np.linalg.norm(beside - ball)
