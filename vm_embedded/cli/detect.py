@@ -26,7 +26,7 @@ from .options import ANGLES, add_live, add_model, add_pose, add_settings, read_o
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
-_FILES_ONLY = ("save_overlay", "save_points", "emit_points", "explain")
+_FILES_ONLY = ("save_boxes", "save_overlay", "save_points", "emit_points", "explain")
 """Options that a live camera rejects."""
 
 
@@ -76,6 +76,13 @@ def parser() -> argparse.ArgumentParser:
     )
     output.add_argument(
         "--save-points", type=Path, metavar="DIR", help="write NAME.npz with pixels, rays and probabilities"
+    )
+    output.add_argument(
+        "--save-boxes",
+        type=Path,
+        metavar="DIR",
+        help="write each image, its lens and pose, and the boxes of its objects as NAME.txt in YOLO format, for "
+        "annotation tools and vm-label; near misses go to candidates.jsonl; DIR must be new or empty",
     )
     output.add_argument("--emit-points", metavar="CLASS,...", help="add the points of these classes to the JSON")
     output.add_argument(
@@ -160,7 +167,9 @@ def _detect_live(options: argparse.Namespace) -> int:
     try:
         for name in _FILES_ONLY:
             if getattr(options, name):
-                raise InputError(f"--{name.replace('_', '-')} works only with files, not with a live camera")
+                raise InputError(
+                    f"--{name.replace('_', '-')} works only with files, not with a live camera; make a "
+                    "recording, and give its folder")
         daemon = Daemon(lambda: read_options(options), EventLog("vm-detect"))
         return asyncio.run(daemon.run())
     except VisualMeshError as error:

@@ -6,7 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..arrays import Image
 from ..cameras.image_files import Frame, check_file_format, lens_beside, open_source
@@ -16,6 +16,7 @@ from ..geometry.lens import Lens
 from ..geometry.lens_files import read_lens_file
 from ..geometry.orientation import Orientation
 from ..live.configuration import Configuration
+from ..output.box_files import BoxWriter
 from ..output.messages import file_message
 from ..output.result_files import make_folder, save_overlay, save_points
 from .progress import ProgressBar
@@ -38,12 +39,13 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:
             make_folder(folder)
+    boxes = BoxWriter(options.save_boxes, _object_classes(detector)) if options.save_boxes is not None else None
 
     processed = 0
     bar = ProgressBar(source.count)
     for frame in source.frames:
         try:
-            line = _process(frame, detector, pose, options, emit_points)
+            line = _process(frame, detector, pose, options, emit_points, boxes)
         except VisualMeshError as error:
             bar.clear()
             complain(str(error))
@@ -77,8 +79,17 @@ class _DefaultPose:
         return lens, orientation
 
 
+def _object_classes(detector: Detector) -> tuple[str, ...]:
+    return tuple(each.name for each in detector.manifest.classes if each.kind == "object")
+
+
 def _process(
-    frame: Frame, detector: Detector, pose: _DefaultPose, options: argparse.Namespace, emit_points: Sequence[str]
+    frame: Frame,
+    detector: Detector,
+    pose: _DefaultPose,
+    options: argparse.Namespace,
+    emit_points: Sequence[str],
+    boxes: BoxWriter | None,
 ) -> str:
     """Detect in a frame, save the files that the options ask for, and return its line of JSON.
 
@@ -86,7 +97,7 @@ def _process(
     """
     image = frame.read()  # its errors name the file
     try:
-        return _detect(image, frame, detector, pose, options, emit_points)
+        return _detect(image, frame, detector, pose, options, emit_points, boxes)
     except VisualMeshError as error:
         raise InputError(f"{frame.source}: {error}") from error
 
@@ -98,9 +109,14 @@ def _detect(
     pose: _DefaultPose,
     options: argparse.Namespace,
     emit_points: Sequence[str],
+    boxes: BoxWriter | None,
 ) -> str:
     lens, orientation = pose.of(frame)
-    detections = detector.detect(image, orientation, lens, explain=options.explain)
+    detections = detector.detect(image, orientation, lens, explain=options.explain or boxes is not None)
+    if boxes is not None:
+        boxes.write(frame, image, lens, orientation, detections)
+        if not options.explain:
+            detections = replace(detections, rejected=())
     if options.save_points is not None:
         save_points(options.save_points, frame, detections)
     if options.save_overlay is not None:

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import cv2
 
+from ..arrays import Image
 from ..cameras.camera import Shot
 from ..config.entries import check_entries, number, text_line
 from ..errors import InputError
@@ -156,12 +157,17 @@ def _write_moment(folder: Path, index: int, moment: Moment) -> int:
     """Write image and lens file of a moment, and return the size of the image [bytes]."""
     encoded = moment.shot.encoded
     if encoded is None:
-        content, suffix = cv2.imencode(".png", moment.shot.image, _PNG)[1].tobytes(), "png"
+        content, suffix = encode_png(moment.shot.image), "png"
     else:
         content, suffix = encoded, "jpg"
     (folder / f"image{index:07d}.{suffix}").write_bytes(content)
     (folder / f"lens{index:07d}.yaml").write_text(format_lens_file(moment.lens, moment.orientation), encoding="utf-8")
     return len(content)
+
+
+def encode_png(image: Image) -> bytes:
+    """A lossless PNG of an image (height, width[, channels]), which takes little time to compress."""
+    return cv2.imencode(".png", image, _PNG)[1].tobytes()
 
 
 def delete_oldest_recordings(folder: Path, limit: float) -> None:

@@ -1,0 +1,159 @@
+"""Boxes of detections, for annotation tools and for the labeling page of vm-label.
+
+A folder of boxes holds, for each frame: the image imageNAME.*, its objects in imageNAME.txt in YOLO format, and its
+lens and pose in lensNAME.yaml. A line of a YOLO file is `class x y width height`: the number of the class in
+classes.txt, then center and size as shares of the image.
+
+candidates.jsonl has a line of JSON for each box with its confidence. It also has the near misses: rejected candidates
+that may be objects. They are in no YOLO file, because a tool would take them for objects.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ..arrays import Floats, Image
+from ..cameras.image_files import Frame
+from ..detection.detections import Detections
+from ..errors import InputError
+from ..files import atomic_write
+from ..geometry.lens import Lens
+from ..geometry.lens_files import format_lens_file
+from ..geometry.orientation import Orientation
+from .recorder import encode_png
+from .result_files import frame_name, make_folder
+
+CLASSES, CANDIDATES = "classes.txt", "candidates.jsonl"
+
+Shares = tuple[float, float, float, float]
+"""Center x and y, width and height of a box, as shares of the image's width and height."""
+
+SAME_PLACE = 0.5
+"""Intersection over union above which two boxes of a class show the same object."""
+
+_NEAR_MISS = 0.05
+"""Lowest confidence of a near miss."""
+
+_LEAST_SIDE = 2.0
+"""Boxes with a shorter side [px] are left out: nobody can judge them."""
+
+
+@dataclass(frozen=True)
+class CandidateBox:
+    """A box of an image. confidence: 0 to 1. found: whether it is a detection; otherwise it is a near miss."""
+
+    class_name: str
+    shares: Shares
+    confidence: float
+    found: bool
+
+
+class BoxWriter:
+    """Writes a folder of boxes, frame by frame.
+
+    folder: must be new or empty. classes: names of the classes that have boxes, in the order of their numbers. Raises
+    InputError for a folder with files, or if it can't be created.
+    """
+
+    def __init__(self, folder: Path, classes: tuple[str, ...]) -> None:
+        if any(make_folder(folder).iterdir()):
+            raise InputError(f"--save-boxes {folder}: the folder is not empty; give a new one, to keep its labels")
+        self._folder, self._classes = folder, classes
+        self._names: set[str] = set()
+        _write(folder / CLASSES, "".join(f"{name}\n" for name in classes).encode())
+        _write(folder / CANDIDATES, b"")
+
+    def write(self, frame: Frame, image: Image, lens: Lens, orientation: Orientation, detections: Detections) -> Path:
+        """Write the files of a frame, and return the path of its image.
+
+        image: uint8 (height, width[, channels]), written as PNG if the frame has no file. detections: with the rejected
+        candidates. Raises InputError.
+        """
+        name, boxes = self._unique_name(frame), candidate_boxes(detections, (image.shape[1], image.shape[0]))
+        path = self._folder / f"{name}{'.png' if frame.path is None else frame.path.suffix}"
+        _write(path, encode_png(image) if frame.path is None else frame.path.read_bytes())
+        lens_file = format_lens_file(lens, orientation)
+        _write(self._folder / f"lens{name.removeprefix('image')}.yaml", lens_file.encode())
+        labels = [self._yolo_line(each) for each in boxes if each.found]
+        _write(self._folder / f"{name}.txt", "".join(labels).encode())
+        self._append_candidates("".join(_json_line(path.name, each) for each in boxes))
+        return path
+
+    def _append_candidates(self, lines: str) -> None:
+        path = self._folder / CANDIDATES
+        try:
+            with path.open("a", encoding="utf-8") as file:
+                file.write(lines)
+        except OSError as error:
+            raise InputError(f"can't write {path}: {error.strerror or error}") from error
+
+    def _unique_name(self, frame: Frame) -> str:
+        """A name that no frame had before. It begins with image, so that the lens file belongs to it."""
+        base = frame_name(frame)
+        base = name = base if base.startswith("image") else f"image-{base}"
+        number = 1
+        while name in self._names:
+            number += 1
+            name = f"{base}-{number}"
+        self._names.add(name)
+        return name
+
+    def _yolo_line(self, box: CandidateBox) -> str:
+        return f"{self._classes.index(box.class_name)} {' '.join(f'{each:.6f}' for each in box.shares)}\n"
+
+
+def candidate_boxes(detections: Detections, size: tuple[int, int]) -> list[CandidateBox]:
+    """The boxes of detections, and after them those of near misses, each most confident first.
+
+    size: width and height of the image [px]. A near miss at the place of a better box of its class is left out.
+    """
+    near = sorted((each for each in detections.rejected if each.confidence >= _NEAR_MISS), key=lambda e: -e.confidence)
+    boxes: list[CandidateBox] = []
+    for each in (*detections.objects, *near):
+        shares, found = bounding_box(each.outline, size), each.reason is None
+        if shares is None:
+            continue
+        others = (other.shares for other in boxes if other.class_name == each.class_name)
+        if found or all(overlap(shares, other) <= SAME_PLACE for other in others):
+            boxes.append(CandidateBox(each.class_name, shares, round(each.confidence, 3), found))
+    return boxes
+
+
+def bounding_box(outline: Floats, size: tuple[int, int]) -> Shares | None:
+    """The bounding rectangle of the part of an outline (m, 2) [px] that is in an image; None if hardly any of it is.
+
+    size: width and height of the image [px]. Pixel centers are whole numbers. The shares have six digits.
+    """
+    if len(outline) < 3 or not np.isfinite(outline).all():
+        return None
+    low = np.clip(outline.min(axis=0) + 0.5, 0.0, size)
+    high = np.clip(outline.max(axis=0) + 0.5, 0.0, size)
+    if (high - low).min() < _LEAST_SIDE:
+        return None
+    x, y, width, height = np.concatenate([(low + high) / 2 / size, (high - low) / size]).round(6).tolist()
+    return x, y, width, height
+
+
+def overlap(a: Shares, b: Shares) -> float:
+    """Intersection over union of two boxes of an image."""
+    sides = [
+        max(min(a[i] + a[i + 2] / 2, b[i] + b[i + 2] / 2) - max(a[i] - a[i + 2] / 2, b[i] - b[i + 2] / 2), 0.0)
+        for i in (0, 1)
+    ]
+    both = sides[0] * sides[1]
+    return both / (a[2] * a[3] + b[2] * b[3] - both)
+
+
+def _json_line(image: str, box: CandidateBox) -> str:
+    fields = {"image": image, "class": box.class_name, "box": box.shares}
+    return json.dumps(fields | {"confidence": box.confidence, "found": box.found}) + "\n"
+
+
+def _write(path: Path, content: bytes) -> None:
+    with atomic_write(path) as part:
+        part.write_bytes(content)
