@@ -1,6 +1,7 @@
-"""Shared by all tests: the settings for random inputs, and the folder of the reference data."""
+"""Shared by all tests: the settings for random inputs, the folder of the reference data, and a browser."""
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -21,3 +22,26 @@ def shared():
     if not path.is_dir():
         pytest.skip(f"needs the reference data, but there is no folder {path}; set VM_SHARED to its folder")
     return path
+
+
+@pytest.fixture
+def browser(tmp_path):
+    """Chromium without a screen, driven by selenium."""
+    webdriver = pytest.importorskip("selenium.webdriver", reason="needs selenium, of the extra dev")
+    binary, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if binary is None or driver is None:
+        pytest.skip("needs chromium and chromium-driver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = binary
+    for each in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-dev-shm-usage",
+        "--window-size=1200,800",
+    ):
+        options.add_argument(each)
+    options.add_argument(f"--user-data-dir={tmp_path / 'browser'}")
+    found = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    yield found
+    found.quit()

@@ -20,6 +20,7 @@ ROOMS = {
     "vm_export": "",
     "vm_synth": "__main__ > cli > dataset > render > scene > balls, bodies",
     "vm_mesh": "",
+    "vm_label": "",
     "vm_train": "__main__ > cli > look > evaluation > learning > graphs > formats > boxes, data, scores",
 }
 """The rooms of each package, from top to bottom: a room imports only from itself and from rooms further down. A comma
@@ -32,6 +33,7 @@ PACKAGES = {
     "vm_export": {"vm_embedded"},
     "vm_synth": {"vm_embedded", "vm_workstation"},
     "vm_mesh": {"vm_embedded", "vm_workstation"},
+    "vm_label": {"vm_embedded", "vm_workstation"},
     "vm_train": {"vm_embedded", "vm_workstation", "vm_export", "vm_synth"},
 }
 """Packages of the project that each package may import."""

@@ -15,6 +15,7 @@ def test_package_data_and_scripts_are_declared():
         "vm-train",
         "vm-evaluate",
         "vm-mesh",
+        "vm-label",
     }
     assert [each.split(">")[0] for each in project["dependencies"]] == [
         "numpy",

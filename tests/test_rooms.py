@@ -21,6 +21,7 @@ FEWEST = {
     "vm_export": 12,
     "vm_synth": 35,
     "vm_mesh": 6,
+    "vm_label": 8,
     "vm_train": 55,
 }
 """Fewer modules than these mean that a check below looks in the wrong place."""
@@ -31,6 +32,7 @@ OUTSIDE = {
     "vm_export": {"numpy", "torch", "onnx", "yaml"},
     "vm_synth": {"numpy", "cv2", "mitsuba", "drjit", "matplotlib"},
     "vm_mesh": {"numpy", "matplotlib"},
+    "vm_label": {"numpy", "cv2"},
     "vm_train": {"numpy", "cv2", "torch", "matplotlib", "yaml", "PIL"},
 }
 """Packages of others that each package may import."""
@@ -118,6 +120,10 @@ def test_heavy_packages_are_imported_where_they_are_used():
         ("vm_export.cli", {"torch", "onnx", "matplotlib", "yaml", "mitsuba", "vm_synth", "vm_train"}),
         ("vm_synth.cli", {"mitsuba", "drjit", "torch", "matplotlib", "onnx", "scipy", "vm_export"}),
         ("vm_mesh.cli", {"torch", "onnx", "matplotlib", "mitsuba", "vm_export", "vm_synth", "vm_train"}),
+        (
+            "vm_label.cli",
+            {"torch", "onnx", "onnxruntime", "matplotlib", "mitsuba", "vm_export", "vm_synth", "vm_train"},
+        ),
         ("vm_train.cli.train", {"mitsuba", "drjit", "matplotlib", "tensorboard"}),
         ("vm_train.cli.evaluate", {"mitsuba", "drjit", "matplotlib", "tensorboard"}),
     ],

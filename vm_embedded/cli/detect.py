@@ -169,7 +169,8 @@ def _detect_live(options: argparse.Namespace) -> int:
             if getattr(options, name):
                 raise InputError(
                     f"--{name.replace('_', '-')} works only with files, not with a live camera; make a "
-                    "recording, and give its folder")
+                    "recording, and give its folder"
+                )
         daemon = Daemon(lambda: read_options(options), EventLog("vm-detect"))
         return asyncio.run(daemon.run())
     except VisualMeshError as error:

@@ -101,12 +101,18 @@ class HttpServer:
 
 
 def _has_numeric_host(head: list[str]) -> bool:
-    """Whether a browser uses localhost or an IP address. Another web site could point its own name at this machine and
-    read the responses (DNS rebinding), so names are rejected."""
+    """Whether a request without or with a header Host is allowed, see is_numeric_host."""
     hosts = [line.partition(":")[2].strip() for line in head[1:] if line.lower().startswith("host:")]
-    if not hosts:
-        return True
-    host = hosts[0].rpartition(":")[0] if hosts[0].rpartition(":")[2].isdigit() else hosts[0]
+    return not hosts or is_numeric_host(hosts[0])
+
+
+def is_numeric_host(host: str) -> bool:
+    """Whether a header Host, ADDRESS or ADDRESS:PORT, names localhost or an IP address.
+
+    Another web site could point its own name at this machine and read the responses (DNS rebinding), so names are
+    rejected.
+    """
+    host = host.rpartition(":")[0] if host.rpartition(":")[2].isdigit() else host
     try:
         return host == "localhost" or bool(ip_address(host.strip("[]")))
     except ValueError:

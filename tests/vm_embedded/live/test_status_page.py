@@ -1,6 +1,5 @@
 """The status page in a real browser, without a screen."""
 
-import shutil
 import socket
 import time
 
@@ -8,8 +7,6 @@ import pytest
 
 from tests.vm_embedded.live.running import running
 from tests.vm_embedded.live.test_faults import QUICK, script
-
-webdriver = pytest.importorskip("selenium.webdriver", reason="needs selenium, of the extra dev")
 
 MARK = """
 const picture = document.getElementById("picture"), canvas = document.createElement("canvas");
@@ -20,27 +17,6 @@ const pixels = context.getImageData(0, 0, 64, 48).data;
 return picture.naturalWidth + ":" + pixels.reduce((sum, each) => (sum * 31 + each) % 1000003, 7);
 """
 """A number that tells the shown picture from others, after its width."""
-
-
-@pytest.fixture
-def browser(tmp_path):
-    binary, driver = shutil.which("chromium"), shutil.which("chromedriver")
-    if binary is None or driver is None:
-        pytest.skip("needs chromium and chromium-driver")
-    options = webdriver.ChromeOptions()
-    options.binary_location = binary
-    for each in (
-        "--headless=new",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-dev-shm-usage",
-        "--window-size=1200,800",
-    ):
-        options.add_argument(each)
-    options.add_argument(f"--user-data-dir={tmp_path / 'browser'}")
-    found = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
-    yield found
-    found.quit()
 
 
 def wait(what, seconds=60.0):

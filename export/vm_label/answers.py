@@ -1,0 +1,117 @@
+"""The file of answers: a line of JSON for each answer, on disk before the page shows it as saved.
+
+The last line for a crop counts. A line that was cut short, for example by a power failure, is ignored.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import json
+import os
+import time
+from pathlib import Path
+from types import TracebackType
+
+from vm_embedded.errors import InputError
+
+from .crops import Crop
+
+ANSWERS_FILE = "answers.jsonl"
+
+ANSWERS = ("yes", "no", "skip")
+"""yes: the box holds an object of the class. no: it does not. skip: the person can't say, or the box is bad."""
+
+
+def read_answers(folder: Path) -> tuple[dict[str, str], list[str]]:
+    """The answers of a folder of boxes by crop, oldest first, and a line of text for each line without an answer.
+
+    A crop whose answer was taken back has none. Raises InputError if the file can't be read.
+    """
+    path = folder / ANSWERS_FILE
+    try:
+        content = path.read_bytes() if path.exists() else b""
+    except OSError as error:
+        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+    answers: dict[str, str] = {}
+    faults = []
+    for number, line in enumerate(content.splitlines(), start=1):
+        try:
+            fields = json.loads(line)
+            crop, answer = fields["crop"], fields["answer"]
+            if not isinstance(crop, str) or answer not in (*ANSWERS, None):
+                raise ValueError("not an answer")
+        except (ValueError, KeyError, TypeError):
+            if line.strip():
+                faults.append(f"{path}: line {number} is not an answer; it is ignored")
+            continue
+        answers.pop(crop, None)  # so that the newest is the last one
+        if answer is not None:
+            answers[crop] = answer
+    return answers, faults
+
+
+class AnswerFile:
+    """Appends answers to the file of a folder of boxes. Only one process at a time can have it open.
+
+    Raises InputError if another process has it open, or if it can't be written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / ANSWERS_FILE
+        try:
+            self._file = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                self._end_last_line()
+                _sync_folder(folder)
+            except BaseException:
+                os.close(self._file)
+                raise
+        except BlockingIOError as error:
+            raise InputError(f"another vm-label has {self.path} open; stop it, or use its page") from error
+        except OSError as error:
+            raise InputError(f"can't write {self.path}: {error.strerror or error}") from error
+
+    def __enter__(self) -> AnswerFile:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        os.close(self._file)
+
+    def append(self, crop: Crop, answer: str | None) -> None:
+        """Write an answer, or None to take it back, and wait until it is on disk. Raises InputError.
+
+        After an error, the file is as before.
+        """
+        fields = {"crop": crop.id, "answer": answer, "image": crop.image, "class": crop.class_name, "box": crop.shares}
+        now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+        line = json.dumps(fields | {"time": now}).encode() + b"\n"
+        try:
+            size = os.fstat(self._file).st_size
+            try:
+                if os.write(self._file, line) < len(line):
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+                os.fsync(self._file)
+            except OSError:
+                os.ftruncate(self._file, size)
+                raise
+        except OSError as error:
+            raise InputError(f"can't write {self.path}: {error.strerror or error}") from error
+
+    def _end_last_line(self) -> None:
+        """End a line that was cut short, so that the next answer has its own line."""
+        size = os.fstat(self._file).st_size
+        if size and os.pread(self._file, 1, size - 1) != b"\n":
+            os.write(self._file, b"\n")
+
+
+def _sync_folder(folder: Path) -> None:
+    """Wait until a new file's name is on disk."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

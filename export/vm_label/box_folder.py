@@ -1,0 +1,159 @@
+"""Reading a folder of boxes: from vm-detect --save-boxes, or in YOLO format from another tool."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from vm_embedded.cameras.image_files import IMAGE_SUFFIXES
+from vm_embedded.errors import InputError, unknown
+from vm_embedded.output.box_files import CANDIDATES, SAME_PLACE, CandidateBox, Shares, overlap
+
+from .crops import Crop
+from .yolo_labels import label_path, parse_label, read_class_names, read_text
+
+
+@dataclass(frozen=True)
+class BoxFolder:
+    """The images and boxes in a folder and in the folders in it.
+
+    images: paths relative to the folder. classes: names of the classes. faulty: images whose boxes are not all
+    readable. problems: a line of text for each fault.
+    """
+
+    path: Path
+    images: tuple[str, ...]
+    classes: tuple[str, ...]
+    crops: tuple[Crop, ...]
+    faulty: frozenset[str]
+    problems: tuple[str, ...]
+
+
+def read_box_folder(path: Path, only: Sequence[str] = ()) -> BoxFolder:
+    """Read a folder of boxes. only: names of the classes to read; all if empty.
+
+    A box that can't be read is a problem; the rest is used. Raises InputError if the folder has no images, a
+    classes.txt that can't be read, or none of a class of `only`.
+    """
+    reader = _Reader(path)
+    images = sorted(_images(path))
+    if not images:
+        raise InputError(f"no images in {path} (looked for {', '.join(IMAGE_SUFFIXES)})")
+    stems = Counter(image.with_suffix("") for image in images)
+    for image in images:
+        if stems[image.with_suffix("")] > 1:
+            reader.report(image, f"{image}: another image has the same name, so {label_path(image).name} is ambiguous")
+        else:
+            reader.read(image)
+    for name in only:
+        if name not in reader.classes:
+            raise InputError(unknown("class", name, reader.classes))
+    crops = dict.fromkeys(crop for crop in reader.crops if not only or crop.class_name in only)
+    return BoxFolder(
+        path,
+        tuple(image.relative_to(path).as_posix() for image in images),
+        tuple(name for name in reader.classes if not only or name in only),
+        tuple(crops),
+        frozenset(reader.faulty),
+        tuple(reader.problems),
+    )
+
+
+class _Reader:
+    """Collects the crops, classes and problems of a folder's images."""
+
+    def __init__(self, top: Path) -> None:
+        self._top = top
+        self._names: dict[Path, tuple[str, ...]] = {}
+        self._candidates: dict[Path, dict[str, list[CandidateBox]]] = {}
+        self.classes: dict[str, None] = {}
+        self.crops: list[Crop] = []
+        self.faulty: set[str] = set()
+        self.problems: list[str] = []
+
+    def report(self, image: Path, problem: str) -> None:
+        """Note that not all boxes of an image can be read."""
+        self.faulty.add(image.relative_to(self._top).as_posix())
+        self.problems.append(problem)
+
+    def read(self, image: Path) -> None:
+        """Read the boxes of an image: those of its label file, with their confidences, and the near misses."""
+        labels, name = label_path(image), image.relative_to(self._top).as_posix()
+        candidates = self._candidates_of(image)
+        confidences = {(each.class_name, each.shares): each.confidence for each in candidates}
+        crops = []
+        for class_name, shares, confidence in self._labels(image, labels):
+            known = confidences.get((class_name, shares)) if confidence is None else confidence
+            crops.append(Crop(name, class_name, shares, known))
+        for each in candidates:
+            places = [crop.shares for crop in crops if crop.class_name == each.class_name]
+            if not each.found and all(overlap(each.shares, place) <= SAME_PLACE for place in places):
+                crops.append(Crop(name, each.class_name, each.shares, each.confidence))
+        self.classes |= dict.fromkeys(crop.class_name for crop in crops)
+        self.crops += crops
+
+    def _labels(self, image: Path, labels: Path) -> Iterator[tuple[str, Shares, float | None]]:
+        """The boxes of a label file; each fault is reported."""
+        classes = self._class_names(labels.parent if labels.exists() else image.parent)
+        try:
+            lines = read_text(labels).splitlines() if labels.exists() else []
+        except InputError as error:
+            self.report(image, str(error))
+            return
+        for number, line in enumerate(lines, start=1):
+            if line.strip():
+                try:
+                    yield parse_label(line, classes)
+                except InputError as error:
+                    self.report(image, f"{labels}: line {number} {error}")
+
+    def _class_names(self, folder: Path) -> tuple[str, ...]:
+        if folder not in self._names:
+            self._names[folder] = read_class_names(folder, self._top)
+            self.classes |= dict.fromkeys(self._names[folder])
+        return self._names[folder]
+
+    def _candidates_of(self, image: Path) -> list[CandidateBox]:
+        if image.parent not in self._candidates:
+            path = image.parent / CANDIDATES
+            self._candidates[image.parent], faults = read_candidates(path) if path.is_file() else ({}, [])
+            self.problems += faults
+        return self._candidates[image.parent].get(image.name, [])
+
+
+def read_candidates(path: Path) -> tuple[dict[str, list[CandidateBox]], list[str]]:
+    """The boxes in a candidates.jsonl by the name of their image, and a line of text for each line that has none.
+
+    Raises InputError if the file can't be read.
+    """
+    found: dict[str, list[CandidateBox]] = defaultdict(list)
+    faults = []
+    for number, line in enumerate(read_text(path).splitlines(), start=1):
+        try:
+            fields = json.loads(line)
+            x, y, width, height = (float(each) for each in fields["box"])
+            confidence = float(fields["confidence"])
+            if not all(0.0 <= each <= 1.0 for each in (x, y, width, height, confidence)) or not width * height:
+                raise ValueError("values out of range")
+            box = CandidateBox(str(fields["class"]), (x, y, width, height), confidence, bool(fields["found"]))
+            found[str(fields["image"])].append(box)
+        except (ValueError, KeyError, TypeError):
+            faults.append(f"{path}: line {number} is not a box; it is ignored")
+    return found, faults
+
+
+def _images(path: Path) -> Iterator[Path]:
+    """The images in a folder and in its folders, without hidden ones. Raises InputError."""
+
+    def fail(error: OSError) -> None:
+        raise InputError(f"can't read {error.filename or path}: {error.strerror or error}") from error
+
+    for folder, folders, files in os.walk(path, onerror=fail):
+        folders[:] = [each for each in folders if not each.startswith(".")]
+        for name in files:
+            if PurePosixPath(name).suffix.lower() in IMAGE_SUFFIXES and not name.startswith("."):
+                yield Path(folder, name)
