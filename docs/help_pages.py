@@ -19,6 +19,7 @@ from vm_embedded.cli import bench, detect, doctor
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.live import configuration as detection
 from vm_export import cli as export
+from vm_label import cli as label
 from vm_mesh import cli as mesh
 from vm_synth import cli as synth
 from vm_synth.scene import configuration as scene
@@ -47,7 +48,7 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
     """All programs, and commands of programs ("vm-train check"), with their parsers, in the order of the page."""
     robot = (detect.parser(), doctor.parser(), bench.parser(), export.parser())
     workstation = (each for program in (synth, train, evaluate, mesh) for each in program.parsers().values())
-    return {each.prog: each for each in (*robot, *workstation)}
+    return {each.prog: each for each in (*robot, *workstation, label.parser())}
 
 
 def command_line() -> str:

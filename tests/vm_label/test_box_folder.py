@@ -1,0 +1,130 @@
+"""Folders of boxes: of vm-detect and of other tools, with faults."""
+
+import json
+import shutil
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vm_embedded.errors import InputError
+from vm_label.box_folder import read_box_folder
+from vm_label.crops import most_doubtful_first
+from vm_label.yolo_labels import parse_label
+
+from .made import make_folder
+
+SHARE = st.floats(-0.5, 1.5, allow_nan=False)
+
+
+def test_boxes_and_near_misses_come_most_doubtful_first(tmp_path):
+    found = read_box_folder(make_folder(tmp_path, 4))
+    crops = most_doubtful_first(found.crops)
+    assert [crop.confidence for crop in crops] == [0.5, 0.623, 0.745, 0.2, 0.2, 0.2, 0.2, 0.867]
+    assert len({crop.id for crop in crops}) == 8
+    assert found.classes == ("ball",)
+    assert found.problems == ()
+
+
+def test_what_another_tool_changed_counts(tmp_path):
+    make_folder(tmp_path, 3)
+    (tmp_path / "image0000.txt").write_text("")  # deleted there
+    (tmp_path / "image0001.txt").write_text("0 0.3 0.3 0.1 0.1\n")  # moved there
+    (tmp_path / "image0002.txt").write_text("0 0.5 0.1 0.11 0.1\n")  # a near miss became a box
+    crops = read_box_folder(tmp_path).crops
+    assert [(crop.image[:9], crop.confidence) for crop in crops] == [
+        *(("image0000", 0.2), ("image0001", None), ("image0001", 0.2), ("image0002", None))
+    ]
+
+
+def test_folders_of_other_tools_come_in_the_order_of_their_images(tmp_path):
+    for name in ("b", "a"):
+        make_folder(tmp_path / name / "images", 2)
+        (tmp_path / name / "images" / "candidates.jsonl").unlink()
+        (tmp_path / name / "labels").mkdir()
+        for label in (tmp_path / name / "images").glob("*.txt"):
+            shutil.move(label, tmp_path / name / "labels" / label.name)
+    crops = most_doubtful_first(read_box_folder(tmp_path).crops)
+    assert [crop.image for crop in crops] == [f"{name}/images/image000{i}.jpg" for name in "ab" for i in (0, 1)]
+    assert {crop.confidence for crop in crops} == {None}
+    assert {crop.class_name for crop in crops} == {"ball"}
+
+
+def test_without_names_a_class_has_its_number_and_predictions_keep_their_confidence(tmp_path):
+    make_folder(tmp_path, 1, near=False)
+    (tmp_path / "classes.txt").unlink()
+    (tmp_path / "candidates.jsonl").unlink()
+    (tmp_path / "image0000.txt").write_text("7 0.5 0.5 0.2 0.2 0.31\n0 0.2 0.2 0.1 0.1\n")
+    assert [(crop.class_name, crop.confidence) for crop in read_box_folder(tmp_path).crops] == [
+        ("7", 0.31),
+        ("0", None),
+    ]
+    assert len(read_box_folder(tmp_path, ["0"]).crops) == 1
+    with pytest.raises(InputError, match=r"unknown class '8'.*allowed: 7, 0"):
+        read_box_folder(tmp_path, ["8"])
+
+
+@pytest.mark.parametrize(
+    ("line", "part"),
+    [
+        ("0 0.5 0.5 0.1", "line 1 has 4 values; a line is `class x y width height`"),
+        ("0 0.5 0.5 0.1 0.1 0.2 0.3 0.4 0.5", "has 9 values"),
+        ("0 0.5 half 0.1 0.1", "not a number"),
+        ("0 0.5 nan 0.1 0.1", "not finite"),
+        ("0 0.5 0.5 0.1 0.1 1.5", "confidence 1.5"),
+        ("1 0.5 0.5 0.1 0.1", "class '1'; allowed: 0 to 0"),
+        ("-1 0.5 0.5 0.1 0.1", "class '-1'"),
+        ("0 2.5 0.5 0.1 0.1", "outside of the image"),
+        ("0 0.5 0.5 0 0.1", "without an area"),
+    ],
+)
+def test_a_bad_line_is_named_and_the_rest_is_used(tmp_path, line, part):
+    make_folder(tmp_path, 2, near=False)
+    (tmp_path / "image0001.txt").write_text(f"{line}\n0 0.5 0.5 0.2 0.2\n")
+    found = read_box_folder(tmp_path)
+    (problem,) = found.problems
+    assert part in problem
+    assert "image0001.txt: line 1" in problem
+    assert found.faulty == {"image0001.jpg"}
+    assert len(found.crops) == 2
+
+
+def test_bad_candidates_and_images_with_one_name_are_named(tmp_path):
+    make_folder(tmp_path, 2)
+    lines = (tmp_path / "candidates.jsonl").read_text().splitlines()
+    wrong = json.dumps(json.loads(lines[0]) | {"confidence": 7})
+    (tmp_path / "candidates.jsonl").write_text("\n".join([*lines, "[]", wrong, lines[0][:30]]))
+    shutil.copy(tmp_path / "image0001.jpg", tmp_path / "image0001.png")
+    found = read_box_folder(tmp_path)
+    assert len(found.crops) == 2
+    assert [problem.split(": ")[1][:7] for problem in found.problems if "candidates.jsonl" in problem] == [
+        *("line 5 ", "line 6 ", "line 7 ")
+    ]
+    assert sum("ambiguous" in problem for problem in found.problems) == 2
+    assert found.faulty == {"image0001.jpg", "image0001.png"}
+
+
+def test_folders_without_images_or_with_bad_classes_are_refused(tmp_path):
+    with pytest.raises(InputError, match="no images"):
+        read_box_folder(tmp_path)
+    with pytest.raises(InputError, match="can't read"):
+        read_box_folder(tmp_path / "missing")
+    make_folder(tmp_path, 1, classes=("ball", "ball"))
+    with pytest.raises(InputError, match="a name twice"):
+        read_box_folder(tmp_path)
+    (tmp_path / "classes.txt").write_bytes(b"\xff\xfe")
+    with pytest.raises(InputError, match="not UTF-8"):
+        read_box_folder(tmp_path)
+
+
+@given(SHARE, SHARE, SHARE, SHARE)
+def test_a_box_is_clipped_to_the_image_or_refused(x, y, width, height):
+    try:
+        _, (cx, cy, w, h), _ = parse_label(f"0 {x!r} {y!r} {width!r} {height!r}", ["ball"])
+    except InputError:
+        assert min(x + width / 2, 1) <= max(x - width / 2, 0) or min(y + height / 2, 1) <= max(y - height / 2, 0)
+        return
+    assert 0.0 < w <= width + 1e-12
+    assert 0.0 < h <= height + 1e-12
+    for center, side in ((cx, w), (cy, h)):
+        assert -1e-12 <= center - side / 2 <= center + side / 2 <= 1.0 + 1e-12
