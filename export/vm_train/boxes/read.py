@@ -46,19 +46,20 @@ def read_boxes(
 
 
 def _format(files: FolderFiles, format: str | None) -> str:
-    if format is not None:
-        if format not in FORMATS:
-            raise InputError(unknown("format", format, FORMATS))
-        return format
+    """The format to read. Raises InputError if the folder does not have it, or has several."""
+    if format is not None and format not in FORMATS:
+        raise InputError(unknown("format", format, FORMATS))
     found = [name for name, (is_there, _) in FORMATS.items() if is_there(files)]
     if not found:
         raise InputError(
             f"no annotations in {files.folder}: expected YOLO (NAME.txt), Pascal VOC (NAME.xml) or COCO (.json with "
             "images, annotations and categories)"
         )
-    if len(found) > 1:
+    if format is None and len(found) > 1:
         raise InputError(f"{files.folder} has annotations in several formats, {', '.join(found)}: choose one of them")
-    return found[0]
+    if format is not None and format not in found:
+        raise InputError(f"no annotations in format {format} in {files.folder}; it has {', '.join(found)}")
+    return format or found[0]
 
 
 def _checked(

@@ -23,6 +23,7 @@ from vm_workstation.text_tables import aligned, summary
 from ..data.classes import Classes
 from ..data.inspection import Inspection, inspect_pictures
 from ..data.pictures import find_pictures
+from .check_boxes import add_check_boxes
 
 EXIT_OK, EXIT_FAULTS = 0, 1
 
@@ -46,7 +47,8 @@ def check_parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="vm-train check",
         description="Read all pictures of a folder, or of the shards in it. Print tables of their contents, and list "
-        "the unusable pictures. Exit status: 0 if all can be used, 1 otherwise.",
+        "the unusable pictures. With --boxes, do this for images with boxes. Exit status: 0 if all can be used, 1 "
+        "otherwise.",
     )
     made.add_argument("data", type=Path, metavar="DATA", help="folder of imageX.jpg or .png, maskX.png, lensX.yaml")
     made.add_argument(
@@ -55,6 +57,7 @@ def check_parser() -> argparse.ArgumentParser:
     made.add_argument("--workers", type=at_least(1), metavar="N", help="reading processes; default: all cores")
     made.add_argument("--json", type=Path, metavar="FILE", help="write all results and all faults to this file")
     made.add_argument("--strict", action="store_true", help="also exit with 1 if a class appears in no picture")
+    add_check_boxes(made)
     return made
 
 

@@ -16,6 +16,7 @@ from vm_workstation.stopping import stoppable
 from ..data.pictures import find_pictures
 from ..learning.configuration import HEADER, TrainConfiguration
 from .check import run_check
+from .check_boxes import refuse_other_options, run_check_boxes
 from .import_pictures import run_import
 from .look import print_look_config, resume_look, run_look
 from .options import parsers
@@ -74,6 +75,9 @@ def _resume(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
+    refuse_other_options(options)
+    if options.boxes:
+        return run_check_boxes(options)
     classes = read_sections(TrainConfiguration, options.config).classes
     objects = [name for name, kind in classes.kinds.items() if kind == "object"]
     return run_check(options, classes.mask_classes(), objects)

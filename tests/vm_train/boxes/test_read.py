@@ -151,6 +151,8 @@ def test_folders_without_use_are_refused(tmp_path):
     with pytest.raises(InputError, match="several formats, yolo, voc: choose one"):
         read_boxes(tmp_path)
     assert read_boxes(tmp_path, "voc").names == ("goal post",)
+    with pytest.raises(InputError, match=r"no annotations in format coco in .*; it has yolo, voc"):
+        read_boxes(tmp_path, "coco")
 
 
 def test_sub_folders_are_recordings(tmp_path):

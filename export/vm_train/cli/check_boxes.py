@@ -1,0 +1,123 @@
+"""vm-train check --boxes: facts about the boxes of a folder, their faults, and a contact sheet."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from vm_embedded.detection.settings import Settings
+from vm_embedded.errors import InputError
+from vm_embedded.files import atomic_write, check_writable
+from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
+from vm_workstation.contact_sheet import check_sheet_path, write_sheet
+from vm_workstation.option_types import at_least
+
+from ..boxes.box import BoxedSet
+from ..boxes.read import read_boxes
+from ..boxes.sheet import box_sheet, unusual_first
+from ..boxes.summary import classes_of, name_faults, summary_lines
+from .box_options import add_box_options, parse_names
+
+EXIT_OK, EXIT_FAULTS = 0, 1
+
+_NAMED = 40
+"""Faults to print."""
+
+_ON_SHEET = 400
+"""Boxes on a contact sheet, if no other number is given."""
+
+_OWN = ("format", "names", "network", "sheet", "count")
+"""Options that are only for boxes."""
+
+_OTHERS = ("config", "workers", "strict")
+"""Options that are only for pictures with masks."""
+
+
+def add_check_boxes(parser: argparse.ArgumentParser) -> None:
+    """Add the options of vm-train check --boxes."""
+    group = parser.add_argument_group("images with boxes, see docs/own-frames.md")
+    group.add_argument(
+        "--boxes",
+        action="store_true",
+        help="DATA holds images with boxes in YOLO, Pascal VOC or COCO format; they need neither masks nor lenses",
+    )
+    add_box_options(group)
+    group.add_argument(
+        "--network",
+        metavar="MODEL",
+        help="network whose objects the boxes should show: a checkpoint (.pt), a model file (.onnx), or a network of "
+        f"the package ({', '.join(SHIPPED)}); default {DEFAULT}",
+    )
+    group.add_argument("--sheet", type=Path, metavar="FILE", help="draw the boxes of these objects to a .jpg or .png")
+    group.add_argument(
+        "--count", type=at_least(1), metavar="N", help=f"boxes to draw, the most unusual ones; default {_ON_SHEET}"
+    )
+
+
+def refuse_other_options(options: argparse.Namespace) -> None:
+    """Raise InputError for an option that has no effect with --boxes, or only with it."""
+    for name in _OTHERS if options.boxes else _OWN:
+        if getattr(options, name):
+            which = "is not for folders of boxes: leave it out" if options.boxes else "needs --boxes"
+            raise InputError(f"--{name} {which}")
+
+
+def run_check_boxes(options: argparse.Namespace) -> int:
+    """Check as the options say and return the exit status.
+
+    Raises InputError if the folder has no boxes, or if the results can't be written.
+    """
+    for path in filter(None, (options.json, options.sheet)):
+        check_writable(path)
+    if options.sheet is not None:
+        check_sheet_path(options.sheet)
+    objects, round_names = _objects(options.network or DEFAULT)
+    found = read_boxes(options.data, options.format, parse_names(options.names), round_names)
+    faults = [*found.faults, *name_faults(found, objects)]
+    print("\n".join(summary_lines(found)))
+    if options.json is not None:
+        with atomic_write(options.json) as part:
+            part.write_text(json.dumps(_as_json(found, faults), indent=1) + "\n", encoding="utf-8")
+    for line in [*faults[:_NAMED], *_more(len(faults))]:
+        print(f"vm-train: {line}", file=sys.stderr)
+    if options.sheet is not None:
+        _write_sheet(options, found, objects)
+    return EXIT_FAULTS if faults else EXIT_OK
+
+
+def _objects(network: str) -> tuple[list[str], list[str]]:
+    """The classes of objects that a network finds, and those of them that look round. Raises InputError, ModelError."""
+    from ..evaluation.answers import load_subject
+
+    manifest = load_subject(model_path(network), Settings()).manifest
+    objects = [each.name for each in manifest.classes if each.kind == "object"]
+    return objects, objects if manifest.shape == "sphere" else []
+
+
+def _more(count: int) -> list[str]:
+    return [f"and {count - _NAMED} more; vm-train check --boxes --json FILE lists all"] if count > _NAMED else []
+
+
+def _write_sheet(options: argparse.Namespace, found: BoxedSet, objects: Sequence[str]) -> None:
+    places = [place for name in objects for place in unusual_first(found.pictures, name)]
+    chosen = places[: options.count or _ON_SHEET]
+    if not chosen:
+        raise InputError(f"can't draw {options.sheet}: there is no box of class {' or '.join(objects)}")
+    write_sheet(options.sheet, box_sheet(chosen, options.data))
+    print(f"{options.sheet}: {len(chosen)} of {len(places)} boxes of {', '.join(objects)}")
+
+
+def _as_json(found: BoxedSet, faults: Sequence[str]) -> dict[str, Any]:
+    """All results, for other programs."""
+    return {
+        "pictures": len(found.pictures),
+        "faults": list(faults),
+        "classes": classes_of(found),
+        "recordings": dict(sorted(Counter(each.recording for each in found.pictures).items())),
+        "sizes": {f"{w}x{h}": count for (w, h), count in Counter(each.size for each in found.pictures).most_common()},
+    }
