@@ -10,7 +10,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Size
 
 from .annotation import Annotation, Annotations, RawBox
-from .coco_file import CocoFile, Entry, coco_files, is_id, number, parse_coco, shown
+from .coco_file import CocoFile, Entry, Id, coco_files, is_id, number, parse_coco, shown
 from .folder_files import FolderFiles
 from .image_index import ImageIndex, image_folders, once_each
 
@@ -53,7 +53,7 @@ class _Reader:
     def annotations(self) -> list[Annotation]:
         """The images that can be used, with their boxes."""
         images = self._images()
-        boxes: dict[int, list[RawBox]] = defaultdict(list)
+        boxes: dict[Id, list[RawBox]] = defaultdict(list)
         known = {entry.get("id") for entry in self._content.images if is_id(entry.get("id"))}
         for position, entry in enumerate(self._content.annotations):
             name = shown(entry["id"]) if "id" in entry else f"at position {position}"
@@ -71,10 +71,10 @@ class _Reader:
             if path not in self.spoiled
         ]
 
-    def _images(self) -> dict[int, tuple[Path, Size | None]]:
+    def _images(self) -> dict[Id, tuple[Path, Size | None]]:
         """Image file and stated size [px] by id."""
-        found: dict[int, tuple[Path, Size | None]] = {}
-        keys: dict[Path, int] = {}
+        found: dict[Id, tuple[Path, Size | None]] = {}
+        keys: dict[Path, Id] = {}
         uses = Counter(shown(entry.get("id")) for entry in self._content.images)
         for entry in self._content.images:
             key = entry.get("id")
@@ -92,7 +92,7 @@ class _Reader:
             image = self._index.labels([path])
             try:
                 if not is_id(key) or uses[shown(key)] > 1:
-                    raise InputError("its id must be a whole number that no other image has")
+                    raise InputError("its id must be a number or a text that no other image has")
                 if path in keys:
                     raise InputError(f"image {keys[path]} has the same name: two images with one name")
                 keys[path] = key
@@ -113,7 +113,7 @@ def _size(entry: Entry) -> Size | None:
     return (width, height) if width and height else None
 
 
-def _box(entry: Entry, place: str, categories: Mapping[int, str]) -> RawBox:
+def _box(entry: Entry, place: str, categories: Mapping[Id, str]) -> RawBox:
     key, bbox = entry.get("category_id"), entry.get("bbox")
     if not is_id(key) or key not in categories:
         known = ", ".join(f"{each} {name}" for each, name in categories.items())

@@ -14,6 +14,9 @@ from .folder_files import FolderFiles, read_bytes, read_text
 
 Entry = Mapping[str, Any]
 
+Id = int | str
+"""COCO has numbers; some programs write texts."""
+
 _TELLING = (b'"file_name"', b'"image_id"')
 
 
@@ -23,7 +26,7 @@ class CocoFile:
 
     images: Sequence[Entry]
     annotations: Sequence[Entry]
-    categories: Mapping[int, str]
+    categories: Mapping[Id, str]
 
 
 def coco_files(files: FolderFiles) -> list[Path]:
@@ -55,20 +58,21 @@ def parse_coco(path: Path) -> CocoFile:
     return CocoFile(images, annotations, _names(categories))
 
 
-def _names(categories: Sequence[Entry]) -> dict[int, str]:
-    names: dict[int, str] = {}
+def _names(categories: Sequence[Entry]) -> dict[Id, str]:
+    names: dict[Id, str] = {}
     for entry in categories:
         key, name = entry.get("id"), entry.get("name")
         if not is_id(key) or not isinstance(name, str) or not name.strip():
-            raise InputError(f"category {shown(dict(entry))} needs a whole number id and a name")
-        if names.setdefault(key, name.strip()) != name.strip():
-            raise InputError(f"category {key} has two names, {names[key]!r} and {name.strip()!r}")
+            raise InputError(f"category {shown(dict(entry))} needs an id and a name")
+        name = " ".join(name.split())
+        if names.setdefault(key, name) != name:
+            raise InputError(f"category {shown(key)} has two names, {names[key]!r} and {name!r}")
     return names
 
 
-def is_id(value: object) -> TypeGuard[int]:
-    """Whether a value can be an id: a whole number."""
-    return isinstance(value, int) and not isinstance(value, bool)
+def is_id(value: object) -> TypeGuard[Id]:
+    """Whether a value can be an id: a whole number or a text."""
+    return isinstance(value, int | str) and not isinstance(value, bool)
 
 
 def number(value: object) -> float:

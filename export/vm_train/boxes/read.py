@@ -56,7 +56,9 @@ def _format(files: FolderFiles, format: str | None) -> str:
             "images, annotations and categories)"
         )
     if format is None and len(found) > 1:
-        raise InputError(f"{files.folder} has annotations in several formats, {', '.join(found)}: choose one of them")
+        raise InputError(
+            f"{files.folder} has annotations in several formats, {', '.join(found)}: choose one with --format"
+        )
     if format is not None and format not in found:
         raise InputError(f"no annotations in format {format} in {files.folder}; it has {', '.join(found)}")
     return format or found[0]

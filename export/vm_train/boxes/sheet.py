@@ -79,15 +79,13 @@ def _cell(crop: Image, lines: tuple[str, str]) -> Image:
 
 def _crop(image: Image, box: Box) -> Image:
     """A square around a box, scaled to the size of a cell, with the box's outline; gray outside of the image."""
-    side = max(_AROUND * max(box.width, box.height), 8.0)
-    scale = _CELL / side
-    corner = box.center + 0.5 - side / 2.0
-    shift = (np.array([0.5, 0.5]) - corner) * scale - 0.5
-    matrix = np.array([[scale, 0.0, shift[0]], [0.0, scale, shift[1]]])
-    how = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR
-    crop = cv2.warpAffine(image, matrix, (_CELL, _CELL), flags=how, borderMode=cv2.BORDER_CONSTANT, borderValue=PAPER)
+    side = max(round(_AROUND * max(box.width, box.height)), 8)
+    x, y = np.round(box.center + 0.5 - side / 2.0).tolist()
+    shift = np.array([[1.0, 0.0, -x], [0.0, 1.0, -y]])
+    cutout = cv2.warpAffine(image, shift, (side, side), flags=cv2.INTER_NEAREST, borderValue=PAPER)
+    crop = cv2.resize(cutout, (_CELL, _CELL), interpolation=cv2.INTER_AREA if side > _CELL else cv2.INTER_LINEAR)
     edges = np.array([[box.left, box.top], [box.right, box.bottom]])
-    (left, top), (right, bottom) = np.round(scaled_pixels(edges, (corner[0], corner[1]), scale)).astype(int).tolist()
+    (left, top), (right, bottom) = np.round(scaled_pixels(edges, (x, y), _CELL / side)).astype(int).tolist()
     cv2.rectangle(crop, (left, top), (right, bottom), _OUTLINE, 1)
     return np.asarray(crop, dtype=np.uint8)
 

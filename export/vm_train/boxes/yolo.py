@@ -11,6 +11,7 @@ from .folder_files import FolderFiles, read_text
 from .yolo_names import is_name_table, read_names
 
 _ENTRIES = ("class", "x", "y", "width", "height")
+_DIGITS = 9  # of a class number
 
 
 def label_paths(image: Path) -> list[Path]:
@@ -94,9 +95,9 @@ def _parse(line: str, place: str, names: tuple[str, ...] | None) -> RawBox:
     entries = line.split()
     if len(entries) != len(_ENTRIES):
         raise InputError(f"has {len(entries)} entries, but a box has 5: {' '.join(_ENTRIES)}")
-    if not (entries[0].isascii() and entries[0].isdigit()):
+    if not (entries[0].isascii() and entries[0].isdigit() and len(entries[0]) <= _DIGITS):
         raise InputError(f"class {entries[0][:20]!r} is not a whole number from 0 up")
-    number = int(entries[0][:9])
+    number = int(entries[0])
     if names is not None and number >= len(names):
         raise InputError(f"class {number} is unknown; the table of names has 0 to {len(names) - 1}: {', '.join(names)}")
     values = []

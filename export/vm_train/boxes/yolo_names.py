@@ -43,7 +43,7 @@ def _read(path: Path) -> tuple[str, ...]:
     try:
         text = read_text(path)
         if path.suffix.lower() in (".yaml", ".yml"):
-            names = _names_in(yaml.safe_load(text))
+            names = [" ".join(name.split()) for name in _names_in(yaml.safe_load(text))]
         else:
             names = [line.strip() for line in text.rstrip().splitlines()]
     except (InputError, yaml.YAMLError) as error:

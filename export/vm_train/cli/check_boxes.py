@@ -40,7 +40,7 @@ _OTHERS = ("config", "workers", "strict")
 
 def add_check_boxes(parser: argparse.ArgumentParser) -> None:
     """Add the options of vm-train check --boxes."""
-    group = parser.add_argument_group("images with boxes, see docs/own-frames.md")
+    group = parser.add_argument_group("images with boxes")
     group.add_argument(
         "--boxes",
         action="store_true",

@@ -3,15 +3,11 @@
 import json
 import math
 
-import cv2
-import numpy as np
 import pytest
-from PIL import Image
 
-from vm_train.boxes.image_facts import read_upright
 from vm_train.boxes.read import read_boxes
 
-from .written import SIZE, WRITERS, coco_table, voc_text, write_coco, write_image, write_voc, write_yolo
+from .written import boxes_of, coco_table, voc_text, write_coco, write_image, write_voc, write_yolo
 
 BALL = ("ball", 20.0, 30.0, 40.0, 50.0)
 GOAL = ("goal", 100.0, 10.0, 110.0, 90.0)
@@ -21,12 +17,6 @@ GOOD = {"good1": [BALL], "good2": [BALL, GOAL], "good3": []}
 def cut(path, share=0.5):
     content = path.read_bytes()
     path.write_bytes(content[: int(share * len(content))])
-
-
-def boxes_of(folder, **options):
-    """Boxes of the usable pictures, by the stem of the image, and all faults."""
-    found = read_boxes(folder, **options)
-    return {each.image.stem: each.boxes for each in found.pictures}, list(found.faults)
 
 
 def check(folder, faults, counts, **options):
@@ -184,6 +174,16 @@ def test_coco_images_and_boxes_of_wrong_sizes(tmp_path):
     )
 
 
+def test_a_box_that_reaches_out_slightly_is_clipped(tmp_path):
+    write_yolo(tmp_path, {"a": [BALL], **GOOD})
+    (tmp_path / "a.txt").write_text("0 0.05 0.5 0.12 0.1\n1 0.9 0.55 0.22 1.1\n")
+    boxes, faults = boxes_of(tmp_path)
+    assert faults == []
+    ball, goal = boxes["a"]
+    assert (ball.left, round(ball.right, 6)) == (-0.5, 17.1)
+    assert (round(goal.left, 6), goal.top, goal.right, goal.bottom) == (125.9, -0.5, 159.5, 119.5)
+
+
 # Unknown classes, and two images with one name.
 
 
@@ -273,7 +273,7 @@ def test_coco_classes_unknown_and_images_of_one_name(tmp_path):
         (lambda table: table.pop("categories"), "lacks categories, a list of tables"),
         (lambda table: table.update(images={}), "lacks images, a list of tables"),
         (lambda table: table["categories"].append({"id": 3, "name": "cup"}), "category 3 has two names"),
-        (lambda table: table["categories"].append({"id": "3", "name": "cup"}), "needs a whole number id and a name"),
+        (lambda table: table["categories"].append({"id": 0.5, "name": "cup"}), "needs an id and a name"),
     ],
 )
 def test_coco_files_of_wrong_structure_are_named(change, said, tmp_path):
@@ -285,77 +285,3 @@ def test_coco_files_of_wrong_structure_are_named(change, said, tmp_path):
     (line,) = read_boxes(tmp_path).faults
     assert line.startswith("instances.json: ")
     assert said in line
-
-
-# Images that their EXIF entry turns.
-
-
-@pytest.mark.parametrize("orientation", range(1, 9))
-def test_an_image_is_read_as_opencv_turns_it(orientation, tmp_path):
-    write_image(tmp_path / "a.png", orientation=orientation)
-    np.testing.assert_array_equal(read_upright(tmp_path / "a.png"), cv2.imread(str(tmp_path / "a.png")))
-
-
-def marked(path, box, orientation):
-    """A black image with a white box (class, left, top, right, bottom), stored upright."""
-    image = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
-    left, top, right, bottom = (int(each) for each in box[1:])
-    image[top:bottom, left:right] = 255
-    exif = Image.Exif()
-    exif[0x0112] = orientation
-    Image.fromarray(image).save(path, exif=exif)
-
-
-@pytest.mark.parametrize("orientation", range(2, 9))
-@pytest.mark.parametrize("format", ["voc", "coco"])
-def test_boxes_drawn_on_the_image_as_stored_are_turned_with_it(format, orientation, tmp_path):
-    WRITERS[format](tmp_path, {**GOOD, "a": [GOAL]})
-    marked(tmp_path / "a.jpg", GOAL, orientation)
-    boxes, (line,) = boxes_of(tmp_path)
-    file = {"voc": "a.xml", "coco": "instances.json"}[format]
-    assert list(boxes) == ["a", *GOOD]
-    if orientation < 5:
-        assert line == (
-            f"a.jpg: turned by its EXIF orientation {orientation}; {file} leaves open whether its boxes are: taken as "
-            "drawn on the turned image"
-        )
-        return
-    assert line == (
-        f"a.jpg: turned by its EXIF orientation {orientation}, but {file} states the size as stored, 160 x 120 px: "
-        "boxes turned"
-    )
-    (box,) = boxes["a"]
-    rows, columns = np.nonzero(read_upright(tmp_path / "a.jpg")[..., 0] > 127)
-    found = (columns.min() - 0.5, rows.min() - 0.5, columns.max() + 0.5, rows.max() + 0.5)
-    assert (box.left, box.top, box.right, box.bottom) == found
-
-
-@pytest.mark.parametrize("format", ["voc", "coco"])
-def test_boxes_drawn_on_the_turned_image_are_right_and_other_sizes_are_not(format, tmp_path):
-    WRITERS[format](tmp_path, {"a": [("goal", 10.0, 100.0, 90.0, 110.0)], "b": []}, size=(120, 160))
-    for name in ("a", "b"):
-        write_image(tmp_path / f"{name}.jpg", orientation=6)
-    boxes, faults = boxes_of(tmp_path)
-    assert faults == []
-    assert boxes["a"][0].bottom == 109.5
-    write_image(tmp_path / "a.jpg", size=(100, 80), orientation=6)
-    file = {"voc": "a.xml", "coco": "instances.json"}[format]
-    _, faults = boxes_of(tmp_path)
-    assert faults == [
-        f"a.jpg: {file} states a size of 120 x 160 px, but the image has 80 x 100 px, or 100 x 80 px without its EXIF "
-        "turn; not used"
-    ]
-
-
-def test_yolo_boxes_are_taken_as_drawn_on_the_turned_image(tmp_path):
-    write_yolo(tmp_path, {**GOOD, "a": [BALL]})
-    write_image(tmp_path / "a.jpg", orientation=6)
-    (tmp_path / "a.yaml").write_text("projection: RECTILINEAR\nfocal_length: 120.0\nfov: 1.5\n")
-    found = read_boxes(tmp_path)
-    assert found.pictures[0].size == (120, 160)
-    assert found.pictures[0].lens is None
-    assert found.faults == (
-        "a.jpg: turned by its EXIF orientation 6; a.txt does not state whether its boxes are: taken as drawn on the "
-        "turned image",
-        "a.yaml: a.jpg is turned by its EXIF orientation 6, the lens is not; a.jpg is used without lens",
-    )

@@ -148,7 +148,7 @@ def test_folders_without_use_are_refused(tmp_path):
         read_boxes(tmp_path, "yol")
     write_yolo(tmp_path, {"a": [BALL]})
     write_voc(tmp_path, {"a": [GOAL]})
-    with pytest.raises(InputError, match="several formats, yolo, voc: choose one"):
+    with pytest.raises(InputError, match="several formats, yolo, voc: choose one with --format"):
         read_boxes(tmp_path)
     assert read_boxes(tmp_path, "voc").names == ("goal post",)
     with pytest.raises(InputError, match=r"no annotations in format coco in .*; it has yolo, voc"):

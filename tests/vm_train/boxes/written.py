@@ -1,4 +1,4 @@
-"""Writes annotated images in each of the formats, in layouts that annotation tools make."""
+"""Writes annotated images in each of the formats, in layouts that annotation tools make, and reads them."""
 
 import json
 import zlib
@@ -7,6 +7,8 @@ from xml.etree import ElementTree
 import cv2
 import numpy as np
 from PIL import Image
+
+from vm_train.boxes.read import read_boxes
 
 SIZE = (160, 120)
 
@@ -91,3 +93,9 @@ def write_coco(folder, pictures, beside=True, size=SIZE):
 
 
 WRITERS = {"yolo": write_yolo, "voc": write_voc, "coco": write_coco}
+
+
+def boxes_of(folder, **options):
+    """Boxes of the usable pictures, by the stem of the image, and all faults."""
+    found = read_boxes(folder, **options)
+    return {each.image.stem: each.boxes for each in found.pictures}, list(found.faults)
