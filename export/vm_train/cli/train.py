@@ -18,6 +18,7 @@ from ..learning.configuration import HEADER, TrainConfiguration
 from .check import run_check
 from .check_boxes import refuse_other_options, run_check_boxes
 from .import_pictures import run_import
+from .fine_tuning import print_tune_config, resume_fine_tuning
 from .look import print_look_config, resume_look, run_look
 from .options import parsers
 from .shards import run_shards
@@ -37,6 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "rate": _rate,
         "config": _config,
         "look-config": print_look_config,
+        "tune-config": print_tune_config,
         "import": run_import,
         "shards": run_shards,
     }
@@ -68,9 +70,12 @@ def _is_leader() -> bool:
 
 
 def _resume(options: argparse.Namespace) -> int:
-    """Resume the training of a network, or of a close look."""
+    """Resume the training of a network or of a close look, or a fine-tuning."""
     from ..look.run_folder import is_look_run
+    from ..tuning.run_folder import is_tuning
 
+    if is_tuning(options.run):
+        return resume_fine_tuning(options)
     return resume_look(options) if is_look_run(options.run) else run_resume(options)
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from .html_page import html_page, html_strip, html_table
 from .summary import (
     Scores,
     as_meters,
@@ -43,21 +44,6 @@ CAPTIONS = {
 }
 """Captions of the plots, in the order of the page."""
 
-_STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #222; max-width: 1180px; margin: 2em auto; padding: 0 1em }
-h1 { font-size: 1.5em; margin-bottom: 0.1em } h2 { font-size: 1.2em; margin: 2em 0 0.4em }
-p.note { background: #fff6dd; border-left: 4px solid #e0b030; padding: 0.5em 0.8em }
-.cards { display: flex; flex-wrap: wrap; gap: 0.7em; margin: 1em 0 }
-.card { border: 1px solid #ddd; border-radius: 6px; padding: 0.5em 0.9em; min-width: 7.5em }
-.card b { display: block; font-size: 1.45em } .card span { color: #666; font-size: 0.87em }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 0.92em }
-th, td { padding: 0.2em 0.75em; text-align: right; border-bottom: 1px solid #e8e8e8 }
-td { white-space: nowrap } .facts td { white-space: normal; overflow-wrap: anywhere }
-th:first-child, td:first-child, .facts td { text-align: left } th { color: #555; font-weight: 600 }
-figure { margin: 1.2em 0 } figure img { max-width: 100% } figcaption { color: #555; font-size: 0.9em }
-.strip { display: flex; flex-wrap: wrap; gap: 0.8em; align-items: flex-start } .strip figure { margin: 0 }
-.true { color: #1f9a33 } .found { color: #c22bc2 }
-"""
 
 _OBJECT_PLOTS = ("objects_curves", "objects_over_distance", "distance_error", "reliability")
 
@@ -76,28 +62,26 @@ def page(scores: Scores, plots: Mapping[str, bytes], strips: Mapping[str, Sequen
         _cards(scores),
     ]
     for name, by_overlap in scores["objects"].items():
-        parts.append(f"<h2>Objects of class {escape(name)}</h2>{_table(*object_table(by_overlap))}")
+        parts.append(f"<h2>Objects of class {escape(name)}</h2>{html_table(*object_table(by_overlap))}")
         parts.append(f"<p>{_CENTER} {escape(_ignored(by_overlap))}</p>")
         parts.append(f"<p>{escape(calibration(scores['calibration'][name]))}.</p>")
     parts += [_plot(name, plots, about) for name in _OBJECT_PLOTS]
     for name, found in scores["proposals"].items():
-        tables = "".join(_table(*each) for each in proposal_tables(found))
+        tables = "".join(html_table(*each) for each in proposal_tables(found))
         parts.append(f"<h2>Proposals for class {escape(name)}</h2><p>{escape(proposal_counts(found))}.</p>")
         parts.append(f'<div class="strip">{tables}</div>')
     parts.append(_plot("proposals", plots, about))
     for heading, pictures in strips.items():
         if pictures:
-            parts.append(f"<h2>{escape(heading)}</h2>{_KEY}{_strip(pictures)}")
+            parts.append(f"<h2>{escape(heading)}</h2>{_KEY}{html_strip(pictures)}")
     for name, each in field_tables(scores["field"]).items():
-        parts.append(f"<h2>{escape(name[0].upper() + name[1:])}</h2>{_table(*each)}")
-    parts.append(f"<h2>Points</h2>{_table(*point_table(scores['points']))}")
+        parts.append(f"<h2>{escape(name[0].upper() + name[1:])}</h2>{html_table(*each)}")
+    parts.append(f"<h2>Points</h2>{html_table(*point_table(scores['points']))}")
     parts += [_plot(name, plots, about) for name in ("points_curves", "points_over_distance", "confusion")]
     if "points_on_object" in plots:
         parts.append("<h2>Mesh points on an object</h2>" + _plot("points_on_object", plots, about))
     parts.append("<h2>Model, data and settings</h2>" + _facts(scores))
-    title = escape(f"vm-evaluate: {about['model']['file']}")
-    head = f'<meta charset="utf-8"><title>{title}</title><style>{_STYLE}</style>'
-    return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>\n' + "\n".join(parts) + "\n</body></html>\n"
+    return html_page(f"vm-evaluate: {about['model']['file']}", parts)
 
 
 def _ignored(by_overlap: Scores) -> str:
@@ -158,18 +142,3 @@ def _plot(name: str, plots: Mapping[str, bytes], about: Scores) -> str:
     caption = CAPTIONS[name] + (about["camera"] if name == "points_on_object" else "")
     source = f"data:image/svg+xml;base64,{base64.b64encode(plots[name]).decode()}"
     return f'<figure><img alt="{name}" src="{source}"><figcaption>{escape(caption)}</figcaption></figure>'
-
-
-def _strip(pictures: Iterable[tuple[bytes, str]]) -> str:
-    shown = (
-        f'<figure><img alt="" src="data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-        for jpeg, caption in pictures
-    )
-    return f'<div class="strip">{"".join(shown)}</div>'
-
-
-def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    head = "".join(f"<th>{escape(each)}</th>" for each in heading)
-    body = "".join("<tr>" + "".join(f"<td>{escape(each)}</td>" for each in row) + "</tr>" for row in rows)
-    return f"<table><tr>{head}</tr>{body}</table>"

@@ -59,7 +59,7 @@ class Collector:
         above = WORTH if item.validates else _NEARLY_WORTH
         places = proposed_places(observation, seen.probabilities, self.settings, self.glance, above)
         if not item.validates:
-            random = _random(self.settings.seed, item.files.number)
+            random = random_of(self.settings.seed, item.files.number)
             places += jittered_places(view, truths, self.settings, random)
             places += random_places(observation, self.settings, random)
         found = label_places(places.tangents(view), truths)
@@ -122,7 +122,7 @@ def _joined(run: LookRun, parts: Sequence[PatchChunk]) -> PatchChunk:
     )
 
 
-def _random(seed: int, number: str) -> np.random.Generator:
-    """Random numbers that depend only on the seed and the picture's number."""
-    digest = hashlib.sha256(f"{seed}:{number}".encode("utf-8", "surrogateescape")).digest()
+def random_of(seed: int, picture: str) -> np.random.Generator:
+    """Random numbers that depend only on the seed and the picture's number or file name."""
+    digest = hashlib.sha256(f"{seed}:{picture}".encode("utf-8", "surrogateescape")).digest()
     return np.random.default_rng(int.from_bytes(digest[:16], "big"))

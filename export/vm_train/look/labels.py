@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from vm_embedded.arrays import Floats, Singles
+from vm_embedded.arrays import Floats, Mask, Singles
 from vm_embedded.detection.patches import Tangents
 from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.network.manifest import Manifest
@@ -65,14 +65,23 @@ class PlaceLabels:
 
 def label_places(places: Tangents, truths: Truths) -> PlaceLabels:
     """Labels of places, whose `radius` is that of the object that is expected there."""
-    count = len(places.axes)
-    if not len(truths):
+    right, down, off, size = _differences(places, truths)
+    return label_by_differences(right, down, off, size, truths.visible >= VISIBLE)
+
+
+def label_by_differences(right: Floats, down: Floats, off: Floats, size: Floats, visible: Mask) -> PlaceLabels:
+    """Labels of n places from their differences (n, t) to t objects.
+
+    right, down: shift of the object's center from the place, off: its length, all in expected radii. size: logarithm of
+    the object's size over the expected one. visible (t,): whether enough of the object is visible to give a label.
+    """
+    count, objects = off.shape
+    if not objects:
         return PlaceLabels(
             np.zeros(count, np.int8), np.zeros((count, 3), np.float32), np.full(count, -1, dtype=np.int64)
         )
-    right, down, off, size = _differences(places, truths)
     maybe = (off < FAR) & (np.abs(size) < UNLIKE)
-    surely = (off <= NEAR) & (np.abs(size) <= ALIKE) & (truths.visible >= VISIBLE)
+    surely = (off <= NEAR) & (np.abs(size) <= ALIKE) & visible
     nearest = np.where(surely, off, np.inf).argmin(axis=1)
     has_object = np.asarray(surely.any(axis=1))
     labels = np.where(has_object, OBJECT, np.where(maybe.any(axis=1), UNLABELED, NOTHING)).astype(np.int8)

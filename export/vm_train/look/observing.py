@@ -24,6 +24,7 @@ from .run_folder import LookRun
 _TASK = 5
 """Pictures that a worker gets at a time."""
 
+Work = TypeVar("Work")
 Result = TypeVar("Result")
 
 
@@ -90,7 +91,7 @@ class Observer:
 
 
 def results_of(
-    make: Callable[[], Callable[[Item], Result]], items: Sequence[Item], workers: int
+    make: Callable[[], Callable[[Work], Result]], items: Sequence[Work], workers: int
 ) -> Generator[Result, None, None]:
     """Results of the function that `make` makes for all items, in order. Each of so many processes makes its own.
 
@@ -108,16 +109,16 @@ def results_of(
         yield from results
 
 
-_worker: Callable[[Item], Any] | None = None
+_worker: Callable[[Any], Any] | None = None
 """The state of a worker process."""
 
 
-def _start(make: Callable[[], Callable[[Item], Any]]) -> None:
+def _start(make: Callable[[], Callable[[Any], Any]]) -> None:
     global _worker
     start_worker()
     _worker = make()
 
 
-def _work(item: Item) -> Any:
+def _work(item: Any) -> Any:
     assert _worker is not None
     return _worker(item)

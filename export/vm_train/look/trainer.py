@@ -47,7 +47,8 @@ class LookStep:
 class LookTrainer:
     """A network that is trained for `total` steps on patches.
 
-    extent: half the side of a patch [expected radii]. Raises InputError if none shows an object, or all do."""
+    extent: half the side of a patch [expected radii]. weights (n,): how often each patch is drawn, compared to others
+    of its kind; None: equally often. Raises InputError if none shows an object, or all do."""
 
     def __init__(
         self,
@@ -57,6 +58,7 @@ class LookTrainer:
         recipe: LookRecipe,
         augmentation: PatchAugmentation,
         total: int,
+        weights: Floats | None = None,
     ) -> None:
         self.network = network.train()
         self.recipe, self.total, self.done = recipe, total, 0
@@ -67,7 +69,10 @@ class LookTrainer:
             if not len(chosen):
                 raise InputError(f"none of the {len(patches)} training patches {what}")
         self._errors: npt.NDArray[np.float32] | None = None
-        self._chances: Floats | None = None
+        self._weights = weights
+        self._shown_chances, self._chances = (
+            None if weights is None else np.cumsum(weights[rows]) for rows in (self._with, self._without)
+        )
         self._optimizer = ScheduledOptimizer(network, Recipe(rate=recipe.rate, decay=recipe.decay), total)
 
     def grade(self) -> float:
@@ -80,7 +85,8 @@ class LookTrainer:
 
     def _set_errors(self, errors: npt.NDArray[np.float32]) -> None:
         self._errors = errors
-        self._chances = np.cumsum(errors.astype(np.float64) + self.recipe.floor)
+        chances = errors.astype(np.float64) + self.recipe.floor
+        self._chances = np.cumsum(chances if self._weights is None else chances * self._weights[self._without])
 
     def step(self) -> LookStep:
         """Learn from one batch. Raises InputError if the loss is NaN or infinite."""
@@ -109,14 +115,9 @@ class LookTrainer:
         """Positions (batch,) of the patches of a step, and whether each shows an object (1) or not (0)."""
         batch = self.recipe.batch
         count = min(max(round(self.recipe.positives * batch), 1), batch - 1)
-        shown = self._with[random.integers(len(self._with), size=count)]
-        if self._chances is None:
-            others = random.integers(len(self._without), size=batch - count)
-        else:
-            others = np.searchsorted(self._chances, random.random(batch - count) * self._chances[-1], side="right")
-            others = np.minimum(others, len(self._without) - 1)
-        chosen = np.concatenate([shown, self._without[others]])
-        return torch.from_numpy(chosen), (torch.arange(batch) < count).float()
+        shown = _drawn(self._with, self._shown_chances, count, random)
+        others = _drawn(self._without, self._chances, batch - count, random)
+        return torch.from_numpy(np.concatenate([shown, others])), (torch.arange(batch) < count).float()
 
     def save(self, path: Path, more: Mapping[str, Any]) -> None:
         """Write the state to resume from, with `more` plain values. Raises InputError if it can't be written."""
@@ -141,6 +142,16 @@ class LookTrainer:
             self.done = int(state["done"])
         except (RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
             raise InputError(f"the state belongs to another training: {one_line(error)}") from error
+
+
+def _drawn(
+    rows: npt.NDArray[np.intp], chances: Floats | None, count: int, random: np.random.Generator
+) -> npt.NDArray[np.intp]:
+    """`count` of n rows, with repetitions. chances (n,): sums of their chances so far; None: all have the same."""
+    if chances is None:
+        return np.asarray(rows[random.integers(len(rows), size=count)])
+    drawn = np.searchsorted(chances, random.random(count) * chances[-1], side="right")
+    return np.asarray(rows[np.minimum(drawn, len(rows) - 1)])
 
 
 def _seed(*parts: int) -> int:

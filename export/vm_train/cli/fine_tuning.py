@@ -1,0 +1,116 @@
+"""vm-train look --boxes: fine-tune the close look of a model file on the user's own frames, or resume that."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from vm_embedded.config.sections import parse_overrides, read_sections
+from vm_embedded.config.toml_writer import to_commented_toml
+from vm_embedded.errors import InputError
+from vm_embedded.network.bundled import model_path
+
+from .box_options import add_box_options, parse_names
+from ..tuning.configuration import TUNING_HEADER, TuningConfiguration
+from .training import EXIT_INTERRUPTED, EXIT_OK, stop_requests
+
+_NAMED = 20
+"""Faults to name."""
+
+
+def tune_config_parser() -> argparse.ArgumentParser:
+    """The parser of vm-train tune-config, which has no options."""
+    return argparse.ArgumentParser(
+        prog="vm-train tune-config",
+        description="Print a tune.toml, the configuration of vm-train look --boxes, with all entries, their meanings, "
+        "units, limits and defaults.",
+    )
+
+
+def print_tune_config(options: argparse.Namespace) -> int:
+    """Print a tune.toml with all defaults."""
+    print(to_commented_toml(TuningConfiguration(), TUNING_HEADER), end="")
+    return EXIT_OK
+
+
+def begin_fine_tuning(options: argparse.Namespace) -> int:
+    """Begin a fine-tuning, train, and return the exit status. Raises VisualMeshError."""
+    from ..tuning.run_folder import begin_tuning
+
+    if options.data is not None or options.glance is not None:
+        what = "DATA" if options.data is not None else "--glance"
+        raise InputError(f"--boxes fine-tunes the close look that {options.model} has: leave out {what}")
+    example = "training.epochs=5"
+    configuration = read_sections(TuningConfiguration, options.config, parse_overrides(options.set, example))
+    names, model = parse_names(options.names), model_path(options.model)
+    run, found = begin_tuning(
+        options.output,
+        options.boxes,
+        names,
+        configuration,
+        model,
+        str(options.model),
+        options.rendered,
+        options.threads or 1,
+    )
+    _complain(found.faults, options.boxes)
+    if options.strict and found.faults:
+        raise InputError("some boxes can't be used, see above: repair them, or leave out --strict to skip them")
+    recordings = len({each.recording for each in run.pictures})
+    count = len(run.split.training), len(run.split.validation)
+    print(
+        f"{options.boxes}: {len(run.pictures)} frames of {recordings} recordings: {count[0]} for training, {count[1]} "
+        "for validation",
+        flush=True,
+    )
+    if not count[1]:
+        print(
+            "vm-train: no recording is small enough to be kept for validation; only rendered patches decide when the "
+            "training ends",
+            file=sys.stderr,
+        )
+    return _fine_tune(run.folder, None, options)
+
+
+def resume_fine_tuning(options: argparse.Namespace) -> int:
+    """Resume a fine-tuning and return the exit status. Raises VisualMeshError."""
+    return _fine_tune(options.run, options.data, options)
+
+
+def _complain(faults: Sequence[str], folder: Path) -> None:
+    for fault in faults[:_NAMED]:
+        print(f"vm-train: {fault}", file=sys.stderr)
+    if len(faults) > _NAMED:
+        more = len(faults) - _NAMED
+        print(f"vm-train: and {more} more; vm-train check {folder} --boxes lists them all", file=sys.stderr)
+
+
+def _fine_tune(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> int:
+    """Train from the last state of a folder on. moved_to: where the frames are now. Returns the exit status.
+
+    Raises KeyboardInterrupt that tells how to continue.
+    """
+    from ..learning.hardware import set_up_hardware
+    from ..learning.run_folder import locked
+    from ..tuning.fine_tuning import fine_tune
+    from ..tuning.run_folder import read_tuning
+
+    run = read_tuning(folder, moved_to)
+    workers = options.workers or len(os.sched_getaffinity(0))
+    try:
+        with locked(folder), set_up_hardware("cpu", workers, options.threads or run.threads) as hardware:
+            if hardware.size > 1:
+                raise InputError("vm-train look runs in one process: start it without torchrun")
+            with stop_requests() as stop_requested:
+                finished = fine_tune(run, workers, stop_requested)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"continue with vm-train resume {folder}") from None
+    if not finished:
+        print(f"vm-train: stopped; continue with vm-train resume {folder}", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    print(f"report: {folder / 'report.html'}")
+    print(f"next: vm-detect --model {run.model_path}")
+    return EXIT_OK

@@ -1,0 +1,66 @@
+"""The network's own candidates in a picture without lens and pose: it looks everywhere, at several sizes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vm_embedded.arrays import Floats
+from vm_embedded.detection.looking import Look, look_at
+from vm_embedded.detection.pyramid import Pyramid
+from vm_embedded.geometry.lens import Size
+
+from .windows import WindowPlaces, Windows, grid_windows
+
+_FACTOR = 1.4
+"""Ratio of two neighboring sizes; a network still knows an object that is 4/3 of the expected size."""
+
+_SMALLEST = 5.0
+"""Smallest radius to look for [px]: smaller windows are many, and show little."""
+
+_UNLIKE = math.log(1.5)
+"""A window is no candidate if the network sees an object there that is larger or smaller by this (logarithm)."""
+
+
+def search_radii(objects: Windows) -> Floats:
+    """Radii (s,) to look for [px]: from small to large ones of the objects, without the outermost 2 %."""
+    low, high = np.percentile(objects.radii, [2.0, 98.0])
+    low = max(float(low), _SMALLEST)
+    high = max(float(high), low)
+    count = 1 + math.ceil(math.log(high / low) / math.log(_FACTOR))
+    return np.geomspace(low, high, count) if count > 1 else np.array([low])
+
+
+def find_candidates(pyramid: Pyramid, size: Size, look: Look, radii: Floats, above: float, most: int) -> Windows:
+    """The windows that look most like an object to a network's first look, best first.
+
+    size: of the frame [px]. radii (s,): to look for [px]. above: lowest probability of a candidate. most: number of
+    candidates. Of candidates that overlap, the better one stays. Raises ModelError if the network does not run.
+    """
+    first = look.glance or look
+    windows = grid_windows(size, radii)
+    answers = first.run(windows.cut(pyramid, first.contract)).astype(np.float64)
+    likely = np.flatnonzero((answers[:, 0] > above) & (np.abs(answers[:, 3]) < _UNLIKE))
+    likely = likely[np.argsort(-answers[likely, 0], kind="stable")]
+    found = windows.part(likely).moved(answers[likely, 1], answers[likely, 2])
+    return _without_overlaps(found, most)
+
+
+def look_at_windows(pyramid: Pyramid, look: Look, windows: Windows) -> tuple[Windows, Floats]:
+    """The windows where the network sees an object after all its looks, and its probabilities (n,)."""
+    places = WindowPlaces(pyramid, windows)
+    answers = look_at(places, look)
+    return places.windows, answers[:, 0].astype(np.float64)
+
+
+def _without_overlaps(windows: Windows, most: int) -> Windows:
+    """The first windows of which none contains the center of an earlier one, and none is contained in this way."""
+    kept = Windows.none()
+    for number in range(len(windows)):
+        each = windows.part(np.array([number]))
+        if each.beside(kept)[0]:
+            kept = Windows.joined(kept, each)
+            if len(kept) == most:
+                break
+    return kept

@@ -1,0 +1,112 @@
+"""Collects patches of boxed frames: beside the boxes, at random places, and at the network's own candidates.
+
+The number of processes does not change the result, nor does an interruption: finished chunks of frames stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from vm_embedded.arrays import Floats
+from vm_embedded.detection.pyramid import Pyramid
+from vm_embedded.network.look_contract import LookContract
+
+from ..boxes.box import BoxedPicture
+from ..boxes.image_facts import read_upright
+from ..look.collection import random_of
+from ..look.labels import UNLABELED
+from ..look.observing import results_of
+from ..look.patch_set import PatchChunk, PatchSet
+from ..look.places import JITTERED, PROPOSED, RANDOM
+from ..look.torch_look import TorchLook
+from .boxed_objects import objects_of
+from .candidates import find_candidates
+from .configuration import WindowSettings
+from .run_folder import TuningRun
+from .stages import network_before
+from .windows import Windows, jittered_windows, random_windows
+
+CHUNK = 20
+"""Frames in a file of patches."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A boxed frame and its position in the run's list."""
+
+    picture: BoxedPicture
+    position: int
+
+
+@dataclass(frozen=True, eq=False)
+class Collector:
+    """Cuts the patches of a frame. contract: of the network that learns from them. radii (s,): of objects [px]."""
+
+    look: TorchLook
+    contract: LookContract
+    settings: WindowSettings
+    radii: Floats
+    object_class: str
+    is_round: bool
+
+    @classmethod
+    def of(cls, run: TuningRun, stage: str) -> Collector:
+        """The collector of a stage. Raises InputError or ModelError."""
+        before = network_before(run, stage)
+        look = TorchLook(before.network, before.contract, TorchLook.of(before.glance))
+        settings = run.configuration.patches
+        return cls(look, before.contract, settings, run.radii, run.object_class, run.is_round)
+
+    def __call__(self, frame: Frame) -> PatchSet:
+        """The patches of a frame. Raises InputError if it can't be read any more."""
+        picture, settings = frame.picture, self.settings
+        pyramid = Pyramid(read_upright(picture.image), "bgr8")
+        objects = objects_of(picture, self.object_class, self.is_round)
+        random = random_of(settings.seed, picture.image.name)
+        parts = {
+            PROPOSED: find_candidates(
+                pyramid, picture.size, self.look, self.radii, settings.above, settings.candidates
+            ),
+            JITTERED: jittered_windows(objects, settings.jittered, settings.jitter, settings.size_jitter, random),
+            RANDOM: random_windows(picture.size, self.radii, settings.random, random),
+        }
+        windows = Windows.joined(*parts.values())
+        kinds = np.repeat(np.array(list(parts), dtype=np.int8), [len(each) for each in parts.values()])
+        found = windows.label(objects)
+        clear = found.labels != UNLABELED
+        return PatchSet(
+            windows.part(clear).cut(pyramid, self.contract),
+            found.labels[clear],
+            found.targets[clear],
+            kinds[clear],
+            np.full(int(clear.sum()), frame.position, dtype=np.int32),
+        )
+
+
+def collect_windows(run: TuningRun, stage: str, workers: int, report: Callable[[int], None]) -> PatchSet:
+    """Collect the patches of all frames for a stage, or read those that are collected.
+
+    workers: processes; 1 uses only this process. report: is called with the number of frames that are done. Raises
+    InputError, and VisualMeshError if a worker was killed.
+    """
+    frames = [Frame(picture, position) for position, picture in enumerate(run.pictures)]
+    groups = [frames[start : start + CHUNK] for start in range(0, len(frames), CHUNK)]
+    paths = [run.folder / "patches" / f"{stage}-{number:05d}.npz" for number in range(len(groups))]
+    missing = [(path, group) for path, group in zip(paths, groups, strict=True) if not path.exists()]
+    remaining = [frame for _, group in missing for frame in group]
+    size, done = network_before(run, stage).contract.size, len(frames) - len(remaining)
+    report(done)
+    with closing(results_of(partial(Collector.of, run, stage), remaining, workers)) as results:
+        for path, group in missing:
+            parts = []
+            for _ in group:
+                parts.append(next(results))
+                done += 1
+                report(done)
+            PatchChunk(PatchSet.joined(size, parts), 0, 0, ()).save(path)
+    return PatchSet.joined(size, [PatchChunk.load(path).patches for path in paths])

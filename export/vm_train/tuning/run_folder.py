@@ -1,0 +1,216 @@
+"""The folder of a fine-tuning: what it was begun with, and what it has produced.
+
+tune.toml: the configuration. run.json: where the boxes are. before.onnx: the model file that it began with.
+rendered.npz: rendered patches. patches/: patches of the user's frames. glance.pt, look.pt: the networks, when they are
+trained. state.pt: the state to resume from. log-glance/, log-look/: the records of each step. model.onnx: the new model
+file. report.html, result.json: what both networks find in the frames for validation.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from vm_embedded import __version__
+from vm_embedded.arrays import Floats
+from vm_embedded.config.sections import read_sections
+from vm_embedded.config.toml_writer import to_commented_toml
+from vm_embedded.errors import InputError
+from vm_embedded.files import atomic_write
+from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.network.look_contract import LookContract
+from vm_embedded.network.model_file import ModelFile, read_model
+from vm_export.look_weights import look_of
+
+from ..boxes.box import BoxedPicture, BoxedSet
+from ..boxes.read import read_boxes
+from ..data.split import Split
+from ..learning.run_folder import check_unused
+from .boxed_objects import all_objects, boxes_sha256, check_boxes, split_by_recording
+from .candidates import search_radii
+from .configuration import TuningConfiguration
+from .rendered_sample import check_rendered, write_rendered_for
+
+KIND = "tuning"
+_FORMAT = 1
+_FILES = (
+    "tune.toml",
+    "before.onnx",
+    "rendered.npz",
+    "patches",
+    "state.pt",
+    "glance.pt",
+    "look.pt",
+    "model.onnx",
+    "report.html",
+    "result.json",
+)
+"""Files that a new fine-tuning would overwrite."""
+
+
+@dataclass(frozen=True)
+class TuningRun:
+    """A fine-tuning as its folder describes it; `begin_tuning` and `read_tuning` make it.
+
+    boxes: folder of the frames. names: for names of classes in the boxes, those of the network. model: the network as
+    the user named it. before: its model file. pictures: the frames with their boxes. split: positions of the frames in
+    `pictures`, as text. threads: number of computing threads; a resumed training takes the same.
+    """
+
+    folder: Path
+    boxes: Path
+    names: Mapping[str, str]
+    model: str
+    before: ModelFile
+    pictures: tuple[BoxedPicture, ...]
+    split: Split
+    configuration: TuningConfiguration
+    threads: int
+
+    @property
+    def state_path(self) -> Path:
+        """File of the state to resume from."""
+        return self.folder / "state.pt"
+
+    @property
+    def rendered_path(self) -> Path:
+        """File of the rendered patches."""
+        return self.folder / "rendered.npz"
+
+    @property
+    def model_path(self) -> Path:
+        """The new model file."""
+        return self.folder / "model.onnx"
+
+    def stage_path(self, stage: str) -> Path:
+        """File of a trained network."""
+        return self.folder / f"{stage}.pt"
+
+    @property
+    def contract(self) -> LookContract:
+        """The contract of the look network that it began with. Raises ModelError if there is none."""
+        return look_of(self.before).contract
+
+    @property
+    def object_class(self) -> str:
+        """The class that the networks judge."""
+        return self.contract.object_class
+
+    @property
+    def is_round(self) -> bool:
+        """Whether the objects look round from everywhere."""
+        return isinstance(self.before.manifest.object_shape, Sphere)
+
+    def part(self, numbers: Sequence[str]) -> list[BoxedPicture]:
+        """The frames with these positions, as text."""
+        return [self.pictures[int(each)] for each in numbers]
+
+    @property
+    def radii(self) -> Floats:
+        """Radii (s,) of objects to look for [px]."""
+        return search_radii(all_objects(self.part(self.split.training), self.object_class, self.is_round))
+
+
+def begin_tuning(
+    folder: Path,
+    boxes: Path,
+    names: Mapping[str, str],
+    configuration: TuningConfiguration,
+    model: Path,
+    name: str,
+    rendered: Path | None = None,
+    threads: int = 1,
+) -> tuple[TuningRun, BoxedSet]:
+    """Write the files of a new fine-tuning, and return it with the boxes that were read.
+
+    model: a model file with a close look; name: as the user named it. rendered: folder of the training of that look;
+    None: the patches of the package. Raises InputError, also if the folder holds a training, and ModelError.
+    """
+    check_unused(folder, _FILES)
+    before = read_model(model)
+    look = look_of(before)
+    found = read_boxes(boxes, names=names)
+    check_boxes(found, look.contract.object_class, str(boxes))
+    check_rendered(look.contract, rendered)
+    split = split_by_recording(found.pictures, configuration.data.validation, configuration.data.split_seed)
+    try:
+        (folder / "patches").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
+    run = TuningRun(folder, boxes.resolve(), dict(names), name, before, found.pictures, split, configuration, threads)
+    check_boxes(
+        BoxedSet(tuple(run.part(split.training)), (), ()), look.contract.object_class, f"{boxes}, part for training,"
+    )
+    with atomic_write(folder / "before.onnx") as part:
+        part.write_bytes(before.content)
+    write_rendered_for(run.rendered_path, rendered)
+    _write(folder / "tune.toml", to_commented_toml(configuration))
+    _write(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
+    return run, found
+
+
+def is_tuning(folder: Path) -> bool:
+    """Whether a folder holds a fine-tuning."""
+    try:
+        content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(content, dict) and content.get("kind") == KIND
+
+
+def read_tuning(folder: Path, moved_to: Path | None = None) -> TuningRun:
+    """The fine-tuning of a folder. moved_to: where its boxes are now. Raises InputError or ModelError."""
+    path = folder / "run.json"
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content["format"] != _FORMAT:
+            raise InputError(f"{path} was written by another release: begin the fine-tuning again")
+        boxes = Path(content["boxes"]) if moved_to is None else moved_to.resolve()
+        names = {str(key): str(value) for key, value in content["names"].items()}
+        model, threads = str(content["model"]), int(content["threads"])
+        digests = str(content["boxes_sha256"]), str(content["configuration_sha256"]), str(content["before_sha256"])
+    except OSError as error:
+        raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{path} is damaged: {error}") from error
+    configuration = read_sections(TuningConfiguration, folder / "tune.toml")
+    pictures = read_boxes(boxes, names=names).pictures
+    split = split_by_recording(pictures, configuration.data.validation, configuration.data.split_seed)
+    before = read_model(folder / "before.onnx")
+    run = TuningRun(folder, boxes, names, model, before, pictures, split, configuration, threads)
+    present = boxes_sha256(pictures), _configuration_sha256(configuration), before.sha256
+    for what, now, then in zip((str(boxes), "tune.toml", "before.onnx"), present, digests, strict=True):
+        if now != then:
+            raise InputError(
+                f"{what} was changed since the fine-tuning began: undo the change, or begin another one in a new folder"
+            )
+    return run
+
+
+def _description(run: TuningRun) -> dict[str, Any]:
+    """The content of run.json."""
+    return {
+        "kind": KIND,
+        "format": _FORMAT,
+        "version": __version__,
+        "boxes": str(run.boxes),
+        "names": dict(run.names),
+        "model": run.model,
+        "threads": run.threads,
+        "boxes_sha256": boxes_sha256(run.pictures),
+        "configuration_sha256": _configuration_sha256(run.configuration),
+        "before_sha256": run.before.sha256,
+    }
+
+
+def _configuration_sha256(configuration: TuningConfiguration) -> str:
+    return hashlib.sha256(json.dumps(asdict(configuration)).encode()).hexdigest()
+
+
+def _write(path: Path, text: str) -> None:
+    with atomic_write(path) as part:
+        part.write_text(text, encoding="utf-8")

@@ -1,0 +1,194 @@
+"""Training of one stage: a network learns from the user's patches and from rendered ones, and the best epoch stays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import torch
+
+from vm_embedded.arrays import Floats
+from vm_embedded.cli.progress import ProgressBar
+from vm_export.look_checkpoint import LookCheckpoint
+from vm_export.look_network import LookNetwork
+
+from ..learning.log import TrainingLog
+from ..learning.trainer import read_state
+from ..look.labels import OBJECT
+from ..look.patch_set import PatchSet
+from ..look.scores import Calibration, logits_of
+from ..look.trainer import LookTrainer
+from .run_folder import TuningRun
+
+_SAVE_INTERVAL = 30.0
+"""Time between two states [s]."""
+
+_RENDERED_VALIDATION = 5
+"""One of so many rendered patches is for validation."""
+
+
+@dataclass(frozen=True, eq=False)
+class StagePatches:
+    """Patches of a stage: the user's own and rendered ones, each for training and for validation."""
+
+    own: PatchSet
+    rendered: PatchSet
+    own_validation: PatchSet
+    rendered_validation: PatchSet
+
+    @classmethod
+    def of(cls, run: TuningRun, own: PatchSet, rendered: PatchSet) -> StagePatches:
+        """Divide patches by the run's split."""
+        validates = np.isin(own.pictures, np.array(run.split.validation, dtype=np.int64))
+        shared = np.arange(len(rendered)) % _RENDERED_VALIDATION == 0
+        return cls(own.part(~validates), rendered.part(~shared), own.part(validates), rendered.part(shared))
+
+    def for_training(self, share: float) -> tuple[PatchSet, Floats]:
+        """All training patches and their weights (n,), so that `share` of those drawn, of each kind, are own ones."""
+        patches = PatchSet.joined(self.own.patches.shape[1], [self.own, self.rendered])
+        weights = np.zeros(len(patches))
+        is_own = np.arange(len(patches)) < len(self.own)
+        for label in np.unique(patches.labels):
+            for mine, part in ((True, share), (False, 1.0 - share)):
+                rows = (patches.labels == label) & (is_own == mine)
+                weights[rows] = part / max(int(rows.sum()), 1)
+        return patches, weights
+
+
+@dataclass
+class StageProgress:
+    """How far a stage is, besides its weights; state.pt keeps these entries.
+
+    validated: number of validated epochs. best: the lowest loss of a validation; best_epoch: its epoch, from 1, or 0.
+    """
+
+    stage: str
+    validated: int = 0
+    best: float = math.inf
+    best_epoch: int = 0
+
+
+def train_stage(
+    run: TuningRun, stage: str, before: LookCheckpoint, patches: StagePatches, stop_requested: Callable[[], bool]
+) -> LookNetwork | None:
+    """Train the network of a stage from `before` on, and calibrate it. Returns None after a stop. Raises InputError."""
+    state = read_state(run.state_path) if run.state_path.exists() else None
+    if state is not None and state["more"]["progress"]["stage"] != stage:
+        state = None  # it is left from a stage that is finished
+    return _Stage(run, stage, before, patches, state).run(stop_requested)
+
+
+class _Stage:
+    """A stage in work, from its last state on."""
+
+    def __init__(
+        self,
+        run: TuningRun,
+        stage: str,
+        before: LookCheckpoint,
+        patches: StagePatches,
+        state: Mapping[str, Any] | None,
+    ) -> None:
+        self._run, self._stage, self._patches = run, stage, patches
+        settings = run.configuration
+        self._recipe = settings.training
+        self._total = self._recipe.epochs * self._recipe.steps
+        training, weights = patches.for_training(self._recipe.own)
+        self._calibration = _calibration(before.network, patches.rendered_validation)
+        network = before.network
+        recipe = self._recipe.for_stage(stage)
+        self._trainer = LookTrainer(
+            network, training, before.contract.extent, recipe, settings.augmentation, self._total, weights
+        )
+        self._progress, self._best = StageProgress(stage), _copy(network)
+        if state is not None:
+            self._trainer.load(state)
+            self._progress = StageProgress(**state["more"]["progress"])
+            self._best = dict(state["more"]["best"])
+        self._bar = ProgressBar(self._total, "vm-train", self._trainer.done)
+        self._saved = perf_counter()
+
+    def run(self, stop_requested: Callable[[], bool]) -> LookNetwork | None:
+        """Train until the end or a stop, and return the calibrated network of the best epoch; None after a stop."""
+        own = self._patches.own
+        print(f"{self._stage}: {len(own)} patches of your frames, {own.objects} of them show the object", flush=True)
+        folder = self._run.folder / f"log-{self._stage}"
+        folder.mkdir(exist_ok=True)
+        with TrainingLog(folder, 1, self._trainer.done, self._progress.validated) as log:
+            while self._progress.validated < self._recipe.epochs and not self._is_late():
+                if not self._train_epoch(log, stop_requested):
+                    return None
+        self._bar.clear()
+        network = self._trainer.network.eval()
+        network.load_state_dict(self._best)
+        after = _calibration(network, self._patches.rendered_validation)
+        # The probability of a rendered patch keeps its meaning: it was calibrated on what is found in whole pictures.
+        scale = after.scale / self._calibration.scale
+        offset = (after.offset - self._calibration.offset) / self._calibration.scale
+        network.calibration.copy_(torch.tensor([scale, offset]))
+        return network
+
+    def _is_late(self) -> bool:
+        """Whether the validation has not become better for too long."""
+        return self._progress.validated - self._progress.best_epoch >= self._recipe.patience
+
+    def _train_epoch(self, log: TrainingLog, stop_requested: Callable[[], bool]) -> bool:
+        """Train the rest of an epoch, and validate. Returns False after a stop."""
+        epoch = self._progress.validated
+        if self._trainer.done == epoch * self._recipe.steps:
+            self._trainer.grade()
+        while self._trainer.done < (epoch + 1) * self._recipe.steps:
+            step = self._trainer.step()
+            losses = {"loss": step.presence + step.place, "presence": step.presence, "place": step.place}
+            log.write(step.number, losses | {"rate": step.rate})
+            self._bar.advance()
+            if stop_requested():
+                self._bar.clear()
+                self._save()
+                return False
+            if perf_counter() - self._saved > _SAVE_INTERVAL:
+                self._save()
+        own, rendered = (self._loss(each) for each in (self._patches.own_validation, self._patches.rendered_validation))
+        loss = rendered if math.isnan(own) else 0.5 * (own + rendered)
+        self._progress.validated += 1
+        if loss < self._progress.best:
+            self._progress.best, self._progress.best_epoch = loss, self._progress.validated
+            self._best = _copy(self._trainer.network)
+        log.write(self._trainer.done, {"epoch": self._progress.validated, "own": own, "rendered": rendered})
+        self._bar.clear()
+        print(
+            f"{self._stage}, epoch {self._progress.validated} of {self._recipe.epochs}: loss {own:.3f} for your frames, "
+            f"{rendered:.3f} for rendered ones",
+            flush=True,
+        )
+        self._save()
+        return True
+
+    def _loss(self, patches: PatchSet) -> float:
+        """Mean cross-entropy of patches with, and of those without an object; NaN if one of them is missing."""
+        self._trainer.network.eval()
+        logits = logits_of(self._trainer.network, patches.patches)[:, 0].astype(np.float64)
+        self._trainer.network.train()
+        shown = patches.labels == OBJECT
+        if not 0 < shown.sum() < len(shown):
+            return math.nan
+        losses = np.logaddexp(0.0, np.where(shown, -logits, logits))
+        return float(0.5 * losses[shown].mean() + 0.5 * losses[~shown].mean())
+
+    def _save(self) -> None:
+        self._trainer.save(self._run.state_path, {"progress": asdict(self._progress), "best": self._best})
+        self._saved = perf_counter()
+
+
+def _calibration(network: LookNetwork, patches: PatchSet) -> Calibration:
+    """The calibration of a network's logits on labeled patches."""
+    logits = logits_of(network.eval(), patches.patches)[:, 0].astype(np.float64)
+    return Calibration.fit(logits, patches.labels == OBJECT)
+
+
+def _copy(network: LookNetwork) -> dict[str, torch.Tensor]:
+    return {name: value.detach().clone() for name, value in network.state_dict().items()}
