@@ -21,7 +21,7 @@ ROOMS = {
     "vm_synth": "__main__ > cli > dataset > render > scene > balls, bodies",
     "vm_mesh": "",
     "vm_label": "",
-    "vm_train": "__main__ > cli > look > evaluation > learning > graphs > formats > boxes, data, scores",
+    "vm_train": "__main__ > cli > tuning > look > evaluation > learning > graphs > formats > boxes, data, scores",
 }
 """The rooms of each package, from top to bottom: a room imports only from itself and from rooms further down. A comma
 separates rooms of the same level, which do not import each other; a plus joins modules that count as one room. A

@@ -13,8 +13,8 @@ from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
 
-from .box_options import add_box_options, parse_names
 from ..tuning.configuration import TUNING_HEADER, TuningConfiguration
+from .box_options import parse_names
 from .training import EXIT_INTERRUPTED, EXIT_OK, stop_requests
 
 _NAMED = 20
@@ -38,20 +38,19 @@ def print_tune_config(options: argparse.Namespace) -> int:
 
 def begin_fine_tuning(options: argparse.Namespace) -> int:
     """Begin a fine-tuning, train, and return the exit status. Raises VisualMeshError."""
-    from ..tuning.run_folder import begin_tuning
+    from ..tuning.run_folder import BoxSource, begin_tuning
 
     if options.data is not None or options.glance is not None:
         what = "DATA" if options.data is not None else "--glance"
         raise InputError(f"--boxes fine-tunes the close look that {options.model} has: leave out {what}")
     example = "training.epochs=5"
     configuration = read_sections(TuningConfiguration, options.config, parse_overrides(options.set, example))
-    names, model = parse_names(options.names), model_path(options.model)
+    source = BoxSource(options.boxes.resolve(), options.format, parse_names(options.names))
     run, found = begin_tuning(
         options.output,
-        options.boxes,
-        names,
+        source,
         configuration,
-        model,
+        model_path(options.model),
         str(options.model),
         options.rendered,
         options.threads or 1,

@@ -17,6 +17,7 @@ from vm_workstation.option_types import at_least
 from ..data.pictures import find_pictures
 from ..data.split import split_by_seed
 from ..look.configuration import LOOK_HEADER, LookConfiguration
+from .box_options import add_box_options
 from .fine_tuning import begin_fine_tuning
 from .training import EXIT_INTERRUPTED, EXIT_OK, stop_requests
 
@@ -26,32 +27,11 @@ def look_parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
         prog="vm-train look",
         description="Train the close look of a mesh network: a small network that judges a patch of the picture at "
-        "each proposal of the mesh network. Or, with --boxes, fine-tune the one that a model file has. You can stop or kill it at any time: vm-train resume continues, and the "
-        "final network is the same as without the stop.",
+        "each proposal of the mesh network. Or, with --boxes, fine-tune the one that a model file has. You can stop or "
+        "kill it at any time: vm-train resume continues, and the final network is the same as without the stop.",
     )
     made.add_argument(
         "data", type=Path, nargs="?", metavar="DATA", help="folder of imageX.jpg or .png, maskX.png, lensX.yaml"
-    )
-    made.add_argument(
-        "--boxes",
-        type=Path,
-        metavar="DIR",
-        help="instead of DATA: fine-tune the close look of MODEL on your own frames with boxes, in YOLO, Pascal VOC or "
-        "COCO format; they need neither lens nor pose",
-    )
-    made.add_argument(
-        "--names",
-        nargs="+",
-        default=[],
-        metavar="CLASS=NAME",
-        help="with --boxes: for classes of the boxes, the network's names, for example 0=ball",
-    )
-    made.add_argument(
-        "--rendered",
-        type=Path,
-        metavar="RUN",
-        help="with --boxes: folder of the vm-train look training that made the close look of MODEL; its patches are "
-        "mixed in, so that nothing is forgotten; default: patches of the package, which show balls",
     )
     made.add_argument(
         "--from",
@@ -90,6 +70,22 @@ def look_parser() -> argparse.ArgumentParser:
         metavar="N",
         help="computing threads; default 1; another number changes the last digits of results",
     )
+    group = made.add_argument_group("fine-tuning", "Instead of DATA: boxes of your own frames, without lens and pose.")
+    group.add_argument(
+        "--boxes",
+        type=Path,
+        metavar="DIR",
+        help="folder of frames with boxes, in YOLO, Pascal VOC or COCO format; the close look that the model file "
+        "MODEL has learns from them",
+    )
+    add_box_options(group)
+    group.add_argument(
+        "--rendered",
+        type=Path,
+        metavar="RUN",
+        help="folder of the vm-train look training that made the close look of MODEL; its patches are mixed in, so "
+        "that the network forgets nothing; default: patches of the package, which show balls",
+    )
     return made
 
 
@@ -115,8 +111,8 @@ def run_look(options: argparse.Namespace) -> int:
         return begin_fine_tuning(options)
     if options.data is None:
         raise InputError("give a folder of rendered pictures, DATA, or one of frames with boxes, --boxes DIR")
-    if options.names or options.rendered:
-        raise InputError("--names and --rendered go with --boxes: leave them out, or give --boxes DIR")
+    if options.names or options.format or options.rendered:
+        raise InputError("--names, --format and --rendered go with --boxes: leave them out, or give --boxes DIR")
     configuration = read_sections(LookConfiguration, options.config, parse_overrides(options.set, "training.epochs=5"))
     model = model_path(options.model)
     numbers = [each.number for each in find_pictures(options.data)]

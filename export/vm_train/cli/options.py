@@ -8,6 +8,7 @@ from pathlib import Path
 from vm_workstation.option_types import at_least
 
 from .check import check_parser
+from .fine_tuning import tune_config_parser
 from .import_pictures import import_parser
 from .look import look_config_parser, look_parser
 from .shards import shards_parser
@@ -18,7 +19,9 @@ DEVICES = ("auto", "cpu", "cuda")
 _EPILOG = """\
 other commands (add --help for their options):
   vm-train look DATA           train the close look of a network: it judges the network's proposals
+  vm-train look --boxes DIR    fine-tune the close look of a model file on your own frames
   vm-train look-config         print a look.toml with all entries and their defaults
+  vm-train tune-config         print a tune.toml, the configuration of a fine-tuning
   vm-train resume RUN          continue a training that was stopped
   vm-train check DATA          count what the pictures show, and list the damaged ones
   vm-train preview DATA        draw augmented pictures with the points of the mesh
@@ -121,6 +124,7 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
         parser(),
         look_parser(),
         look_config_parser(),
+        tune_config_parser(),
         resume_parser(),
         check_parser(),
         preview_parser(),

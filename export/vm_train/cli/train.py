@@ -17,8 +17,8 @@ from ..data.pictures import find_pictures
 from ..learning.configuration import HEADER, TrainConfiguration
 from .check import run_check
 from .check_boxes import refuse_other_options, run_check_boxes
-from .import_pictures import run_import
 from .fine_tuning import print_tune_config, resume_fine_tuning
+from .import_pictures import run_import
 from .look import print_look_config, resume_look, run_look
 from .options import parsers
 from .shards import run_shards

@@ -16,8 +16,8 @@ from vm_export.look_checkpoint import LookCheckpoint
 
 from ..look.patch_set import PatchSet
 from .collection import collect_windows
-from .report import write_report
 from .rendered_patches import read_rendered
+from .report import write_report
 from .run_folder import TuningRun
 from .stage_training import StagePatches, train_stage
 from .stages import LOOK, network_before, stages_of
@@ -59,7 +59,7 @@ def _provenance(run: TuningRun, before: LookCheckpoint, own: PatchSet) -> Mappin
     """Where the network comes from, for its contract."""
     return dict(before.contract.provenance) | {
         "fine_tuned_by": f"vm-train {__version__}",
-        "fine_tuned_on": run.boxes.name,
+        "fine_tuned_on": run.boxes.folder.name,
         "fine_tuned_frames": str(len(run.split.training)),
         "fine_tuned_patches_sha256": own.sha256(),
         "fine_tuned_from_sha256": run.before.sha256,
@@ -91,5 +91,6 @@ def _finish(run: TuningRun, stop_requested: Callable[[], bool]) -> bool:
             json.dumps({"before": before.as_dict(), "after": after.as_dict()}, indent=1) + "\n", encoding="utf-8"
         )
     write_report(run, before, after)
-    print(f"{run.model_path}: in the {len(frames)} frames for validation, it finds {after.found_of()}; before, {before.found_of()}")
+    print(f"{run.model_path}: in {len(frames)} frames for validation, it finds {after.found_of()}")
+    print(f"before the fine-tuning: {before.found_of()}")
     return True

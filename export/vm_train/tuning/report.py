@@ -42,15 +42,15 @@ def _page(run: TuningRun, frames: list[BoxedPicture], before: WindowScores, afte
     name = run.object_class
     recordings = len({each.recording for each in frames})
     about = (
-        f"The close look of {run.model} learned from {len(run.split.training)} frames of {run.boxes.name}. These scores "
-        f"are of {len(frames)} other frames, from {recordings} other recordings."
+        f"The close look of {run.model} learned from {len(run.split.training)} frames of {run.boxes.folder.name}. "
+        f"These scores are of {len(frames)} other frames, from {recordings} other recordings."
     )
-    parts = [f"<h1>{escape(run.boxes.name)}: {escape(name)}</h1>", f"<p>{escape(about)}</p>"]
+    parts = [f"<h1>{escape(run.boxes.folder.name)}: {escape(name)}</h1>", f"<p>{escape(about)}</p>"]
     if not frames:
         parts.append(
             '<p class="note">No recording is small enough to be kept for validation, so nothing was measured.</p>'
         )
-        return html_page(f"vm-train look: {run.boxes.name}", parts)
+        return html_page(f"vm-train look: {run.boxes.folder.name}", parts)
     heading, rows = _table(before, after)
     parts.append(html_table(heading, rows))
     missed = after.boxes.probabilities < REPORTED
@@ -58,13 +58,13 @@ def _page(run: TuningRun, frames: list[BoxedPicture], before: WindowScores, afte
     strips = {
         f"Boxes of {name} that are missed": (after.boxes, missed & ~lost),
         f"Boxes of {name} that only the network before found": (after.boxes, lost),
-        f"Found beside all boxes: false, or without a box": (after.others, after.others.probabilities >= REPORTED),
+        "Found beside all boxes: false, or without a box": (after.others, after.others.probabilities >= REPORTED),
     }
     for title, (looked, chosen) in strips.items():
         if chosen.any():
             parts.append(f"<h2>{escape(title)}: {int(chosen.sum())}</h2>")
             parts.append(html_strip(list(_crops(frames, looked, chosen))))
-    return html_page(f"vm-train look: {run.boxes.name}", parts)
+    return html_page(f"vm-train look: {run.boxes.folder.name}", parts)
 
 
 def _table(before: WindowScores, after: WindowScores) -> tuple[list[str], list[list[str]]]:
@@ -86,9 +86,7 @@ def _table(before: WindowScores, after: WindowScores) -> tuple[list[str], list[l
     return heading, [row("before", before), row("after", after)]
 
 
-def _crops(
-    frames: list[BoxedPicture], looked: Looked, chosen: npt.NDArray[np.bool_]
-) -> Iterator[tuple[bytes, str]]:
+def _crops(frames: list[BoxedPicture], looked: Looked, chosen: npt.NDArray[np.bool_]) -> Iterator[tuple[bytes, str]]:
     """Pictures around windows, the most probable first, and their captions."""
     rows = np.flatnonzero(chosen)
     for row in rows[np.argsort(-looked.probabilities[rows], kind="stable")][:_SHOWN]:

@@ -53,17 +53,29 @@ _FILES = (
 
 
 @dataclass(frozen=True)
+class BoxSource:
+    """A folder of boxes, its format (None: the one that is there), and new names for classes of the boxes."""
+
+    folder: Path
+    format: str | None
+    names: Mapping[str, str]
+
+    def read(self) -> BoxedSet:
+        """The boxes. Raises InputError."""
+        return read_boxes(self.folder, self.format, self.names)
+
+
+@dataclass(frozen=True)
 class TuningRun:
     """A fine-tuning as its folder describes it; `begin_tuning` and `read_tuning` make it.
 
-    boxes: folder of the frames. names: for names of classes in the boxes, those of the network. model: the network as
-    the user named it. before: its model file. pictures: the frames with their boxes. split: positions of the frames in
-    `pictures`, as text. threads: number of computing threads; a resumed training takes the same.
+    boxes: where the frames are. model: the network as the user named it. before: its model file. pictures: the frames
+    with their boxes. split: positions of the frames in `pictures`, as text. threads: number of computing threads; a
+    resumed training takes the same.
     """
 
     folder: Path
-    boxes: Path
-    names: Mapping[str, str]
+    boxes: BoxSource
     model: str
     before: ModelFile
     pictures: tuple[BoxedPicture, ...]
@@ -117,8 +129,7 @@ class TuningRun:
 
 def begin_tuning(
     folder: Path,
-    boxes: Path,
-    names: Mapping[str, str],
+    boxes: BoxSource,
     configuration: TuningConfiguration,
     model: Path,
     name: str,
@@ -133,18 +144,17 @@ def begin_tuning(
     check_unused(folder, _FILES)
     before = read_model(model)
     look = look_of(before)
-    found = read_boxes(boxes, names=names)
-    check_boxes(found, look.contract.object_class, str(boxes))
+    found = boxes.read()
+    check_boxes(found, look.contract.object_class, str(boxes.folder))
     check_rendered(look.contract, rendered)
     split = split_by_recording(found.pictures, configuration.data.validation, configuration.data.split_seed)
     try:
         (folder / "patches").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
-    run = TuningRun(folder, boxes.resolve(), dict(names), name, before, found.pictures, split, configuration, threads)
-    check_boxes(
-        BoxedSet(tuple(run.part(split.training)), (), ()), look.contract.object_class, f"{boxes}, part for training,"
-    )
+    run = TuningRun(folder, boxes, name, before, found.pictures, split, configuration, threads)
+    for_training = BoxedSet(tuple(run.part(split.training)), (), ())
+    check_boxes(for_training, look.contract.object_class, f"{boxes.folder}, part for training,")
     with atomic_write(folder / "before.onnx") as part:
         part.write_bytes(before.content)
     write_rendered_for(run.rendered_path, rendered)
@@ -169,8 +179,8 @@ def read_tuning(folder: Path, moved_to: Path | None = None) -> TuningRun:
         content = json.loads(path.read_text(encoding="utf-8"))
         if content["format"] != _FORMAT:
             raise InputError(f"{path} was written by another release: begin the fine-tuning again")
-        boxes = Path(content["boxes"]) if moved_to is None else moved_to.resolve()
-        names = {str(key): str(value) for key, value in content["names"].items()}
+        box_folder = Path(content["boxes"]) if moved_to is None else moved_to.resolve()
+        boxes = BoxSource(box_folder, content["format_of_boxes"], dict(content["names"]))
         model, threads = str(content["model"]), int(content["threads"])
         digests = str(content["boxes_sha256"]), str(content["configuration_sha256"]), str(content["before_sha256"])
     except OSError as error:
@@ -178,12 +188,12 @@ def read_tuning(folder: Path, moved_to: Path | None = None) -> TuningRun:
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{path} is damaged: {error}") from error
     configuration = read_sections(TuningConfiguration, folder / "tune.toml")
-    pictures = read_boxes(boxes, names=names).pictures
+    pictures = boxes.read().pictures
     split = split_by_recording(pictures, configuration.data.validation, configuration.data.split_seed)
     before = read_model(folder / "before.onnx")
-    run = TuningRun(folder, boxes, names, model, before, pictures, split, configuration, threads)
+    run = TuningRun(folder, boxes, model, before, pictures, split, configuration, threads)
     present = boxes_sha256(pictures), _configuration_sha256(configuration), before.sha256
-    for what, now, then in zip((str(boxes), "tune.toml", "before.onnx"), present, digests, strict=True):
+    for what, now, then in zip((str(boxes.folder), "tune.toml", "before.onnx"), present, digests, strict=True):
         if now != then:
             raise InputError(
                 f"{what} was changed since the fine-tuning began: undo the change, or begin another one in a new folder"
@@ -197,8 +207,9 @@ def _description(run: TuningRun) -> dict[str, Any]:
         "kind": KIND,
         "format": _FORMAT,
         "version": __version__,
-        "boxes": str(run.boxes),
-        "names": dict(run.names),
+        "boxes": str(run.boxes.folder),
+        "format_of_boxes": run.boxes.format,
+        "names": dict(run.boxes.names),
         "model": run.model,
         "threads": run.threads,
         "boxes_sha256": boxes_sha256(run.pictures),

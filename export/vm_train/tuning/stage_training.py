@@ -161,8 +161,8 @@ class _Stage:
         log.write(self._trainer.done, {"epoch": self._progress.validated, "own": own, "rendered": rendered})
         self._bar.clear()
         print(
-            f"{self._stage}, epoch {self._progress.validated} of {self._recipe.epochs}: loss {own:.3f} for your frames, "
-            f"{rendered:.3f} for rendered ones",
+            f"{self._stage}, epoch {self._progress.validated} of {self._recipe.epochs}: loss {own:.3f} for your "
+            f"frames, {rendered:.3f} for rendered ones",
             flush=True,
         )
         self._save()
