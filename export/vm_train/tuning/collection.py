@@ -65,7 +65,7 @@ class Collector:
     def __call__(self, frame: Frame) -> PatchSet:
         """The patches of a frame. Raises InputError if it can't be read any more."""
         picture, settings = frame.picture, self.settings
-        pyramid = Pyramid(read_upright(picture.image), "bgr8")
+        pyramid = Pyramid(read_upright(picture.image), "bgr")
         objects = objects_of(picture, self.object_class, self.is_round)
         random = random_of(settings.seed, picture.image.name)
         parts = {

@@ -17,7 +17,7 @@ from vm_export.look_checkpoint import LookCheckpoint
 from ..look.patch_set import PatchSet
 from .collection import collect_windows
 from .rendered_patches import read_rendered
-from .report import write_report
+from .report import REPORT, write_report
 from .run_folder import TuningRun
 from .stage_training import StagePatches, train_stage
 from .stages import LOOK, network_before, stages_of
@@ -30,11 +30,13 @@ def fine_tune(run: TuningRun, workers: int, stop_requested: Callable[[], bool]) 
     workers: processes that collect patches. The network is the same however often the training was stopped or killed.
     Raises InputError, ModelError and VisualMeshError.
     """
-    own: PatchSet | None = None
+    if (run.folder / REPORT).exists():
+        print(f"{run.model_path}: the fine-tuning was finished already")
+        return True
     for stage in stages_of(run):
         if run.stage_path(stage).exists():
             continue
-        own = _collect(run, stage, workers)
+        own = _collect(run, stage, workers, stop_requested)
         before = network_before(run, stage)
         rendered = read_rendered(run.rendered_path, before.contract.size)
         network = train_stage(run, stage, before, StagePatches.of(run, own, rendered), stop_requested)
@@ -47,10 +49,17 @@ def fine_tune(run: TuningRun, workers: int, stop_requested: Callable[[], bool]) 
     return _finish(run, stop_requested)
 
 
-def _collect(run: TuningRun, stage: str, workers: int) -> PatchSet:
+def _collect(run: TuningRun, stage: str, workers: int, stop_requested: Callable[[], bool]) -> PatchSet:
+    """The patches of a stage. Raises KeyboardInterrupt for a stop: the finished files of patches stay."""
     bar = ProgressBar(len(run.pictures), "vm-train")
+
+    def report(done: int) -> None:
+        bar.show(done)
+        if stop_requested():
+            raise KeyboardInterrupt
+
     try:
-        return collect_windows(run, stage, workers, bar.show)
+        return collect_windows(run, stage, workers, report)
     finally:
         bar.clear()
 

@@ -19,6 +19,9 @@ from ..evaluation.html_page import html_page, html_strip, html_table
 from .run_folder import TuningRun
 from .window_scores import PASSING, REPORTED, Looked, WindowScores
 
+REPORT = "report.html"
+"""Name of the file, the last one that a fine-tuning writes."""
+
 _SHOWN = 24
 """Crops in a strip."""
 
@@ -34,7 +37,7 @@ _COLOR = (60, 60, 230)
 def write_report(run: TuningRun, before: WindowScores, after: WindowScores) -> None:
     """Write report.html of a run. Raises InputError if it can't be written."""
     frames = run.part(run.split.validation)
-    with atomic_write(run.folder / "report.html") as part:
+    with atomic_write(run.folder / REPORT) as part:
         part.write_text(_page(run, frames, before, after), encoding="utf-8")
 
 

@@ -114,7 +114,7 @@ def score_frames(
     for number, frame in enumerate(frames):
         if stop_requested():
             return None
-        pyramid = Pyramid(read_upright(frame.image), "bgr8")
+        pyramid = Pyramid(read_upright(frame.image), "bgr")
         objects = objects_of(frame, object_class, is_round)
         somewhere = random_windows(frame.size, radii, _RANDOM, random_of(0, frame.image.name))
         candidates = find_candidates(pyramid, frame.size, look, radii, _ABOVE, _CANDIDATES)

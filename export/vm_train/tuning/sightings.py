@@ -1,0 +1,42 @@
+"""What a close look sees clearly in boxed frames, wherever it is: to find objects without a box."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from vm_embedded.detection.looking import Look
+from vm_embedded.detection.pyramid import Pyramid
+
+from ..boxes.box import Box, BoxedPicture
+from ..boxes.image_facts import read_upright
+from ..boxes.unlabeled import Sighting
+from .boxed_objects import all_objects
+from .candidates import find_candidates, look_at_windows, search_radii
+
+CLEAR = 0.95
+"""Probability from which a sighting is clear."""
+
+_ABOVE, _CANDIDATES = 0.1, 20
+
+
+def clear_sightings(
+    look: Look, pictures: Sequence[BoxedPicture], is_round: bool, report: Callable[[], None]
+) -> Iterator[Sighting]:
+    """The objects of the look's class that it sees clearly, as large as those that have boxes.
+
+    report: is called after each picture. Raises InputError for an image that can't be read, and ModelError.
+    """
+    name = look.contract.object_class
+    objects = all_objects(pictures, name, is_round)
+    if not len(objects):
+        return
+    radii = search_radii(objects)
+    for picture in pictures:
+        pyramid = Pyramid(read_upright(picture.image), "bgr")
+        candidates = find_candidates(pyramid, picture.size, look, radii, _ABOVE, _CANDIDATES)
+        windows, probabilities = look_at_windows(pyramid, look, candidates)
+        for (x, y), radius, probability in zip(windows.centers, windows.radii, probabilities, strict=True):
+            if probability >= CLEAR:
+                box = Box(name, x - radius, y - radius, x + radius, y + radius)
+                yield Sighting(picture.image, box, float(probability))
+        report()
