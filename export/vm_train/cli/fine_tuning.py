@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from vm_embedded.config.sections import parse_overrides, read_sections
@@ -38,6 +39,31 @@ def print_tune_config(options: argparse.Namespace) -> int:
 
 def begin_fine_tuning(options: argparse.Namespace) -> int:
     """Begin a fine-tuning, train, and return the exit status. Raises VisualMeshError."""
+    with _telling_how_to_continue(options.output):
+        return _begin(options)
+
+
+def resume_fine_tuning(options: argparse.Namespace) -> int:
+    """Resume a fine-tuning and return the exit status. Raises VisualMeshError."""
+    with _telling_how_to_continue(options.run):
+        return _fine_tune(options.run, options.data, options)
+
+
+@contextmanager
+def _telling_how_to_continue(folder: Path) -> Iterator[None]:
+    """Give a KeyboardInterrupt a text with the command, if the folder holds a fine-tuning by then."""
+    from ..tuning.run_folder import is_tuning
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        if is_tuning(folder):
+            raise KeyboardInterrupt(f"continue with vm-train resume {folder}") from None
+        raise
+
+
+def _begin(options: argparse.Namespace) -> int:
+    """Write the folder of a fine-tuning, train, and return the exit status."""
     from ..tuning.run_folder import BoxSource, begin_tuning
 
     if options.data is not None or options.glance is not None:
@@ -74,11 +100,6 @@ def begin_fine_tuning(options: argparse.Namespace) -> int:
     return _fine_tune(run.folder, None, options)
 
 
-def resume_fine_tuning(options: argparse.Namespace) -> int:
-    """Resume a fine-tuning and return the exit status. Raises VisualMeshError."""
-    return _fine_tune(options.run, options.data, options)
-
-
 def _complain(faults: Sequence[str], folder: Path) -> None:
     for fault in faults[:_NAMED]:
         print(f"vm-train: {fault}", file=sys.stderr)
@@ -88,10 +109,7 @@ def _complain(faults: Sequence[str], folder: Path) -> None:
 
 
 def _fine_tune(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> int:
-    """Train from the last state of a folder on. moved_to: where the frames are now. Returns the exit status.
-
-    Raises KeyboardInterrupt that tells how to continue.
-    """
+    """Train from the last state of a folder on. moved_to: where the frames are now. Returns the exit status."""
     from ..learning.hardware import set_up_hardware
     from ..learning.run_folder import locked
     from ..tuning.fine_tuning import fine_tune
@@ -99,14 +117,11 @@ def _fine_tune(folder: Path, moved_to: Path | None, options: argparse.Namespace)
 
     run = read_tuning(folder, moved_to)
     workers = options.workers or len(os.sched_getaffinity(0))
-    try:
-        with locked(folder), set_up_hardware("cpu", workers, options.threads or run.threads) as hardware:
-            if hardware.size > 1:
-                raise InputError("vm-train look runs in one process: start it without torchrun")
-            with stop_requests() as stop_requested:
-                finished = fine_tune(run, workers, stop_requested)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"continue with vm-train resume {folder}") from None
+    with locked(folder), set_up_hardware("cpu", workers, options.threads or run.threads) as hardware:
+        if hardware.size > 1:
+            raise InputError("vm-train look runs in one process: start it without torchrun")
+        with stop_requests() as stop_requested:
+            finished = fine_tune(run, workers, stop_requested)
     if not finished:
         print(f"vm-train: stopped; continue with vm-train resume {folder}", file=sys.stderr)
         return EXIT_INTERRUPTED

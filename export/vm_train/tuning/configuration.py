@@ -65,7 +65,13 @@ class TuningRecipe:
         """The recipe of a trainer: of the glance, or of the look itself."""
         rate = self.glance_rate if stage == "glance" else self.rate
         return LookRecipe(
-            epochs=self.epochs, batch=self.batch, positives=self.positives, rate=rate, decay=self.decay, seed=self.seed
+            epochs=self.epochs,
+            rounds=1,
+            batch=self.batch,
+            positives=self.positives,
+            rate=rate,
+            decay=self.decay,
+            seed=self.seed,
         )
 
 

@@ -6,6 +6,7 @@ patches each, compressed as WebP.
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -45,7 +46,7 @@ def read_rendered(path: Path, size: int) -> PatchSet:
             sheets = [cv2.imdecode(file[f"sheet{number}"], cv2.IMREAD_COLOR) for number in range(_count(len(labels)))]
             targets, kinds = file["targets"].astype(np.float32), file["kinds"]
         patches = np.concatenate([_cut(np.asarray(sheet, dtype=np.uint8), made) for sheet in sheets])[: len(labels)]
-    except (OSError, ValueError, KeyError, EOFError, cv2.error) as error:
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, cv2.error) as error:
         raise InputError(f"can't read {path}: {one_line(error)}") from error
     if size != made:
         method = cv2.INTER_AREA if size < made else cv2.INTER_LINEAR

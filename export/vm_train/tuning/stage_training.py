@@ -1,4 +1,7 @@
-"""Training of one stage: a network learns from the user's patches and from rendered ones, and the best epoch stays."""
+"""Training of one stage: a network learns from the user's patches and from rendered ones, and the best epoch stays.
+
+Patches without an object are drawn by the network's errors, which it learns at the beginning and in the middle.
+"""
 
 from __future__ import annotations
 
@@ -139,7 +142,7 @@ class _Stage:
     def _train_epoch(self, log: TrainingLog, stop_requested: Callable[[], bool]) -> bool:
         """Train the rest of an epoch, and validate. Returns False after a stop."""
         epoch = self._progress.validated
-        if self._trainer.done == epoch * self._recipe.steps:
+        if self._trainer.done == epoch * self._recipe.steps and epoch in (0, self._recipe.epochs // 2):
             self._trainer.grade()
         while self._trainer.done < (epoch + 1) * self._recipe.steps:
             step = self._trainer.step()

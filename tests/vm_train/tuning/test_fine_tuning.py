@@ -1,0 +1,195 @@
+"""vm-train look --boxes as a user types it: real processes that are stopped, killed and resumed."""
+
+import json
+import re
+import shutil
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+
+from tests.vm_train.commands import COMMAND, environment, run
+from vm_embedded.network.bundled import model_path
+from vm_embedded.network.close_look import CloseLook
+from vm_embedded.network.model_file import read_model
+from vm_export.look_weights import look_of
+from vm_train.cli.train import main
+from vm_train.learning.log import read_log
+
+
+@pytest.fixture(scope="module")
+def tune(frames, tiny):
+    """Runs vm-train look --boxes with one worker; more arguments override these."""
+
+    def run_tuning(output, *arguments, **options):
+        given = ["--from", "ball-small", "--names", "0=ball", "--config", tiny, "--workers", 1, *arguments]
+        return run("look", "--boxes", frames, "-o", output, *given, **options)
+
+    return run_tuning
+
+
+@pytest.fixture(scope="module")
+def whole(tune, tmp_path_factory):
+    """A fine-tuning that nobody disturbs."""
+    folder = tmp_path_factory.mktemp("whole") / "run"
+    return folder, tune(folder)
+
+
+def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
+    folder, done = whole
+    lines = done.stdout.splitlines()
+    assert lines[0] == f"{frames}: 12 frames of 3 recordings: 8 for training, 4 for validation"
+    for start, stage in ((1, "glance"), (4, "look")):
+        assert re.fullmatch(rf"{stage}: \d+ patches of your frames, \d+ of them show the object", lines[start])
+        for epoch in (1, 2):
+            assert re.fullmatch(
+                rf"{stage}, epoch {epoch} of 2: loss [\d.]+ for your frames, [\d.]+ for rendered ones",
+                lines[start + epoch],
+            )
+    assert re.search(r"model.onnx: in 4 frames for validation, it finds \d+ of \d+ boxes and \d+ false", lines[7])
+    assert lines[9:] == [f"report: {folder / 'report.html'}", f"next: vm-detect --model {folder / 'model.onnx'}"]
+    assert {path.name for path in folder.iterdir()} == {
+        *("tune.toml", "run.json", "before.onnx", "rendered.npz", "patches", "glance.pt", "look.pt"),
+        *("log-glance", "log-look", "model.onnx", "report.html", "result.json"),
+    }
+    result = json.loads((folder / "result.json").read_text())
+    assert result["before"]["boxes"] == result["after"]["boxes"] > 0
+    page = (folder / "report.html").read_text()
+    assert "8 frames" in page
+    assert "4 other frames" in page
+
+
+def test_the_new_model_differs_only_in_its_close_look(whole):
+    folder, _ = whole
+    before, after = read_model(model_path("ball-small")), read_model(folder / "model.onnx")
+    assert after.manifest.classes == before.manifest.classes
+    assert after.manifest.self_test.as_dict() == before.manifest.self_test.as_dict()
+    assert after.look != before.look
+    assert after.glance != before.glance
+    provenance = after.manifest.look.provenance
+    assert provenance["fine_tuned_frames"] == "8"
+    assert provenance["fine_tuned_from_sha256"] == before.sha256
+    assert provenance["data"] == before.manifest.look.provenance["data"]
+    assert CloseLook.of(after).glance is not None  # loads, and passes its self-tests
+
+
+def test_a_log_has_each_step_once(whole):
+    folder, _ = whole
+    for stage in ("glance", "look"):
+        records = [record for _, record in read_log(folder / f"log-{stage}" / "log.jsonl")]
+        assert [each["step"] for each in records if "loss" in each] == list(range(1, 9))
+        assert [each["epoch"] for each in records if "epoch" in each] == [1, 2]
+
+
+def assert_same(folder, expected):
+    for name in ("model.onnx", "glance.pt", "look.pt", "result.json", "report.html", "log-look/log.jsonl"):
+        assert (folder / name).read_bytes() == (expected / name).read_bytes(), name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("how", "wait"),
+    [
+        (signal.SIGKILL, "log-look/log.jsonl"),
+        pytest.param(signal.SIGINT, "run.json", marks=pytest.mark.long),
+        pytest.param(signal.SIGTERM, "log-glance/log.jsonl", marks=pytest.mark.long),
+        pytest.param(signal.SIGKILL, "patches/glance-00000.npz", marks=pytest.mark.long),
+        pytest.param(signal.SIGTERM, "patches/look-00000.npz", marks=pytest.mark.long),
+        pytest.param(signal.SIGKILL, "model.onnx", marks=pytest.mark.long),
+    ],
+)
+def test_what_is_stopped_at_any_moment_ends_with_the_same_bytes(how, wait, whole, frames, tiny, tmp_path):
+    folder = tmp_path / "run"
+    given = ["--from", "ball-small", "--names", "0=ball", "--config", tiny, "--workers", "1"]
+    process = subprocess.Popen(
+        [*COMMAND, "look", "--boxes", str(frames), "-o", str(folder), *map(str, given)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    deadline = time.monotonic() + 120
+    while not (folder / wait).exists():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    process.send_signal(how)
+    error = process.communicate(timeout=60)[1]
+    assert process.returncode == (-signal.SIGKILL if how == signal.SIGKILL else 130)
+    assert "Traceback" not in error
+    if how != signal.SIGKILL:
+        assert error.endswith(f"vm-train: stopped; continue with vm-train resume {folder}\n")
+    run("resume", folder, "--workers", 2)
+    assert_same(folder, whole[0])
+
+
+def test_a_finished_one_says_so_and_a_begun_one_is_not_begun_again(whole, tune):
+    folder, _ = whole
+    assert "finished already" in run("resume", folder).stdout
+    assert f"vm-train resume {folder}" in tune(folder, code=1).stderr
+
+
+def test_changed_boxes_or_settings_are_refused(whole, frames, tmp_path):
+    folder = shutil.copytree(whole[0], tmp_path / "run")
+    moved = shutil.copytree(frames, tmp_path / "moved")
+    assert "finished already" in run("resume", folder, "--data", moved).stdout
+    next(path for path in sorted(moved.glob("*.txt")) if path.read_text()).write_text("")
+    assert f"{moved} was changed since" in run("resume", folder, "--data", moved, code=1).stderr
+    (folder / "tune.toml").write_text("[training]\nepochs = 3\n")
+    assert "tune.toml was changed since" in run("resume", folder, code=1).stderr
+
+
+@pytest.fixture
+def complaint(frames, tmp_path, capsys):
+    """What vm-train look --boxes says about arguments that it can't use: one line."""
+
+    def complain(*arguments):
+        assert main(["look", "-o", str(tmp_path / "run"), *map(str, arguments)]) == 1
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1
+        return error
+
+    return complain
+
+
+def test_mistakes_are_told_in_one_line(complaint, frames, tmp_path):
+    ball, boxes = ["--from", "ball-small"], ["--boxes", frames]
+    assert "give a folder of rendered pictures, DATA, or" in complaint(*ball)
+    assert "has no box of class ball" in complaint(*ball, *boxes)
+    assert "--names 0=ball" in complaint(*ball, *boxes)
+    assert "leave out DATA" in complaint(frames, *ball, *boxes)
+    assert "leave out --glance" in complaint(*ball, *boxes, "--glance", "x.pt")
+    assert "go with --boxes" in complaint(frames, *ball, "--names", "0=ball")
+    assert "patience" in complaint(*ball, *boxes, "--names", "0=ball", "--set", "training.patiense=3")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_class_without_rendered_patches_needs_a_run(whole, tmp_path, complaint, frames):
+    shown = look_of(read_model(model_path("ball-small")))
+    assert shown.contract.object_class == "ball"
+    assert "holds no training" in complaint(
+        "--from", "ball-small", "--boxes", frames, "--names", "0=ball", "--rendered", tmp_path
+    )
+
+
+def test_tune_config_prints_what_config_reads(tmp_path, tune):
+    text = run("tune-config").stdout
+    assert "[training]" in text
+    path = tmp_path / "tune.toml"
+    path.write_text(text.replace("epochs = 8", "epochs = 0"))
+    assert "epochs must be" in tune(tmp_path / "run", "--config", path, code=1).stderr
+
+
+def test_weights_of_a_file_written_again_are_the_same(whole):
+    """Reading a look network back from a model file and writing it again loses nothing."""
+    again = look_of(read_model(whole[0] / "model.onnx"))
+    patches = np.random.default_rng(0).integers(0, 256, (5, again.contract.size, again.contract.size, 3), np.uint8)
+    look = CloseLook.of(read_model(whole[0] / "model.onnx"))
+    import torch
+
+    with torch.inference_mode():
+        np.testing.assert_allclose(again.network(torch.from_numpy(patches)).numpy(), look.run(patches), atol=1e-5)
