@@ -61,7 +61,7 @@ def test_many_small_recordings_give_about_the_share_that_was_asked_for():
 
 def test_a_class_without_boxes_tells_which_there_are():
     boxes = BoxedSet((BoxedPicture(Path("x.jpg"), SIZE, (Box("0", 1, 2, 3, 4),), "a"),), (), ("0",))
-    with pytest.raises(InputError, match="DIR has no box of class ball.*it has 0 \\(1\\).*--names 0=ball"):
+    with pytest.raises(InputError, match=r"DIR has no box of class ball.*it has 0 \(1\).*--names 0=ball"):
         check_boxes(boxes, "ball", "DIR")
     with pytest.raises(InputError, match="no picture of DIR can be used"):
         check_boxes(BoxedSet((), (), ()), "ball", "DIR")
