@@ -1,17 +1,19 @@
 """vm-train check --boxes, as a user types it."""
 
 import json
+import re
 
 import cv2
 import pytest
 
+from tests.rooms import CHECKOUT
 from vm_embedded.errors import InputError
 from vm_train.boxes.read import read_boxes
 from vm_train.boxes.summary import name_faults
 from vm_train.cli.box_options import parse_names
 
 from ..boxes.written import WRITERS, write_voc, write_yolo
-from ..commands import run
+from ..commands import run, run_module
 
 PICTURES = {
     "cam0_0001": [("fußball", 20.0, 30.0, 40.0, 50.0), ("robot", 100.0, 10.0, 110.0, 90.0)],
@@ -98,3 +100,20 @@ def test_names_are_pairs():
     assert parse_names(["0=ball", "a=b=ball", "0=ball"]) == {"0": "ball", "a=b": "ball"}
     with pytest.raises(InputError, match="renames '0' to both 'ball' and 'cup'"):
         parse_names(["0=ball", "0=cup"])
+
+
+def test_a_clear_ball_without_a_box_is_told(tmp_path):
+    """Pictures of the demo with boxes of what the detector found, except one."""
+    saved, demo = tmp_path / "saved", CHECKOUT / "tests" / "fixtures" / "demo"
+    run_module("vm_embedded.cli.detect", "--camera", demo, "--save-boxes", saved)
+    clearest = max(
+        (line for line in map(json.loads, (saved / "candidates.jsonl").read_text().splitlines()) if line["found"]),
+        key=lambda line: line["confidence"],
+    )
+    start = f"vm-train: {clearest['image']}: probably an unlabeled ball at "
+    assert start not in run("check", saved, "--boxes", code=1).stderr  # it sees another one in one of the pictures
+    (saved / clearest["image"]).with_suffix(".txt").write_text("")
+    told = [line for line in run("check", saved, "--boxes", code=1).stderr.splitlines() if line.startswith(start)]
+    assert len(told) == 1
+    assert re.search(r"\(probability 0\.9\d+\)$", told[0])
+    assert run("check", saved, "--boxes", "--no-look").stderr == ""
