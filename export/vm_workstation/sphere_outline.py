@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from vm_embedded.arrays import Floats
@@ -27,18 +25,23 @@ def sphere_outline(
     too.
     """
     toward = (center - np.array([0.0, 0.0, orientation.height])) @ orientation.rotation
-    distance = float(np.linalg.norm(toward))
-    axis = toward / distance
-    side = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
-    side /= np.linalg.norm(side)
-    turn = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)[:, None]
-    around = np.cos(turn) * side + np.sin(turn) * np.cross(axis, side)
-    sine = min(radius / distance, 1.0)  # of the angle between the axis and the rays that touch the sphere
-    rays = math.sqrt(1.0 - sine * sine) * axis + sine * around
+    rays = touching_rays(toward[None], np.array([radius]), corners)[0]
     pixels = lens.project(rays, size)
     if not unseen:
         pixels[~lens.sees(rays)] = np.nan
     return pixels
+
+
+def touching_rays(toward: Floats, radii: Floats, corners: int) -> Floats:
+    """Unit rays (m, corners, 3) that touch spheres at `toward` (m, 3) from the camera, with `radii` (m,), both [m]."""
+    distance = np.linalg.norm(toward, axis=1, keepdims=True)
+    axis = toward / distance
+    side = np.cross(axis, np.where(np.abs(axis[:, 2:]) < 0.9, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]))
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    turn = np.linspace(0.0, 2.0 * np.pi, corners, endpoint=False)[:, None]
+    around = np.cos(turn) * side[:, None] + np.sin(turn) * np.cross(axis, side)[:, None]
+    sine = np.minimum(radii[:, None] / distance, 1.0)[:, None]  # of the angle between the axis and the rays
+    return np.asarray(np.sqrt(1.0 - sine * sine) * axis[:, None] + sine * around)
 
 
 def polygon_area(pixels: Floats) -> float:

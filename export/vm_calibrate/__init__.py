@@ -1,0 +1,1 @@
+"""The program vm-calibrate, which estimates lens and pose of a camera."""

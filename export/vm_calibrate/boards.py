@@ -1,0 +1,149 @@
+"""Chessboards and ChArUco boards, and how to find their corners in a picture."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+
+from vm_embedded.arrays import Floats, Image
+from vm_embedded.errors import InputError, unknown
+
+FEWEST_CORNERS = 8
+"""Fewest corners of a ChArUco board that count as found: its pose has six numbers, from two for each corner."""
+
+_FIND = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
+
+
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """Corners of a board in a picture: places on the board (n, 2) [m] and pixels (n, 2)."""
+
+    places: Floats
+    pixels: Floats
+
+
+@dataclass(frozen=True)
+class Chessboard:
+    """A chessboard. columns, rows: number of inner corners, at least 3 each. square: length of a square's side [m]."""
+
+    columns: int
+    rows: int
+    square: float
+
+    def find(self, gray: Image) -> Corners | None:
+        """The corners in a gray picture, or None if not all are visible."""
+        found, pixels = cv2.findChessboardCornersSB(gray, (self.columns, self.rows), flags=_FIND)
+        if not found:
+            return None
+        places = np.array([(x, y) for y in range(self.rows) for x in range(self.columns)]) * self.square
+        return Corners(places, _refined(gray, pixels))
+
+    def other_size(self, gray: Image) -> str | None:
+        """The number of inner corners of a board of another size in a picture, as in 9x6, or None."""
+        flags = _FIND | cv2.CALIB_CB_LARGER
+        found, _, marks = cv2.findChessboardCornersSBWithMeta(gray, (3, 3), flags)
+        size = None if not found or marks is None else (marks.shape[1], marks.shape[0])
+        return None if size in (None, (self.columns, self.rows), (self.rows, self.columns)) else f"{size[0]}x{size[1]}"
+
+
+@dataclass(frozen=True)
+class CharucoBoard:
+    """A chessboard with markers in its white squares.
+
+    columns, rows: number of squares, at least 3 each. square, marker: lengths of their sides [m]. dictionary: name of
+    the markers, as in 4X4_50. legacy: printed by an OpenCV before 4.6, which began even numbers of rows differently.
+    """
+
+    columns: int
+    rows: int
+    square: float
+    marker: float
+    dictionary: str
+    legacy: bool = False
+
+    @cached_property
+    def _board(self) -> cv2.aruco.CharucoBoard:
+        markers = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{self.dictionary}"))
+        board = cv2.aruco.CharucoBoard((self.columns, self.rows), self.square, self.marker, markers)
+        board.setLegacyPattern(self.legacy)
+        return board
+
+    @cached_property
+    def _detector(self) -> cv2.aruco.CharucoDetector:
+        return cv2.aruco.CharucoDetector(self._board)
+
+    def find(self, gray: Image) -> Corners | None:
+        """The visible corners in a gray picture, or None if they are too few."""
+        pixels, numbers, _, _ = self._detector.detectBoard(gray)
+        if numbers is None or len(numbers) < FEWEST_CORNERS:
+            return None
+        places = np.asarray(self._board.getChessboardCorners(), dtype=np.float64)[numbers.ravel(), :2]
+        if np.linalg.matrix_rank(places - places.mean(axis=0), tol=0.1 * self.square) < 2:
+            return None  # corners in one line do not determine a pose
+        return Corners(places, _refined(gray, pixels))
+
+    def other_size(self, gray: Image) -> str | None:
+        """What the markers of a picture say about a wrong option, or None without any marker."""
+        _, _, _, markers = self._detector.detectBoard(gray)
+        return None if markers is None or not len(markers) else f"{len(markers)} markers"
+
+
+Board = Chessboard | CharucoBoard
+
+
+def board_from(
+    size: str, square: float, dictionary: str | None = None, marker: float | None = None, legacy: bool = False
+) -> Board:
+    """The board of the options --board, --square, --charuco, --marker and --legacy. Raises InputError for wrong ones."""
+    sides = re.fullmatch(r"(\d{1,3})x(\d{1,3})", size)
+    if sides is None or min(columns := int(sides[1]), rows := int(sides[2])) < 3:
+        raise InputError(f"--board must be COLUMNSxROWS of at least 3 each, as in 9x6, not {size!r}")
+    _check_length("--square", square)
+    if dictionary is None:
+        if marker is not None or legacy:
+            raise InputError("--marker and --legacy belong to a ChArUco board; give --charuco too")
+        return Chessboard(columns, rows, square)
+    name = dictionary.upper().removeprefix("DICT_")
+    if name not in DICTIONARIES:
+        raise InputError(unknown("--charuco dictionary", dictionary, DICTIONARIES))
+    if marker is None:
+        raise InputError("a ChArUco board needs --marker, the length of a marker's side [m]")
+    _check_length("--marker", marker)
+    if marker >= square:
+        raise InputError(f"--marker {marker:g} must be below --square {square:g}: markers lie inside of squares")
+    board = CharucoBoard(columns, rows, square, marker, name, legacy)
+    needed, held = (columns * rows) // 2, len(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{name}")).bytesList)
+    if needed > held:
+        raise InputError(f"a board of {size} squares needs {needed} markers, but {name} has {held}")
+    return board
+
+
+DICTIONARIES = tuple(
+    sorted(name.removeprefix("DICT_") for name in dir(cv2.aruco) if name.startswith("DICT_") and name == name.upper())
+)
+"""Names of the marker dictionaries of OpenCV."""
+
+
+def _refined(gray: Image, corners: Floats) -> Floats:
+    """Pixels (n, 2) of corners, moved to where the edges around them cross.
+
+    The detectors fit straight edges over whole squares, which is wrong by up to a pixel for wide lenses.
+    """
+    pixels = corners.reshape(-1, 2).astype(np.float64)
+    apart = np.linalg.norm(pixels[:, None] - pixels, axis=2)
+    spacing = float(apart[apart > 0.0].min())
+    window = int(np.clip(0.3 * spacing, 2, 6))
+    stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-3)
+    start = pixels.astype(np.float32).reshape(-1, 1, 2)
+    found = cv2.cornerSubPix(gray, start, (window, window), (-1, -1), stop).reshape(-1, 2)
+    near = np.linalg.norm(found - pixels, axis=1) < 0.2 * spacing
+    return np.where(near[:, None], found, pixels).astype(np.float64)
+
+
+def _check_length(name: str, value: float) -> None:
+    if not 0.0 < value < 100.0:
+        raise InputError(f"{name} must be a length above 0 m, as in 0.03, not {value:g}")

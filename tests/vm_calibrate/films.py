@@ -1,0 +1,94 @@
+"""Pictures of boards, drawn by following each pixel's ray through a lens to the board."""
+
+import cv2
+import numpy as np
+
+from tests.vm_embedded.strategies import rotation
+from vm_calibrate.boards import board_from
+from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA
+
+SIZE = (640, 480)
+SQUARE = 0.04
+COLUMNS, ROWS = 8, 5
+PER_SQUARE = 40
+"""Texture pixels for each square."""
+
+
+def chessboard_texture():
+    """A chessboard with white margins of one square; (rows + 3, columns + 3) squares in texture pixels."""
+    squares = np.add.outer(np.arange(ROWS + 1), np.arange(COLUMNS + 1)) % 2 * 255
+    return _with_margin(np.kron(squares, np.ones((PER_SQUARE, PER_SQUARE))))
+
+
+def charuco(legacy=False):
+    return board_from("9x6", SQUARE, "4X4_50", 0.75 * SQUARE, legacy)
+
+
+def charuco_texture(legacy=False):
+    """A ChArUco board of 9x6 squares with the same outline and corners as the chessboard."""
+    return _with_margin(charuco(legacy)._board.generateImage((9 * PER_SQUARE, 6 * PER_SQUARE)).astype(np.float64))
+
+
+def _with_margin(texture):
+    return np.pad(texture, PER_SQUARE, constant_values=255).astype(np.float32)
+
+
+class Film:
+    """A camera with a lens. Each pixel is the mean of two by two rays."""
+
+    def __init__(self, lens, seed=0):
+        self.lens = lens
+        self.random = np.random.default_rng(seed)
+        x, y = ((np.arange(2 * n) - 0.5) / 2.0 for n in SIZE)
+        pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+        rays = lens.unproject(pixels, SIZE)
+        rays[~(np.isfinite(rays).all(axis=1) & lens.sees(rays))] = 0.0
+        self.rays = rays.astype(np.float32)
+
+    def picture(self, turn, place, texture, blur=0.6, noise=2.0):
+        """A gray picture of a board whose frame has rotation `turn` (3, 3) and origin `place` (3,) for the camera.
+
+        The board's frame begins at its first inner corner, as that of the detectors.
+        """
+        turn, place = np.float32(turn), np.float32(place)
+        across = self.rays @ turn  # components along the board's axes
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = (turn[:, 2] @ place) / across[:, 2]
+            hits = (across[:, :2] * distance[:, None] - turn[:, :2].T @ place) / SQUARE
+        hits[~(distance > 0)] = -100.0
+        u, v = ((np.nan_to_num(hits, nan=-100.0) + 2.0) * PER_SQUARE - 0.5).T
+        shape = (2 * SIZE[1], 2 * SIZE[0])
+        seen = cv2.remap(
+            texture,
+            np.clip(u, -9, 3e4).reshape(shape).astype(np.float32),
+            np.clip(v, -9, 3e4).reshape(shape).astype(np.float32),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=110,
+        )
+        image = cv2.resize(cv2.GaussianBlur(seen, None, 2.0 * blur), SIZE, interpolation=cv2.INTER_AREA)
+        image = 20.0 + 0.8 * image + self.random.normal(0.0, noise, image.shape)
+        return np.clip(image, 0, 255).astype(np.uint8)
+
+    def pictures(self, count, texture):
+        """Pictures of a board held towards the camera, all over the picture, at several distances and tilts."""
+        width, height = SIZE
+        cells = [(x, y) for y in (0.25, 0.5, 0.75) for x in (0.2, 0.35, 0.5, 0.65, 0.8)]
+        made = []
+        for index in range(count):
+            pixel = np.array(cells[index % len(cells)]) * (width, height) + self.random.uniform(-20, 20, 2)
+            ray = self.lens.unproject(pixel[None], SIZE)[0]
+            made.append(self.picture(*self.facing(ray), texture))
+        return made
+
+    def facing(self, ray):
+        """A pose of a board in the direction of a ray, turned towards the camera and then tilted at random."""
+        axis = np.cross([1.0, 0.0, 0.0], ray)
+        sine = np.linalg.norm(axis)
+        toward = rotation(axis / max(sine, 1e-9) * np.arctan2(sine, ray[0])) @ OPTICAL_TO_CAMERA
+        tilt = rotation(self.random.uniform(-1.0, 1.0, 3) * (0.7, 0.7, 0.5))
+        turn = toward @ tilt
+        middle = turn @ np.array([(COLUMNS - 1) / 2.0, (ROWS - 1) / 2.0, 0.0]) * SQUARE
+        share = self.random.uniform(0.22, 0.4)  # of the picture's width
+        distance = COLUMNS * SQUARE * self.lens.scale / (share * SIZE[0])
+        return turn, distance * ray - middle
