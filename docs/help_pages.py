@@ -15,6 +15,7 @@ from pathlib import Path
 
 import api_page
 
+from vm_calibrate import cli as calibrate
 from vm_embedded.cli import bench, detect, doctor
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.live import configuration as detection
@@ -47,7 +48,8 @@ def pages() -> dict[Path, str]:
 def parsers() -> dict[str, argparse.ArgumentParser]:
     """All programs, and commands of programs ("vm-train check"), with their parsers, in the order of the page."""
     robot = (detect.parser(), doctor.parser(), bench.parser(), export.parser())
-    workstation = (each for program in (synth, train, evaluate, mesh) for each in program.parsers().values())
+    programs = (calibrate, synth, train, evaluate, mesh)
+    workstation = (each for program in programs for each in program.parsers().values())
     return {each.prog: each for each in (*robot, *workstation, label.parser())}
 
 

@@ -16,6 +16,7 @@ def test_package_data_and_scripts_are_declared():
         "vm-evaluate",
         "vm-mesh",
         "vm-label",
+        "vm-calibrate",
     }
     assert [each.split(">")[0] for each in project["dependencies"]] == [
         "numpy",

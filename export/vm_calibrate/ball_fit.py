@@ -82,9 +82,7 @@ class _Problem:
     def solve(self) -> SharedFit:
         """The best pose, from several starts: balls in one line or at one distance have more than one minimum."""
         own = np.zeros((len(self.radii), 2))
-        fits = [
-            fit_shared(self._residuals, self.groups, start, own, _OUTLIER, _ASSUMED) for start in self._starts()
-        ]
+        fits = [fit_shared(self._residuals, self.groups, start, own, _OUTLIER, _ASSUMED) for start in self._starts()]
         return min(fits, key=lambda fit: float(np.sqrt(1.0 + fit.residuals**2).sum()))
 
     def advice(self, fit: SharedFit) -> str:

@@ -69,7 +69,9 @@ def read_balls(path: Path, radius: float | None, label: str | None, size: Size |
         balls, size = _read_yolo(path, radius, label)
     else:
         if size is None:
-            raise InputError("the lens file does not have the size of its pictures; add an entry `size: [width, height]`")
+            raise InputError(
+                "the lens file does not have the size of its pictures; add an entry `size: [width, height]`"
+            )
         balls = _read_json(path, radius)
     if not balls:
         raise InputError(f"{path} has no balls" + (f" of class {label}" if label is not None else ""))
@@ -161,7 +163,7 @@ def _yolo_lines(path: Path) -> list[tuple[int, tuple[str, Floats]]]:
         except ValueError as error:
             raise InputError(f"{path}:{number} must be `class x y width height`, not {line[:60]!r}") from error
         box = np.array([x - width / 2.0, y - height / 2.0, x + width / 2.0, y + height / 2.0])
-        if not (np.isfinite(box).all() and width > 0.0 and height > 0.0 and -0.1 < box.min() and box.max() < 1.1):
+        if not (np.isfinite(box).all() and width > 0.0 and height > 0.0 and box.min() > -0.1 and box.max() < 1.1):
             raise InputError(f"{path}:{number} has a box that is empty or outside of the picture: {line[:60]!r}")
         found.append((number, (name, box)))
     return found

@@ -57,23 +57,27 @@ class _Problem:
     def solve(self) -> SharedFit:
         """The best pose, from the mean of those that each board alone gives."""
         poses = [self._alone(each) for each in self.sightings]
+        # Detectors count rows downwards, so that a board is mirrored if its first axis runs right and its third up.
+        sides = np.array([-np.sign(shift @ rotation[:, 2]) for rotation, shift in poses])
+        poses = [(rotation * (1.0, 1.0, side), shift) for (rotation, shift), side in zip(poses, sides, strict=True)]
+        self.places = self.places * np.column_stack([np.ones(len(self.frame)), sides[self.frame]])
         normal = np.sum([rotation[:, 2] for rotation, _ in poses], axis=0)
         normal /= np.linalg.norm(normal)
         height = float(np.median([-shift @ normal for _, shift in poses])) + self.thickness
         if height <= 0.0:
-            raise InputError("the board is not on a floor below the camera; the camera must see its printed side from above")
+            raise InputError(
+                "the board is not on a floor below the camera; the camera must see its printed side from above"
+            )
         shared = numbers_of(normal, height)
         own = np.stack([self._place(shared, rotation, shift) for rotation, shift in poses])
         return fit_shared(self._residuals, np.repeat(self.frame, 2), shared, own, _OUTLIER)
 
     def _alone(self, sighting: Sighting) -> tuple[Floats, Floats]:
-        """Rotation and translation of a board, whose third axis points to the side of the camera."""
+        """Rotation and translation from a board to the camera."""
         try:
-            rays = self.lens.unproject(sighting.corners.pixels, self.size)
-            rotation, shift = first_pose(sighting.corners.places, rays)
+            return first_pose(sighting.corners.places, self.lens.unproject(sighting.corners.pixels, self.size))
         except InputError as error:
             raise InputError(f"{sighting.name}: {error}; does the lens file belong to this camera?") from error
-        return (rotation if shift @ rotation[:, 2] < 0.0 else rotation * (1.0, 1.0, -1.0)), shift
 
     def _place(self, shared: Floats, rotation: Floats, shift: Floats) -> Floats:
         """Place on the floor, in camera heights, and heading of a board (3,) [rad], for a camera pose."""
@@ -85,8 +89,7 @@ class _Problem:
         orientation = orientation_of(shared)
         own = own[self.frame]
         cosine, sine = np.cos(own[:, 2]), np.sin(own[:, 2])
-        # A detector counts rows downwards in the picture, so a board seen from above is mirrored on the floor.
-        x, y = self.places[:, 0], -self.places[:, 1]
+        x, y = self.places.T
         corners = np.column_stack(
             [
                 own[:, 0] * orientation.height + cosine * x - sine * y,

@@ -40,14 +40,17 @@ class Chessboard:
         if not found:
             return None
         places = np.array([(x, y) for y in range(self.rows) for x in range(self.columns)]) * self.square
-        return Corners(places, _refined(gray, pixels))
+        return Corners(places, _refined(gray, pixels.reshape(-1, 2).astype(np.float64)))
 
     def other_size(self, gray: Image) -> str | None:
-        """The number of inner corners of a board of another size in a picture, as in 9x6, or None."""
-        flags = _FIND | cv2.CALIB_CB_LARGER
-        found, _, marks = cv2.findChessboardCornersSBWithMeta(gray, (3, 3), flags)
-        size = None if not found or marks is None else (marks.shape[1], marks.shape[0])
-        return None if size in (None, (self.columns, self.rows), (self.rows, self.columns)) else f"{size[0]}x{size[1]}"
+        """The number of inner corners of a board of another size in a picture, as in 9x6, or None.
+
+        A board with less than half of the corners is not another board, but the visible part of the right one.
+        """
+        found, _, marks = cv2.findChessboardCornersSBWithMeta(gray, (3, 3), _FIND | cv2.CALIB_CB_LARGER)
+        rows, columns = marks.shape[:2] if found and marks is not None else (0, 0)
+        same = {columns, rows} == {self.columns, self.rows}
+        return None if same or 2 * columns * rows < self.columns * self.rows else f"{columns}x{rows}"
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ class CharucoBoard:
         places = np.asarray(self._board.getChessboardCorners(), dtype=np.float64)[numbers.ravel(), :2]
         if np.linalg.matrix_rank(places - places.mean(axis=0), tol=0.1 * self.square) < 2:
             return None  # corners in one line do not determine a pose
-        return Corners(places, _refined(gray, pixels))
+        return Corners(places, _refined(gray, pixels.reshape(-1, 2).astype(np.float64)))
 
     def other_size(self, gray: Image) -> str | None:
         """What the markers of a picture say about a wrong option, or None without any marker."""
@@ -98,7 +101,7 @@ Board = Chessboard | CharucoBoard
 def board_from(
     size: str, square: float, dictionary: str | None = None, marker: float | None = None, legacy: bool = False
 ) -> Board:
-    """The board of the options --board, --square, --charuco, --marker and --legacy. Raises InputError for wrong ones."""
+    """The board of the options --board, --square, --charuco, --marker and --legacy. Raises InputError."""
     sides = re.fullmatch(r"(\d{1,3})x(\d{1,3})", size)
     if sides is None or min(columns := int(sides[1]), rows := int(sides[2])) < 3:
         raise InputError(f"--board must be COLUMNSxROWS of at least 3 each, as in 9x6, not {size!r}")
@@ -116,7 +119,10 @@ def board_from(
     if marker >= square:
         raise InputError(f"--marker {marker:g} must be below --square {square:g}: markers lie inside of squares")
     board = CharucoBoard(columns, rows, square, marker, name, legacy)
-    needed, held = (columns * rows) // 2, len(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{name}")).bytesList)
+    needed, held = (
+        (columns * rows) // 2,
+        len(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{name}")).bytesList),
+    )
     if needed > held:
         raise InputError(f"a board of {size} squares needs {needed} markers, but {name} has {held}")
     return board
@@ -128,12 +134,11 @@ DICTIONARIES = tuple(
 """Names of the marker dictionaries of OpenCV."""
 
 
-def _refined(gray: Image, corners: Floats) -> Floats:
+def _refined(gray: Image, pixels: Floats) -> Floats:
     """Pixels (n, 2) of corners, moved to where the edges around them cross.
 
     The detectors fit straight edges over whole squares, which is wrong by up to a pixel for wide lenses.
     """
-    pixels = corners.reshape(-1, 2).astype(np.float64)
     apart = np.linalg.norm(pixels[:, None] - pixels, axis=2)
     spacing = float(apart[apart > 0.0].min())
     window = int(np.clip(0.3 * spacing, 2, 6))

@@ -18,8 +18,8 @@ class PoseFit:
     """A fitted pose.
 
     orientation: of the camera. height [m], pitch and roll [rad]: standard deviations. error: RMS residual [px].
-    residuals: RMS residual of each measured thing that was used, by name [px]. left_out: things that were not used, with
-    the reason. warnings: what the measurements do not determine well.
+    residuals: RMS residual of each ball or frame that was used, by name [px]. left_out: balls or frames that were not
+    used, with the reason. warnings: what the measurements do not determine well.
     """
 
     orientation: Orientation

@@ -77,7 +77,7 @@ def find_boards(source: str, board: Board) -> Search:
 
 
 def choose(search: Search, most: int) -> list[Sighting]:
-    """At most `most` sharp sightings whose boards differ in place, size and tilt; the others are counted as left out."""
+    """At most `most` sharp sightings, whose boards differ in place, size and tilt; counts the others as left out."""
     limit = _BLUR * float(np.median([each.blur for each in search.sightings]))
     sharp = [each for each in search.sightings if each.blur <= limit]
     search.left_out["blurred"] += len(search.sightings) - len(sharp)
@@ -95,7 +95,7 @@ def _sharp_frames(source: str) -> Iterator[tuple[str, Image]]:
     """Names and images of a source; of a long one the sharpest frame out of each of SEARCHED parts."""
     opened = open_source(source)
     if opened.count is None:
-        raise InputError(f"the number of frames of {source} is unknown; record a video file, or give a folder of pictures")
+        raise InputError(f"the number of frames of {source} is unknown; give a video file or a folder of pictures")
     length = -(-opened.count // SEARCHED)
     progress = ProgressBar(opened.count, "vm-calibrate")
     best: tuple[float, str, Image] | None = None
@@ -156,13 +156,15 @@ def _nothing_found(source: str, board: Board, count: int, sharpest: Image) -> st
                 f"{where} shows a ChArUco board of {board.columns}x{board.rows} squares, but {other} of "
                 f"{board.dictionary} are visible; check --board, which counts squares, and try --legacy"
             )
-        return f"{where} shows a marker of {board.dictionary}; check --charuco, light, and that markers are large enough"
+        return (
+            f"{where} shows a marker of {board.dictionary}; check --charuco, light, and that markers are large enough"
+        )
     if other is not None:
         return (
             f"{where} shows a chessboard with {board.columns}x{board.rows} inner corners, but one with {other} is "
             f"visible; --board counts the corners where four squares meet: try --board {other}"
         )
     return (
-        f"{where} shows a chessboard with {board.columns}x{board.rows} inner corners; the whole board with a white margin "
-        "must be visible, sharp and evenly lit, and --board counts the corners where four squares meet, not squares"
+        f"{where} shows a chessboard with {board.columns}x{board.rows} inner corners; the whole board with a white "
+        "margin must be visible, sharp and evenly lit, and --board counts the corners where four squares meet"
     )

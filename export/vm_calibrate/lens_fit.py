@@ -50,6 +50,11 @@ class LensFit:
         weights = np.array([len(each.corners.pixels) for each in self.frames])
         return float(np.sqrt((self.errors**2 * weights).sum() / weights.sum()))
 
+    @property
+    def typical_error(self) -> float:
+        """Median of the frames' errors [px], outliers included, to compare kinds of lenses."""
+        return float(np.median([*self.errors, *(error for _, error in self.outliers)]))
+
 
 def fit_lens(kind: str, sightings: list[Sighting], size: Size) -> LensFit:
     """Fit a lens of a kind to sightings in pictures of a size [px]; frames that disagree with the others are left out.
@@ -121,7 +126,7 @@ class _Problem:
             numbers = min(starts, key=self._first_error)
         poses = self._first_poses(numbers)
         if poses is None:
-            raise InputError(f"the corners do not fit to this kind of lens; try another --lens")
+            raise InputError("the corners do not fit to this kind of lens; try another --lens")
         self.poses = poses
         own = np.zeros((len(self.sightings), 6))
         return fit_shared(self._residuals, np.repeat(self.frame, 2), numbers, own, _OUTLIER)

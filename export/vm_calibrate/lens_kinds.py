@@ -128,7 +128,9 @@ def picture_angle(lens: Lens, size: Size) -> float:
     """Largest angle from the axis [rad] of a pixel on the edge of the picture that the lens reaches."""
     width, height = size
     across, down = np.linspace(-0.5, width - 0.5, 65), np.linspace(-0.5, height - 0.5, 65)
-    edge = [(x, y) for x in across for y in (down[0], down[-1])] + [(x, y) for x in (across[0], across[-1]) for y in down]
+    edge = [(x, y) for x in across for y in (down[0], down[-1])] + [
+        (x, y) for x in (across[0], across[-1]) for y in down
+    ]
     rays = lens.unproject(np.array(edge), size)
     forward = rays[np.isfinite(rays).all(axis=1), 0]
     return lens.limit if len(forward) < len(edge) else min(float(np.arccos(forward.min().clip(-1.0, 1.0))), lens.limit)

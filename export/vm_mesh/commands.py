@@ -17,6 +17,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.files import atomic_write, check_writable
 from vm_embedded.geometry.lens import Size
 from vm_embedded.geometry.lens_files import LensFile
+from vm_workstation.option_types import parse_size
 from vm_workstation.plots import check_figure_path, save_figure
 
 from .built_mesh import BuiltMesh
@@ -28,7 +29,6 @@ from .options import (
     lens_file,
     models_for,
     orientation_of,
-    parse_size,
     plan_and_model,
     positive,
 )

@@ -20,6 +20,7 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
+from vm_workstation.option_types import parse_size
 
 from .built_mesh import MeshPlan
 
@@ -87,15 +88,6 @@ def image_size(options: argparse.Namespace, file: LensFile) -> Size:
     if size is None:
         raise InputError("the lens file does not have the size of the pictures; give --size")
     return size
-
-
-def parse_size(text: str) -> Size:
-    """Width and height [px] from text such as 640x512. Raises InputError."""
-    width, cross, height = text.partition("x")
-    sides = [int(each) if each.isascii() and each.isdigit() else 0 for each in (width, height)]
-    if not cross or not all(sides):
-        raise InputError(f"size must be WIDTHxHEIGHT in pixels, as 640x512, not {text!r}")
-    return sides[0], sides[1]
 
 
 def check_distances(given: Sequence[float]) -> None:

@@ -70,15 +70,12 @@ def read_lens_file(path: str | Path) -> LensFile:
         raise InputError(f"lens file {path}: {error}") from error
 
 
-def format_lens_file(lens: Lens, orientation: Orientation) -> str:
+def format_lens_file(lens: Lens, orientation: Orientation | None) -> str:
     """The text of a lens file with this lens and orientation; reading it gives exactly the same numbers.
 
-    Radial lenses use the reference's format, calibrated ones a calibration with an additional Hoc. Raises InputError
-    for other lenses.
+    Radial lenses use the reference's format, calibrated ones a calibration with an additional Hoc. Without an
+    orientation there is no Hoc. Raises InputError for other lenses.
     """
-    hoc = np.eye(4)
-    hoc[:3, :3] = orientation.rotation
-    hoc[2, 3] = orientation.height
     if isinstance(lens, RadialLens):
         lines = [
             f"projection: {type(lens).__name__.upper()}",
@@ -101,7 +98,11 @@ def format_lens_file(lens: Lens, orientation: Orientation) -> str:
             lines += [f"image_width: {lens.size[0]}", f"image_height: {lens.size[1]}"]
     else:
         raise InputError(f"lens of type {type(lens).__name__} has no file format; use a radial or a calibrated lens")
-    lines += ["Hoc:", *(f"  - {_listed(row)}" for row in hoc.tolist())]
+    if orientation is not None:
+        hoc = np.eye(4)
+        hoc[:3, :3] = orientation.rotation
+        hoc[2, 3] = orientation.height
+        lines += ["Hoc:", *(f"  - {_listed(row)}" for row in hoc.tolist())]
     return "\n".join(lines) + "\n"
 
 

@@ -1,0 +1,139 @@
+"""vm-calibrate: estimates lens and pose of a camera, and writes them as vm-detect reads them."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from vm_embedded.errors import VisualMeshError, install_extra, unknown
+from vm_workstation.option_types import at_least
+
+EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
+
+LENS_NAMES = ("auto", "pinhole", "fisheye", "rectilinear", "equisolid", "equidistant")
+"""What --lens takes; without `auto` the kinds of lens_kinds.py, which loads OpenCV."""
+
+_EPILOG = "Exit status: 0 done, 1 not done (standard error says why), 2 wrong usage, 130 interrupted."
+
+
+def parsers() -> dict[str, argparse.ArgumentParser]:
+    """The argument parsers of the commands."""
+    lens = _parser("lens", "Estimate the lens of a camera from a chessboard or ChArUco board in a video or pictures.")
+    lens.add_argument("source", metavar="SOURCE", help="video, folder of pictures, or glob in quotes")
+    _add_board(lens)
+    lens.add_argument(
+        "--lens",
+        choices=LENS_NAMES,
+        default="auto",
+        help="kind of lens: OpenCV's pinhole or fisheye, or a radial one of the reference; default auto, which takes "
+        "the better of pinhole and fisheye",
+    )
+    lens.add_argument(
+        "--frames",
+        type=at_least(5),
+        default=40,
+        metavar="N",
+        help="most frames to use for the fit; default %(default)s",
+    )
+    lens.add_argument(
+        "--fov",
+        metavar="ANGLE",
+        help="full angle that a radial lens covers, as in 185deg; default: to the corners of the picture",
+    )
+
+    kalibr = _parser("kalibr", "Convert the lens of a camera from a file of Kalibr (camchain.yaml).")
+    kalibr.add_argument("source", type=Path, metavar="FILE", help="file of Kalibr")
+    kalibr.add_argument("--camera", metavar="NAME", help="camera of the file, as in cam0; needed if it has several")
+
+    pose = _parser("pose", "Estimate height, pitch and roll of a fixed camera from balls or a board on the floor.")
+    pose.add_argument(
+        "source", nargs="?", metavar="SOURCE", help="with --board: video, folder or picture of the board on the floor"
+    )
+    pose.add_argument("--lens", type=Path, required=True, metavar="FILE", help="lens file of the camera")
+    balls = pose.add_argument_group("balls on the floor")
+    balls.add_argument(
+        "--balls",
+        type=Path,
+        metavar="PATH",
+        help="folder of pictures with boxes in YOLO text files beside them, or a JSON file of outlines or boxes",
+    )
+    balls.add_argument("--radius", type=float, metavar="M", help="radius of the balls [m]; default: from the JSON file")
+    balls.add_argument("--label", metavar="CLASS", help="class of balls in YOLO files, as in 0; default: all boxes")
+    balls.add_argument(
+        "--size", metavar="WxH", help="size of the pictures of a JSON file [px]; default: from the lens file"
+    )
+    _add_board(pose)
+    pose.add_argument(
+        "--thickness", type=float, default=0.0, metavar="M", help="thickness of the board [m]; default %(default)g"
+    )
+    return {"lens": lens, "kalibr": kalibr, "pose": pose}
+
+
+def _parser(command: str, description: str) -> argparse.ArgumentParser:
+    made = argparse.ArgumentParser(prog=f"vm-calibrate {command}", description=description, epilog=_EPILOG)
+    made.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="lens file to write, .yaml")
+    return made
+
+
+def _add_board(parser: argparse.ArgumentParser) -> None:
+    needed: dict[str, Any] = {"required": True} if parser.prog.endswith("lens") else {}
+    board = parser.add_argument_group("board")
+    board.add_argument(
+        "--board",
+        metavar="WxH",
+        help="inner corners of a chessboard, as in 9x6: where four squares meet; squares of a ChArUco board",
+        **needed,
+    )
+    board.add_argument(
+        "--square",
+        type=float,
+        metavar="M",
+        help="side of a square [m]"
+        + ("; default 1, as only its proportion to --marker matters for a lens" if needed else ""),
+    )
+    board.add_argument(
+        "--charuco", metavar="DICT", help="the board is a ChArUco board with markers of this dictionary, as in 4X4_50"
+    )
+    board.add_argument("--marker", type=float, metavar="M", help="side of a marker of a ChArUco board [m]")
+    board.add_argument(
+        "--legacy", action="store_true", help="the ChArUco board is from a program with an OpenCV before 4.6"
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run vm-calibrate and return its exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    known = parsers()
+    if not given or given[0] in ("-h", "--help"):
+        print("usage: vm-calibrate COMMAND ...\n\ncommands (vm-calibrate COMMAND --help lists their options):")
+        print("\n".join(f"  {name:9s}{each.description}" for name, each in known.items()))
+        return EXIT_OK if given else EXIT_USAGE
+    if given[0] not in known:
+        print(f"vm-calibrate: {unknown('command', given[0], known)}", file=sys.stderr)
+        return EXIT_USAGE
+    options = known[given[0]].parse_args(given[1:])
+    try:
+        from .commands import COMMANDS
+
+        COMMANDS[given[0]](options)
+    except ImportError as error:
+        missing = (error.name or str(error)).partition(".")[0]
+        print(f"vm-calibrate: {missing} is not installed; {install_extra('calibrate')}", file=sys.stderr)
+        return EXIT_FAILED
+    except VisualMeshError as error:
+        print(f"vm-calibrate: {error}", file=sys.stderr)
+        return EXIT_FAILED
+    except KeyboardInterrupt:
+        print("vm-calibrate: interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:  # the reader, such as head, has closed the pipe
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return EXIT_OK
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,124 @@
+"""The commands of vm-calibrate."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from vm_embedded.config.units import parse_angle
+from vm_embedded.errors import InputError
+from vm_embedded.files import atomic_write, check_writable
+from vm_embedded.geometry.lens import Lens, Size
+from vm_embedded.geometry.lens_files import format_lens_file, read_lens_file
+from vm_embedded.geometry.orientation import Orientation
+from vm_workstation.option_types import parse_size
+
+from .ball_fit import fit_balls
+from .balls import read_balls
+from .board_on_floor import fit_board_on_floor
+from .boards import Board, board_from
+from .floor_pose import PoseFit
+from .frames import Sighting, choose, find_boards
+from .kalibr import read_kalibr
+from .lens_fit import LensFit, fit_lens
+from .report import lens_lines, lens_warnings, pose_lines
+
+_MOST_PLACES = 30
+"""Most frames from which a pose is fitted to a board on the floor."""
+
+
+def lens(options: argparse.Namespace) -> None:
+    """Estimate a lens and write it."""
+    check_writable(options.output)
+    fov = None if options.fov is None else parse_angle(options.fov, "--fov")
+    if fov is not None and options.lens in ("auto", "pinhole", "fisheye"):
+        raise InputError("--fov is for a radial lens; files of pinhole and fisheye lenses have no field of view")
+    board = _board(options, 1.0)
+    search = find_boards(options.source, board)
+    fit = _fit(options.lens, choose(search, options.frames), search.size)
+    found = fit.lens if fov is None else replace(fit.lens, fov=fov)
+    lines = lens_lines(fit, search.size, search.left_out)
+    _write(options.output, found, None, lines)
+    _warn(lens_warnings(fit, search.size))
+
+
+def kalibr(options: argparse.Namespace) -> None:
+    """Convert a lens of Kalibr."""
+    check_writable(options.output)
+    name, found = read_kalibr(options.source, options.camera)
+    _write(options.output, found, None, [f"lens            {name} of {options.source.name}, from Kalibr"])
+
+
+def pose(options: argparse.Namespace) -> None:
+    """Estimate a pose and write it with the lens."""
+    check_writable(options.output)
+    if (options.balls is None) == (options.board is None):
+        raise InputError("give either --balls, or --board with a video or pictures of the board on the floor")
+    file = read_lens_file(options.lens)
+    fit = _pose_from_balls(options, file.lens) if options.board is None else _pose_from_board(options, file.lens)
+    _write(options.output, file.lens, fit.orientation, pose_lines(fit))
+    _warn(list(fit.warnings))
+
+
+def _board(options: argparse.Namespace, square: float | None) -> Board:
+    """The board of the options; without --square, with the default `square` [m]. Raises InputError."""
+    side = options.square if options.square is not None else square
+    if side is None:
+        raise InputError("the pose needs the size of the board; give --square in meters")
+    if options.charuco is not None and options.square is None:
+        raise InputError("a ChArUco board needs --square and --marker, the lengths of their sides [m]")
+    return board_from(options.board, side, options.charuco, options.marker, options.legacy)
+
+
+def _fit(kind: str, sightings: list[Sighting], size: Size) -> LensFit:
+    """The fitted lens of a kind; for `auto` the better one of pinhole and fisheye. Raises InputError."""
+    if kind != "auto":
+        return fit_lens(kind, sightings, size)
+    fits, problems = [], []
+    for each in ("pinhole", "fisheye"):
+        try:
+            fits.append(fit_lens(each, sightings, size))
+        except InputError as error:
+            problems.append(error)
+    if not fits:
+        raise problems[0]
+    print("tried           " + ", ".join(f"{fit.kind} {fit.typical_error:.2f} px" for fit in fits))
+    return min(fits, key=lambda fit: fit.typical_error)
+
+
+def _pose_from_balls(options: argparse.Namespace, lens: Lens) -> PoseFit:
+    if options.source is not None:
+        raise InputError(f"--balls needs no SOURCE; remove {options.source}")
+    size = parse_size(options.size) if options.size is not None else lens.size
+    balls, size = read_balls(options.balls, options.radius, options.label, size)
+    return fit_balls(balls, lens.for_image(size), size)
+
+
+def _pose_from_board(options: argparse.Namespace, lens: Lens) -> PoseFit:
+    if options.source is None:
+        raise InputError("--board needs SOURCE: a video, folder or picture of the board on the floor")
+    if not 0.0 <= options.thickness < 1.0:
+        raise InputError(f"--thickness must be a length from 0 to 1 m, not {options.thickness:g}")
+    search = find_boards(options.source, _board(options, None))
+    sightings = choose(search, _MOST_PLACES)
+    return fit_board_on_floor(sightings, lens.for_image(search.size), search.size, options.thickness)
+
+
+def _write(path: Path, lens: Lens, orientation: Orientation | None, lines: list[str]) -> None:
+    """Write a lens file with a report at its head, and print the report."""
+    head = "".join(f"# {line}\n" for line in ["made by vm-calibrate", *lines])
+    with atomic_write(path) as part:
+        part.write_text(head + format_lens_file(lens, orientation), encoding="utf-8")
+    print("\n".join(lines))
+    print(f"{path}: written")
+
+
+def _warn(warnings: list[str]) -> None:
+    for warning in warnings:
+        print(f"vm-calibrate: warning: {warning}", file=sys.stderr)
+
+
+COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {"lens": lens, "kalibr": kalibr, "pose": pose}
