@@ -80,10 +80,11 @@ class _Problem:
         self.sizes = np.stack([each.size for each in balls])
 
     def solve(self) -> SharedFit:
-        """The best pose, from several starts: balls in one line or at one distance have more than one minimum."""
+        """The best pose, from the two best starts: balls in one line have more than one minimum."""
         own = np.zeros((len(self.radii), 2))
-        fits = [fit_shared(self._residuals, self.groups, start, own, _OUTLIER, _ASSUMED) for start in self._starts()]
-        return min(fits, key=lambda fit: float(np.sqrt(1.0 + fit.residuals**2).sum()))
+        starts = sorted(self._starts(), key=lambda start: _cost(self._residuals(start, own)))[:2]
+        fits = [fit_shared(self._residuals, self.groups, start, own, _OUTLIER, _ASSUMED) for start in starts]
+        return min(fits, key=lambda fit: _cost(fit.residuals))
 
     def advice(self, fit: SharedFit) -> str:
         """What balls are missing for a well determined pose."""
@@ -119,6 +120,11 @@ class _Problem:
         return np.asarray((seen - self.measured).ravel())
 
 
+def _cost(residuals: Floats) -> float:
+    """A sum that large residuals (N,) [px] enter linearly."""
+    return float(np.nan_to_num(np.abs(residuals), nan=1e4).clip(max=1e4).sum())
+
+
 def _boxes(polygons: Floats) -> Floats:
     """Left, top, right and bottom edges (m, 4) of polygons (m, k, 2) [px]."""
     return np.concatenate([polygons.min(axis=1), polygons.max(axis=1)], axis=1)
@@ -131,5 +137,6 @@ def _circles(polygons: Floats) -> Floats:
     ahead = np.roll(here, -1, axis=1)
     cross = here[..., 0] * ahead[..., 1] - here[..., 1] * ahead[..., 0]
     area = cross.sum(axis=1) / 2.0
-    center = ((here + ahead) * cross[..., None]).sum(axis=1) / (6.0 * area[:, None]) + origin[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):  # a pose far off may shrink a ball to nothing
+        center = ((here + ahead) * cross[..., None]).sum(axis=1) / (6.0 * area[:, None]) + origin[:, 0]
     return np.column_stack([center, np.sqrt(np.abs(area) / np.pi)])

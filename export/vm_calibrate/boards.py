@@ -40,7 +40,7 @@ class Chessboard:
         if not found:
             return None
         places = np.array([(x, y) for y in range(self.rows) for x in range(self.columns)]) * self.square
-        return Corners(places, _refined(gray, pixels.reshape(-1, 2).astype(np.float64)))
+        return Corners(places, _refined(gray, pixels.reshape(-1, 2).astype(np.float64), 0.3))
 
     def other_size(self, gray: Image) -> str | None:
         """The number of inner corners of a board of another size in a picture, as in 9x6, or None.
@@ -50,7 +50,9 @@ class Chessboard:
         found, _, marks = cv2.findChessboardCornersSBWithMeta(gray, (3, 3), _FIND | cv2.CALIB_CB_LARGER)
         rows, columns = marks.shape[:2] if found and marks is not None else (0, 0)
         same = {columns, rows} == {self.columns, self.rows}
-        return None if same or 2 * columns * rows < self.columns * self.rows else f"{columns}x{rows}"
+        if same or 2 * columns * rows < self.columns * self.rows:
+            return None
+        return f"{max(columns, rows)}x{min(columns, rows)}"
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,8 @@ class CharucoBoard:
         places = np.asarray(self._board.getChessboardCorners(), dtype=np.float64)[numbers.ravel(), :2]
         if np.linalg.matrix_rank(places - places.mean(axis=0), tol=0.1 * self.square) < 2:
             return None  # corners in one line do not determine a pose
-        return Corners(places, _refined(gray, pixels.reshape(-1, 2).astype(np.float64)))
+        margin = (1.0 - self.marker / self.square) / 2.0  # beyond it there are edges of the markers
+        return Corners(places, _refined(gray, pixels.reshape(-1, 2).astype(np.float64), margin))
 
     def other_size(self, gray: Image) -> str | None:
         """What the markers of a picture say about a wrong option, or None without any marker."""
@@ -134,14 +137,15 @@ DICTIONARIES = tuple(
 """Names of the marker dictionaries of OpenCV."""
 
 
-def _refined(gray: Image, pixels: Floats) -> Floats:
+def _refined(gray: Image, pixels: Floats, reach: float) -> Floats:
     """Pixels (n, 2) of corners, moved to where the edges around them cross.
 
+    reach: distance up to which only these edges are visible, as a share of the distance between corners.
     The detectors fit straight edges over whole squares, which is wrong by up to a pixel for wide lenses.
     """
     apart = np.linalg.norm(pixels[:, None] - pixels, axis=2)
     spacing = float(apart[apart > 0.0].min())
-    window = int(np.clip(0.3 * spacing, 2, 6))
+    window = int(np.clip(reach * spacing, 2, 6))
     stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-3)
     start = pixels.astype(np.float32).reshape(-1, 1, 2)
     found = cv2.cornerSubPix(gray, start, (window, window), (-1, -1), stop).reshape(-1, 2)

@@ -21,7 +21,7 @@ from .boards import Board, CharucoBoard, Corners
 SEARCHED = 200
 """Most frames of a source in which the board is looked for; it takes up to a second in a large frame."""
 
-_BLUR = 1.8
+_BLUR = 1.5
 """Frames whose edges are wider than this multiple of the median are left out."""
 
 
@@ -49,13 +49,14 @@ def find_boards(source: str, board: Board) -> Search:
     Raises InputError if the source can't be read, its frames differ in size, or no frame shows the board; the message
     tells what may be wrong.
     """
+    left_out = Counter[str]()
     search: Search | None = None
     best: tuple[float, Image] | None = None
-    for name, image in _sharp_frames(source):
+    for name, image in _sharp_frames(source, left_out):
         gray = _gray(image)
         size = (gray.shape[1], gray.shape[0])
         if search is None:
-            search = Search(size, [])
+            search = Search(size, [], left_out)
         elif search.size != size:
             raise InputError(
                 f"{name} has {size[0]} x {size[1]} px, but frames before it have {search.size[0]} x {search.size[1]} "
@@ -65,14 +66,14 @@ def find_boards(source: str, board: Board) -> Search:
         if corners is not None:
             search.sightings.append(Sighting(name, corners, _edge_width(gray, corners.pixels)))
             continue
-        search.left_out["without the board"] += 1
+        left_out["without the board"] += 1
         sharpness = _sharpness(gray)
         if best is None or sharpness > best[0]:
             best = (sharpness, gray)
     if search is None:
         raise InputError(f"{source} has no frame that can be read")
     if not search.sightings and best is not None:
-        raise InputError(_nothing_found(source, board, search.left_out.total(), best[1]))
+        raise InputError(_nothing_found(source, board, left_out["without the board"], best[1]))
     return search
 
 
@@ -91,8 +92,11 @@ def choose(search: Search, most: int) -> list[Sighting]:
     return [sharp[index] for index in sorted(chosen)]
 
 
-def _sharp_frames(source: str) -> Iterator[tuple[str, Image]]:
-    """Names and images of a source; of a long one the sharpest frame out of each of SEARCHED parts."""
+def _sharp_frames(source: str, left_out: Counter[str]) -> Iterator[tuple[str, Image]]:
+    """Names and images of a source; of a long one the sharpest frame out of each of SEARCHED parts.
+
+    Counts frames that can't be read in `left_out`.
+    """
     opened = open_source(source)
     if opened.count is None:
         raise InputError(f"the number of frames of {source} is unknown; give a video file or a folder of pictures")
@@ -101,12 +105,15 @@ def _sharp_frames(source: str) -> Iterator[tuple[str, Image]]:
     best: tuple[float, str, Image] | None = None
     try:
         for frame in opened.frames:
-            image = frame.read()
             name = frame.source if frame.path is not None else f"frame {frame.index}"
-            sharpness = _sharpness(_gray(image)) if length > 1 else 0.0
-            if best is None or sharpness > best[0]:
-                best = (sharpness, name, image)
-            if (frame.index + 1) % length == 0:
+            try:
+                image = frame.read()
+                sharpness = _sharpness(_gray(image)) if length > 1 else 0.0
+                if best is None or sharpness > best[0]:
+                    best = (sharpness, name, image)
+            except InputError:
+                left_out["unreadable"] += 1
+            if best is not None and (frame.index + 1) % length == 0:
                 yield best[1:]
                 best = None
             progress.advance()

@@ -24,7 +24,7 @@ _OUTLIER = 1.0
 _WORSE = 3.0
 """A frame with this multiple of the median reprojection error is left out, if its error is above _NOTABLE [px] too."""
 
-_NOTABLE = 0.3
+_NOTABLE = 0.5
 
 
 @dataclass(frozen=True, eq=False)

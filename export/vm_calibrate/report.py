@@ -24,6 +24,7 @@ def lens_lines(fit: LensFit, size: Size, left_out: Counter[str]) -> list[str]:
     reach, corner = (math.degrees(each) for each in _angles(fit, pixels, size))
     counted = [f"{number} {reason}" for reason, number in left_out.items() if number]
     counted += [f"{sighting.name} ({error:.1f} px off)" for sighting, error in fit.outliers]
+    covered = f"{100.0 * coverage(pixels, size):.0f} % of the picture"
     focal = ", ".join(_known(value, deviation, "px") for value, deviation in fit.focal_lengths.T)
     center = ", ".join(_known(value, deviation, "px") for value, deviation in fit.center.T)
     return [
@@ -31,8 +32,7 @@ def lens_lines(fit: LensFit, size: Size, left_out: Counter[str]) -> list[str]:
         f"focal length    {focal}",
         f"optical center  {center}",
         f"reprojection    {fit.error:.2f} px RMS of {len(pixels)} corners",
-        f"coverage        {100.0 * coverage(pixels, size):.0f} % of the picture; corners to {reach:.0f} degrees from the "
-        f"axis, picture to {corner:.0f}",
+        f"coverage        {covered}; corners to {reach:.0f} degrees from the axis, picture to {corner:.0f}",
         f"frames          {len(fit.frames)} used" + (f"; left out: {', '.join(counted)}" if counted else ""),
     ]
 

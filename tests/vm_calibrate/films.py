@@ -1,14 +1,42 @@
 """Pictures of boards, drawn by following each pixel's ray through a lens to the board."""
 
+import math
+from functools import cache
+
 import cv2
 import numpy as np
 
 from tests.vm_embedded.strategies import rotation
 from vm_calibrate.boards import board_from
+from vm_calibrate.cli import main
+from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
 from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA
+from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 
 SIZE = (640, 480)
-SQUARE = 0.04
+
+LENSES = {
+    "pinhole": BrownLens(
+        fov=math.radians(160.0),
+        focal_lengths=(400.0, 404.0),
+        optical_center=(325.0, 236.0),
+        coefficients=(-0.25, 0.06, 0.001, -0.0008, 0.0),
+        size=SIZE,
+    ),
+    "fisheye": FisheyeLens(
+        fov=2.0 * math.pi,
+        focal_lengths=(230.0, 229.0),
+        optical_center=(316.0, 245.0),
+        coefficients=(-0.02, 0.004, -0.002, 0.0003),
+        size=SIZE,
+    ),
+    "rectilinear": Rectilinear(focal_length=420.0, fov=2.0, center=(6.0, -9.0), distortion=(2e-7, 0.0), size=SIZE),
+    "equisolid": Equisolid(focal_length=240.0, fov=3.6, center=(-5.0, 4.0), distortion=(3e-7, 1e-12), size=SIZE),
+    "equidistant": Equidistant(focal_length=200.0, fov=3.8, center=(5.0, 3.0), distortion=(4.4e-7, 0.0), size=SIZE),
+}
+"""A lens of each kind."""
+
+SQUARE = 0.08
 COLUMNS, ROWS = 8, 5
 PER_SQUARE = 40
 """Texture pixels for each square."""
@@ -36,9 +64,9 @@ def _with_margin(texture):
 class Film:
     """A camera with a lens. Each pixel is the mean of two by two rays."""
 
-    def __init__(self, lens, seed=0):
+    def __init__(self, lens):
         self.lens = lens
-        self.random = np.random.default_rng(seed)
+        self.random = np.random.default_rng(0)
         x, y = ((np.arange(2 * n) - 0.5) / 2.0 for n in SIZE)
         pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         rays = lens.unproject(pixels, SIZE)
@@ -72,6 +100,7 @@ class Film:
 
     def pictures(self, count, texture):
         """Pictures of a board held towards the camera, all over the picture, at several distances and tilts."""
+        self.random = np.random.default_rng(0)  # the same pictures, whichever were drawn before
         width, height = SIZE
         cells = [(x, y) for y in (0.25, 0.5, 0.75) for x in (0.2, 0.35, 0.5, 0.65, 0.8)]
         made = []
@@ -92,3 +121,32 @@ class Film:
         share = self.random.uniform(0.22, 0.4)  # of the picture's width
         distance = COLUMNS * SQUARE * self.lens.scale / (share * SIZE[0])
         return turn, distance * ray - middle
+
+    def on_floor(self, camera, x, y, yaw, texture, thickness=0.0):
+        """A picture of a board on the floor at x, y [m] from below the camera, for the camera's orientation."""
+        cosine, sine = np.cos(yaw), np.sin(yaw)
+        turn = np.array([[cosine, sine, 0.0], [sine, -cosine, 0.0], [0.0, 0.0, -1.0]])
+        place = np.array([x, y, thickness - camera.height])
+        return self.picture(camera.rotation.T @ turn, camera.rotation.T @ place, texture)
+
+
+@cache
+def film(kind):
+    """The film of a kind of lens: its rays take a second or more."""
+    return Film(LENSES[kind])
+
+
+def write(folder, pictures):
+    """Write pictures into a new folder."""
+    folder.mkdir()
+    for index, picture in enumerate(pictures):
+        cv2.imwrite(str(folder / f"{index:03d}.png"), picture)
+    return folder
+
+
+def run(capsys, *arguments, code=0):
+    """What a command prints: standard output, or standard error if it fails."""
+    assert main([str(each) for each in arguments]) == code
+    done = capsys.readouterr()
+    assert "Traceback" not in done.err
+    return done.err if code else done.out
