@@ -71,9 +71,17 @@ class CharucoBoard:
     legacy: bool = False
 
     @cached_property
+    def markers(self) -> cv2.aruco.Dictionary:
+        """The dictionary of the markers."""
+        return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{self.dictionary}"))
+
+    def marker_corners(self) -> list[Floats]:
+        """Corners (4, 2) of each marker [m], right and down from the board's upper left corner."""
+        return [np.asarray(each, dtype=np.float64)[:, :2] for each in self._board.getObjPoints()]
+
+    @cached_property
     def _board(self) -> cv2.aruco.CharucoBoard:
-        markers = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{self.dictionary}"))
-        board = cv2.aruco.CharucoBoard((self.columns, self.rows), self.square, self.marker, markers)
+        board = cv2.aruco.CharucoBoard((self.columns, self.rows), self.square, self.marker, self.markers)
         board.setLegacyPattern(self.legacy)
         return board
 
@@ -122,10 +130,7 @@ def board_from(
     if marker >= square:
         raise InputError(f"--marker {marker:g} must be below --square {square:g}: markers lie inside of squares")
     board = CharucoBoard(columns, rows, square, marker, name, legacy)
-    needed, held = (
-        (columns * rows) // 2,
-        len(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, f"DICT_{name}")).bytesList),
-    )
+    needed, held = columns * rows // 2, len(board.markers.bytesList)
     if needed > held:
         raise InputError(f"a board of {size} squares needs {needed} markers, but {name} has {held}")
     return board

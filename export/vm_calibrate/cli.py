@@ -22,6 +22,9 @@ _EPILOG = "Exit status: 0 done, 1 not done (standard error says why), 2 wrong us
 
 def parsers() -> dict[str, argparse.ArgumentParser]:
     """The argument parsers of the commands."""
+    board = _parser("board", "Draw a chessboard or ChArUco board in its true size, to print.", "drawing to write, .svg")
+    _add_board(board)
+
     lens = _parser("lens", "Estimate the lens of a camera from a chessboard or ChArUco board in a video or pictures.")
     lens.add_argument("source", metavar="SOURCE", help="video, folder of pictures, or glob in quotes")
     _add_board(lens)
@@ -70,17 +73,17 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
     pose.add_argument(
         "--thickness", type=float, default=0.0, metavar="M", help="thickness of the board [m]; default %(default)g"
     )
-    return {"lens": lens, "kalibr": kalibr, "pose": pose}
+    return {"board": board, "lens": lens, "kalibr": kalibr, "pose": pose}
 
 
-def _parser(command: str, description: str) -> argparse.ArgumentParser:
+def _parser(command: str, description: str, output: str = "lens file to write, .yaml") -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(prog=f"vm-calibrate {command}", description=description, epilog=_EPILOG)
-    made.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="lens file to write, .yaml")
+    made.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help=output)
     return made
 
 
 def _add_board(parser: argparse.ArgumentParser) -> None:
-    needed: dict[str, Any] = {"required": True} if parser.prog.endswith("lens") else {}
+    needed: dict[str, Any] = {} if parser.prog.endswith("pose") else {"required": True}
     board = parser.add_argument_group("board")
     board.add_argument(
         "--board",
@@ -93,7 +96,9 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="M",
         help="side of a square [m]"
-        + ("; default 1, as only its proportion to --marker matters for a lens" if needed else ""),
+        + (
+            "; default 1, as only its proportion to --marker matters for a lens" if parser.prog.endswith("lens") else ""
+        ),
     )
     board.add_argument(
         "--charuco", metavar="DICT", help="the board is a ChArUco board with markers of this dictionary, as in 4X4_50"

@@ -18,6 +18,7 @@ from vm_workstation.option_types import parse_size
 
 from .ball_fit import fit_balls
 from .balls import read_balls
+from .board_drawing import board_svg
 from .board_on_floor import fit_board_on_floor
 from .boards import Board, board_from
 from .floor_pose import PoseFit
@@ -30,14 +31,26 @@ _MOST_PLACES = 30
 """Most frames from which a pose is fitted to a board on the floor."""
 
 
+def board(options: argparse.Namespace) -> None:
+    """Draw a board to print."""
+    check_writable(options.output)
+    if options.output.suffix.lower() != ".svg":
+        raise InputError(
+            f"the drawing of a board is an SVG file; give -o a name that ends in .svg, not {options.output}"
+        )
+    drawn = _board(options, None)
+    with atomic_write(options.output) as part:
+        part.write_text(board_svg(drawn), encoding="utf-8")
+    print(f"{options.output}: written; print it at 100 %, and measure a square: {1000.0 * drawn.square:g} mm")
+
+
 def lens(options: argparse.Namespace) -> None:
     """Estimate a lens and write it."""
     check_writable(options.output)
     fov = None if options.fov is None else parse_angle(options.fov, "--fov")
     if fov is not None and options.lens in ("auto", "pinhole", "fisheye"):
         raise InputError("--fov is for a radial lens; files of pinhole and fisheye lenses have no field of view")
-    board = _board(options, 1.0)
-    search = find_boards(options.source, board)
+    search = find_boards(options.source, _board(options, 1.0))
     fit = _fit(options.lens, choose(search, options.frames), search.size)
     found = fit.lens if fov is None else replace(fit.lens, fov=fov)
     lines = lens_lines(fit, search.size, search.left_out)
@@ -67,7 +80,7 @@ def _board(options: argparse.Namespace, square: float | None) -> Board:
     """The board of the options; without --square, with the default `square` [m]. Raises InputError."""
     side = options.square if options.square is not None else square
     if side is None:
-        raise InputError("the pose needs the size of the board; give --square in meters")
+        raise InputError("the size of the board is missing; give --square in meters")
     if options.charuco is not None and options.square is None:
         raise InputError("a ChArUco board needs --square and --marker, the lengths of their sides [m]")
     return board_from(options.board, side, options.charuco, options.marker, options.legacy)
@@ -121,4 +134,9 @@ def _warn(warnings: list[str]) -> None:
         print(f"vm-calibrate: warning: {warning}", file=sys.stderr)
 
 
-COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {"lens": lens, "kalibr": kalibr, "pose": pose}
+COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
+    "board": board,
+    "lens": lens,
+    "kalibr": kalibr,
+    "pose": pose,
+}

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ def call(*arguments, **variables):
 def test_help_and_unknown_commands_as_a_process():
     listed = call("--help")
     assert listed.returncode == 0
-    assert all(name in listed.stdout for name in ("lens", "kalibr", "pose"))
+    assert all(name in listed.stdout for name in ("board", "lens", "kalibr", "pose"))
     assert call().returncode == 2
     wrong = call("lends")
     assert wrong.returncode == 2
@@ -119,3 +120,35 @@ def test_a_legacy_board_is_found_with_its_option(tmp_path):
     assert len(board.find(drawn).pixels) == 49
     found = board_from("8x8", 1.0, "4X4_50", 0.75).find(drawn)
     assert found is None or len(found.pixels) < 49
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("8x5", "--square", "0.03"),
+        ("8x6", "--square", "0.03", "--charuco", "5X5_100", "--marker", "0.022"),
+        ("8x8", "--square", "0.03", "--charuco", "4X4_50", "--marker", "0.02", "--legacy"),
+    ],
+)
+def test_a_drawn_board_is_found(options, tmp_path, capsys):
+    assert "a square: 30 mm" in run(capsys, "board", "--board", *options, "-o", tmp_path / "board.svg")
+    root = ElementTree.parse(tmp_path / "board.svg").getroot()
+    _, _, width, height = (float(each) for each in root.get("viewBox").split())
+    assert root.get("width") == f"{width:g}mm"
+    drawn = np.full((round(4 * height), round(4 * width)), 255, np.uint8)
+    for each in root.iter("{http://www.w3.org/2000/svg}rect"):
+        x, y, w, h = (float(each.get(name)) for name in ("x", "y", "width", "height"))
+        drawn[round(4 * y) : round(4 * (y + h)), round(4 * x) : round(4 * (x + w))] = 0
+    lengths = dict(zip(options[1::2], options[2::2], strict=False))
+    marker = float(lengths["--marker"]) if "--marker" in lengths else None
+    board = board_from(options[0], 0.03, lengths.get("--charuco"), marker, "--legacy" in options)
+    corners = board.find(drawn)
+    assert len(corners.pixels) == {"8x5": 40, "8x6": 35, "8x8": 49}[options[0]]
+    steps = np.diff(corners.pixels[:4, 0])
+    assert np.abs(steps) == pytest.approx(120.0, abs=0.6)
+
+
+def test_a_board_needs_its_size_and_the_right_kind_of_file(tmp_path, capsys):
+    board = ("board", "--board", "9x6")
+    assert "give --square in meters" in run(capsys, *board, "-o", tmp_path / "a.svg", code=1)
+    assert "ends in .svg" in run(capsys, *board, "--square", "0.03", "-o", tmp_path / "a.pdf", code=1)

@@ -223,7 +223,7 @@ def test_options_that_do_not_belong_together_are_errors(tmp_path, capsys):
     assert "no picture with a text file" in run(capsys, *pose, "--balls", tmp_path, "--radius", "0.1", code=1)
     assert "--radius must be a length" in run(capsys, *pose, "--balls", tmp_path, "--radius", "-1", code=1)
     folder = write(tmp_path / "floor", [np.zeros((480, 640), np.uint8)])
-    assert "the pose needs the size of the board" in run(capsys, *pose, folder, "--board", "8x5", code=1)
+    assert "the size of the board is missing" in run(capsys, *pose, folder, "--board", "8x5", code=1)
 
 
 def test_the_height_of_real_robots_is_found(shared, tmp_path, capsys):

@@ -29,7 +29,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     concern all frames.
     """
     format = given.detector.format
-    pose = _DefaultPose(given.lens.lens if given.lens else None, given.orientation.orientation())
+    pose = _DefaultPose(given.lens.lens if given.lens else None, given.fixed_orientation())
     detector = Detector.from_file(given.model, given.detector)
     emit_points = [name.strip() for name in options.emit_points.split(",")] if options.emit_points else []
     for name in emit_points:
@@ -75,7 +75,7 @@ class _DefaultPose:
         if lens is None:
             raise InputError("no lens: give --lens, or put lensNAME.yaml beside imageNAME")
         if orientation is None:
-            raise InputError("no orientation: give --height (and --pitch, --roll), or Hoc in lensNAME.yaml")
+            raise InputError("no orientation: give --height (and --pitch, --roll), or Hoc in the lens file")
         return lens, orientation
 
 

@@ -49,7 +49,11 @@ def add_pose(parser: argparse.ArgumentParser, description: str) -> None:
     pose.add_argument(
         "--lens", type=Path, metavar="FILE", help="lens file: YAML of the reference or of a calibration, or TOML"
     )
-    pose.add_argument("--height", metavar="M", help="height of the camera above the ground plane [m]")
+    pose.add_argument(
+        "--height",
+        metavar="M",
+        help="height of the camera above the ground plane [m]; default: the pose of the lens file",
+    )
     pose.add_argument("--pitch", metavar="ANGLE", help="angle of the optical axis below the horizon [rad]; default 0")
     pose.add_argument("--roll", metavar="ANGLE", help="tilt of the camera to its right side [rad]; default 0")
 

@@ -51,11 +51,7 @@ def make_workload(options: argparse.Namespace, given: Configuration) -> Workload
     swing, sway = parse_angle(options.swing, "--swing"), parse_length(options.sway, "--sway")
     if options.frames < 1:
         raise InputError(f"--frames must be at least 1, not {options.frames}")
-    middle = (
-        given.orientation.orientation()
-        or (given.lens.orientation if given.lens else None)
-        or Orientation.from_roll_pitch(_HEIGHT, 0.0, _PITCH)
-    )
+    middle = given.fixed_orientation() or Orientation.from_roll_pitch(_HEIGHT, 0.0, _PITCH)
     if abs(sway) >= middle.height:
         raise InputError(f"--sway {sway:g} m moves a camera at {middle.height:g} m below the plane; give a smaller one")
     image, lens = _image_and_lens(options, given.lens.lens if given.lens else None, given.detector.format)

@@ -95,9 +95,9 @@ class Answerer:
         """
         settings = self.configuration.pose
         if settings.source == "fixed":
-            fixed = shot.orientation or self.configuration.orientation.orientation()
+            fixed = shot.orientation or self.configuration.fixed_orientation()
             if fixed is None:
-                raise InputError("no orientation: give --height or --pose-source")
+                raise InputError("no orientation: give --height, --pose-source, or Hoc in the lens file")
             return fixed
         poses, arrived = self._poses.poses, self._poses.arrived
         deadline = time.monotonic() + 1e-3 * settings.wait_ms

@@ -36,7 +36,10 @@ Each comment gives the meaning of the next entry, its unit in brackets, and its 
 
 @dataclass(frozen=True)
 class FixedPose:
-    """Section [orientation]: the pose of the camera if neither the frames nor a pose stream give it."""
+    """Section [orientation]: the pose of the camera if neither the frames nor a pose stream give it.
+
+    Without a height, the pose comes from the lens file.
+    """
 
     height: float | None = length(None, "height of the camera above the plane")
     pitch: float | None = angle(None, 'angle of the optical axis below the horizon, in radians or as in "20deg"')
@@ -135,6 +138,13 @@ class Configuration:
     status: StatusSettings = field(default_factory=StatusSettings)
     recorder: RecorderSettings = field(default_factory=RecorderSettings)
     deploy: DeploySettings = field(default_factory=DeploySettings)
+
+    def fixed_orientation(self) -> Orientation | None:
+        """The orientation of section [orientation], or without a height there the one of the lens file, or None.
+
+        Raises InputError for angles without a height.
+        """
+        return self.orientation.orientation() or (self.lens.orientation if self.lens is not None else None)
 
 
 def read_configuration(path: str | Path) -> Configuration:

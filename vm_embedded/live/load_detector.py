@@ -16,7 +16,7 @@ def load_checked_detector(configuration: Configuration) -> Detector:
     """
     detector = Detector.from_file(configuration.model, configuration.detector)
     camera = configuration.camera.source
-    orientation = configuration.orientation.orientation()  # raises InputError for angles without a height
+    orientation = configuration.fixed_orientation()  # raises InputError for angles without a height
     if is_live(camera):
         camera_opener(configuration.camera, raw=configuration.detector.format != "bgr")  # only for its checks
     if configuration.recorder.trigger_class:
@@ -25,5 +25,7 @@ def load_checked_detector(configuration: Configuration) -> Detector:
         if configuration.lens is None:
             raise InputError(f"camera {without_password(camera)} needs a lens: give --lens")
         if configuration.pose.source == "fixed" and orientation is None:
-            raise InputError(f"camera {without_password(camera)} needs poses: give --height or --pose-source")
+            raise InputError(
+                f"camera {without_password(camera)} needs poses: give --height, --pose-source, or Hoc in the lens file"
+            )
     return detector

@@ -6,6 +6,8 @@ import pytest
 
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
+from vm_embedded.geometry.lens_files import format_lens_file
+from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.live.configuration import Configuration, read_configuration
 from vm_embedded.network.bundled import DEFAULT, model_path
@@ -199,3 +201,14 @@ def test_a_signer_is_a_key_without_its_comment(write, given, kept):
 def test_a_signer_that_is_no_key_is_refused(write, given):
     with pytest.raises(InputError, match=r"line 2.*signer must be an Ed25519 public key"):
         read_configuration(write(f'[deploy]\nsigner = "{given}"\n'))
+
+
+def test_the_orientation_comes_from_the_lens_file_unless_a_height_is_given(write, tmp_path):
+    camera = Orientation.from_roll_pitch(0.7, roll=0.1, pitch=0.3)
+    (tmp_path / "lens.yaml").write_text(format_lens_file(Equisolid(focal_length=420.0, fov=1.8), camera))
+    lens = 'lens = "lens.yaml"\n'
+    assert read_configuration(write(lens)).fixed_orientation().height == 0.7
+    assert read_configuration(write(lens + "[orientation]\nheight = 0.9\n")).fixed_orientation().pitch == 0.0
+    assert read_configuration(write("")).fixed_orientation() is None
+    with pytest.raises(InputError, match="pitch and roll need a height"):
+        read_configuration(write(lens + "[orientation]\npitch = 0.1\n")).fixed_orientation()
