@@ -5,6 +5,7 @@ from functools import cache
 
 import cv2
 import numpy as np
+import pytest
 
 from tests.vm_embedded.strategies import rotation
 from vm_calibrate.boards import board_from
@@ -34,6 +35,9 @@ LENSES = {
     "equisolid": Equisolid(focal_length=240.0, fov=3.6, center=(-5.0, 4.0), distortion=(3e-7, 1e-12), size=SIZE),
     "equidistant": Equidistant(focal_length=200.0, fov=3.8, center=(5.0, 3.0), distortion=(4.4e-7, 0.0), size=SIZE),
 }
+
+KINDS = [pytest.param(kind, marks=() if kind == "fisheye" else pytest.mark.long) for kind in LENSES]
+"""One kind of lens for `make test`, all of them for CI."""
 """A lens of each kind."""
 
 SQUARE = 0.08

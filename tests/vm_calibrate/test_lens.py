@@ -12,7 +12,7 @@ from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.geometry.radial_lenses import Rectilinear
 
-from .films import LENSES, SIZE, charuco_texture, chessboard_texture, film, run, write
+from .films import KINDS, LENSES, SIZE, charuco_texture, chessboard_texture, film, run, write
 
 BOARD = ("--board", "8x5")
 
@@ -41,7 +41,7 @@ def folders(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", LENSES)
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_lens_of_pictures_is_found(kind, folders, tmp_path, capsys):
     printed = run(capsys, "lens", folders(kind), *BOARD, "--lens", kind, "-o", tmp_path / "lens.yaml")
     file = read_lens_file(tmp_path / "lens.yaml")
@@ -53,7 +53,7 @@ def test_the_lens_of_pictures_is_found(kind, folders, tmp_path, capsys):
     assert (tmp_path / "lens.yaml").read_text().startswith("# made by vm-calibrate\n# lens")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_kind_of_lens_is_chosen(folders, tmp_path, capsys):
     for kind, expected in (("pinhole", BrownLens), ("equidistant", FisheyeLens)):
         printed = run(capsys, "lens", folders(kind), *BOARD, "-o", tmp_path / "lens.yaml")

@@ -12,7 +12,7 @@ from vm_calibrate.frames import Search, Sighting, choose
 from vm_calibrate.lens_fit import fit_lens
 from vm_embedded.errors import InputError
 
-from .films import COLUMNS, LENSES, ROWS, SIZE, SQUARE, film
+from .films import COLUMNS, KINDS, LENSES, ROWS, SIZE, SQUARE, film
 
 PLACES = np.array([(x, y) for y in range(ROWS) for x in range(COLUMNS)]) * SQUARE
 
@@ -38,7 +38,7 @@ def sightings(kind, count, noise, seed):
     return made
 
 
-@pytest.mark.parametrize("kind", LENSES)
+@pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=3)
 @given(seed=seeds)
 def test_the_true_lens_is_within_the_stated_uncertainty(kind, seed):
@@ -86,7 +86,7 @@ def test_it_agrees_with_opencv_on_a_fisheye():
     assert fit.focal_lengths[0] == pytest.approx([matrix[0, 0], matrix[1, 1]], rel=5e-4)
 
 
-@pytest.mark.parametrize("kind", LENSES)
+@pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=10)
 @given(seed=seeds)
 def test_the_first_pose_is_exact_without_noise(kind, seed):

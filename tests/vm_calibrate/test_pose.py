@@ -20,7 +20,7 @@ from vm_embedded.geometry.lens_files import format_lens_file, read_lens_file
 from vm_embedded.geometry.orientation import Orientation
 from vm_workstation.sphere_outline import polygon_area, sphere_outline
 
-from .films import LENSES, SIZE, chessboard_texture, film, run, write
+from .films import KINDS, LENSES, SIZE, chessboard_texture, film, run, write
 
 CAMERA = Orientation.from_roll_pitch(0.8, roll=0.06, pitch=0.7)
 BOARD = ("--board", "8x5", "--square", "0.08", "--thickness", "0.005")
@@ -75,7 +75,7 @@ def seen_balls(lens, camera, random, box=False, noise=1.0, spots=SPOTS, each=6, 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", LENSES)
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_pose_over_a_board_is_found(kind, tmp_path, capsys):
     spots = ((0.8, 0.0, 0.3), (1.2, -0.3, -0.7), (1.0, 0.3, 1.9))
     pictures = [film(kind).on_floor(CAMERA, *spot, chessboard_texture(), thickness=0.005) for spot in spots]
