@@ -41,7 +41,7 @@ def board(options: argparse.Namespace) -> None:
     drawn = _board(options, None)
     with atomic_write(options.output) as part:
         part.write_text(board_svg(drawn), encoding="utf-8")
-    print(f"{options.output}: written; print it at 100 %, and measure a square: {1000.0 * drawn.square:g} mm")
+    print(f"{options.output}: written; print it at 100 %, and check that a square has {1000.0 * drawn.square:g} mm")
 
 
 def lens(options: argparse.Namespace) -> None:

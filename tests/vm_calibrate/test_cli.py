@@ -131,7 +131,7 @@ def test_a_legacy_board_is_found_with_its_option(tmp_path):
     ],
 )
 def test_a_drawn_board_is_found(options, tmp_path, capsys):
-    assert "a square: 30 mm" in run(capsys, "board", "--board", *options, "-o", tmp_path / "board.svg")
+    assert "a square has 30 mm" in run(capsys, "board", "--board", *options, "-o", tmp_path / "board.svg")
     root = ElementTree.parse(tmp_path / "board.svg").getroot()
     _, _, width, height = (float(each) for each in root.get("viewBox").split())
     assert root.get("width") == f"{width:g}mm"
