@@ -21,17 +21,20 @@ from vm_workstation.contact_sheet import check_sheet_path, choose_indices, write
 from vm_workstation.option_types import at_least
 from vm_workstation.stopping import stoppable
 
+from .dataset.assets import asset_files, read_assets
 from .dataset.contact_sheet import cell, read_labeled, sheet
 from .dataset.files import indices_in, is_done
 from .dataset.inspection import inspect, read_checked_plan
 from .dataset.plan import Plan, digest, shard_of
 from .dataset.plots import load_matplotlib, plot
 from .dataset.report import as_json, problems, tables
+from .dataset.training_file import write_training
 from .dataset.workers import FinishedPicture, Job, render_all
 from .render.mitsuba import find_llvm, load_mitsuba
 from .scene.configuration import HEADER, SceneConfiguration
 from .scene.environment import Environment
 from .scene.maps import find_maps, missing_held_out
+from .scene.rooms import HELD_OUT_ROOMS, ROOMS, room_name
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
@@ -62,7 +65,10 @@ def parser() -> argparse.ArgumentParser:
         "--count", type=at_least(0), required=True, metavar="N", help="number of pictures in the whole set"
     )
     made.add_argument(
-        "--hdri", type=Path, required=True, metavar="DIR", help="folder of environment maps: .hdr, .exr, .pfm"
+        "--hdri",
+        type=Path,
+        metavar="DIR",
+        help="folder of environment maps: .hdr, .exr, .pfm; default: built-in rooms, which look less real",
     )
     made.add_argument("--seed", type=at_least(0), default=0, metavar="S", help="random seed; default 0")
     made.add_argument("--config", type=Path, metavar="FILE", help="scene.toml; missing entries keep their defaults")
@@ -172,19 +178,19 @@ def _render(options: argparse.Namespace) -> int:
         raise InputError(f"--workers ({workers}) and --count ({options.count}) must be at least 1")
     configuration = read_sections(SceneConfiguration, options.config, parse_overrides(options.set, _EXAMPLE))
     find_llvm()
-    found = find_maps(options.hdri, configuration.maps, options.held_out)
-    missing = missing_held_out(options.hdri, configuration.maps)
-    if missing:
-        print(f"vm-synth: held-out maps that are not in {options.hdri}: {', '.join(missing)}", file=sys.stderr)
-    maps = _valid_maps(found, configuration)
+    maps = _maps(options, configuration)
+    rooms = () if maps else tuple(HELD_OUT_ROOMS if options.held_out else ROOMS)
     load_mitsuba()
-    if configuration.ground.photographed and not any(path.stem in configuration.maps.floors for path in maps):
-        print("vm-synth: none of the maps has an entry in [maps.floors], so all pictures show a field", file=sys.stderr)
+    read_assets(configuration)
     try:
         options.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"can't create folder {options.out}: {error.strerror or error}") from error
-    Plan(options.seed, options.count, configuration, {path.stem: digest(path) for path in maps}).write(options.out)
+    lights = {path.stem: digest(path) for path in maps} or {room_name(each): "built in" for each in rooms}
+    files = {str(path): digest(path) for path in asset_files(configuration)}
+    Plan(options.seed, options.count, configuration, lights, files).write(options.out)
+    if not configuration.object.is_ball:
+        write_training(options.out, configuration)
 
     own = shard_of(range(options.count), *options.shard)
     left = [index for index in own if not is_done(options.out, index)]
@@ -198,7 +204,7 @@ def _render(options: argparse.Namespace) -> int:
         bar.advance()
 
     try:
-        render_all(Job(options.out, tuple(maps), options.seed, configuration), left, workers, report)
+        render_all(Job(options.out, tuple(maps), options.seed, configuration, rooms), left, workers, report)
     finally:
         bar.clear()
         if bar.done:
@@ -209,6 +215,21 @@ def _render(options: argparse.Namespace) -> int:
             )
     print(f"{options.out}: {len(own)} pictures")
     return EXIT_OK
+
+
+def _maps(options: argparse.Namespace, configuration: SceneConfiguration) -> list[Path]:
+    """The maps that light the scenes, of the folder --hdri; none without the option. Raises InputError."""
+    if options.hdri is None:
+        return []
+    found = find_maps(options.hdri, configuration.maps, options.held_out)
+    missing = missing_held_out(options.hdri, configuration.maps)
+    if missing:
+        print(f"vm-synth: held-out maps that are not in {options.hdri}: {', '.join(missing)}", file=sys.stderr)
+    maps = _valid_maps(found, configuration)
+    on_field = configuration.object.is_ball and configuration.ground.photographed
+    if on_field and not any(path.stem in configuration.maps.floors for path in maps):
+        print("vm-synth: none of the maps has an entry in [maps.floors], so all pictures show a field", file=sys.stderr)
+    return maps
 
 
 def _valid_maps(paths: Sequence[Path], configuration: SceneConfiguration) -> list[Path]:

@@ -15,8 +15,8 @@ from vm_embedded.arrays import Floats, Indices, Mask, Singles
 
 from .paints import Paint
 
-LABELS = ("goal", "environment", "robot")
-"""The classes of bodies."""
+LABELS = ("goal", "environment", "robot", "ball")
+"""The classes of bodies; ball is that of the object to detect, also if it is not a ball."""
 
 Point = Sequence[float] | Floats
 """Three coordinates [m]."""

@@ -63,7 +63,7 @@ def scene_description(index: int, map_name: str, scene: Scene, picture: Picture)
     return {
         "index": index,
         "map": map_name,
-        "ground": "photographed" if scene.field is None else "field",
+        "ground": _ground(scene),
         "height": scene.orientation.height,
         "pitch": scene.orientation.pitch,
         "roll": scene.orientation.roll,
@@ -72,6 +72,7 @@ def scene_description(index: int, map_name: str, scene: Scene, picture: Picture)
         "other_ball": None
         if scene.other is None
         else {**_ball_position(scene.other), "label": scene.other_label, "design": asdict(scene.other.design)},
+        **_object_descriptions(scene, picture),
         "field": None if scene.field is None else _finite(asdict(scene.field)),
         "things": list(scene.names),
         "standing": [asdict(each) for each in standing_objects(scene)],
@@ -100,6 +101,44 @@ def _ball_description(scene: Scene, ball: PlacedBall, picture: Picture) -> dict[
         "visible": float(min(picture.coverage.sum(dtype=np.float64) / max(area, 1e-9), 1.0)),
         "design": asdict(ball.design),
     }
+
+
+def _ground(scene: Scene) -> str:
+    if scene.surface is not None:
+        return "table" if scene.surface.is_table else "floor"
+    return "photographed" if scene.field is None else "field"
+
+
+def _object_descriptions(scene: Scene, picture: Picture) -> dict[str, Any]:
+    """The entries of objects that are not the ball; none if the object to detect is the ball."""
+    if scene.surface is None:
+        return {}
+    described = []
+    for number, each in enumerate(scene.objects):
+        pixel, area = _hull_area(scene, number)
+        described.append(
+            {
+                "center": [float(value) for value in each.center],
+                "radius": each.radius,
+                "height": each.height,
+                "distance": float(np.hypot(*each.center[:2])),
+                "pixel": pixel,
+                "pixel_radius": math.sqrt(area / math.pi),
+                "visible": float(min(picture.areas[number] / max(area, 1e-9), 1.0)),
+            }
+        )
+    return {"object": {"name": scene.object_name, "radius": scene.ball_radius, "height": scene.object_height}, "objects": described}
+
+
+def _hull_area(scene: Scene, number: int) -> tuple[list[float], float]:
+    """Where the center of an object is in the picture [px], and the area of its convex hull there [px^2]."""
+    start = sum(scene.counts[:number])
+    vertices = scene.mesh.vertices[start : start + scene.counts[number]]
+    points = np.concatenate([scene.objects[number].center[None], vertices]) - scene.camera
+    rays = (points @ scene.orientation.rotation) / np.linalg.norm(points, axis=1, keepdims=True)
+    pixels = scene.lens.project(rays, scene.size)
+    hull = cv2.convexHull(pixels[1:].astype(np.float32))[:, 0]
+    return [float(value) for value in pixels[0]], polygon_area(hull)
 
 
 def _finite(table: dict[str, Any]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +20,14 @@ from .files import FORMAT, PARTS, read_table
 class Plan:
     """Defines a set: the same plan gives the same pictures.
 
-    maps: names of the maps, each with the SHA-256 of its file.
+    maps: names of the maps, each with the SHA-256 of its file. files: the same for the other files of the configuration.
     """
 
     seed: int
     count: int
     configuration: SceneConfiguration
     maps: dict[str, str]
+    files: dict[str, str] = field(default_factory=dict)
 
     def as_json(self) -> str:
         """The content of set.json."""
@@ -41,7 +42,7 @@ class Plan:
         wanted = json.loads(self.as_json())
         if path.exists():
             found = read_plan(folder)
-            for key in ("format", "seed", "maps", "configuration"):
+            for key in ("format", "seed", "maps", "files", "configuration"):
                 if found.get(key) != wanted[key]:
                     shown = f": {found.get(key)}, not {wanted[key]}" if key in ("format", "seed") else ""
                     raise InputError(

@@ -19,18 +19,25 @@ from ..render.tracer import Tracer
 from ..scene.configuration import SceneConfiguration
 from ..scene.draw_scene import draw_scene
 from ..scene.environment import Environment
+from ..scene.own_object import NO_ASSETS, Assets
+from ..scene.rooms import furnish_room
 from ..scene.scene import Scene
+from .assets import read_assets
 from .picture_writer import write_picture
 
 
 @dataclass(frozen=True)
 class Job:
-    """What all workers share: output folder, sorted maps, seed and configuration."""
+    """What all workers share: output folder, sorted maps, seed and configuration.
+
+    rooms: numbers of the built-in rooms that light the scenes if there are no maps.
+    """
 
     folder: Path
     maps: tuple[Path, ...]
     seed: int
     configuration: SceneConfiguration
+    rooms: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -41,12 +48,14 @@ class FinishedPicture:
     memory: int
 
 
-def scene_of(job: Job, index: int) -> tuple[Scene, Environment]:
-    """Draw the scene of a picture. It depends only on the job and the picture's number."""
+def scene_of(job: Job, index: int, assets: Assets = NO_ASSETS) -> tuple[Scene, Environment]:
+    """Draw the scene of a picture. It depends only on the job, its files and the picture's number."""
     random = np.random.default_rng([job.seed, index])
-    path = job.maps[random.integers(len(job.maps))]
-    environment = Environment.read(path, job.configuration.maps)
-    return draw_scene(random, job.configuration, environment), environment
+    if job.maps:
+        environment = Environment.read(job.maps[random.integers(len(job.maps))], job.configuration.maps)
+    else:
+        environment = furnish_room(job.rooms[random.integers(len(job.rooms))])
+    return draw_scene(random, job.configuration, environment, assets), environment
 
 
 def render_all(job: Job, indices: Sequence[int], workers: int, report: Callable[[FinishedPicture], None]) -> None:
@@ -77,20 +86,20 @@ def _set_environment() -> None:
     os.environ["MALLOC_TRIM_THRESHOLD_"] = str(1 << 30)
 
 
-_worker: tuple[Job, Tracer] | None = None
+_worker: tuple[Job, Tracer, Assets] | None = None
 """Kept by a worker process between pictures."""
 
 
 def _start(job: Job) -> None:
     global _worker
     start_worker()
-    _worker = (job, Tracer())
+    _worker = (job, Tracer(), read_assets(job.configuration))
 
 
 def _render_one(index: int) -> FinishedPicture:
     assert _worker is not None
-    job, tracer = _worker
-    scene, environment = scene_of(job, index)
+    job, tracer, assets = _worker
+    scene, environment = scene_of(job, index, assets)
     picture = render(scene, environment, tracer, job.configuration.ground)
     write_picture(job.folder, index, environment.name, scene, picture)
     return FinishedPicture(index, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)

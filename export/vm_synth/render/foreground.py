@@ -33,13 +33,15 @@ class Foreground:
     """The objects as a layer over the background.
 
     light: mean light (h, w, 3) of the covered part of each pixel. share: share (h, w) of each pixel that objects cover.
-    coverage: share (h, w) that the ball covers. classes: share (h, w, C) that objects of each class cover.
+    coverage: share (h, w) that the ball or the objects to detect cover. classes: share (h, w, C) that objects of each
+    class cover. areas: visible area of each of the scene's objects [px^2].
     """
 
     light: Singles
     share: Singles
     coverage: Singles
     classes: Singles
+    areas: tuple[float, ...]
 
     def classes_over(self, background: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
         """The class (h, w) that covers most of each pixel, in front of the background's classes (h, w)."""
@@ -58,7 +60,7 @@ def trace_foreground(scene: Scene, tracer: Tracer, rays: Floats, brightest: floa
     which removes bright specks that no camera shows.
     """
     shape = rays.shape[:2]
-    buffers = _Buffers(shape)
+    buffers = _Buffers(shape, len(scene.objects))
     reached, inside = _find_objects(scene, tracer, rays)
     small = np.zeros(shape, dtype=bool)
     for ball in (scene.ball, scene.other):
@@ -78,7 +80,7 @@ def trace_foreground(scene: Scene, tracer: Tracer, rays: Floats, brightest: floa
         if chosen.any():
             buffers.trace(scene, tracer, chosen, side, brightest)
     buffers.smooth(~small)
-    return Foreground(buffers.light, buffers.share, buffers.coverage, buffers.classes)
+    return Foreground(buffers.light, buffers.share, buffers.coverage, buffers.classes, tuple(buffers.areas.tolist()))
 
 
 def _find_objects(scene: Scene, tracer: Tracer, rays: Floats) -> tuple[Mask, Mask]:
@@ -177,11 +179,12 @@ def _subpixel_offsets(side: int) -> Floats:
 class _Buffers:
     """The arrays of a Foreground while it is traced, and the mean albedo, normal and distance of each pixel."""
 
-    def __init__(self, shape: tuple[int, ...]) -> None:
+    def __init__(self, shape: tuple[int, ...], objects: int) -> None:
         self.light, self.albedo, self.normal = (np.zeros((*shape, 3), dtype=np.float32) for _ in range(3))
         self.share, self.coverage = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
         self.depth = np.ones(shape, dtype=np.float32)
         self.classes = np.zeros((*shape, len(CLASSES)), dtype=np.float32)
+        self.areas = np.zeros(objects)
 
     def trace(self, scene: Scene, tracer: Tracer, chosen: Mask, side: int, brightest: float) -> None:
         """Trace the chosen pixels (h, w) with side^2 rays each, and store the result."""
@@ -205,7 +208,9 @@ class _Buffers:
         self.depth[here] = np.maximum(depth / np.maximum(hit.sum(axis=1), 1), 1e-3)
         self.share[here] = covered.mean(axis=(1, 2), dtype=np.float32)
         what = what.reshape(len(rows), -1)
-        self.coverage[here] = (what == BALL).mean(axis=1, dtype=np.float32)
+        owner = _objects_hit(scene, what)
+        self.coverage[here] = ((what == BALL) | (owner >= 0)).mean(axis=1, dtype=np.float32)
+        self.areas += np.bincount(owner[owner >= 0], minlength=len(self.areas)) / len(offsets)
         for label, rays_of in _by_class(scene, what):
             self.classes[rows, columns, label] += rays_of.mean(axis=1, dtype=np.float32)
 
@@ -225,6 +230,16 @@ def _mean(values: Singles, covered: Mask) -> Singles:
     for ray in range(values.shape[1]):  # NumPy is slow with sums over a short axis in the middle
         total += np.where(covered[:, ray], values[:, ray], np.float32(0.0))
     return np.asarray(total / np.maximum(covered.sum(axis=1), 1), dtype=np.float32)
+
+
+def _objects_hit(scene: Scene, what: npt.NDArray[np.int32]) -> npt.NDArray[np.int64]:
+    """Number of the scene's object that each ray (n, k) hits, -1 for all else; what: hits (n, k)."""
+    own = len(scene.objects)
+    if not own:
+        return np.full(what.shape, -1)
+    ends = np.cumsum(scene.counts[:own])
+    body = np.searchsorted(ends, scene.mesh.triangles[np.maximum(what, 0), 0], side="right")
+    return np.where((what >= 0) & (body < own), body, -1)
 
 
 def _by_class(scene: Scene, what: npt.NDArray[np.int32]) -> list[tuple[int, Mask]]:

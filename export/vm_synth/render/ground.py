@@ -22,12 +22,12 @@ def paint_ground(field: Field, points: Floats, range_: Floats, pixel: float) -> 
     local = (np.where(seen[..., None], points, 1e6) - np.array(field.middle)) @ field.rotation
     x, y = np.ascontiguousarray(local[..., 0]), np.ascontiguousarray(local[..., 1])
     ax, ay = np.abs(x), np.abs(y)
-    steps = _change_per_pixel(ax), _change_per_pixel(ay)
+    steps = change_per_pixel(ax), change_per_pixel(ay)
     if math.isinf(field.border):
         carpet = seen.astype(np.float32)
     else:
-        carpet = _share_inside(field.length / 2.0 + field.border - ax, steps[0])
-        carpet *= _share_inside(field.width / 2.0 + field.border - ay, steps[1]) * seen
+        carpet = share_inside(field.length / 2.0 + field.border - ax, steps[0])
+        carpet *= share_inside(field.width / 2.0 + field.border - ay, steps[1]) * seen
     lines = _line_shares(field, x, y, steps) * seen
     slow = color_patches(field.seed, points)
     if field.wear:
@@ -37,7 +37,7 @@ def paint_ground(field: Field, points: Floats, range_: Floats, pixel: float) -> 
     grain = turf_texture(field.turf, field.seed % 3, points, footprint)
     grass = np.array(field.grass, dtype=np.float32) * (1.0 + field.texture * (grain + slow))
     if field.stripe:
-        shade = 0.5 + np.clip(np.sin(np.pi * x / field.stripe) / _change_per_pixel(np.pi * x / field.stripe), -0.5, 0.5)
+        shade = 0.5 + np.clip(np.sin(np.pi * x / field.stripe) / change_per_pixel(np.pi * x / field.stripe), -0.5, 0.5)
         grass *= (0.88 + 0.24 * shade[..., None]).astype(np.float32)
     paint = field.paint * (1.0 + 0.3 * field.texture * grain.mean(axis=-1, keepdims=True))
     # Thin paint covers the bright tips of the blades, not the dark ground between them.
@@ -66,19 +66,19 @@ def _line_shares(field: Field, x: Floats, y: Floats, steps: tuple[Floats, Floats
     half_length, half_width, line = field.length / 2.0, field.width / 2.0, field.line_width
     ax, ay = np.abs(x), np.abs(y)
     lines = _rectangle(ax, ay, steps, half_length, half_width, line)
-    halfway = _share_near(x, _change_per_pixel(x), line) * _share_inside(half_width - ay, steps[1])
+    halfway = _share_near(x, change_per_pixel(x), line) * share_inside(half_width - ay, steps[1])
     np.maximum(lines, halfway, out=lines)
     around = np.hypot(x, y)
-    outward = _change_per_pixel(around)
+    outward = change_per_pixel(around)
     np.maximum(lines, _share_near(around - field.length / 12.0, outward, line), out=lines)
     for depth, breadth in ((field.length / 9.0, field.width / 2.0), (field.length / 4.5, field.width / 1.2)):
         # The frame of an area; its outer side lies on the goal line.
         across = np.abs(ax - half_length + depth / 2.0)
-        frame = _rectangle(across, ay, (_change_per_pixel(across), steps[1]), depth / 2.0, breadth / 2.0, line)
+        frame = _rectangle(across, ay, (change_per_pixel(across), steps[1]), depth / 2.0, breadth / 2.0, line)
         np.maximum(lines, frame, out=lines)
     mark = np.hypot(ax - half_length + field.length / 6.0, y)
-    for distance, step in ((mark, _change_per_pixel(mark)), (around, outward)):
-        np.maximum(lines, _share_inside(line - distance, step), out=lines)
+    for distance, step in ((mark, change_per_pixel(mark)), (around, outward)):
+        np.maximum(lines, share_inside(line - distance, step), out=lines)
     return np.asarray(lines)
 
 
@@ -89,8 +89,8 @@ def _rectangle(
 
     ax, ay: |x| and |y| (h, w) [m]. steps: their changes per pixel (h, w).
     """
-    sides = _share_near(ax - half_length, steps[0], line) * _share_inside(half_width + line / 2.0 - ay, steps[1])
-    ends = _share_near(ay - half_width, steps[1], line) * _share_inside(half_length + line / 2.0 - ax, steps[0])
+    sides = _share_near(ax - half_length, steps[0], line) * share_inside(half_width + line / 2.0 - ay, steps[1])
+    ends = _share_near(ay - half_width, steps[1], line) * share_inside(half_length + line / 2.0 - ax, steps[0])
     return np.asarray(np.maximum(sides, ends))
 
 
@@ -104,7 +104,7 @@ def _share_near(distance: Floats, step: Floats, width: float) -> Singles:
     return np.asarray(np.maximum(over, 0.0) / (2.0 * half), dtype=np.float32)
 
 
-def _share_inside(distance: Floats, step: Floats) -> Singles:
+def share_inside(distance: Floats, step: Floats) -> Singles:
     """Share (h, w) of each pixel on the positive side of an edge.
 
     distance: signed, to the edge (h, w) [m]. step: its change per pixel (h, w).
@@ -112,7 +112,7 @@ def _share_inside(distance: Floats, step: Floats) -> Singles:
     return np.asarray(np.clip(0.5 + distance / step, 0.0, 1.0), dtype=np.float32)
 
 
-def _change_per_pixel(distance: Floats) -> Floats:
+def change_per_pixel(distance: Floats) -> Floats:
     """How much a distance (h, w) changes from one pixel to the next.
 
     The smaller change to either neighbor counts, because one of them may show the sky.

@@ -21,9 +21,11 @@ from vm_workstation.ranges import uniform
 from ..scene.configuration import CLASSES, GroundRanges
 from ..scene.environment import Environment
 from ..scene.scene import Scene
+from ..scene.surface import Surface
 from .foreground import trace_foreground
 from .ground import ground_light, paint_ground
 from .rays import pixel_angle, pixel_grid, rays_through
+from .surface_paint import paint_surface
 from .tracer import Tracer
 from .turf import ground_noise
 
@@ -38,12 +40,14 @@ class Picture:
     """A rendered scene.
 
     radiance: linear RGB (h, w, 3), 0 outside of the lens's field of view. classes: position in CLASSES of each pixel
-    (h, w), or UNLABELED. coverage: share (h, w) of each pixel that the ball covers.
+    (h, w), or UNLABELED. coverage: share (h, w) of each pixel that the object to detect covers. areas: visible area of
+    each of the scene's objects [px^2].
     """
 
     radiance: Singles
     classes: npt.NDArray[np.uint8]
     coverage: Singles
+    areas: tuple[float, ...] = ()
 
 
 def render(scene: Scene, environment: Environment, tracer: Tracer, ground: GroundRanges) -> Picture:
@@ -52,32 +56,61 @@ def render(scene: Scene, environment: Environment, tracer: Tracer, ground: Groun
     tracer.load_scene(scene, environment)
     rays = rays_through(scene, pixel_grid(scene.size))
     seen = np.isfinite(rays[..., 0])
-    radiance, classes = _background(scene, environment, rays, random, ground)
+    radiance, classes, table = _background(scene, environment, rays, random, ground)
     if scene.ball is not None or scene.other is not None or len(scene.mesh.triangles):
         below = seen & (rays[..., 2] < -1e-3)
-        radiance *= _shadows(scene, rays, below, tracer, random)
+        radiance *= 1.0 + table[..., None] * (_shadows(scene, rays, below, tracer, random) - 1.0)
     foreground = trace_foreground(scene, tracer, rays, 30.0 * max(float(radiance.mean()), 1e-6))
     radiance += foreground.share[..., None] * (foreground.light - radiance)
     classes = foreground.classes_over(classes)
     radiance[~seen] = 0.0
     classes[~seen] = UNLABELED
-    return Picture(radiance, classes, foreground.coverage)
+    return Picture(radiance, classes, foreground.coverage, foreground.areas)
 
 
 def _background(
     scene: Scene, environment: Environment, rays: Floats, random: np.random.Generator, ground: GroundRanges
-) -> tuple[Singles, npt.NDArray[np.uint8]]:
-    """Radiance (h, w, 3) and classes (h, w) of a scene without objects and shadows."""
+) -> tuple[Singles, npt.NDArray[np.uint8], Singles]:
+    """Radiance (h, w, 3) and classes (h, w) of a scene without objects and shadows.
+
+    Also the share (h, w) of each pixel that shows ground on which shadows fall: all but the surroundings of a table.
+    """
     up = np.array([0.0, 0.0, 1.0])
     safe = np.where(np.isfinite(rays), rays, up)
     radiance = environment.radiance_along(safe)
     classes = np.full(rays.shape[:2], CLASSES.index("environment"), dtype=np.uint8)
+    ground_share = np.full(rays.shape[:2], float(scene.surface is None), dtype=np.float32)
     rows = np.flatnonzero((safe[..., 2] < -1e-4).any(axis=1))
     if len(rows):
         # One more row on each side: lines are drawn from differences between neighboring pixels.
         part = slice(max(int(rows[0]) - 1, 0), int(rows[-1]) + 2)
-        _add_ground(scene, environment, safe[part], random, ground, radiance[part], classes[part])
-    return radiance, classes
+        if scene.surface is not None:
+            ground_share[part] = _add_surface(scene, scene.surface, environment, safe[part], random, ground, radiance[part])
+        else:
+            _add_ground(scene, environment, safe[part], random, ground, radiance[part], classes[part])
+    return radiance, classes, ground_share
+
+
+def _add_surface(
+    scene: Scene,
+    surface: Surface,
+    environment: Environment,
+    safe: Floats,
+    random: np.random.Generator,
+    ground: GroundRanges,
+    radiance: Singles,
+) -> Singles:
+    """Draw a table or floor into radiance (h, w, 3) where rays (h, w, 3) point down; returns its share (h, w)."""
+    distance, points = _plane_points(scene, safe)
+    albedo, share = paint_surface(surface, points, distance, pixel_angle(scene.lens, scene.size))
+    light = 1.0 + uniform(random, ground.light) * ground_light(points, surface.seed)
+    lit = albedo * (environment.irradiance / np.pi).astype(np.float32) * light[..., None]
+    mirrored = environment.radiance_along(safe * (1.0, 1.0, -1.0))
+    # A glossy top scatters bright lamps; no camera shows them unbroken.
+    limit = 4.0 * float(np.median(lit)) + 1e-6
+    lit += surface.shine * cv2.GaussianBlur(np.minimum(mirrored, limit), (0, 0), 3.0)
+    radiance += share[..., None] * (lit - radiance)
+    return share
 
 
 def _add_ground(
@@ -90,10 +123,8 @@ def _add_ground(
     classes: npt.NDArray[np.uint8],
 ) -> None:
     """Draw the ground into radiance (h, w, 3) and classes (h, w) where rays (h, w, 3) point down."""
-    below = safe[..., 2] < -1e-4
-    with np.errstate(divide="ignore"):
-        distance = np.where(below, scene.orientation.height / -safe[..., 2], np.inf)
-    points = np.where(below[..., None], safe[..., :2] * np.where(below, distance, 0.0)[..., None], np.inf)
+    distance, points = _plane_points(scene, safe)
+    below = np.isfinite(distance)
     pixel = pixel_angle(scene.lens, scene.size)
     if scene.field is None:
         strength = uniform(random, ground.detail)
@@ -106,6 +137,17 @@ def _add_ground(
     radiance += carpet[..., None] * (lit - radiance)
     classes[carpet > 0.5] = CLASSES.index("field")
     classes[(lines * carpet) > 0.5] = CLASSES.index("line")
+
+
+def _plane_points(scene: Scene, safe: Floats) -> tuple[Floats, Floats]:
+    """Distances (h, w) [m] along rays (h, w, 3) to the plane, and where they meet it (h, w, 2) [m].
+
+    Both are infinite for rays that do not point down.
+    """
+    below = safe[..., 2] < -1e-4
+    with np.errstate(divide="ignore"):
+        distance = np.where(below, scene.orientation.height / -safe[..., 2], np.inf)
+    return distance, np.where(below[..., None], safe[..., :2] * np.where(below, distance, 0.0)[..., None], np.inf)
 
 
 def _shadows(scene: Scene, rays: Floats, below: Mask, tracer: Tracer, random: np.random.Generator) -> Singles:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from vm_embedded.config.entries import check_entries, one_of, share
+from vm_embedded.config.entries import check_entries, one_of, share, text_line
 from vm_workstation.ranges import range_of
 
 from ..balls.draw_design import DesignRanges
@@ -13,7 +13,9 @@ from ..bodies.catalog import BodyRanges
 from .camera import CameraRanges
 from .field import FieldRanges
 from .maps import MapRanges
+from .own_object import ObjectRanges
 from .sensor import SensorRanges
+from .surface import TableRanges
 
 CLASSES = ("ball", "goal", "line", "field", "environment", "robot")
 """The classes of pixels; masks during rendering hold positions in this tuple."""
@@ -28,7 +30,12 @@ An entry [low, high] is a range: each picture gets a random value between the tw
 
 @dataclass(frozen=True)
 class GroundRanges:
-    """Section [ground]: the ground below the ball."""
+    """Section [ground]: the ground below the ball or the objects."""
+
+    kind: str = one_of(
+        ("table", "floor"), "table", "ground below objects that are not the ball; the ball lies on a field"
+    )
+    textures: str = text_line("", 'folder of pictures of tables or floors to put there; "": random textures')
 
     photographed: float = share(
         0.5, "share of pictures that show the flat floor of their map, if it has one; the others show a field"
@@ -106,6 +113,8 @@ class SceneConfiguration:
     camera: CameraRanges = dataclasses.field(default_factory=CameraRanges)
     ground: GroundRanges = dataclasses.field(default_factory=GroundRanges)
     field: FieldRanges = dataclasses.field(default_factory=FieldRanges)
+    object: ObjectRanges = dataclasses.field(default_factory=ObjectRanges)
+    table: TableRanges = dataclasses.field(default_factory=TableRanges)
     ball: TargetRanges = dataclasses.field(default_factory=TargetRanges)
     ball_design: DesignRanges = dataclasses.field(default_factory=DesignRanges)
     things: ThingRanges = dataclasses.field(default_factory=ThingRanges)

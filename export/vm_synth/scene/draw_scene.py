@@ -14,15 +14,21 @@ from vm_workstation.ranges import uniform
 from ..bodies.solids import join_bodies
 from .camera import draw_lens, draw_orientation
 from .configuration import SceneConfiguration
+from .draw_table_scene import draw_table_scene
 from .environment import Environment
 from .field import Field, draw_field
+from .own_object import NO_ASSETS, Assets
 from .placement import ATTEMPTS, NEAREST, Placement, draw_ball_at, in_picture, intersects_ball
 from .scene import Scene
 from .sensor import draw_sensor
 
 
-def draw_scene(random: np.random.Generator, ranges: SceneConfiguration, environment: Environment) -> Scene:
-    """Draw a scene under an environment map."""
+def draw_scene(
+    random: np.random.Generator, ranges: SceneConfiguration, environment: Environment, assets: Assets = NO_ASSETS
+) -> Scene:
+    """Draw a scene under an environment map. assets: the files of the configuration."""
+    if not ranges.object.is_ball:
+        return draw_table_scene(random, ranges, assets)
     lens = draw_lens(random, ranges.camera)
     photographed = environment.floor is not None and random.random() < ranges.ground.photographed
     floor = environment.floor if photographed else None

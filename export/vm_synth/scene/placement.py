@@ -20,6 +20,7 @@ from ..bodies.solids import Body
 from .configuration import SceneConfiguration
 from .field import Field
 from .scene import PlacedBall
+from .surface import Surface
 
 ATTEMPTS = 60
 NEAREST = 0.12  # [m], smallest distance on the plane between camera and objects
@@ -58,7 +59,7 @@ class Placement:
         ranges: SceneConfiguration,
         lens: RadialLens,
         orientation: Orientation,
-        field: Field | None,
+        field: Field | Surface | None,
         floor: float | None,
     ) -> None:
         self.bodies: list[Body] = []
@@ -93,6 +94,10 @@ class Placement:
             carrier = draw_carrier(random, bodies, self._orientation.height)
             if carrier is not None:
                 self.bodies.append(carrier.moved(self._orientation.yaw, (0.0, 0.0, 0.0)))
+
+    def add_other(self, bodies: list[Body]) -> None:
+        """Place bodies at a free spot, if there is one."""
+        self._add(bodies)
 
     def add_goals(self, field: Field) -> None:
         """Place two goals at the ends of their field."""
