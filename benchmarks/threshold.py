@@ -42,9 +42,9 @@ def observed(
         picture = read_picture(files, classes)
         scene = read_scene(files.image.with_name(f"scene{files.number}.json"))
         assert scene is not None
-        manifest = replace(subject.manifest, radius=scene.ball_radius, object_radius=scene.ball_radius)
+        manifest = replace(subject.manifest, radius=scene.radius, object_radius=scene.ball_radius)
         try:
-            observation = subject.observe(picture, scene.ball_radius)
+            observation = subject.observe(picture, scene.radius)
         except GeometryError:
             continue
         yield true_objects(picture, scene, manifest)["ball"], observation

@@ -13,7 +13,7 @@ import numpy as np
 from vm_embedded.arrays import Floats, Indices
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Lens, Size
-from vm_workstation.sphere_outline import touching_rays
+from vm_workstation.outlines import touching_rays
 
 from .balls import SeenBall
 from .floor_pose import PoseFit, numbers_of, orientation_of, pose_fit

@@ -18,7 +18,7 @@ from vm_embedded.cli import detect
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens_files import format_lens_file, read_lens_file
 from vm_embedded.geometry.orientation import Orientation
-from vm_workstation.sphere_outline import polygon_area, sphere_outline
+from vm_workstation.outlines import polygon_area, sphere_outline
 
 from .films import KINDS, LENSES, SIZE, chessboard_texture, film, run, write
 

@@ -10,7 +10,7 @@ from vm_synth.scene.camera import CameraRanges
 from vm_synth.scene.configuration import CLASSES, GroundRanges, SceneConfiguration, TargetRanges, ThingRanges
 from vm_synth.scene.draw_scene import draw_scene
 from vm_synth.scene.environment import Environment
-from vm_workstation.sphere_outline import sphere_outline
+from vm_workstation.outlines import sphere_outline
 
 SIZE = (96, 64)
 

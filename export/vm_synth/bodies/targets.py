@@ -59,7 +59,7 @@ def draw_target(
 
     textures: pictures (h, w, 3) of linear albedo that are wrapped around it; without any, it gets random paints.
     """
-    colored = _textured(solid, textures[random.integers(len(textures))]) if textures else _painted(random, solid)
+    colored = _textured(solid, textures[int(random.integers(len(textures)))]) if textures else _painted(random, solid)
     sized = colored.turned(rotation(yaw=random.uniform(-np.pi, np.pi))).stretched(radius, radius, height)
     return body([sized], "ball", name)
 

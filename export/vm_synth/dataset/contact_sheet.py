@@ -13,8 +13,11 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.cameras.image_files import read_image
-from vm_embedded.errors import InputError, VisualMeshError, one_line
+from vm_embedded.errors import GeometryError, InputError, one_line
+from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.lens_files import read_lens_file
+from vm_embedded.geometry.shape import Shape
+from vm_embedded.geometry.sphere import Sphere
 from vm_workstation.contact_sheet import (
     FAINT_INK,
     GAP,
@@ -26,7 +29,7 @@ from vm_workstation.contact_sheet import (
     scaled_pixels,
     write_text,
 )
-from vm_workstation.sphere_outline import sphere_outline
+from vm_workstation.outlines import shape_outline
 
 from .files import CLASS_COLORS, file_of, read_truth
 
@@ -42,19 +45,19 @@ _INSET = 0.3  # width of the magnified part, as a share of the tile's width
 class LabeledPicture:
     """A picture with its truth.
 
-    image: (h, w, 3) BGR. mask: (h, w, 4) BGRA. truth: content of scene*.json. outline: of the ball (n, 2) [px], NaN
-    outside of the lens's field of view, or None without a ball.
+    image: (h, w, 3) BGR. mask: (h, w, 4) BGRA. truth: content of scene*.json. outlines: of the ball
+    or the other objects to detect, each (n, 2) [px], NaN outside of the lens's field of view.
     """
 
     index: int
     image: Image
     mask: Image
     truth: dict[str, Any]
-    outline: Floats | None
+    outlines: tuple[Floats, ...]
 
 
 def read_labeled(folder: Path, index: int) -> LabeledPicture:
-    """Read a picture and compute its ball's outline. Raises InputError that names the invalid file."""
+    """Read a picture and compute the outlines of its objects. Raises InputError that names the invalid file."""
     image = read_image(file_of(folder, "image", index))
     mask = read_image(file_of(folder, "mask", index), raw=True)
     size = (image.shape[1], image.shape[0])
@@ -66,24 +69,37 @@ def read_labeled(folder: Path, index: int) -> LabeledPicture:
     if lens.orientation is None:
         raise InputError(f"{lens_path} has no camera pose (Hoc)")
     try:
-        ball = truth["ball"]
-        found = None
-        if ball is not None:
-            center, radius = np.array(ball["center"], dtype=np.float64), float(ball["radius"])
-            found = sphere_outline(lens.lens.for_image(size), lens.orientation, center, radius, size)
+        found = tuple(
+            shape_outline(lens.lens.for_image(size), lens.orientation, shape, center, size)
+            for shape, center in _shapes(truth)
+        )
         shown = LabeledPicture(index, image, mask, truth, found)
         captions(shown)
-    except VisualMeshError:
-        raise
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, GeometryError) as error:
         raise InputError(f"{file_of(folder, 'scene', index)} is damaged: {one_line(error)}") from error
     return shown
 
 
+def _shapes(truth: dict[str, Any]) -> list[tuple[Shape, Floats]]:
+    """Shape and center (3,) [m] of the ball, or of each of the other objects to detect."""
+    shown = truth["objects"] if "object" in truth else [truth["ball"]] if truth["ball"] is not None else []
+    return [
+        (
+            Cylinder(float(each["radius"]), float(each["height"]))
+            if "height" in each
+            else Sphere(float(each["radius"])),
+            np.array(each["center"], dtype=np.float64).reshape(3),
+        )
+        for each in shown
+    ]
+
+
 def captions(shown: LabeledPicture) -> tuple[str, str]:
-    """Two lines of text: the picture's number and map, and its ball."""
-    ball = shown.truth["ball"]
+    """Two lines of text: the picture's number and map, and its ball or the number of its objects."""
     head = f"{shown.index}  {shown.truth['map']}"
+    if "object" in shown.truth:
+        return head, f"{len(shown.outlines)} of class {shown.truth['object']['name']}"
+    ball = shown.truth["ball"]
     if ball is None:
         return head, "no ball"
     about = f"{ball['distance']:.2f} m, radius {ball['pixel_radius']:.1f} px, {100.0 * ball['visible']:.0f} % visible"
@@ -114,8 +130,9 @@ def cell(shown: LabeledPicture, width: int) -> Image:
     how = cv2.INTER_AREA if zoom < 1.0 else cv2.INTER_LINEAR
     upper = cv2.resize(shown.image, size, interpolation=how)
     lower = np.asarray(cv2.resize(tinted(shown.image, shown.mask), size, interpolation=how), dtype=np.uint8)
-    if shown.outline is not None:
-        _draw_outline(lower, scaled_pixels(shown.outline, (0.0, 0.0), zoom))
+    for outline in shown.outlines:
+        _draw_outline(lower, scaled_pixels(outline, (0.0, 0.0), zoom))
+    if len(shown.outlines) == 1:
         _add_inset(lower, shown, zoom)
     text = np.full((2 * LINE + 4, width, 3), PAPER, dtype=np.uint8)
     for row, (line, color) in enumerate(zip(captions(shown), (INK, FAINT_INK), strict=True)):
@@ -134,9 +151,9 @@ def _draw_outline(canvas: Image, pixels: Floats) -> None:
 
 
 def _add_inset(canvas: Image, shown: LabeledPicture, zoom: float) -> None:
-    """Draw a magnified cutout of a small ball, without tints, in the farthest corner."""
-    assert shown.outline is not None
-    pixels = shown.outline[np.isfinite(shown.outline).all(axis=1)]
+    """Draw a magnified cutout of a single small object, without tints, in the farthest corner."""
+    (outline,) = shown.outlines
+    pixels = outline[np.isfinite(outline).all(axis=1)]
     height, width = canvas.shape[:2]
     side = min(round(_INSET * width), height // 2)
     if not len(pixels):
@@ -152,7 +169,7 @@ def _add_inset(canvas: Image, shown: LabeledPicture, zoom: float) -> None:
     inset = np.asarray(
         cv2.warpAffine(shown.image, matrix, (side, side), flags=cv2.INTER_NEAREST, borderValue=PAPER), dtype=np.uint8
     )
-    _draw_outline(inset, scaled_pixels(shown.outline, corner, scale))
+    _draw_outline(inset, scaled_pixels(outline, corner, scale))
     inset[[0, -1]] = inset[:, [0, -1]] = INK
     left = 0 if middle[0] * zoom > width / 2.0 else width - side
     top = 0 if middle[1] * zoom > height / 2.0 else height - side
@@ -170,7 +187,7 @@ def sheet(cells: Sequence[Image], columns: int, title: str) -> Image:
     canvas = np.full((*size, 3), PAPER, dtype=np.uint8)
     place = GAP + write_text(canvas, title, (GAP, head - GAP - 3), INK) + 3 * GAP
     legend = {name: CLASS_COLORS[name] for name in ("field", "line", "goal", "robot", "ball")}
-    draw_legend(canvas, {**legend, "true outline of the ball": OUTLINE}, (place, head - GAP - 3))
+    draw_legend(canvas, {**legend, "true outline": OUTLINE}, (place, head - GAP - 3))
     for number, each in enumerate(cells):
         row, column = divmod(number, columns)
         top, left = head + row * (height + GAP), GAP + column * (width + GAP)

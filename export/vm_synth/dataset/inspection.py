@@ -28,11 +28,11 @@ _STEP = 2  # every second row and column of a mask is counted
 
 
 @dataclass(frozen=True)
-class BallFacts:
-    """The ball of a picture.
+class ObjectFacts:
+    """The ball of a picture, or another object to detect.
 
     distance: on the plane [m]. pixel_radius: radius of a circle with the area of its outline [px]. pixel: its center
-    (x, y) [px]. visible: visible share of the outline's area. kind: its pattern.
+    (x, y) [px]. visible: visible share of the outline's area. kind: pattern of a ball, class of another object.
     """
 
     distance: float
@@ -46,8 +46,8 @@ class BallFacts:
 class Facts:
     """What a picture shows.
 
-    height [m], pitch and roll [rad] of the camera. shares: share of the pixels of each class, and "unlabeled"; empty if
-    masks were not read.
+    object_name: class of the objects to detect. objects: these. height [m], pitch and roll [rad] of the camera.
+    shares: share of the pixels of each class, and "unlabeled"; empty if masks were not read.
     """
 
     index: int
@@ -57,7 +57,8 @@ class Facts:
     height: float
     pitch: float
     roll: float
-    ball: BallFacts | None
+    object_name: str
+    objects: tuple[ObjectFacts, ...]
     other_ball: str | None
     shares: dict[str, float]
 
@@ -166,7 +167,8 @@ def _read_facts(folder: Path, maps: Any, size: Size | None, index: int) -> Facts
             raise InputError(f"{file_of(folder, 'scene', index)} describes picture {truth['index']}, not {index}")
         if truth["map"] not in maps:
             raise InputError(f"{file_of(folder, 'scene', index)}: map {truth['map']} is not in set.json")
-        ball, other = truth["ball"], truth["other_ball"]
+        name, objects = _objects(truth)
+        other = truth["other_ball"]
         pose = lens.orientation
         apart = np.abs(np.array([truth[name] - getattr(pose, name) for name in ("height", "pitch", "roll")]))
         if apart.max() > _SAME_POSE:
@@ -181,7 +183,8 @@ def _read_facts(folder: Path, maps: Any, size: Size | None, index: int) -> Facts
             height=_number(truth["height"]),
             pitch=_number(truth["pitch"]),
             roll=_number(truth["roll"]),
-            ball=None if ball is None else _ball_facts(ball),
+            object_name=name,
+            objects=objects,
             other_ball=None if other is None else str(other["label"]),
             shares=shares,
         )
@@ -193,10 +196,19 @@ def _read_facts(folder: Path, maps: Any, size: Size | None, index: int) -> Facts
         raise InputError(f"{file_of(folder, 'scene', index)} is damaged: {one_line(error)}") from error
 
 
-def _ball_facts(ball: dict[str, Any]) -> BallFacts:
-    x, y = ball["pixel"]
-    numbers = [_number(ball[name]) for name in ("distance", "pixel_radius", "visible")]
-    return BallFacts(numbers[0], numbers[1], (_number(x), _number(y)), numbers[2], str(ball["design"]["kind"]))
+def _objects(truth: dict[str, Any]) -> tuple[str, tuple[ObjectFacts, ...]]:
+    """The class of the objects to detect, and these objects."""
+    if "object" in truth:
+        name = str(truth["object"]["name"])
+        return name, tuple(_object_facts(each, name) for each in truth["objects"])
+    ball = truth["ball"]
+    return "ball", () if ball is None else (_object_facts(ball, str(ball["design"]["kind"])),)
+
+
+def _object_facts(shown: dict[str, Any], kind: str) -> ObjectFacts:
+    x, y = shown["pixel"]
+    numbers = [_number(shown[name]) for name in ("distance", "pixel_radius", "visible")]
+    return ObjectFacts(numbers[0], numbers[1], (_number(x), _number(y)), numbers[2], kind)
 
 
 def _number(value: Any) -> float:

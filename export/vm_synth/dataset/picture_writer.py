@@ -17,7 +17,7 @@ import numpy as np
 from vm_embedded.arrays import Image
 from vm_embedded.files import atomic_write
 from vm_embedded.geometry.lens_files import format_lens_file
-from vm_workstation.sphere_outline import polygon_area, sphere_outline
+from vm_workstation.outlines import polygon_area, sphere_outline
 
 from ..render.image_processing import encode_jpeg, process_image
 from ..render.picture import UNLABELED, Picture
@@ -127,7 +127,10 @@ def _object_descriptions(scene: Scene, picture: Picture) -> dict[str, Any]:
                 "visible": float(min(picture.areas[number] / max(area, 1e-9), 1.0)),
             }
         )
-    return {"object": {"name": scene.object_name, "radius": scene.ball_radius, "height": scene.object_height}, "objects": described}
+    return {
+        "object": {"name": scene.object_name, "radius": scene.ball_radius, "height": scene.object_height},
+        "objects": described,
+    }
 
 
 def _hull_area(scene: Scene, number: int) -> tuple[list[float], float]:
@@ -138,7 +141,7 @@ def _hull_area(scene: Scene, number: int) -> tuple[list[float], float]:
     rays = (points @ scene.orientation.rotation) / np.linalg.norm(points, axis=1, keepdims=True)
     pixels = scene.lens.project(rays, scene.size)
     hull = cv2.convexHull(pixels[1:].astype(np.float32))[:, 0]
-    return [float(value) for value in pixels[0]], polygon_area(hull)
+    return [float(value) for value in pixels[0]], polygon_area(hull.astype(np.float64))
 
 
 def _finite(table: dict[str, Any]) -> dict[str, Any]:

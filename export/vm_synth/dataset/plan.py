@@ -20,7 +20,7 @@ from .files import FORMAT, PARTS, read_table
 class Plan:
     """Defines a set: the same plan gives the same pictures.
 
-    maps: names of the maps, each with the SHA-256 of its file. files: the same for the other files of the configuration.
+    maps: names of the maps, each with the SHA-256 of its file. files: the same for other files of the configuration.
     """
 
     seed: int

@@ -15,7 +15,7 @@ from vm_embedded.geometry.lens import Size
 
 from ..scene.configuration import CLASSES
 from .inspection import Facts
-from .report import categories, quantities
+from .report import categories, object_name, objects_of, quantities
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,15 +23,9 @@ if TYPE_CHECKING:
 _GREEN, _GRAY, _RED = "#2a7f62", "#9aa5b1", "#c0392b"
 _CLASS_COLORS = {"ball": "#d62728", "goal": "#e3c000", "line": "#c9c9c9", "field": "#2ca02c", "robot": "#3355dd"}
 
-_HISTOGRAMS = (
-    "camera height [m]",
-    "camera pitch [deg]",
-    "camera roll [deg]",
-    "ball distance [m]",
-    "ball radius [px]",
-    "ball visible [%]",
-)
-_UNEVEN = ("camera roll [deg]", "ball visible [%]")  # plotted on a log scale
+_CAMERA = ("camera height [m]", "camera pitch [deg]", "camera roll [deg]")
+_OBJECT = ("distance [m]", "radius [px]", "visible [%]")
+_UNEVEN = ("roll [deg]", "visible [%]")  # plotted on a log scale
 _MOST = 14  # largest number of bars
 _DOT = 4000.0  # total area of all dots
 
@@ -59,12 +53,12 @@ def plot(facts: Sequence[Facts], size: Size, title: str, path: Path) -> None:
     figure, grid = pyplot.subplots(3, 4, figsize=(14.0, 9.0), layout="constrained")
     figure.suptitle(title, fontsize=11)
     axes = list(grid.flat)
-    values, kinds = quantities(facts), categories(facts)
-    for each, name in zip(axes, _HISTOGRAMS, strict=False):
+    values, kinds, shown_name = quantities(facts), categories(facts), object_name(facts)
+    for each, name in zip(axes, (*_CAMERA, *(f"{shown_name} {what}" for what in _OBJECT)), strict=False):
         _histogram(each, values.get(name, []), name)
     _places(axes[6], facts, size)
     _shares(axes[7], values)
-    for each, shown in ((axes[8], ("ground", "lens")), (axes[9], ("ball", "other ball"))):
+    for each, shown in ((axes[8], ("ground", "lens")), (axes[9], (shown_name, "other ball"))):
         _bars(each, {f"{what}: {name}": n for what in shown for name, n in kinds[what].items()}, "pictures")
     _bars(
         axes[10], dict(kinds["ball design"].most_common(_MOST)), _titled("balls with a pattern", kinds["ball design"])
@@ -79,13 +73,14 @@ def plot(facts: Sequence[Facts], size: Size, title: str, path: Path) -> None:
 
 
 def _histogram(axes: Axes, values: Sequence[float], name: str) -> None:
+    uneven = name.endswith(_UNEVEN)
     axes.set_xlabel(name, fontsize=9)
-    axes.set_ylabel("pictures, log scale" if name in _UNEVEN else "pictures", fontsize=9)
+    axes.set_ylabel("pictures, log scale" if uneven else "pictures", fontsize=9)
     if not values:
         return _nothing(axes)
     # Balls at the edge of a rectilinear lens can be huge; they count in the last column.
-    shown = np.minimum(values, np.quantile(values, 0.995) if name == "ball radius [px]" else np.inf)
-    axes.hist(shown, bins=40, color=_GREEN, log=name in _UNEVEN)
+    shown = np.minimum(values, np.quantile(values, 0.995) if name.endswith("radius [px]") else np.inf)
+    axes.hist(shown, bins=40, color=_GREEN, log=uneven)
     median, (low, high) = float(np.median(values)), axes.get_xlim()
     axes.axvline(median, color=_RED, linewidth=1.0)
     side = "left" if median < (low + high) / 2.0 else "right"
@@ -94,13 +89,13 @@ def _histogram(axes: Axes, values: Sequence[float], name: str) -> None:
 
 
 def _places(axes: Axes, facts: Sequence[Facts], size: Size) -> None:
-    balls = [each.ball for each in facts if each.ball is not None]
-    x, y = np.array([each.pixel for each in balls]).reshape(-1, 2).T
-    axes.scatter(x, y, s=_DOT / max(len(balls), 1), color=_GREEN)
+    shown = objects_of(facts)
+    x, y = np.array([each.pixel for each in shown]).reshape(-1, 2).T
+    axes.scatter(x, y, s=_DOT / max(len(shown), 1), color=_GREEN)
     axes.set_xlim(-0.5, size[0] - 0.5)
     axes.set_ylim(size[1] - 0.5, -0.5)
     axes.set_aspect("equal")
-    axes.set_xlabel("ball positions in the picture [px]", fontsize=9)
+    axes.set_xlabel(f"{object_name(facts)} positions in the picture [px]", fontsize=9)
 
 
 def _shares(axes: Axes, values: dict[str, list[float]]) -> None:

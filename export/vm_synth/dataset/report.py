@@ -13,7 +13,7 @@ from typing import Any
 from vm_workstation.text_tables import aligned, summary
 
 from ..scene.configuration import CLASSES
-from .inspection import Facts, Inspection
+from .inspection import Facts, Inspection, ObjectFacts
 
 _LISTED = 20
 """Largest number of faults, and of gaps, that are listed."""
@@ -23,19 +23,19 @@ _NO_BREAK = "\xa0"  # a space at which lines are not wrapped
 
 
 def quantities(facts: Sequence[Facts]) -> dict[str, list[float]]:
-    """The values of all pictures, by name with unit. Values of balls come from pictures with a ball."""
-    balls = [each.ball for each in facts if each.ball is not None]
+    """The values of all pictures, by name with unit. Values of objects are those of all objects."""
+    objects, name = objects_of(facts), object_name(facts)
     found = {
         "camera height [m]": [each.height for each in facts],
         "camera pitch [deg]": [math.degrees(each.pitch) for each in facts],
         "camera roll [deg]": [math.degrees(each.roll) for each in facts],
-        "ball distance [m]": [each.distance for each in balls],
-        "ball radius [px]": [each.pixel_radius for each in balls],
-        "ball visible [%]": [100.0 * each.visible for each in balls],
+        f"{name} distance [m]": [each.distance for each in objects],
+        f"{name} radius [px]": [each.pixel_radius for each in objects],
+        f"{name} visible [%]": [100.0 * each.visible for each in objects],
     }
     if any(each.shares for each in facts):
-        for name in (*CLASSES, "unlabeled"):
-            found[f"{name} pixels [%]"] = [100.0 * each.shares[name] for each in facts]
+        for each_class in (*CLASSES, "unlabeled"):
+            found[f"{each_class} pixels [%]"] = [100.0 * each.shares[each_class] for each in facts]
     return {name: values for name, values in found.items() if values}
 
 
@@ -44,19 +44,32 @@ def categories(facts: Sequence[Facts]) -> dict[str, Counter[str]]:
     return {
         "ground": Counter(each.ground for each in facts),
         "lens": Counter(each.projection for each in facts),
-        "ball": Counter(_ball_state(each) for each in facts),
+        object_name(facts): Counter(state for each in facts for state in _states(each)),
         "other ball": Counter(each.other_ball or "none" for each in facts),
-        "ball design": Counter(each.ball.kind for each in facts if each.ball is not None),
+        "ball design": Counter(each.kind for each in objects_of(facts)),
         "map": Counter(each.map for each in facts),
     }
 
 
-def _ball_state(facts: Facts) -> str:
-    if facts.ball is None:
-        return "none"
-    if facts.ball.visible <= 0.0:
+def objects_of(facts: Sequence[Facts]) -> list[ObjectFacts]:
+    """The objects to detect of all pictures."""
+    return [shown for each in facts for shown in each.objects]
+
+
+def object_name(facts: Sequence[Facts]) -> str:
+    """The class of the objects to detect."""
+    return facts[0].object_name if facts else "ball"
+
+
+def _states(facts: Facts) -> list[str]:
+    """How much of each object to detect is visible; none for a picture without one."""
+    return [_state(each) for each in facts.objects] or ["none"]
+
+
+def _state(shown: ObjectFacts) -> str:
+    if shown.visible <= 0.0:
         return "hidden"
-    return "whole" if facts.ball.visible > 0.98 else "in part"
+    return "whole" if shown.visible > 0.98 else "in part"
 
 
 def as_json(found: Inspection) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vm_embedded.arrays import Floats, Singles
+from vm_embedded.arrays import Indices, Singles
 from vm_embedded.errors import InputError, one_line
 
 from ..bodies.solids import Solid, rotation
@@ -56,7 +56,7 @@ def _rows(values: Any, kind: type[Any]) -> Any:
     return np.asarray(values.numpy(), dtype=kind).reshape(-1, 3)
 
 
-def _vertex_normals(vertices: Singles, triangles: Floats) -> Singles:
+def _vertex_normals(vertices: Singles, triangles: Indices) -> Singles:
     """Unit normals (n, 3) of vertices: the means of those of their triangles, weighted by area."""
     corners = vertices[triangles].astype(np.float64)
     faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

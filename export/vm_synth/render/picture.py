@@ -85,7 +85,9 @@ def _background(
         # One more row on each side: lines are drawn from differences between neighboring pixels.
         part = slice(max(int(rows[0]) - 1, 0), int(rows[-1]) + 2)
         if scene.surface is not None:
-            ground_share[part] = _add_surface(scene, scene.surface, environment, safe[part], random, ground, radiance[part])
+            ground_share[part] = _add_surface(
+                scene, scene.surface, environment, safe[part], random, ground, radiance[part]
+            )
         else:
             _add_ground(scene, environment, safe[part], random, ground, radiance[part], classes[part])
     return radiance, classes, ground_share

@@ -30,7 +30,9 @@ class ObjectRanges:
     file: str = text_line("", "for solid file: an .obj or .ply file; it is scaled to radius and height")
     up: str = one_of(("y", "z"), "z", "axis of the file that points up")
     textures: str = text_line("", 'folder of pictures to wrap around it; "": random colors')
-    radius: tuple[float, float] = range_of(0.04, 0.04, "radius of the smallest upright cylinder around it", "m", (0.002, 5))
+    radius: tuple[float, float] = range_of(
+        0.04, 0.04, "radius of the smallest upright cylinder around it", "m", (0.002, 5)
+    )
     height: tuple[float, float] = range_of(0.1, 0.1, "its height", "m", (0.002, 5.0))
     count: tuple[float, float] = range_of(0, 3, "number of objects in a picture", "", (0, 20))
     distance: tuple[float, float] = range_of(
@@ -39,7 +41,9 @@ class ObjectRanges:
     cut: float = share(0.15, "share of objects that the picture's border may cut")
     apart: float = number(2.1, "smallest distance between the axes of two objects", "radii", (2.0, 100.0))
     wrong_size: float = share(0.25, "share of pictures with an object of the wrong size, of class environment")
-    smaller: tuple[float, float] = range_of(0.3, 0.65, "its size if it is smaller, relative to the object", "", (0.01, 1))
+    smaller: tuple[float, float] = range_of(
+        0.3, 0.65, "its size if it is smaller, relative to the object", "", (0.01, 1)
+    )
     larger: tuple[float, float] = range_of(1.6, 2.5, "its size if it is larger, relative to the object", "", (1, 20))
 
     def __post_init__(self) -> None:

@@ -35,11 +35,11 @@ def furnish_room(number: int) -> Environment:
     picture *= 1.0 + 0.2 * cv2.GaussianBlur(random.standard_normal(picture.shape, dtype=np.float32), (0, 0), 0.8)
     slow = cv2.resize(random.uniform(0.6, 1.4, (4, 8, 1)).astype(np.float32), _SIZE, interpolation=cv2.INTER_CUBIC)
     picture *= np.maximum(slow, 0.2)[..., None]
-    picture = cv2.GaussianBlur(picture, (0, 0), random.uniform(0.6, 1.6))
+    blurred = cv2.GaussianBlur(picture, (0, 0), random.uniform(0.6, 1.6))
     lamps = np.zeros_like(picture)
     _add_boxes(random, lamps, int(random.integers(1, 7)), (0.02, 0.42), (3.0, 60.0), smaller=0.5)
-    picture += cv2.GaussianBlur(lamps, (0, 0), random.uniform(0.8, 3.0))
-    return Environment(room_name(number), np.maximum(picture, 1e-3).astype(np.float32), None)
+    light = blurred + cv2.GaussianBlur(lamps, (0, 0), random.uniform(0.8, 3.0))
+    return Environment(room_name(number), np.maximum(light, 1e-3).astype(np.float32), None)
 
 
 def _add_boxes(

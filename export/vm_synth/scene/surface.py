@@ -89,7 +89,7 @@ def draw_surface(
         # Within the ellipse in the table, and away from its edge.
         place = 0.4 * reach * np.array([length * math.cos(around), width * math.sin(around)])
         middle -= np.array([[c, -s], [s, c]]) @ place
-    texture = textures[random.integers(len(textures))] if textures else draw_texture(random)
+    texture = textures[int(random.integers(len(textures)))] if textures else draw_texture(random)
     return Surface(
         length=length,
         width=width,

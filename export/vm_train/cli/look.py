@@ -16,6 +16,8 @@ from vm_workstation.option_types import at_least
 
 from ..data.pictures import find_pictures
 from ..data.split import split_by_seed
+from ..learning.class_table import ClassTable
+from ..learning.configuration import TrainConfiguration
 from ..look.configuration import LOOK_HEADER, LookConfiguration
 from .box_options import add_box_options
 from .fine_tuning import begin_fine_tuning
@@ -115,6 +117,7 @@ def run_look(options: argparse.Namespace) -> int:
         raise InputError("--names, --format and --rendered go with --boxes: leave them out, or give --boxes DIR")
     configuration = read_sections(LookConfiguration, options.config, parse_overrides(options.set, "training.epochs=5"))
     model = model_path(options.model)
+    configuration = _with_classes_of(model, configuration)
     numbers = [each.number for each in find_pictures(options.data)]
     split = split_by_seed(numbers, configuration.data.validation, 0.0, configuration.data.split_seed)
     strict, threads = options.strict, options.threads or 1
@@ -123,6 +126,17 @@ def run_look(options: argparse.Namespace) -> int:
     count = len(split.training), len(split.validation)
     print(f"{options.data}: {len(numbers)} pictures: {count[0]} for training, {count[1]} for validation", flush=True)
     return _train(run.folder, None, options)
+
+
+def _with_classes_of(model: Path, configuration: LookConfiguration) -> LookConfiguration:
+    """The configuration with the classes of the train.toml beside the mesh network, unless it has classes of its own.
+
+    Raises InputError if that train.toml can't be read.
+    """
+    beside = model.with_name("train.toml")
+    if configuration.classes != ClassTable.default() or not beside.exists():
+        return configuration
+    return replace(configuration, classes=read_sections(TrainConfiguration, beside).classes)
 
 
 def resume_look(options: argparse.Namespace) -> int:

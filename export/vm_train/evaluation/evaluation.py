@@ -120,7 +120,7 @@ class Evaluation:
             truth = field_truth(picture, stage, [each.name for each in manifest.classes])
             self.features.add(truth, answer.features)
         if scene is not None:
-            self.radii.append(scene.ball_radius)
+            self.radii.append(scene.radius)
         orientation = picture.lens.orientation
         assert orientation is not None
         self.poses.append(CameraPose(files, orientation.height, orientation.pitch))
@@ -137,7 +137,7 @@ def evaluate_pictures(subject: Subject, pictures: Sequence[PictureFiles], classe
         try:
             picture, scene = _read(files, classes, rules)
             stage = None if result.features is None else read_field(_scene_file(files))
-            answer = subject.answer(picture, scene.ball_radius if scene and rules.radius_of == "scene" else None)
+            answer = subject.answer(picture, scene.radius if scene and rules.radius_of == "scene" else None)
         except (InputError, GeometryError) as error:
             if isinstance(error, PictureFault) and error.kind == "color":
                 # Many masks may have this color. To skip them all would change what the scores measure.

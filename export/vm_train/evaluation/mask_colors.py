@@ -15,11 +15,12 @@ from ..learning.configuration import TrainConfiguration
 
 
 def default_colors(model: Path, chosen: Path | None) -> Mapping[str, tuple[Color, ...]]:
-    """Colors of classes from the train.toml beside a checkpoint or its pictures.json, or else those of vm-synth.
+    """Colors of classes from the train.toml beside a model or a pictures.json, or else those of vm-synth.
 
     chosen: the list of pictures, if any. Raises InputError if train.toml can't be read.
     """
-    for folder in (each.parent for each in (chosen, model) if each is not None and each.suffix in (".json", ".pt")):
+    named = [each for each in (chosen, model) if each is not None and each.suffix in (".json", ".pt", ".onnx")]
+    for folder in (each.parent for each in named):
         if (folder / "train.toml").exists():
             return read_sections(TrainConfiguration, folder / "train.toml").classes.colors
     return {name: (color,) for name, color in CLASS_COLORS.items()}

@@ -13,35 +13,45 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Mask
 from vm_embedded.errors import InputError
+from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.shape import Shape
+from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.manifest import Manifest
-from vm_workstation.sphere_outline import polygon_area, sphere_outline
+from vm_workstation.outlines import polygon_area, shape_outline
 
 from ..data.pictures import Picture
 from ..scores.overlaps import TrueObject, coverage
 
 BALL = "ball"
-"""The class of the object in a sceneX.json."""
+"""The class of the object in a sceneX.json that does not name another one."""
 
 
 @dataclass(frozen=True, eq=False)
-class SceneBall:
-    """The ball of a scene.
+class SceneObject:
+    """An object of a scene: a ball, or a cylinder on the plane.
 
-    center (3,) [m]: in the frame of the picture's orientation. radius [m]. visible: share of its outline.
+    center (3,) [m]: in the frame of the picture's orientation. radius [m]. visible: share of its outline. height [m]:
+    of a cylinder, 0 for a ball.
     """
 
     center: Floats
     radius: float
     visible: float
+    height: float = 0.0
+
+    @property
+    def shape(self) -> Shape:
+        """Its shape."""
+        return Cylinder(self.radius, self.height) if self.height else Sphere(self.radius)
 
 
 @dataclass(frozen=True, eq=False)
 class SceneTruth:
-    """The truth of vm-synth about a picture: the radius of its balls [m], and its ball, if it has one."""
+    """The truth of vm-synth about a picture: the right radius of its objects [m], the objects, and their class."""
 
-    ball_radius: float
-    ball: SceneBall | None
+    radius: float
+    objects: tuple[SceneObject, ...]
+    class_name: str = BALL
 
 
 def read_scene(path: Path) -> SceneTruth | None:
@@ -50,60 +60,69 @@ def read_scene(path: Path) -> SceneTruth | None:
         return None
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
-        ball = table["ball"]
-        found = None
-        if ball is not None:
-            found = SceneBall(np.array(ball["center"], dtype=np.float64), float(ball["radius"]), float(ball["visible"]))
-        truth = SceneTruth(float(table["ball_radius"]), found)
+        if "object" in table:
+            found = tuple(_read_object(each, float(each["height"])) for each in table["objects"])
+            truth = SceneTruth(float(table["object"]["radius"]), found, str(table["object"]["name"]))
+        else:
+            ball = table["ball"]
+            found = () if ball is None else (_read_object(ball, 0.0),)
+            truth = SceneTruth(float(table["ball_radius"]), found)
     except (OSError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{path.name}: is not a scene file of vm-synth: {error!r}") from error
     if not _is_valid(truth):
-        raise InputError(f"{path.name}: center, radius or visible share of its ball is out of range")
+        raise InputError(
+            f"{path.name}: center, radius, height or visible share of its {truth.class_name} is out of range"
+        )
     return truth
 
 
+def _read_object(entry: dict[str, Any], height: float) -> SceneObject:
+    center = np.array(entry["center"], dtype=np.float64)
+    return SceneObject(center, float(entry["radius"]), float(entry["visible"]), height)
+
+
 def _is_valid(truth: SceneTruth) -> bool:
-    ball = truth.ball
-    if ball is None:
-        return 0.0 < truth.ball_radius < math.inf
-    numbers = (truth.ball_radius, ball.radius)
-    placed = ball.center.shape == (3,) and bool(np.isfinite(ball.center).all())
-    return placed and all(0.0 < each < math.inf for each in numbers) and 0.0 <= ball.visible <= 1.0
+    return 0.0 < truth.radius < math.inf and all(_is_valid_object(each) for each in truth.objects)
+
+
+def _is_valid_object(found: SceneObject) -> bool:
+    placed = found.center.shape == (3,) and bool(np.isfinite(found.center).all())
+    sized = 0.0 < found.radius < math.inf and 0.0 <= found.height < math.inf
+    return placed and sized and 0.0 <= found.visible <= 1.0
 
 
 def true_objects(picture: Picture, scene: SceneTruth | None, manifest: Manifest) -> dict[str, list[TrueObject]]:
     """The true objects of each class of the kind object.
 
-    With a scene, the class ball has the scene's ball with its whole outline, or no object. Otherwise each connected
-    piece of the mask is an object of the manifest's size; it stands where the mean ray through the piece meets the
-    plane.
+    With a scene, the scene's class has the scene's objects with their whole outlines. Otherwise each connected piece of
+    the mask is an object of the manifest's size; it stands where the mean ray through the piece meets the plane.
     """
     shape = manifest.object_shape
     found: dict[str, list[TrueObject]] = {}
     for number, each in enumerate(manifest.classes):
         if each.kind != "object":
             continue
-        if each.name == BALL and scene is not None:
-            found[each.name] = [] if scene.ball is None else [_of_scene(picture, scene.ball)]
+        if scene is not None and each.name == scene.class_name:
+            found[each.name] = [_of_scene(picture, one) for one in scene.objects]
         else:
             found[each.name] = _of_mask(picture, picture.labels == number, shape)
     return found
 
 
-def _of_scene(picture: Picture, ball: SceneBall) -> TrueObject:
+def _of_scene(picture: Picture, shown: SceneObject) -> TrueObject:
     height, width = picture.labels.shape
     orientation, size = picture.lens.orientation, (width, height)
     assert orientation is not None
     lens = picture.lens.lens.for_image(size)
-    whole: dict[str, Any] = {"center": ball.center, "radius": ball.radius, "size": size}
-    window, share = coverage(sphere_outline(lens, orientation, **whole), size)
+    whole: dict[str, Any] = {"center": shown.center, "size": size}
+    window, share = coverage(shape_outline(lens, orientation, shown.shape, **whole), size)
     mask = np.zeros((height, width), dtype=np.float32)
     mask[window] = share
-    radius = math.sqrt(polygon_area(sphere_outline(lens, orientation, **whole, unseen=True)) / math.pi)
-    toward = ball.center - (0.0, 0.0, orientation.height)
+    radius = math.sqrt(polygon_area(shape_outline(lens, orientation, shown.shape, **whole, unseen=True)) / math.pi)
+    toward = shown.center - (0.0, 0.0, orientation.height)
     distance = float(np.linalg.norm(toward))
-    angle = math.asin(min(ball.radius / distance, 1.0))
-    return TrueObject(mask, ball.center, radius, ball.visible, toward / distance, angle)
+    angle = math.asin(min(shown.radius / distance, 1.0))
+    return TrueObject(mask, shown.center, radius, shown.visible, toward / distance, angle)
 
 
 def _of_mask(picture: Picture, shown: Mask, shape: Shape) -> list[TrueObject]:

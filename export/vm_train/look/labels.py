@@ -14,7 +14,7 @@ from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.network.manifest import Manifest
 
 from ..data.pictures import Picture
-from ..evaluation.object_truth import BALL, SceneTruth, true_objects
+from ..evaluation.object_truth import SceneTruth, true_objects
 from ..scores.overlaps import TrueObject
 
 NOTHING, OBJECT, UNLABELED = 0, 1, -1
@@ -118,8 +118,9 @@ def find_truths(
         return Truths.none()
     positions = np.stack([each.position for each in known])
     centers = (positions - (0.0, 0.0, view.height)) @ view.heading
-    if object_class == BALL and scene is not None and scene.ball is not None:
-        return Truths(centers, np.array([scene.ball.radius]), np.array([scene.ball.visible]))
+    if scene is not None and object_class == scene.class_name:
+        radii, visible = (np.array([getattr(each, name) for each in scene.objects]) for name in ("radius", "visible"))
+        return Truths(centers, radii, visible)
     shares = np.array([_visible_share(view, center, each) for center, each in zip(centers, known, strict=True)])
     return Truths(centers, np.full(len(known), view.shape.radius), shares)
 

@@ -87,7 +87,7 @@ class Observer:
 
     def _radius(self, scene: SceneTruth | None) -> float | None:
         """Radius of the objects to look for [m]: that of the scene, if the mesh network is for any radius."""
-        return scene.ball_radius if scene is not None and self.subject.manifest.any_radius else None
+        return scene.radius if scene is not None and self.subject.manifest.any_radius else None
 
 
 def results_of(

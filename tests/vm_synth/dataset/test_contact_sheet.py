@@ -9,11 +9,12 @@ import pytest
 
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens_files import read_lens_file
+from vm_embedded.geometry.sphere import Sphere
 from vm_synth.cli import main, parsers
 from vm_synth.dataset.contact_sheet import OUTLINE, captions, cell, read_labeled, sheet, tinted
 from vm_synth.dataset.files import PARTS, file_of, read_truth
 from vm_workstation.contact_sheet import scaled_pixels
-from vm_workstation.sphere_outline import polygon_area, sphere_outline
+from vm_workstation.outlines import polygon_area, shape_outline
 
 from ..sets import SIZE, scene_of, write_set
 
@@ -25,13 +26,19 @@ def folder(tmp_path_factory):
     return write_set(tmp_path_factory.mktemp("sheets") / "balls", range(COUNT))
 
 
+def outline_of(scene):
+    """The outline of a scene's ball."""
+    shape = Sphere(scene.ball.radius)
+    return shape_outline(scene.lens, scene.orientation, shape, scene.ball.center, SIZE)
+
+
 def with_ball(least=4.0):
     """Numbers of the set's pictures that show a whole ball of at least this radius [px]."""
     found = []
     for index in range(COUNT):
         scene = scene_of(index)
         if scene.ball is not None:
-            pixels = sphere_outline(scene.lens, scene.orientation, scene.ball.center, scene.ball.radius, SIZE)
+            pixels = outline_of(scene)
             inside = np.isfinite(pixels).all() and (pixels > 0).all() and (pixels < np.array(SIZE) - 1).all()
             if inside and polygon_area(pixels) > np.pi * least**2:
                 found.append(index)
@@ -42,16 +49,16 @@ def with_ball(least=4.0):
 def test_the_outline_from_the_files_is_the_scene_s(folder):
     for index in range(COUNT):
         scene, shown = scene_of(index), read_labeled(folder, index)
-        assert (scene.ball is None) == (shown.outline is None)
+        assert (scene.ball is None) == (not shown.outlines)
         if scene.ball is not None:
-            straight = sphere_outline(scene.lens, scene.orientation, scene.ball.center, scene.ball.radius, SIZE)
-            np.testing.assert_allclose(shown.outline, straight, atol=1e-9)
+            straight = outline_of(scene)
+            np.testing.assert_allclose(shown.outlines[0], straight, atol=1e-9)
 
 
 def test_rays_through_the_outline_touch_the_ball(folder):
     for index in with_ball():
         lens, ball = read_lens_file(file_of(folder, "lens", index)), read_truth(folder, index)["ball"]
-        rays = lens.lens.unproject(read_labeled(folder, index).outline, SIZE) @ lens.orientation.rotation.T
+        rays = lens.lens.unproject(read_labeled(folder, index).outlines[0], SIZE) @ lens.orientation.rotation.T
         toward = np.array(ball["center"]) - [0.0, 0.0, lens.orientation.height]
         off = np.linalg.norm(np.cross(rays, toward), axis=1)
         np.testing.assert_allclose(off, ball["radius"], rtol=1e-6)
@@ -67,7 +74,7 @@ def test_a_cell_draws_the_outline_on_the_ball_s_rim(folder, width):
     assert made.shape[1] == width
     assert not (plain == OUTLINE[::-1]).all(axis=-1).any()
     difference = np.abs(lower.astype(int) - OUTLINE[::-1]).sum(axis=-1)
-    rim = np.rint(scaled_pixels(shown.outline, (0.0, 0.0), width / SIZE[0])).astype(int)
+    rim = np.rint(scaled_pixels(shown.outlines[0], (0.0, 0.0), width / SIZE[0])).astype(int)
     near = [difference[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].min() for x, y in rim]
     assert np.mean(np.array(near) < 200) > 0.95
 

@@ -190,13 +190,13 @@ def test_numbers_are_those_of_the_pictures(folder):
     for index, facts in enumerate(found.facts):
         truth, picture = read_truth(folder, index), picture_of(scene_of(index))
         assert facts.height == truth["height"]
-        assert (facts.ball is None) == (truth["ball"] is None)
+        assert len(facts.objects) == (truth["ball"] is not None)
         assert facts.projection == type(scene_of(index).lens).__name__.lower()
         counted = picture.classes[::2, ::2]
         for number, name in enumerate(CLASSES):
             assert facts.shares[name] == pytest.approx((counted == number).mean())
         assert sum(facts.shares.values()) == pytest.approx(1.0)
-    balls = [each.ball for each in found.facts if each.ball is not None]
+    balls = [ball for each in found.facts for ball in each.objects]
     assert quantities(found.facts)["ball distance [m]"] == [each.distance for each in balls]
     assert sum(categories(found.facts)["ball"].values()) == COUNT
     assert sum(categories(found.facts)["ball design"].values()) == len(balls)

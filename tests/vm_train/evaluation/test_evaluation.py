@@ -19,7 +19,7 @@ from vm_train.data.pictures import Picture, find_pictures, read_picture
 from vm_train.evaluation.answers import ExactSubject, load_subject
 from vm_train.evaluation.evaluation import Evaluation, Rules, evaluate_pictures
 from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
-from vm_train.evaluation.object_truth import SceneBall, SceneTruth
+from vm_train.evaluation.object_truth import SceneObject, SceneTruth
 from vm_train.evaluation.tables import as_csv, as_json
 from vm_train.evaluation.workers import Job, evaluate
 
@@ -61,7 +61,7 @@ def drawn_pictures():
         image = cv2.imread(str(path))
         lens = read_lens_file(FOLDER / path.name.replace("image", "lens").replace(".jpg", ".yaml"))
         ball = truth[path.name]
-        scene = SceneTruth(ball["radius"], SceneBall(np.array(ball["position"]), ball["radius"], 1.0))
+        scene = SceneTruth(ball["radius"], (SceneObject(np.array(ball["position"]), ball["radius"], 1.0),))
         yield Picture(image, np.full(image.shape[:2], 2, dtype=np.int8), lens), scene
 
 
@@ -104,8 +104,8 @@ def test_a_robot_finds_the_same_balls_with_its_shared_meshes(models):
     robot = load_subject(MODEL, SETTINGS, as_robot=True)
     for picture, scene in drawn_pictures():
         answer = robot.answer(picture)
-        nearest = min(np.linalg.norm(each.position - scene.ball.center) for each in answer.found)
-        assert nearest < 0.05 * np.linalg.norm(scene.ball.center)
+        nearest = min(np.linalg.norm(each.position - scene.objects[0].center) for each in answer.found)
+        assert nearest < 0.05 * np.linalg.norm(scene.objects[0].center)
         exact = models["pt"].answer(picture)
         assert len(answer.distances) == pytest.approx(len(exact.distances), rel=0.35)
         assert np.isfinite(answer.distances).all()

@@ -13,8 +13,8 @@ from vm_embedded.errors import InputError
 from vm_embedded.network.model_file import read_model
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
-from vm_train.evaluation.object_truth import SceneBall, SceneTruth, read_scene, true_objects
-from vm_workstation.sphere_outline import sphere_outline
+from vm_train.evaluation.object_truth import SceneObject, SceneTruth, read_scene, true_objects
+from vm_workstation.outlines import sphere_outline
 
 from ...drawn_scenes import MODEL
 from ..drawn import RADIUS, draw_set
@@ -49,9 +49,9 @@ def test_a_scene_s_ball_covers_what_its_mask_shows(pictures):
         (ball,) = true_objects(picture, scene, MANIFEST)["ball"]
         assert np.count_nonzero((ball.mask >= 0.5) != mask) <= 0.05 * mask.sum() + 3
         assert ball.radius == pytest.approx(math.sqrt(mask.sum() / math.pi), rel=0.05)
-        assert ball.position.tolist() == scene.ball.center.tolist()
+        assert ball.position.tolist() == scene.objects[0].center.tolist()
         assert ball.visible == 1.0
-        toward = scene.ball.center - (0.0, 0.0, picture.lens.orientation.height)
+        toward = scene.objects[0].center - (0.0, 0.0, picture.lens.orientation.height)
         assert ball.offsets(toward[None] / np.linalg.norm(toward)) == pytest.approx(0.0, abs=1e-6)
         assert ball.angular_radius == pytest.approx(math.asin(RADIUS / np.linalg.norm(toward)))
 
@@ -60,7 +60,7 @@ def test_the_outline_of_a_ball_is_one_radius_from_its_center(pictures):
     for picture, scene, mask in whole_balls(pictures):
         (ball,) = true_objects(picture, scene, MANIFEST)["ball"]
         size, orientation = mask.shape[::-1], picture.lens.orientation
-        outline = sphere_outline(picture.lens.lens.for_image(size), orientation, scene.ball.center, RADIUS, size)
+        outline = sphere_outline(picture.lens.lens.for_image(size), orientation, scene.objects[0].center, RADIUS, size)
         rays = picture.lens.lens.for_image(size).unproject(outline, size) @ orientation.rotation.T
         assert ball.offsets(rays) == pytest.approx(1.0, abs=1e-3)
 
@@ -70,7 +70,7 @@ def test_a_mask_alone_gives_nearly_the_same_ball(pictures):
     for picture, scene, mask in whole_balls(pictures):
         (ball,) = true_objects(picture, None, manifest)["ball"]
         assert (ball.mask == mask).all()
-        assert ball.position == pytest.approx(scene.ball.center, rel=0.06, abs=0.02)
+        assert ball.position == pytest.approx(scene.objects[0].center, rel=0.06, abs=0.02)
         (true,) = true_objects(picture, scene, manifest)["ball"]
         assert true.offsets(ball.bearing[None])[0] < 0.15
         assert ball.angular_radius == pytest.approx(true.angular_radius, rel=0.06)
@@ -97,9 +97,9 @@ def test_what_is_above_the_horizon_has_no_place(pictures):
 
 def test_a_scene_without_a_ball_and_a_hidden_one(pictures):
     picture, _ = pictures[0]
-    assert true_objects(picture, SceneTruth(RADIUS, None), MANIFEST)["ball"] == []
-    hidden = SceneBall(np.array([1.0, 0.1, RADIUS]), RADIUS, 0.0)
-    (found,) = true_objects(picture, SceneTruth(RADIUS, hidden), MANIFEST)["ball"]
+    assert true_objects(picture, SceneTruth(RADIUS, ()), MANIFEST)["ball"] == []
+    hidden = SceneObject(np.array([1.0, 0.1, RADIUS]), RADIUS, 0.0)
+    (found,) = true_objects(picture, SceneTruth(RADIUS, (hidden,)), MANIFEST)["ball"]
     assert found.visible == 0.0
     assert found.mask.sum() > 10.0
 
@@ -127,7 +127,7 @@ GOOD = {"ball_radius": 0.07, "ball": {"center": [1.0, 0.0, 0.07], "radius": 0.07
 def test_scenes_that_make_no_sense_are_named(tmp_path, change):
     path = tmp_path / "scene7.json"
     path.write_text(json.dumps(GOOD))
-    assert read_scene(path).ball.radius == 0.07
+    assert read_scene(path).objects[0].radius == 0.07
     path.write_text(json.dumps(GOOD | change))
     with pytest.raises(InputError, match=r"^scene7\.json"):
         read_scene(path)
@@ -147,7 +147,7 @@ def test_a_ball_that_the_border_cuts_covers_what_is_in_the_picture(pictures):
     orientation = picture.lens.orientation
     ray = picture.lens.lens.unproject(np.array([[0.0, height - 20.0]]), (width, height))[0] @ orientation.rotation.T
     center = ray * (orientation.height - RADIUS) / -ray[2] + (0.0, 0.0, orientation.height)
-    (cut,) = true_objects(picture, SceneTruth(RADIUS, SceneBall(center, RADIUS, 0.5)), MANIFEST)["ball"]
+    (cut,) = true_objects(picture, SceneTruth(RADIUS, (SceneObject(center, RADIUS, 0.5),)), MANIFEST)["ball"]
     assert cut.mask.shape == (height, width)
     assert 0.3 < cut.mask.sum() / (math.pi * cut.radius**2) < 0.7
     assert cv2.countNonZero(cut.mask[:, width // 2 :]) == 0

@@ -58,8 +58,8 @@ def test_proposals_are_in_the_frame_of_the_found_objects(looking, as_robot):
     for picture, scene in drawn_pictures():
         centers = subject.answer(picture).proposals["ball"]
         positions = centers + np.array([0.0, 0.0, picture.lens.orientation.height])
-        nearest = np.linalg.norm(positions - scene.ball.center, axis=1).min()
-        assert nearest < 0.1 * np.linalg.norm(scene.ball.center)
+        nearest = np.linalg.norm(positions - scene.objects[0].center, axis=1).min()
+        assert nearest < 0.1 * np.linalg.norm(scene.objects[0].center)
 
 
 def test_parts_with_proposals_add_up_in_any_number_of_processes(files, looking):

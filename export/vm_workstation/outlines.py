@@ -1,4 +1,4 @@
-"""The exact outline of a sphere in a picture."""
+"""The exact outlines of objects in a picture."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.shape import Shape
 
 
 def sphere_outline(
@@ -42,6 +43,28 @@ def touching_rays(toward: Floats, radii: Floats, corners: int) -> Floats:
     around = np.cos(turn) * side[:, None] + np.sin(turn) * np.cross(axis, side)[:, None]
     sine = np.minimum(radii[:, None] / distance, 1.0)[:, None]  # of the angle between the axis and the rays
     return np.asarray(np.sqrt(1.0 - sine * sine) * axis[:, None] + sine * around)
+
+
+def shape_outline(
+    lens: Lens,
+    orientation: Orientation,
+    shape: Shape,
+    center: Floats,
+    size: Size,
+    corners: int = 256,
+    unseen: bool = False,
+) -> Floats:
+    """The outline of an object on the plane as a polygon, pixels (corners, 2).
+
+    center (3,) [m]: of the object; the world's origin is on the plane below the camera. size, unseen: as in
+    sphere_outline. Raises GeometryError for a camera inside of the object.
+    """
+    height = orientation.height
+    rays = shape.outline(center - np.array([0.0, 0.0, height]), height, corners) @ orientation.rotation
+    pixels = lens.project(rays, size)
+    if not unseen:
+        pixels[~lens.sees(rays)] = np.nan
+    return pixels
 
 
 def polygon_area(pixels: Floats) -> float:
