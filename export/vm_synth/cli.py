@@ -40,9 +40,12 @@ EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
 _EXAMPLE = "camera.picture_width=1280"
 
+_EXAMPLES = ("cups", "cones", "soccer", "polyhaven")
+"""Configurations in the folder of this module."""
+
 _EPILOG = """\
 other commands, each with its own --help:
-  vm-synth preview OUT    draw a contact sheet with masks and the true outlines of the balls
+  vm-synth preview OUT    draw a contact sheet with masks and true outlines
   vm-synth check OUT      describe the set in tables and plots; find missing and damaged files
   vm-synth config         print all entries of scene.toml with meaning, unit, limits and default
 
@@ -55,8 +58,8 @@ def parser() -> argparse.ArgumentParser:
     """The options of vm-synth OUT."""
     made = argparse.ArgumentParser(
         prog="vm-synth",
-        description="Render pictures of a ball lit by 360 degree photographs, with masks, lens, camera pose and true "
-        "ball position.",
+        description="Render pictures of a ball, or of another object on a table or floor, lit by 360 degree photographs. "
+        "Each has masks, lens, camera pose and the true positions of the objects.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -93,9 +96,9 @@ def preview_parser() -> argparse.ArgumentParser:
     """The options of vm-synth preview OUT."""
     made = argparse.ArgumentParser(
         prog="vm-synth preview",
-        description="Draw a contact sheet of a set. Below each picture is a copy with tinted classes and the ball's "
-        "outline. The outline is computed from position, lens and pose, not from the rendered mask. Small balls are "
-        "also magnified. It also works while the set is rendering.",
+        description="Draw a contact sheet of a set. Below each picture is a copy with tinted classes and the outlines of "
+        "the objects to detect. They are computed from position, lens and pose, not from the rendered mask. A single "
+        "small object is also magnified. It also works while the set is rendering.",
     )
     made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
     made.add_argument("--count", type=at_least(1), default=24, metavar="N", help="number of pictures; default 24")
@@ -135,11 +138,15 @@ def check_parser() -> argparse.ArgumentParser:
 
 
 def config_parser() -> argparse.ArgumentParser:
-    """The options of vm-synth config; it has none."""
-    return argparse.ArgumentParser(
+    """The options of vm-synth config."""
+    made = argparse.ArgumentParser(
         prog="vm-synth config",
         description="Print a scene.toml with all entries, their meanings, units, limits and defaults.",
     )
+    made.add_argument(
+        "--example", choices=_EXAMPLES, help="print one of the configurations of the package instead: only its entries"
+    )
+    return made
 
 
 def parsers() -> dict[str, argparse.ArgumentParser]:
@@ -293,5 +300,8 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _config(options: argparse.Namespace) -> int:
+    if options.example is not None:
+        print(Path(__file__).with_name(f"{options.example}.toml").read_text(encoding="utf-8"), end="")
+        return EXIT_OK
     print(to_commented_toml(SceneConfiguration(), HEADER), end="")
     return EXIT_OK
