@@ -22,7 +22,7 @@ from vm_workstation.option_types import at_least
 from vm_workstation.stopping import stoppable
 
 from .dataset.assets import asset_files, read_assets
-from .dataset.contact_sheet import cell, read_labeled, sheet
+from .dataset.contact_sheet import cell, object_name, read_labeled, sheet
 from .dataset.files import indices_in, is_done
 from .dataset.inspection import inspect, read_checked_plan
 from .dataset.plan import Plan, digest, shard_of
@@ -58,8 +58,8 @@ def parser() -> argparse.ArgumentParser:
     """The options of vm-synth OUT."""
     made = argparse.ArgumentParser(
         prog="vm-synth",
-        description="Render pictures of a ball, or of another object on a table or floor, lit by 360 degree photographs. "
-        "Each has masks, lens, camera pose and the true positions of the objects.",
+        description="Render pictures of a ball, or of another object on a table or floor, lit by 360 degree "
+        "photographs. Each has masks, lens, camera pose and the true positions of the objects.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -96,7 +96,7 @@ def preview_parser() -> argparse.ArgumentParser:
     """The options of vm-synth preview OUT."""
     made = argparse.ArgumentParser(
         prog="vm-synth preview",
-        description="Draw a contact sheet of a set. Below each picture is a copy with tinted classes and the outlines of "
+        description="Draw a contact sheet of a set. Below each picture is a copy with tinted classes and outlines of "
         "the objects to detect. They are computed from position, lens and pose, not from the rendered mask. A single "
         "small object is also magnified. It also works while the set is rendering.",
     )
@@ -261,16 +261,18 @@ def _preview(options: argparse.Namespace) -> int:
         raise InputError(f"there is no folder {options.out}")
     check_writable(output)
     there = indices_in(options.out)
-    cells = []
+    cells, name = [], "ball"
     for index in choose_indices(there, options.count, options.first, options.seed):
         try:
-            cells.append(cell(read_labeled(options.out, index), options.width))
+            shown = read_labeled(options.out, index)
+            cells.append(cell(shown, options.width))
+            name = object_name(shown.truth)
         except InputError as error:
             print(f"vm-synth: skipped {error}", file=sys.stderr)
     if not cells:
         after = "" if options.first is None else f" from number {options.first} on"
         raise InputError(f"{options.out} has no complete pictures{after}; run vm-synth check {options.out}")
-    made = sheet(cells, options.columns, f"{options.out.resolve().name}: {len(cells)} of {len(there)} pictures")
+    made = sheet(cells, options.columns, f"{options.out.resolve().name}: {len(cells)} of {len(there)} pictures", name)
     write_sheet(output, made)
     print(f"{output}: {len(cells)} pictures")
     return EXIT_OK

@@ -80,6 +80,11 @@ def read_labeled(folder: Path, index: int) -> LabeledPicture:
     return shown
 
 
+def object_name(truth: dict[str, Any]) -> str:
+    """The class of the objects to detect in a scene."""
+    return str(truth["object"]["name"]) if "object" in truth else "ball"
+
+
 def _shapes(truth: dict[str, Any]) -> list[tuple[Shape, Floats]]:
     """Shape and center (3,) [m] of the ball, or of each of the other objects to detect."""
     shown = truth["objects"] if "object" in truth else [truth["ball"]] if truth["ball"] is not None else []
@@ -98,7 +103,7 @@ def captions(shown: LabeledPicture) -> tuple[str, str]:
     """Two lines of text: the picture's number and map, and its ball or the number of its objects."""
     head = f"{shown.index}  {shown.truth['map']}"
     if "object" in shown.truth:
-        return head, f"{len(shown.outlines)} of class {shown.truth['object']['name']}"
+        return head, f"{len(shown.outlines)} of class {object_name(shown.truth)}"
     ball = shown.truth["ball"]
     if ball is None:
         return head, "no ball"
@@ -176,8 +181,11 @@ def _add_inset(canvas: Image, shown: LabeledPicture, zoom: float) -> None:
     canvas[top : top + side, left : left + side] = inset
 
 
-def sheet(cells: Sequence[Image], columns: int, title: str) -> Image:
-    """Cells of one size (h, w, 3) in rows below a title and a legend. Raises InputError if the sheet is too large."""
+def sheet(cells: Sequence[Image], columns: int, title: str, object_name: str = "ball") -> Image:
+    """Cells of one size (h, w, 3) in rows below a title and a legend. Raises InputError if the sheet is too large.
+
+    object_name: class of the objects to detect.
+    """
     height, width = cells[0].shape[:2]
     columns = min(columns, len(cells))
     rows = math.ceil(len(cells) / columns)
@@ -186,8 +194,8 @@ def sheet(cells: Sequence[Image], columns: int, title: str) -> Image:
     check_sheet_size(size[1], size[0])
     canvas = np.full((*size, 3), PAPER, dtype=np.uint8)
     place = GAP + write_text(canvas, title, (GAP, head - GAP - 3), INK) + 3 * GAP
-    legend = {name: CLASS_COLORS[name] for name in ("field", "line", "goal", "robot", "ball")}
-    draw_legend(canvas, {**legend, "true outline": OUTLINE}, (place, head - GAP - 3))
+    legend = {name: CLASS_COLORS[name] for name in ("field", "line", "goal", "robot")}
+    draw_legend(canvas, {**legend, object_name: CLASS_COLORS["ball"], "true outline": OUTLINE}, (place, head - GAP - 3))
     for number, each in enumerate(cells):
         row, column = divmod(number, columns)
         top, left = head + row * (height + GAP), GAP + column * (width + GAP)

@@ -53,16 +53,15 @@ def plot(facts: Sequence[Facts], size: Size, title: str, path: Path) -> None:
     figure, grid = pyplot.subplots(3, 4, figsize=(14.0, 9.0), layout="constrained")
     figure.suptitle(title, fontsize=11)
     axes = list(grid.flat)
+    designs = categories(facts).get("ball design", Counter[str]())
     values, kinds, shown_name = quantities(facts), categories(facts), object_name(facts)
     for each, name in zip(axes, (*_CAMERA, *(f"{shown_name} {what}" for what in _OBJECT)), strict=False):
         _histogram(each, values.get(name, []), name)
     _places(axes[6], facts, size)
     _shares(axes[7], values)
     for each, shown in ((axes[8], ("ground", "lens")), (axes[9], (shown_name, "other ball"))):
-        _bars(each, {f"{what}: {name}": n for what in shown for name, n in kinds[what].items()}, "pictures")
-    _bars(
-        axes[10], dict(kinds["ball design"].most_common(_MOST)), _titled("balls with a pattern", kinds["ball design"])
-    )
+        _bars(each, {f"{what}: {name}": n for what in shown for name, n in kinds.get(what, {}).items()}, "pictures")
+    _bars(axes[10], dict(designs.most_common(_MOST)), _titled("balls with a pattern", designs))
     _map_use(axes[11], sorted(kinds["map"].values(), reverse=True))
     for each in axes:
         each.spines[["top", "right"]].set_visible(False)

@@ -40,13 +40,17 @@ def quantities(facts: Sequence[Facts]) -> dict[str, list[float]]:
 
 
 def categories(facts: Sequence[Facts]) -> dict[str, Counter[str]]:
-    """The number of pictures in each category, by property."""
+    """The number of pictures in each category, by property; of objects in each state if there are several."""
+    name = object_name(facts)
+    balls = {
+        "other ball": Counter(each.other_ball or "none" for each in facts),
+        "ball design": Counter(each.kind for each in objects_of(facts)),
+    }
     return {
         "ground": Counter(each.ground for each in facts),
         "lens": Counter(each.projection for each in facts),
-        object_name(facts): Counter(state for each in facts for state in _states(each)),
-        "other ball": Counter(each.other_ball or "none" for each in facts),
-        "ball design": Counter(each.kind for each in objects_of(facts)),
+        name: Counter(state for each in facts for state in _states(each)),
+        **(balls if name == "ball" else {}),
         "map": Counter(each.map for each in facts),
     }
 
