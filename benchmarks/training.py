@@ -41,6 +41,7 @@ BATCH = 8
 def configuration(depth: int, width: int) -> TrainConfiguration:
     """A short training."""
     entries = {
+        "mesh": {"sampling": "bilinear", "colors": "absolute"},
         "network": {"depth": depth, "width": width},
         "training": {"epochs": 4, "batch": BATCH, "selection": "balanced"},
     }

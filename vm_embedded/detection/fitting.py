@@ -34,8 +34,7 @@ def fit(view: PreparedView, candidate: Candidate) -> Candidate:
     for reach in _REACHES:
         distance = float(np.linalg.norm(center))
         axis = center / distance
-        # center_height of a cylinder is half its height.
-        across, up = view.shape.radius, max(view.shape.radius, view.shape.center_height)
+        across, up = view.shape.radius, view.shape.half_size
         tried = axis + reach / distance * ((_GRID * (across, up)) @ tangents(axis))
         centers = view.shape.center_along(tried, view.height)
         inside = _share_inside(view.shape.offset(rays, centers, view.height), view)

@@ -26,7 +26,7 @@ class Tangents:
     """The planes of c patches, at the distance 1 from the camera.
 
     axes (c, 3): unit vectors to the centers of the patches. right, down (c, 3): unit vectors along their sides. radius
-    (c,): the object's radius in the plane, the tangent of its angular radius.
+    (c,): half of the longest side of the object in the plane; of a ball the tangent of its angular radius.
     """
 
     axes: Floats
@@ -48,7 +48,8 @@ class Tangents:
         right = np.stack([right_x, right_y, np.zeros_like(x)], axis=1)
         down = np.stack([-z * right_y, z * right_x, x * right_y - y * right_x], axis=1)  # axes x right
         # The camera may be inside of the object, where no tangent exists.
-        radius = view.shape.radius / np.sqrt(np.maximum(distance**2 - view.shape.radius**2, 1e-12))
+        size = view.shape.half_size
+        radius = size / np.sqrt(np.maximum(distance**2 - size**2, 1e-12))
         return cls(axes, right, down, radius)
 
     def turned(self, rotation: Floats) -> Tangents:

@@ -36,6 +36,11 @@ class Shape(ABC):
     def center_height(self) -> float:
         """Height of the object's center over the plane [m]."""
 
+    @property
+    def half_size(self) -> float:
+        """Half of its longest side [m]: its radius, or half its height if that is more."""
+        return max(self.radius, self.center_height)
+
     @abstractmethod
     def spacing(self, height: Number) -> Number:
         """The spacing s for a camera height [m]. phi depends on the height only through n * s."""

@@ -47,12 +47,12 @@ class MeshSettings:
     model: str = one_of(tuple(MESH_MODELS), "ring6", "arrangement of points and neighbors (docs/meshes.md)")
     sampling: str = one_of(
         POINT_SAMPLINGS,
-        "bilinear",
+        "footprint",
         "color of a point; bilinear: interpolated from four pixels; footprint: mean of the area that it covers",
     )
     colors: str = one_of(
         POINT_COLORS,
-        "absolute",
+        "relative",
         "colors that the network gets; absolute: as sampled; relative: mean of the picture's points subtracted, then "
         "divided by their standard deviation",
     )

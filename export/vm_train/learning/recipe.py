@@ -53,13 +53,13 @@ class Recipe:
     gamma: float = number(2.0, "exponent of the focal loss", "", (0.0, 20.0))
     selection: str = one_of(
         RULES,
-        "balanced",
+        "weighted",
         "points that give gradients; all: every labeled point; weighted: every labeled point, with less weight for "
         "frequent classes; balanced: the same number of each class, namely that of the rarest class of kind object; "
         "hard: balanced, preferring points with large errors in earlier rounds",
     )
     balance: float = number(
-        1.0,
+        0.3,
         "class weights for selection weighted; 0: all points have equal weight; 1: all classes have equal total weight",
         "",
         (0.0, 1.0),

@@ -33,8 +33,8 @@ VISIBLE = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Truths:
-    """True objects: centers (t, 3) relative to the camera in the mesh frame [m], radii (t,) [m], and visible shares
-    (t,) of their outlines."""
+    """True objects: centers (t, 3) relative to the camera in the mesh frame [m], radii (t,) [m], of tall objects half
+    their heights, and visible shares (t,) of their outlines."""
 
     centers: Floats
     radii: Floats
@@ -119,10 +119,10 @@ def find_truths(
     positions = np.stack([each.position for each in known])
     centers = (positions - (0.0, 0.0, view.height)) @ view.heading
     if scene is not None and object_class == scene.class_name:
-        radii, visible = (np.array([getattr(each, name) for each in scene.objects]) for name in ("radius", "visible"))
-        return Truths(centers, radii, visible)
+        radii = np.array([each.shape.half_size for each in scene.objects])
+        return Truths(centers, radii, np.array([each.visible for each in scene.objects]))
     shares = np.array([_visible_share(view, center, each) for center, each in zip(centers, known, strict=True)])
-    return Truths(centers, np.full(len(known), view.shape.radius), shares)
+    return Truths(centers, np.full(len(known), view.shape.half_size), shares)
 
 
 def _visible_share(view: PreparedView, center: Floats, shown: TrueObject) -> float:

@@ -26,6 +26,7 @@ shape = "cylinder"
 radius = 0.07
 object_height = 1.0
 model = "wall6"
+sampling = "bilinear"
 max_distance = 3.0
 """
 KINDS = CLASSES.replace('"object"', '"upright"')

@@ -32,7 +32,7 @@ def folder(drawn, tmp_path):
 def graphs_of(folder, kept, count=2, **changes):
     recipe = GraphRecipe(
         CONFIGURATION.classes.mask_classes(),
-        replace(CONFIGURATION.manifest, max_distance=4.0, **changes),
+        replace(CONFIGURATION.manifest, max_distance=4.0, colors="absolute", **changes),
         augmentation=Augmentation(brightness=0.0, contrast=0.0, saturation=0.0, hue=0.0, gamma=0.0, noise=0.0),
     )
     return PictureGraphs(find_pictures(folder), recipe, None, GraphCache(kept, count, recipe))
