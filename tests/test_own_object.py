@@ -7,7 +7,6 @@ import shlex
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
 import pytest
 
@@ -20,13 +19,22 @@ PAGE = DOCS / "own-object.md"
 
 PROGRAMS = tomllib.loads((TOP / "pyproject.toml").read_text())["project"]["scripts"]
 
+SETTINGS = {
+    "data/cups": ("training.epochs=2", "network.depth=3", "network.width=4"),
+    "look": (
+        "training.epochs=2",
+        "training.rounds=1",
+        "training.batch=32",
+        "patches.above=0",
+        "patches.proposals=400",
+        "data.validation=0.4",
+    ),
+}
+"""Settings of small trainings, by the first argument of vm-train."""
+
 LESS = {
     "vm-synth": {"data/cups": ["--count", "24"], "data/cups-test": ["--count", "6"]},
-    "vm-train": {
-        "data/cups": ["--set", "training.epochs=2", "--set", "network.depth=3", "--set", "network.width=4"],
-        "look": ["--set", "training.epochs=2", "--set", "training.rounds=1", "--set", "training.batch=32"]
-        + ["--set", "patches.above=0", "--set", "patches.proposals=400", "--set", "data.validation=0.4"],
-    },
+    "vm-train": {first: [word for each in given for word in ("--set", each)] for first, given in SETTINGS.items()},
 }
 """Options to add to a command, by its program and its first argument."""
 

@@ -38,7 +38,12 @@ class PatchSettings:
 
     object_class: str = text_line("", 'class to judge; "": the first class of kind object that MODEL has')
     size: int = number(32, "samples along each side of a patch", "px", (8, 128))
-    extent: float = number(1.75, "half the side of a patch", "apparent radii of the object", (0.5, 8.0))
+    extent: float = number(
+        1.75,
+        "half the side of a patch; for a tall cylinder in halves of its height",
+        "apparent radii of the object",
+        (0.5, 8.0),
+    )
     above: float = number(
         0.03, "probability of a mesh point from which it counts for a proposal; lower: more proposals", "", (0.0, 0.99)
     )

@@ -10,6 +10,7 @@ from vm_embedded.detection.patches import Tangents, cut_patches, patch_nodes, sa
 from vm_embedded.detection.pixel_formats import FORMATS, checked_image
 from vm_embedded.detection.projection import to_camera
 from vm_embedded.detection.pyramid import Pyramid
+from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 
 from .views import BALL, SIZE, center_at, picture_of, view_at
@@ -150,3 +151,18 @@ def test_a_patch_is_read_from_the_sharpest_level_that_has_a_pixel_for_each_sampl
         pyramid = Pyramid(image, "bgr")
         cut_patches(pyramid, patch_nodes(view, Tangents.at(view, center[None]), EXTENT), size)
         assert len(pyramid._levels) == expected + 1
+
+
+@given(st.floats(0.02, 0.2), st.floats(0.2, 5.0), st.floats(1.1, 6.0), st.floats(4.0, 30.0), st.floats(0.0, 6.28))
+def test_a_patch_holds_a_whole_cylinder_of_any_proportion(radius, proportion, clearance, away, heading):
+    """proportion: height over radius. clearance: of the camera, in heights. away: distance in halves of its size."""
+    shape = Cylinder(radius, proportion * radius)
+    view = view_at()._replace(shape=shape, height=clearance * shape.object_height + 0.05)
+    spot = away * shape.half_size * np.array([np.cos(heading), np.sin(heading)])
+    center = np.array([*spot, shape.center_height - view.height])
+    place = Tangents.at(view, center[None])
+    outline = shape.outline(center, view.height)
+    ahead = outline @ place.axes[0]
+    across = np.stack([outline @ place.right[0], outline @ place.down[0]]) / ahead / place.radius[0]
+    assert np.abs(across).max() < EXTENT
+    assert np.abs(across).max() > 0.6

@@ -235,3 +235,9 @@ def test_a_camera_not_above_the_top_is_told_of_walls(height):
 def test_a_height_that_is_no_length_is_refused(object_height):
     with pytest.raises(GeometryError, match="cylinder height"):
         Cylinder(0.05, object_height)
+
+
+@given(lengths, lengths)
+def test_half_of_the_longest_side_is_a_radius_or_half_a_height(radius, tall):
+    assert Cylinder(radius, tall).half_size == max(radius, tall / 2.0)
+    assert Sphere(radius).half_size == Circle(radius).half_size == radius

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from vm_embedded.errors import InputError
+from vm_embedded.geometry.cylinder import Cylinder
+from vm_embedded.network.manifest import ObjectClass
 from vm_embedded.network.model_file import read_model
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
@@ -131,6 +133,51 @@ def test_scenes_that_make_no_sense_are_named(tmp_path, change):
     path.write_text(json.dumps(GOOD | change))
     with pytest.raises(InputError, match=r"^scene7\.json"):
         read_scene(path)
+
+
+CUP = {"center": [0.9, 0.1, 0.05], "radius": 0.04, "height": 0.1, "visible": 0.8}
+CUPS = GOOD | {"ball": None, "object": {"name": "cup", "radius": 0.04}, "objects": [CUP, CUP | {"visible": 0.0}]}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"object": {"radius": 0.04}},
+        {"object": {"name": "cup", "radius": 0.0}},
+        {"objects": None},
+        {"objects": [CUP | {"height": -0.1}]},
+        {"objects": [CUP | {"center": [1.0]}]},
+        {"objects": [{"center": CUP["center"], "radius": 0.04, "visible": 1.0}]},
+    ],
+)
+def test_scenes_have_several_objects_that_are_not_balls(tmp_path, change):
+    path = tmp_path / "scene7.json"
+    path.write_text(json.dumps(CUPS))
+    found = read_scene(path)
+    assert (found.class_name, found.radius) == ("cup", 0.04)
+    assert [each.visible for each in found.objects] == [0.8, 0.0]
+    assert found.objects[0].shape == Cylinder(0.04, 0.1)
+    path.write_text(json.dumps(CUPS | change))
+    with pytest.raises(InputError, match=r"^scene7\.json"):
+        read_scene(path)
+
+
+def test_a_cylinder_covers_the_pixels_whose_rays_hit_it(pictures):
+    picture, _ = pictures[0]
+    height, width = picture.labels.shape
+    orientation, lens = picture.lens.orientation, picture.lens.lens.for_image((width, height))
+    middle = lens.unproject(np.array([[width / 2.0, 0.7 * height]]), (width, height)) @ orientation.rotation.T
+    shape = Cylinder(0.1, 0.5 * orientation.height)
+    center = shape.center_along(middle, orientation.height)[0]
+    cup = SceneObject(center + np.array([0.0, 0.0, orientation.height]), shape.radius, 1.0, shape.object_height)
+    manifest = replace(MANIFEST, classes=(ObjectClass("cup", "object"), ObjectClass("other", "background")))
+    (found,) = true_objects(picture, SceneTruth(0.1, (cup,), "cup"), manifest)["cup"]
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    rays = lens.unproject(np.stack([x, y], axis=-1).reshape(-1, 2).astype(float), (width, height))
+    hit = shape.covers(rays @ orientation.rotation.T, center[None], orientation.height).reshape(height, width)
+    assert hit.sum() > 50
+    assert np.count_nonzero((found.mask >= 0.5) != hit) <= 0.05 * hit.sum() + 3
+    assert found.angular_radius == pytest.approx(math.asin(0.1 / np.linalg.norm(center)))
 
 
 @pytest.mark.parametrize("text", ["", "[1]", "{", "[" * 100000])
