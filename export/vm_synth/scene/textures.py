@@ -41,7 +41,8 @@ def _read(path: Path) -> Singles:
     picture = cv2.imdecode(np.frombuffer(path.read_bytes() or b"\0", dtype=np.uint8), cv2.IMREAD_COLOR)
     if picture is None:
         raise InputError(f"texture {path} can't be read: it is damaged or not a picture")
-    small = cv2.resize(picture, (_SIDE, _SIDE), interpolation=cv2.INTER_AREA)
+    how = cv2.INTER_AREA if min(picture.shape[:2]) > _SIDE else cv2.INTER_LINEAR
+    small = cv2.resize(picture, (_SIDE, _SIDE), interpolation=how)
     return _to_albedo(small[..., ::-1].astype(np.float32) / 255.0)
 
 
