@@ -45,17 +45,17 @@ class PatchSettings:
         (0.5, 8.0),
     )
     above: float = number(
-        0.03, "probability of a mesh point from which it counts for a proposal; lower: more proposals", "", (0.0, 0.99)
+        0.003, "probability of a mesh point from which it counts for a proposal; lower: more proposals", "", (0.0, 0.99)
     )
     passes: int = number(
-        2,
+        3,
         "on the robot: largest number of looks at a proposal; each further look cuts a new patch "
         "around the center that the previous look found",
         "",
         (1, 4),
     )
     proposals: int = number(40, "largest number of proposals of the mesh network in a picture", "", (1, 1000))
-    jittered: int = number(3, "patches beside true objects in a training picture with objects", "", (0, 1000))
+    jittered: int = number(6, "patches beside true objects in a training picture with objects", "", (0, 1000))
     jitter: float = number(0.6, "largest distance of these from the true center", "apparent radii", (0.0, 1.0))
     size_jitter: float = number(
         0.2,

@@ -73,7 +73,7 @@ def test_its_network_knows_its_contract_and_where_it_comes_from(whole, drawn):
     made = LookCheckpoint.load(folder / "look.pt")
     contract = made.contract
     assert (contract.object_class, contract.size, contract.channels) == ("ball", 16, (4, 6, 8))
-    assert (contract.extent, contract.above, contract.passes) == (1.75, 0.03, 2)
+    assert (contract.extent, contract.above, contract.passes) == (1.75, 0.003, 3)
     assert made.examples.shape == (4, 16, 16, 3)
     assert contract.provenance["data"] == drawn.name
     assert contract.provenance["mesh_sha256"] == json.loads((folder / "run.json").read_text())["mesh_sha256"]
