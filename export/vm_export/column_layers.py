@@ -4,7 +4,7 @@ Two rewritings make them fast:
 
 - SELU and ELU become cheap operators. With c = ln(alpha) and u = z + c, their value is max(u, c) + exp(min(u, c)), up
   to a factor and a constant. c goes into the bias of the layer, factor and constant into the weights of the next one
-  (`_Activation`).
+  (`Activation`).
 - Two classes with a softmax need one output: the difference of their logits.
 """
 
@@ -33,7 +33,7 @@ _SELU_ALPHA, _SELU_SCALE = 1.6732632423543772, 1.0507009873554805
 
 
 @dataclass(frozen=True)
-class _Activation:
+class Activation:
     """The parts of an activation that move into the weights of the layers around it.
 
     With `bias` added before it, activation(z) = scale * nodes(z + bias) + constant. The nodes of SELU and ELU are the
@@ -45,17 +45,18 @@ class _Activation:
     constant: float = 0.0
 
 
-def _exponential(alpha: float, scale: float) -> _Activation:
+def _exponential(alpha: float, scale: float) -> Activation:
     bias = math.log(alpha)
-    return _Activation(bias, scale, -scale * (alpha + bias))
+    return Activation(bias, scale, -scale * (alpha + bias))
 
 
-_ACTIVATIONS = {
+ACTIVATION_PARTS = {
     "selu": _exponential(_SELU_ALPHA, _SELU_SCALE),
     "elu": _exponential(1.0, 1.0),
-    "relu": _Activation(),
-    "tanh": _Activation(),
+    "relu": Activation(),
+    "tanh": Activation(),
 }
+"""The parts by the names of activations."""
 
 
 def write_layers(graph: OnnxGraph, network: Network, convolve: Convolve) -> None:
@@ -63,14 +64,14 @@ def write_layers(graph: OnnxGraph, network: Network, convolve: Convolve) -> None
 
     `convolve` writes the convolutions, which look at neighbors.
     """
-    x, before = "points", _Activation()
+    x, before = "points", Activation()
     for index, (spec, layer) in enumerate(zip(network.shape.layers, network.typed_layers, strict=True)):
         name = f"layer{index}"
         last = index == len(network.shape.layers) - 1
         kernel, bias = _weights(layer)
         if last and spec.activation == "softmax" and spec.width == 2:
             kernel, bias = kernel[1:] - kernel[:1], bias[1:] - bias[:1]
-        activation = _Activation() if last else _ACTIVATIONS[spec.activation]
+        activation = Activation() if last else ACTIVATION_PARTS[spec.activation]
         bias = bias + activation.bias + before.constant * kernel.sum(axis=(1, 2))
         kernel = before.scale * kernel
         if kernel.shape[1] == 1:  # a dense layer
@@ -96,10 +97,10 @@ def _weights(layer: GraphLayer) -> tuple[Floats, Floats]:
 
 
 def _write_activation(graph: OnnxGraph, name: str, activation: str, z: str) -> str:
-    """Write the nodes of an activation, without the parts that `_Activation` moves into the weights."""
+    """Write the nodes of an activation, without the parts that `Activation` moves into the weights."""
     if activation in ("relu", "tanh"):
         return graph.node(activation.capitalize(), [z], f"{name}.activation")
-    corner = graph.constant(f"{activation}.corner", _ACTIVATIONS[activation].bias)
+    corner = graph.constant(f"{activation}.corner", ACTIVATION_PARTS[activation].bias)
     straight = graph.node("Clip", [z, corner], f"{name}.straight")
     below = graph.node("Clip", [z, graph.constant("flat", _FLAT), corner], f"{name}.below")
     curved = graph.node("Exp", [below], f"{name}.curved")

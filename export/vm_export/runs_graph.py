@@ -57,7 +57,7 @@ def _convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, gr
     window = graph.node("Reshape", [thrice, graph.constant(f"{name}.window.shape", [3 * inputs, -1])], f"{name}.window")
 
     taps = np.zeros((outputs, len(groups), inputs, 3))
-    for place, group, shift in _kernel_places(groups):  # row 0 of a window is its right slot, shift +1
+    for place, group, shift in kernel_places(groups):  # row 0 of a window is its right slot, shift +1
         taps[:, group, :, 1 - shift] = kernel[:, place]
     weights = graph.constant(f"{name}.kernel", taps.reshape(outputs * len(groups), 3 * inputs))
     sums = graph.node("MatMul", [weights, window], f"{name}.sums")
@@ -70,7 +70,7 @@ def _convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, gr
     return graph.node("ReduceSum", [grouped, graph.constant("second", [1])], f"{name}.summed", keepdims=0)
 
 
-def _kernel_places(groups: Groups) -> Iterator[tuple[int, int, int]]:
+def kernel_places(groups: Groups) -> Iterator[tuple[int, int, int]]:
     """For each place of a kernel (0 is the point itself): its group, and its offset from the group's middle."""
     for number, group in enumerate(groups):
         for shift, neighbor in zip(group_offsets(group), group, strict=True):

@@ -24,11 +24,13 @@ def read_sections(
     path: Path | None,
     overrides: Mapping[str, Mapping[str, Any]] | None = None,
     noun: str = "configuration",
+    defaults: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Configuration:
     """Read a configuration, a dataclass of sections, from a TOML file; without a file, use all defaults.
 
-    overrides: entries by section that replace those of the file. noun: the kind of file, for messages. Raises
-    InputError naming the file, line, section and entry, and the allowed values.
+    overrides: entries by section that replace those of the file. noun: the kind of file, for messages. defaults:
+    entries by section that replace the defaults; a section with a `read` of its own is taken whole. Raises InputError
+    naming the file, line, section and entry, and the allowed values.
     """
     text = _read_text(path, noun) if path else ""
     where = f"{noun} {path}" if path else noun
@@ -38,6 +40,12 @@ def read_sections(
         raise InputError(f"{where}: {error}") from error
     for name, entries in (overrides or {}).items():
         table[name] = {**_checked_section(name, table.get(name, {})), **entries}
+    whole = {each.name for each in fields(kind) if "read" in each.metadata}
+    for name, entries in (defaults or {}).items():
+        if name in whole:
+            table.setdefault(name, entries)
+        else:
+            table[name] = {**entries, **_checked_section(name, table.get(name, {}))}
     try:
         read: Configuration = _build(kind, table)
         return read

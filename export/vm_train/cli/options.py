@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from vm_embedded.network.bundled import SHIPPED
 from vm_workstation.option_types import at_least
 
 from .check import check_parser
@@ -48,6 +49,7 @@ def parser() -> argparse.ArgumentParser:
     _add_data(made)
     made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
     _add_configuration(made)
+    add_start(made)
     made.add_argument(
         "--teacher",
         type=Path,
@@ -134,6 +136,18 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
         shards_parser(),
     )
     return {each.prog: each for each in made}
+
+
+def add_start(made: argparse.ArgumentParser) -> None:
+    """Add --from."""
+    made.add_argument(
+        "--from",
+        dest="start",
+        metavar="MODEL",
+        help="begin with the weights of a trained network, not with random ones: a checkpoint (.pt), a model file "
+        f"(.onnx), or a network of the package ({', '.join(SHIPPED)}). Its classes, mesh and layers, and "
+        "training.rate 0.001, become the defaults of the configuration",
+    )
 
 
 def _add_data(made: argparse.ArgumentParser) -> None:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.errors import InputError, VisualMeshError
+from vm_embedded.network.bundled import model_path
 
 from ..data.inspection import inspect_pictures
 from ..data.picture_files import PictureFiles
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from ..learning.hardware import Hardware
     from ..learning.rounds import TrainingOutcome
     from ..learning.run_folder import TrainingRun
+    from ..learning.start import Start
 
 _FEW = 10.0
 """Selected points per picture; with fewer, vm-train warns."""
@@ -39,10 +41,13 @@ def run_training(options: argparse.Namespace) -> int:
     """Begin a training, train, and return the exit status. Raises VisualMeshError."""
     from ..learning.hardware import set_up_hardware
 
-    configuration = read_configuration(options)
+    start = load_start(options.start)
+    configuration = read_configuration(options, start)
     with set_up_hardware(options.device, options.workers, options.threads) as hardware:
         # The leader prepares everything; the other processes wait for its error message, or None.
-        error = _message_of_error(lambda: _begin(options, configuration, hardware)) if hardware.is_leader else None
+        error = None
+        if hardware.is_leader:
+            error = _message_of_error(lambda: _begin(options, configuration, hardware, start))
         error = hardware.broadcast(error)
         if error is not None:
             raise InputError(error)
@@ -57,10 +62,26 @@ def run_resume(options: argparse.Namespace) -> int:
         return _train(options.run, hardware, options.data)
 
 
-def read_configuration(options: argparse.Namespace) -> TrainConfiguration:
-    """The configuration of --config and --set. Raises InputError, and ModelError if no model file could hold it."""
-    configuration = read_sections(TrainConfiguration, options.config, parse_overrides(options.set, "training.epochs=5"))
+def load_start(model: str | None) -> Start | None:
+    """The network of --from: a name of the package, or a file. Raises InputError or ModelError."""
+    if model is None:
+        return None
+    from ..learning.start import Start
+
+    return Start.load(model_path(model))
+
+
+def read_configuration(options: argparse.Namespace, start: Start | None = None) -> TrainConfiguration:
+    """The configuration of --config and --set. Raises InputError, and ModelError if no model file could hold it.
+
+    start: the network to begin with; what it describes takes the place of the defaults.
+    """
+    overrides = parse_overrides(options.set, "training.epochs=5")
+    defaults = None if start is None else start.defaults
+    configuration = read_sections(TrainConfiguration, options.config, overrides, defaults=defaults)
     _ = configuration.manifest  # raises ModelError now, before anything takes time
+    if start is not None:
+        start.check(configuration)
     return configuration
 
 
@@ -87,7 +108,9 @@ def find_good_pictures(
     return list(found.good)
 
 
-def _begin(options: argparse.Namespace, configuration: TrainConfiguration, hardware: Hardware) -> None:
+def _begin(
+    options: argparse.Namespace, configuration: TrainConfiguration, hardware: Hardware, start: Start | None
+) -> None:
     """Check all pictures, and write the folder of a new training."""
     from ..learning.run_folder import begin_run, check_unused
     from ..learning.training_data import TrainingData
@@ -105,7 +128,7 @@ def _begin(options: argparse.Namespace, configuration: TrainConfiguration, hardw
     print(f"{options.data}: {len(good)} pictures: {parts}")
     unpacked = None if options.no_unpacked else options.unpacked or options.output / "unpacked"
     data = TrainingData(options.data, split, unpacked, source)
-    run = begin_run(options.output, data, configuration, options.teacher)
+    run = begin_run(options.output, data, configuration, options.teacher, start)
     if run.selected_points_per_picture < _FEW:
         print(
             f"vm-train: only {run.selected_points_per_picture:.1f} points of a picture give gradients, because each "

@@ -1,7 +1,8 @@
 """The rounds of a training.
 
-Each round trains a new network. After each epoch the validation pictures score it, and the round keeps its best epoch
-in a checkpoint. A stopped training continues from the state that it saves every few seconds.
+Each round trains a new network, from random weights or from those of a trained network (start.py). After each epoch the
+validation pictures score it, and the round keeps its best epoch in a checkpoint. A stopped training continues from the
+state that it saves every few seconds.
 """
 
 from __future__ import annotations
@@ -225,6 +226,8 @@ def _round_trainer(run: TrainingRun, hardware: Hardware, progress: TrainingProgr
     recipe = run.configuration.training
     torch.manual_seed(int(np.random.default_rng([recipe.seed, progress.round]).integers(2**31)))
     network = Network(run.configuration.network_shape)
+    if run.start is not None:
+        network.load_state_dict(run.start.checkpoint.network.state_dict())
     graders = [Checkpoint.load(run.round_path(each)).network for each in range(1, progress.round)]
     total = recipe.epochs * steps_an_epoch(recipe.looks * run.data.pictures_per_epoch, recipe.batch)
     shares, weights = run.shares_and_weights(progress.round)

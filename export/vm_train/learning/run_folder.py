@@ -1,9 +1,9 @@
 """The folder of a training: what it was begun with, and what it has produced.
 
 train.toml: the configuration. pictures.json: the split of the pictures. run.json: where the pictures are, and the
-numbers of points of each class. teacher.pt: a copy of the network of --teacher. state.pt: the state to resume from.
-log.jsonl, tensorboard/: the record of each step. round1.pt, ...: the best network of each round. model.pt: the best
-network of all rounds, for vm-evaluate and vm-export.
+numbers of points of each class. teacher.pt, and start.pt or start.onnx: copies of the networks of --teacher and --from.
+state.pt: the state to resume from. log.jsonl, tensorboard/: the record of each step. round1.pt, ...: the best network
+of each round. model.pt: the best network of all rounds, for vm-evaluate and vm-export.
 """
 
 from __future__ import annotations
@@ -32,12 +32,16 @@ from ..graphs.loading import PictureGraphs
 from ..graphs.streamed import StreamedGraphs, StreamSource
 from .configuration import TrainConfiguration
 from .selection import class_weights, selection_shares
+from .start import Start
 from .teacher import Teacher
 from .training_data import TrainingData
 
 _FORMAT = 3
 _TEACHER = "teacher.pt"
-_FILES = ("train.toml", "pictures.json", _TEACHER, "state.pt", "model.pt", "round1.pt", "log.jsonl")
+_STARTS = {".pt": "start.pt", ".onnx": "start.onnx"}
+"""Copies of the network to begin with, by the suffix of its file."""
+
+_FILES = ("train.toml", "pictures.json", _TEACHER, *_STARTS.values(), "state.pt", "model.pt", "round1.pt", "log.jsonl")
 """Files that a new training would overwrite."""
 
 
@@ -45,7 +49,8 @@ _FILES = ("train.toml", "pictures.json", _TEACHER, "state.pt", "model.pt", "roun
 class TrainingRun:
     """A training as its folder describes it; `begin_run` and `read_run` make it.
 
-    counts (C,): number of points of each class in the pictures that `data.counted` names.
+    counts (C,): number of points of each class in the pictures that `data.counted` names. start: the network that each
+    round begins with; None: random weights.
     """
 
     folder: Path
@@ -53,6 +58,7 @@ class TrainingRun:
     configuration: TrainConfiguration
     counts: npt.NDArray[np.int64]
     teacher: Teacher | None = None
+    start: Start | None = None
 
     @property
     def state_path(self) -> Path:
@@ -115,17 +121,23 @@ class TrainingRun:
             "selection": recipe.selection,
             "loss": recipe.loss,
             "teacher_sha256": "none" if self.teacher is None else self.teacher.sha256,
+            "start_sha256": "none" if self.start is None else self.start.sha256,
             "epochs": str(recipe.epochs),
             "seed": str(recipe.seed),
         }
 
 
 def begin_run(
-    folder: Path, data: TrainingData, configuration: TrainConfiguration, teacher: Path | None = None
+    folder: Path,
+    data: TrainingData,
+    configuration: TrainConfiguration,
+    teacher: Path | None = None,
+    start: Start | None = None,
 ) -> TrainingRun:
     """Count the points of each class, and write the files of a new training.
 
-    teacher: checkpoint of the teacher. Raises InputError, also if the folder holds a training.
+    teacher: checkpoint of the teacher. start: the network to begin with, which fits the configuration. Raises
+    InputError, also if the folder holds a training.
     """
     check_unused(folder)
     data = replace(data, folder=data.folder.resolve())
@@ -140,11 +152,14 @@ def begin_run(
             "no training picture has a labeled point: check that the lens files fit the pictures, and [mesh] the "
             "object (a camera below the top of a sphere or cylinder sees no point of its mesh)"
         )
-    run = TrainingRun(folder, data, configuration, counts, loaded)
+    run = TrainingRun(folder, data, configuration, counts, loaded, start)
     write_split(folder / "pictures.json", data.split)
     if teacher is not None:
         with atomic_write(folder / _TEACHER) as part:
             part.write_bytes(teacher.read_bytes())
+    if start is not None:
+        with atomic_write(folder / _start_name(start)) as part:
+            part.write_bytes(start.path.read_bytes())
     _write(folder / "train.toml", to_commented_toml(configuration))
     _write(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
     return run
@@ -160,6 +175,8 @@ def read_run(folder: Path) -> TrainingRun:
         counts = np.array(list(content["points"].values()), dtype=np.int64)
         pictures, unpacked, stream = Path(content["data"]), content["unpacked"], content["source"]
         configuration_sha256, teacher_sha256 = content["configuration_sha256"], content["teacher_sha256"]
+        started = content.get("start")  # trainings of before this entry began with random weights
+        start_name, start_sha256 = (None, None) if started is None else (str(started["file"]), started["sha256"])
         source = None if stream is None else StreamSource(**(stream | {"shards": tuple(stream["shards"])}))
     except OSError as error:
         raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
@@ -167,11 +184,14 @@ def read_run(folder: Path) -> TrainingRun:
         raise InputError(f"{path} is damaged: {error}") from error
     configuration = read_sections(TrainConfiguration, folder / "train.toml")
     teacher = None if teacher_sha256 is None else _load_teacher(folder / _TEACHER, configuration)
+    start = None if start_name is None else Start.load(folder / start_name)
     split = read_split(folder / "pictures.json")
     data = TrainingData(pictures, split, None if unpacked is None else folder / unpacked, source)
-    run = TrainingRun(folder, data, configuration, counts, teacher)
+    run = TrainingRun(folder, data, configuration, counts, teacher, start)
     if teacher is not None and teacher.sha256 != teacher_sha256:
         raise InputError(f"{folder / _TEACHER} was changed since the training began: begin another one")
+    if start is not None and start.sha256 != start_sha256:
+        raise InputError(f"{start.path} was changed since the training began: begin another one")
     if run.configuration_sha256 != configuration_sha256:
         raise InputError(
             f"{folder / 'train.toml'} or pictures.json was changed since the training began: "
@@ -213,8 +233,13 @@ def _description(run: TrainingRun) -> dict[str, Any]:
         "configuration_sha256": run.configuration_sha256,
         "source": None if data.source is None else asdict(data.source),
         "teacher_sha256": None if run.teacher is None else run.teacher.sha256,
+        "start": None if run.start is None else {"file": _start_name(run.start), "sha256": run.start.sha256},
         "points": dict(zip(names, run.counts.tolist(), strict=True)),
     }
+
+
+def _start_name(start: Start) -> str:
+    return _STARTS.get(start.path.suffix.lower(), "start.pt")
 
 
 def _load_teacher(path: Path, configuration: TrainConfiguration) -> Teacher:

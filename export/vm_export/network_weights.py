@@ -1,0 +1,161 @@
+"""The mesh network of a model file as a torch network again, so that a training can go on from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import onnx
+import torch
+from onnx import numpy_helper
+
+from vm_embedded.arrays import Floats
+from vm_embedded.errors import InputError, ModelError
+from vm_embedded.mesh.mesh import Groups
+from vm_embedded.network.manifest import Manifest
+from vm_embedded.network.model_file import ModelFile
+
+from .checkpoint import Checkpoint
+from .column_layers import ACTIVATION_PARTS, Activation
+from .export import LARGEST_DIFFERENCE, largest_difference
+from .network import Network
+from .network_shape import Layer, NetworkShape
+from .runs_graph import kernel_places
+
+_OPERATORS = {"Selu": "selu", "Relu": "relu", "Elu": "elu", "Tanh": "tanh", "Softmax": "softmax", "Sigmoid": "sigmoid"}
+"""Activations by the operators of the layout `plain`."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Weights:
+    """A layer and its weights as torch has them.
+
+    kernel (outputs, inputs of the linear layer), bias (outputs,). depthwise (N + 1, inputs): of a separable one.
+    """
+
+    layer: Layer
+    kernel: Floats
+    bias: Floats
+    depthwise: Floats | None = None
+
+
+class _Graph:
+    """The constants of a model file by name, and its nodes by the names of their outputs."""
+
+    def __init__(self, content: bytes) -> None:
+        graph = onnx.load_from_string(content).graph
+        self.constants = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
+        self.nodes = {each.output[0]: each for each in graph.node}
+
+    @property
+    def layers(self) -> list[str]:
+        """Names of the layers, in order."""
+        count = sum(name.startswith("layer") and name.endswith(".kernel") for name in self.constants)
+        return [f"layer{index}" for index in range(count)]
+
+    def weights(self, name: str) -> Floats:
+        """A constant in double precision. Raises KeyError."""
+        return np.asarray(self.constants[name], dtype=np.float64)
+
+
+def network_of(model: ModelFile) -> Checkpoint:
+    """The mesh network of a model file that vm-export wrote, in any layout; its answers are the same.
+
+    In the layouts `runs` and `lattice`, a separable convolution comes back as a full one. Raises ModelError for files
+    of other programs.
+    """
+    manifest, foreign = model.manifest, f"{model.path}: its mesh network has other layers than vm-export writes"
+    try:
+        graph = _Graph(model.content)
+        layers = _plain(graph) if manifest.layout == "plain" else _columns(graph, manifest)
+        network = _network(layers, manifest.neighbors)
+        difference = largest_difference(model.content, network, manifest)
+    except (KeyError, IndexError, ValueError, RuntimeError, InputError) as error:
+        raise ModelError(f"{foreign}: {error}") from error
+    if not difference <= LARGEST_DIFFERENCE:
+        raise ModelError(f"{foreign}: its answers differ from those of the layers by {difference:.2g}")
+    bare = replace(manifest, layout="plain", operations=0, self_test=None, look=None)
+    return Checkpoint(network, bare)
+
+
+def _network(layers: list[_Weights], neighbors: int) -> Network:
+    network = Network(NetworkShape(tuple(each.layer for each in layers), neighbors))
+    state = {}
+    for index, each in enumerate(layers):
+        state |= {f"layers.{index}.linear.weight": each.kernel, f"layers.{index}.linear.bias": each.bias}
+        if each.depthwise is not None:
+            state[f"layers.{index}.depthwise"] = each.depthwise
+    network.load_state_dict({name: torch.from_numpy(value.astype(np.float32)) for name, value in state.items()})
+    return network.eval()
+
+
+def _plain(graph: _Graph) -> list[_Weights]:
+    """The layers of plain_graph.plain_model. Raises KeyError for other graphs."""
+    found = []
+    for name in graph.layers:
+        kernel, bias = graph.weights(f"{name}.kernel").T, graph.weights(f"{name}.bias")
+        node = graph.nodes["probabilities" if name == graph.layers[-1] else f"{name}.activation"]
+        depthwise = None
+        if f"{name}.around" in graph.constants:
+            kind = "separable"
+            depthwise = np.vstack([graph.weights(f"{name}.self"), graph.weights(f"{name}.around")])
+        else:
+            kind = "convolution" if f"{name}.gathered" in graph.nodes else "dense"
+        found.append(_Weights(Layer(kind, len(bias), _OPERATORS[node.op_type]), kernel, bias, depthwise))
+    return found
+
+
+def _columns(graph: _Graph, manifest: Manifest) -> list[_Weights]:
+    """The layers of column_layers.write_layers, whose rewritings are undone. Raises KeyError for other graphs."""
+    unfold = _from_taps(manifest) if manifest.layout == "lattice" else _from_runs(manifest.model.groups)
+    found, before = [], Activation()
+    for name in graph.layers:
+        kernel, bias = graph.weights(f"{name}.kernel"), graph.weights(f"{name}.bias")[:, 0]
+        is_dense = f"{name}.window" not in graph.nodes and f"{name}.picture" not in graph.nodes
+        kernel = (kernel[:, None] if is_dense else unfold(kernel)) / before.scale
+        is_last = name == graph.layers[-1]
+        activation = _head(graph) if is_last else _activation(graph, name)
+        parts = Activation() if is_last else ACTIVATION_PARTS[activation]
+        bias = bias - parts.bias - before.constant * kernel.sum(axis=(1, 2))
+        if is_last and _is_difference(graph):
+            kernel, bias = np.concatenate([-kernel, kernel]) / 2.0, np.concatenate([-bias, bias]) / 2.0
+        layer = Layer("dense" if is_dense else "convolution", len(bias), activation)
+        found.append(_Weights(layer, kernel.reshape(len(kernel), -1), bias))
+        before = parts
+    return found
+
+
+def _from_runs(groups: Groups) -> Callable[[Floats], Floats]:
+    """The inverse of how runs_graph lays out a kernel: (outputs, N + 1, inputs) from (outputs * G, 3 * inputs)."""
+
+    def unfold(weights: Floats) -> Floats:
+        taps = weights.reshape(-1, len(groups), weights.shape[1] // 3, 3)
+        places = sorted(kernel_places(groups))
+        return np.stack([taps[:, group, :, 1 - shift] for _, group, shift in places], axis=1)
+
+    return unfold
+
+
+def _from_taps(manifest: Manifest) -> Callable[[Floats], Floats]:
+    """The inverse of how lattice_graph lays out a kernel: (outputs, N + 1, inputs) from (outputs, inputs, 3, 3)."""
+    steps = ((0, 0), *(manifest.model.steps or ()))
+    return lambda taps: np.stack([taps[:, :, 1 + up, 1 + right] for right, up in steps], axis=1)
+
+
+def _activation(graph: _Graph, name: str) -> str:
+    """The activation of a layer before the last one."""
+    node = graph.nodes[f"{name}.activation"]
+    if node.op_type != "Add":
+        return _OPERATORS[node.op_type]
+    return graph.nodes[f"{name}.straight"].input[1].removesuffix(".corner")
+
+
+def _head(graph: _Graph) -> str:
+    """The activation of the last layer."""
+    return "softmax" if graph.nodes["probabilities"].op_type == "Div" or _is_difference(graph) else "sigmoid"
+
+
+def _is_difference(graph: _Graph) -> bool:
+    """Whether the last layer gives only the difference of two logits, for a softmax of two classes."""
+    return graph.nodes["probabilities"].input[0] == "head.both"

@@ -1,0 +1,81 @@
+"""The mesh network of a model file is read back: the same answers, from every layout."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.vm_export.checkpoints import checkpoint
+from tests.vm_export.test_export import in_all_layouts, network_shapes
+from vm_embedded.errors import ModelError
+from vm_embedded.network.bundled import SHIPPED, model_path
+from vm_embedded.network.model_file import ModelFile, read_model
+from vm_export import export
+from vm_export.checkpoint import Checkpoint
+from vm_export.network_shape import NetworkShape
+from vm_export.network_weights import network_of
+
+
+@in_all_layouts
+@given(shape=network_shapes(), seed=st.integers(0, 1000))
+@settings(max_examples=20)
+def test_every_network_comes_back_from_its_model_file(layout, shape, seed):
+    made = checkpoint(seed, shape, f"{'xygrid' if layout == 'lattice' else 'ring'}{shape.neighbors}")
+    facts = replace(made.manifest, layout=layout)
+    model = ModelFile(Path("model.onnx"), export.onnx_model(made.network, facts), facts, "")
+    read = network_of(model)
+    test = export.random_example(made.network, 200, seed)
+    with torch.inference_mode():
+        answer = read.network(torch.from_numpy(test.points), torch.from_numpy(test.neighbors)).numpy()
+    np.testing.assert_allclose(answer, test.probabilities, atol=2e-5)
+    if layout == "plain":
+        assert read.network.shape == shape
+    again = ModelFile(Path("again.onnx"), export.onnx_model(read.network, facts), facts, "")
+    assert export.largest_difference(again.content, made.network, facts) < 1e-4
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_networks_of_the_package_come_back_and_are_exported_again(name, tmp_path):
+    shipped = read_model(model_path(name))
+    read = network_of(shipped)
+    export.export(read, tmp_path / "again.onnx", shipped.manifest.layout)
+    again = read_model(tmp_path / "again.onnx")
+    assert export.largest_difference(again.content, network_of(shipped).network, again.manifest) < 1e-5
+    for entry in ("classes", "any_radius", "sampling", "colors", "mesh", "intersections"):
+        assert getattr(again.manifest, entry) == getattr(shipped.manifest, entry)
+    read.save(tmp_path / "network.pt")
+    assert Checkpoint.load(tmp_path / "network.pt").network.shape == read.network.shape
+
+
+def write_changed(path, change):
+    """A model file that a change of its graph makes another one's."""
+    made = checkpoint(1, NetworkShape.uniform(3, 4, 2, activation="elu"))
+    facts = replace(made.manifest, layout="runs")
+    model = onnx.load_from_string(export.onnx_model(made.network, facts))
+    change(model.graph)
+    return ModelFile(path, model.SerializeToString(), facts, "")
+
+
+def rename_kernels(graph):
+    for each in graph.initializer:
+        if each.name.endswith(".kernel"):
+            new = each.name.replace("layer", "block")
+            for node in graph.node:
+                node.input[:] = [new if name == each.name else name for name in node.input]
+            each.name = new
+
+
+def steepen_the_answers(graph):
+    node = next(each for each in graph.node if each.op_type == "Neg")
+    node.op_type = "Tanh"
+
+
+@pytest.mark.parametrize("change", [rename_kernels, steepen_the_answers])
+def test_a_graph_of_another_program_is_refused(change, tmp_path):
+    with pytest.raises(ModelError, match=r"model\.onnx: its mesh network has other layers than vm-export writes"):
+        network_of(write_changed(tmp_path / "model.onnx", change))
