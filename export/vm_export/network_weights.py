@@ -81,7 +81,7 @@ def network_of(model: ModelFile) -> Checkpoint:
 
 def _network(layers: list[_Weights], neighbors: int) -> Network:
     network = Network(NetworkShape(tuple(each.layer for each in layers), neighbors))
-    state = {}
+    state: dict[str, Floats] = {}
     for index, each in enumerate(layers):
         state |= {f"layers.{index}.linear.weight": each.kernel, f"layers.{index}.linear.bias": each.bias}
         if each.depthwise is not None:
@@ -148,7 +148,7 @@ def _activation(graph: _Graph, name: str) -> str:
     node = graph.nodes[f"{name}.activation"]
     if node.op_type != "Add":
         return _OPERATORS[node.op_type]
-    return graph.nodes[f"{name}.straight"].input[1].removesuffix(".corner")
+    return str(graph.nodes[f"{name}.straight"].input[1]).removesuffix(".corner")
 
 
 def _head(graph: _Graph) -> str:
@@ -158,4 +158,4 @@ def _head(graph: _Graph) -> str:
 
 def _is_difference(graph: _Graph) -> bool:
     """Whether the last layer gives only the difference of two logits, for a softmax of two classes."""
-    return graph.nodes["probabilities"].input[0] == "head.both"
+    return bool(graph.nodes["probabilities"].input[0] == "head.both")

@@ -40,12 +40,7 @@ def read_sections(
         raise InputError(f"{where}: {error}") from error
     for name, entries in (overrides or {}).items():
         table[name] = {**_checked_section(name, table.get(name, {})), **entries}
-    whole = {each.name for each in fields(kind) if "read" in each.metadata}
-    for name, entries in (defaults or {}).items():
-        if name in whole:
-            table.setdefault(name, entries)
-        else:
-            table[name] = {**entries, **_checked_section(name, table.get(name, {}))}
+    _fill_in(kind, table, defaults or {})
     try:
         read: Configuration = _build(kind, table)
         return read
@@ -54,6 +49,16 @@ def read_sections(
         raise InputError(f"{where}{'' if line is None else f', line {line}'}: {fault}") from fault
     except VisualMeshError as error:
         raise InputError(f"{where}: {error}") from error
+
+
+def _fill_in(kind: Any, table: dict[str, Any], defaults: Mapping[str, Mapping[str, Any]]) -> None:
+    """Add the entries that a table lacks. Raises InputError."""
+    whole = {each.name for each in fields(kind) if "read" in each.metadata}
+    for name, entries in defaults.items():
+        if name in whole:
+            table.setdefault(name, entries)
+        else:
+            table[name] = {**entries, **_checked_section(name, table.get(name, {}))}
 
 
 class _Fault(InputError):

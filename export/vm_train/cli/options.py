@@ -10,6 +10,7 @@ from vm_workstation.option_types import at_least
 
 from .check import check_parser
 from .fine_tuning import tune_config_parser
+from .import_boxes import import_boxes_parser
 from .import_pictures import import_parser
 from .look import look_config_parser, look_parser
 from .shards import shards_parser
@@ -29,6 +30,7 @@ other commands (add --help for their options):
   vm-train rate DATA           find a learning rate
   vm-train config              print a train.toml with all entries and their defaults
   vm-train import FILES OUT    convert TFRecord files of the reference implementation to pictures
+  vm-train import-boxes DIR OUT  convert frames with boxes, lens and pose to pictures with masks
   vm-train shards DATA OUT     pack pictures into tar files
 
 On several GPUs or machines: torchrun --nproc-per-node=N -m vm_train DATA -o RUN
@@ -133,6 +135,7 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
         rate_parser(),
         config_parser(),
         import_parser(),
+        import_boxes_parser(),
         shards_parser(),
     )
     return {each.prog: each for each in made}

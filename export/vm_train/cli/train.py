@@ -18,6 +18,7 @@ from ..learning.configuration import HEADER, TrainConfiguration
 from .check import run_check
 from .check_boxes import refuse_other_options, run_check_boxes
 from .fine_tuning import print_tune_config, resume_fine_tuning
+from .import_boxes import run_import_boxes
 from .import_pictures import run_import
 from .look import print_look_config, resume_look, run_look
 from .options import parsers
@@ -40,6 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "look-config": print_look_config,
         "tune-config": print_tune_config,
         "import": run_import,
+        "import-boxes": run_import_boxes,
         "shards": run_shards,
     }
     command = given[0] if given[:1] and given[0] in commands else None

@@ -47,11 +47,15 @@ class SceneObject:
 
 @dataclass(frozen=True, eq=False)
 class SceneTruth:
-    """The truth of vm-synth about a picture: the right radius of its objects [m], the objects, and their class."""
+    """The truth about a picture: the right radius of its objects [m], the objects, and their class.
+
+    in_mask: only the mask shows the objects, in the files of vm-train import-boxes.
+    """
 
     radius: float
     objects: tuple[SceneObject, ...]
     class_name: str = BALL
+    in_mask: bool = False
 
 
 def read_scene(path: Path) -> SceneTruth | None:
@@ -64,10 +68,11 @@ def read_scene(path: Path) -> SceneTruth | None:
             found = tuple(_read_object(each, float(each["height"])) for each in table["objects"])
             truth = SceneTruth(float(table["object"]["radius"]), found, str(table["object"]["name"]))
         else:
-            ball = table["ball"]
+            in_mask = table.keys() == {"ball_radius"}
+            ball = None if in_mask else table["ball"]
             found = () if ball is None else (_read_object(ball, 0.0),)
-            truth = SceneTruth(float(table["ball_radius"]), found)
-    except (OSError, KeyError, TypeError, ValueError, RecursionError) as error:
+            truth = SceneTruth(float(table["ball_radius"]), found, in_mask=in_mask)
+    except (OSError, AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{path.name}: is not a scene file of vm-synth: {error!r}") from error
     if not _is_valid(truth):
         raise InputError(
@@ -94,15 +99,16 @@ def _is_valid_object(found: SceneObject) -> bool:
 def true_objects(picture: Picture, scene: SceneTruth | None, manifest: Manifest) -> dict[str, list[TrueObject]]:
     """The true objects of each class of the kind object.
 
-    With a scene, the scene's class has the scene's objects with their whole outlines. Otherwise each connected piece of
-    the mask is an object of the manifest's size; it stands where the mean ray through the piece meets the plane.
+    With a scene of vm-synth, the scene's class has the scene's objects with their whole outlines. Otherwise each
+    connected piece of the mask is an object of the manifest's size; it stands where the mean ray through the piece
+    meets the plane.
     """
     shape = manifest.object_shape
     found: dict[str, list[TrueObject]] = {}
     for number, each in enumerate(manifest.classes):
         if each.kind != "object":
             continue
-        if scene is not None and each.name == scene.class_name:
+        if scene is not None and each.name == scene.class_name and not scene.in_mask:
             found[each.name] = [_of_scene(picture, one) for one in scene.objects]
         else:
             found[each.name] = _of_mask(picture, picture.labels == number, shape)

@@ -75,8 +75,10 @@ def _class_entries(manifest: Manifest) -> dict[str, dict[str, Any]]:
 
     A class whose color is unknown has none, so that reading the section asks for it.
     """
-    usual, names = dict(ClassTable.default().colors), [each.name for each in manifest.classes]
-    left = [color for name, colors in usual.items() if name not in names for color in colors]
+    table, names = ClassTable.default(), [each.name for each in manifest.classes]
+    usual = table.colors
+    free = sorted(set(usual) - set(names), key=lambda name: (table.kinds[name] != "background", name))
+    left = [color for name in free for color in usual[name]]
     backgrounds = [each.name for each in manifest.classes if each.kind == "background"]
 
     def colors(each: ObjectClass) -> list[list[int]]:

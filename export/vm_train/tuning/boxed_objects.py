@@ -10,14 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from vm_embedded.errors import InputError, unknown
-from vm_embedded.geometry.lens import Size
 
-from ..boxes.box import Box, BoxedPicture, BoxedSet
+from ..boxes.box import BoxedPicture, BoxedSet
+from ..boxes.whole import whole_object
 from ..data.split import Split
 from .windows import Windows
-
-_CUT = 2.0
-"""Edges of boxes closer than this to the border of the picture are taken for cut off [px]."""
 
 _SLACK = 1.5
 """Validation may become larger than asked by this factor, so that a recording fits."""
@@ -28,26 +25,9 @@ def objects_of(picture: BoxedPicture, name: str, is_round: bool) -> Windows:
 
     is_round: a box that the picture's border cuts is completed to a square.
     """
-    found = [_object_of(box, picture.size, is_round) for box in picture.boxes if box.name == name]
+    found = [whole_object(box, picture.size, is_round) for box in picture.boxes if box.name == name]
     values = np.array(found).reshape(-1, 3)
     return Windows(values[:, :2], values[:, 2])
-
-
-def _object_of(box: Box, size: Size, is_round: bool) -> tuple[float, float, float]:
-    x, y = box.center.tolist()
-    if not is_round:
-        return x, y, 0.5 * box.width
-    radius = 0.5 * max(box.width, box.height)
-    width, height = size
-    if box.left < _CUT - 0.5 and box.right < width - 0.5 - _CUT:
-        x = box.right - radius
-    elif box.right > width - 0.5 - _CUT:
-        x = box.left + radius
-    if box.top < _CUT - 0.5 and box.bottom < height - 0.5 - _CUT:
-        y = box.bottom - radius
-    elif box.bottom > height - 0.5 - _CUT:
-        y = box.top + radius
-    return x, y, radius
 
 
 def all_objects(pictures: Sequence[BoxedPicture], name: str, is_round: bool) -> Windows:

@@ -1,0 +1,100 @@
+"""Frames with boxes, lens and pose as a folder of pictures with masks, for the training of a mesh network."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+
+from vm_embedded.errors import InputError
+from vm_embedded.files import atomic_write
+from vm_embedded.geometry.lens_files import read_lens_file
+
+from ..boxes.box import BoxedPicture
+from ..data.picture_files import IMAGES
+from .box_masks import MaskRule, mask_of
+
+
+@dataclass(frozen=True)
+class ImportedBoxes:
+    """numbers: the X of imageX.jpg of each frame; None if it lacks lens or pose. labeled: boxes that became labels.
+
+    misfits: a line for each box that did not.
+    """
+
+    numbers: tuple[str | None, ...]
+    labeled: int
+    misfits: tuple[str, ...]
+
+
+def import_boxes(
+    pictures: Sequence[BoxedPicture], folder: Path, out: Path, rule: MaskRule, write_radius: bool
+) -> ImportedBoxes:
+    """Write imageX, maskX.png and lensX.yaml of each frame that has a lens file with a pose.
+
+    folder: that the frames are in. write_radius: also write sceneX.json with the objects' radius, for networks that are
+    trained on objects of many radii. Raises InputError if `out` is not empty or can't be written.
+    """
+    _prepare(out)
+    numbers: list[str | None] = []
+    misfits: list[str] = []
+    labeled = 0
+    for picture in pictures:
+        lens = None if picture.lens is None else read_lens_file(picture.lens)
+        if picture.lens is None or lens is None or lens.orientation is None:
+            numbers.append(None)
+            continue
+        number = _number(picture.image.relative_to(folder), numbers)
+        mask, count, wrong = mask_of(picture, lens, rule)
+        _write(out / f"mask{number}.png", cv2.imencode(".png", mask)[1].tobytes())
+        _copy(picture.lens, out / f"lens{number}.yaml")
+        if write_radius:
+            _write(out / f"scene{number}.json", f"{json.dumps({'ball_radius': rule.shape.radius})}\n".encode())
+        _write_image(picture.image, out / f"image{number}")
+        numbers.append(number)
+        labeled += count
+        misfits += [f"{picture.image.relative_to(folder)}: {each}" for each in wrong]
+    return ImportedBoxes(tuple(numbers), labeled, tuple(misfits))
+
+
+def _prepare(out: Path) -> None:
+    """Make the folder. Raises InputError if it holds anything."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if any(out.iterdir()):
+            raise InputError(f"{out} is not empty: give a new folder")
+    except OSError as error:
+        raise InputError(f"can't write to folder {out}: {error.strerror or error}") from error
+
+
+def _number(path: Path, used: Sequence[str | None]) -> str:
+    """The path of a frame as a picture's number: without separators and dots, and different from all used ones."""
+    number = "_".join(path.with_suffix("").parts).replace(".", "_")
+    while number in used:
+        number += "_"
+    return number
+
+
+def _write_image(image: Path, to: Path) -> None:
+    """Copy an image without any change; convert it to PNG if vm-train does not read its format. Raises InputError."""
+    if image.suffix.lower() in IMAGES:
+        _copy(image, to.with_name(to.name + image.suffix.lower()))
+        return
+    decoded = cv2.imread(str(image), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    if decoded is None:
+        raise InputError(f"can't read image {image}")
+    _write(to.with_name(f"{to.name}.png"), cv2.imencode(".png", decoded)[1].tobytes())
+
+
+def _copy(path: Path, to: Path) -> None:
+    with atomic_write(to) as part:
+        shutil.copyfile(path, part)
+
+
+def _write(path: Path, data: bytes) -> None:
+    with atomic_write(path) as part:
+        part.write_bytes(data)
