@@ -24,8 +24,9 @@ from ..boxes.box import Box, BoxedPicture
 from ..boxes.whole import cut_edges, whole_object
 from ..data.classes import Color
 
-_LARGEST_FACTOR = 1.5
-"""Largest ratio of the widths, or of the heights, of a box and the object on the plane."""
+_LARGEST_FACTOR, _SLACK = 1.5, 4.0
+"""Largest ratio of the widths, or of the heights, of a box and the object on the plane, and what they may differ in
+addition [px]: boxes drawn by hand are often too large by some pixels."""
 
 _MARGIN = 0.05
 """Width of the unlabeled margin on both sides of an edge, as a share of the box's size; one pixel is added."""
@@ -68,7 +69,7 @@ def mask_of(picture: BoxedPicture, lens_file: LensFile, rule: MaskRule) -> tuple
         outside, inside = shown, None
         try:
             outline = _filled(outline_in(box, size, lens, orientation, rule.shape), size)
-            outside, inside = shown | outline, shown & outline
+            outside, inside = shown | outline, _possible(box, size, rule.shape) & outline
         except MisfitError as error:
             misfits.append(f"{_described(box)} {error}; left unlabeled")
         margin = 1 + int(_MARGIN * max(box.width, box.height))
@@ -98,8 +99,8 @@ def outline_in(box: Box, size: Size, lens: Lens, orientation: Orientation, shape
     given = np.array([box.width, box.height])
     if any(cut_edges(box, size)):
         given[:] = 2.0 * radius
-    factors = np.maximum(given / expected, expected / given)
-    if not (factors <= _LARGEST_FACTOR).all():
+    larger, smaller = np.maximum(given, expected), np.minimum(given, expected)
+    if not (larger <= _LARGEST_FACTOR * smaller + _SLACK).all():
         raise MisfitError(
             f"has {_by(given)} px, but an object on the plane there has {_by(expected)} px; is it above the plane, or "
             "partly hidden?"
@@ -133,6 +134,15 @@ def _rectangle(box: Box, size: Size) -> Mask:
     columns, rows = np.arange(size[0]), np.arange(size[1])[:, None]
     across = (columns >= box.left) & (columns <= box.right)
     return np.asarray(across & (rows >= box.top) & (rows <= box.bottom))
+
+
+def _possible(box: Box, size: Size, shape: Shape) -> Mask:
+    """The pixels (h, w) that an object in a box may have: a ball in full view has none in the box's corners."""
+    if any(cut_edges(box, size)) or not isinstance(shape, Sphere):
+        return _rectangle(box, size)
+    columns, rows = np.arange(size[0]), np.arange(size[1])[:, None]
+    (x, y), across, down = box.center, (box.right - box.left) / 2.0, (box.bottom - box.top) / 2.0
+    return np.asarray(((columns - x) / across) ** 2 + ((rows - y) / down) ** 2 <= 1.0)
 
 
 def _grown(pixels: Mask, margin: int) -> Mask:

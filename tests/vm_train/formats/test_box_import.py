@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import subprocess
 from pathlib import Path
 
 import cv2
@@ -11,16 +12,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.manifests import ball_manifest
-from tests.vm_train.commands import run
+from tests.vm_train.commands import run, run_module
 from tests.vm_train.drawn import CLASSES, RADIUS
-from tests.vm_train.formats.boxed import draw_frames, true_box, yolo_line
+from tests.vm_train.formats.boxed import draw_frames, yolo_line
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.network.bundled import model_path
+from vm_embedded.network.model_file import read_model
 from vm_export.checkpoint import Checkpoint
+from vm_export.look_weights import look_of
 from vm_train.boxes.box import Box, BoxedPicture
 from vm_train.boxes.read import read_boxes
 from vm_train.cli.import_boxes import import_boxes_parser, run_import_boxes
@@ -182,14 +186,13 @@ def test_a_ball_that_the_border_cuts_is_labeled(frames):
 
 
 def test_frames_without_lens_or_pose_are_left_out_and_misfits_named(frames, configuration, tmp_path, capsys):
-    folder, drawn = tmp_path / "some", frames[1]
+    folder = tmp_path / "some"
     shutil.copytree(frames[0], folder)
     boxed = [each.stem for each in sorted(folder.glob("*.txt")) if each.read_text()]
     (folder / f"lens{boxed[0].removeprefix('image')}.yaml").unlink()
     without_pose = folder / f"lens{boxed[1].removeprefix('image')}.yaml"
     without_pose.write_text(without_pose.read_text().partition("Hoc")[0])
-    left, top, right, bottom = true_box(drawn, boxed[2].removeprefix("image"))
-    (folder / f"{boxed[2]}.txt").write_text(yolo_line((left, top, left + (right - left) / 2, top + (bottom - top) / 2)))
+    (folder / f"{boxed[2]}.txt").write_text(yolo_line((60.0, 2.0, 100.0, 42.0)))  # in the air
     (folder / "day.2").mkdir()
     for each in (f"{boxed[3]}.txt", f"{boxed[3]}.jpg", f"lens{boxed[3].removeprefix('image')}.yaml"):
         (folder / each).rename(folder / "day.2" / each)
@@ -235,8 +238,8 @@ def test_what_is_missing_is_named(frames, configuration, tmp_path):
 
 
 def test_a_network_of_the_package_is_fine_tuned_as_a_user_types_it(frames, tmp_path):
-    """Import for a network of any radius, then train it on, and check the pictures as its training sees them."""
-    out, folder, days = tmp_path / "own", tmp_path / "run", tmp_path / "days"
+    """Import for a network of any radius, mix with rendered pictures, train it on, and export it with a close look."""
+    out, mixed, folder, days = (tmp_path / name for name in ("own", "mixed", "run", "days"))
     shutil.copytree(frames[0], days / "monday")
     (days / "sunday").mkdir()
     for path in sorted((days / "monday").glob("*00[0-3].*")):
@@ -245,13 +248,24 @@ def test_a_network_of_the_package_is_fine_tuned_as_a_user_types_it(frames, tmp_p
     assert "40 pictures, 4 of them in validation.txt" in done.stdout
     scene = read_scene(next(out.glob("scene*.json")))
     assert (scene.ball_radius, scene.in_mask) == (RADIUS, True)
+
+    mixed.mkdir()
+    subprocess.run(["cp", "-rs", f"{frames[1]}/.", f"{out}/.", mixed], check=True)
     few = ("--set", "training.epochs=1", "--workers", 0, "--threads", 1, "--no-unpacked")
-    run(out, "-o", folder, "--from", "ball", "--validation", out / "validation.txt", *few)
+    trained = run(mixed, "-o", folder, "--from", "ball", "--validation", out / "validation.txt", *few)
+    assert "80 pictures: 76 for training, 4 for validation" in trained.stdout
     made = Checkpoint.load(folder / "model.pt").manifest
     assert (made.any_radius, made.sampling, made.colors) == (True, "footprint", "relative")
     assert json.loads((folder / "run.json").read_text())["start"]["file"] == "start.onnx"
     split = json.loads((folder / "pictures.json").read_text())
     assert split["validation"] == [f"sunday_image000{number}" for number in range(4)]
+
+    look_of(read_model(model_path("ball"))).save(tmp_path / "look.pt")
+    model = tmp_path / "own.onnx"
+    run_module("vm_export.cli", folder / "model.pt", "--look", tmp_path / "look.pt", "-o", model)
+    exported = read_model(model)
+    assert exported.manifest.provenance["start_sha256"] == read_model(model_path("ball")).sha256
+    assert exported.look is not None
 
 
 def test_the_mask_has_the_truth_if_the_scene_only_gives_the_radius(frames, tmp_path):
