@@ -132,3 +132,16 @@ def test_classes_of_unknown_colors_and_layers_of_several_kinds_need_a_configurat
     found = read_sections(TrainConfiguration, None, {"classes": colors}, defaults=start.defaults)
     with pytest.raises(InputError, match=r"has other layers: \[convolution 4 selu, dense 2 softmax\]"):
         start.check(found)
+
+
+def test_a_configuration_goes_before_what_the_network_describes(tmp_path):
+    path = tmp_path / "train.toml"
+    path.write_text("[mesh]\nmax_distance = 6\n[training]\nrate = 0.002\n")
+    start = Start.load(model_path("ball"))
+    found = read_sections(TrainConfiguration, path, {"training": {"epochs": 2}}, defaults=start.defaults)
+    assert (found.mesh.max_distance, found.mesh.intersections) == (6, 3)
+    assert (found.training.rate, found.training.epochs) == (0.002, 2)
+    start.check(found)  # a mesh may reach less far
+    path.write_text("mesh = 3\n")
+    with pytest.raises(InputError, match=r"mesh must be a section, \[mesh\], not 3"):
+        read_sections(TrainConfiguration, path, defaults=start.defaults)
