@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from vm_workstation.sphere_outline import sphere_outline
 
 from tests.manifests import ball_manifest
 from tests.vm_train.commands import run, run_module
@@ -32,7 +33,6 @@ from vm_train.data.classes import Classes
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.object_truth import read_scene, true_objects
 from vm_train.formats.box_masks import MaskRule, mask_of
-from vm_workstation.sphere_outline import sphere_outline
 
 TWO_CLASSES = """
 [classes]
