@@ -4,7 +4,7 @@ The robot has no YAML package. OpenCV's reader rejects sequences that start in t
 most programs write them.
 
 Supported: nested block mappings and sequences; flow sequences and mappings, also over several lines; plain and quoted
-scalars; comments. Skipped: a `%YAML` line, one `---`, and tags. Rejected: anchors, aliases, block scalars, several
+scalars; comments. Skipped: a `%YAML` line, a `---` before and after the document, and tags. Rejected: anchors, aliases, block scalars, several
 documents, and duplicate keys.
 
 A recursive descent: each function below `read_yaml` gets a position (a line, or a column in a flow value) and returns
@@ -64,6 +64,7 @@ def _error(line: _Line, problem: str) -> InputError:
 def _lines(text: str) -> list[_Line]:
     """Lines with content, without comments, each with its number and indentation."""
     lines: list[_Line] = []
+    ended = False  # by a `---`, as ros2 topic echo prints it after a message
     for number, raw in enumerate(text.splitlines(), start=1):
         try:
             content = _without_comment(raw).rstrip(" \t")
@@ -73,7 +74,14 @@ def _lines(text: str) -> list[_Line]:
             continue
         if content == "...":
             break
+        if content == "---" and not ended:
+            ended = True
+            continue
         line = _Line(number, len(content) - len(content.lstrip(" ")), content.strip(" \t"))
+        if ended:
+            raise _error(
+                line, "several documents are not supported; keep the first (ros2 topic echo --once prints one)"
+            )
         if "\t" in raw[: line.indent + 1] or content.startswith("---"):
             raise _error(line, "tabs in the indentation and several documents are not supported")
         lines.append(line)

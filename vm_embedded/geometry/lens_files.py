@@ -28,6 +28,17 @@ _REFERENCE_NAMES = {"centre": "center", "k": "distortion"}
 
 _BROWN, _FISHEYE = ("plumb_bob", "rational_polynomial"), ("equidistant", "fisheye")
 
+_COEFFICIENT_KEYS = (
+    "distortion_coefficients",
+    "D",
+    "d",
+    "distCoeffs",
+    "dist_coeffs",
+    "dist_coeff",
+    "distortion_coeffs",
+)
+"""Names that programs give to the distortion coefficients of a calibration."""
+
 
 @dataclass(frozen=True)
 class LensFile:
@@ -140,12 +151,10 @@ def lens_from_calibration(table: Mapping[str, Any]) -> Lens:
     if matrix is None:
         raise InputError("found neither `projection`, as in a lens, nor `camera_matrix`, as in a calibration")
     k = _numbers(_data(matrix), "camera_matrix", 9)
-    coefficients = _numbers(
-        _data(_first(table, "distortion_coefficients", "D", "d", "distCoeffs", "dist_coeffs") or []), "distortion"
-    )
+    coefficients = _numbers(_data(_coefficients(table)), "distortion")
     width = _first(table, "image_width", "width")
     height = _first(table, "image_height", "height")
-    model = str(table.get("distortion_model", "rational_polynomial" if len(coefficients) == 8 else "plumb_bob"))
+    model = _distortion_model(table, len(coefficients))
     common = {
         "focal_lengths": (k[0], k[4]),
         "optical_center": (k[2], k[5]),
@@ -163,6 +172,32 @@ def lens_from_calibration(table: Mapping[str, Any]) -> Lens:
         # Calibrations have no field of view. 160 degrees is as wide as a rectilinear picture gets.
         return BrownLens(fov=math.radians(160.0), coefficients=tuple(coefficients), **common)  # type: ignore[arg-type]
     raise InputError(unknown("distortion_model", model, (*_BROWN, *_FISHEYE)))
+
+
+def _coefficients(table: Mapping[str, Any]) -> Any:
+    """The distortion coefficients of a calibration; an empty list if it has none.
+
+    Raises InputError for a key that may be meant for them, since a lens without its distortion is silently wrong.
+    """
+    for key in table:
+        if "dist" in str(key).lower() and key not in (*_COEFFICIENT_KEYS, "distortion_model"):
+            raise InputError(unknown("key", key, (*_COEFFICIENT_KEYS, "distortion_model")))
+    return _first(table, *_COEFFICIENT_KEYS) or []
+
+
+def _distortion_model(table: Mapping[str, Any], coefficients: int) -> str:
+    """The distortion model: that of ROS, or what `fisheye_model` says, which OpenCV's calibration sample writes.
+
+    Raises InputError if the two contradict each other.
+    """
+    flag = table.get("fisheye_model")
+    if flag not in (None, 0, 1):
+        raise InputError(f"fisheye_model must be 0 or 1, not {str(flag)[:60]!r}")
+    by_count = "rational_polynomial" if coefficients == 8 else "plumb_bob"
+    model = str(table.get("distortion_model", "fisheye" if flag else by_count))
+    if flag is not None and bool(flag) != (model.lower() in _FISHEYE):
+        raise InputError(f"fisheye_model {int(flag)} contradicts distortion_model {model!r}: remove the wrong one")
+    return model
 
 
 def _first(table: Mapping[str, Any], *keys: str) -> Any:

@@ -181,6 +181,86 @@ def test_what_opencv_writes_is_read(tmp_path, names, count):
     assert read_lens_file(path).lens == expected
 
 
+def opencv_sample(path, fisheye, coefficients):
+    """A file as OpenCV's calibration sample writes it."""
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    storage.write("calibration_time", "Mon 04 May 2026 10:11:12")
+    storage.write("nr_of_frames", 25)
+    storage.write("image_width", 640)
+    storage.write("image_height", 480)
+    storage.write("flags", 0)
+    storage.write("fisheye_model", fisheye)
+    storage.write("camera_matrix", np.array([[612.25, 0.0, 318.5], [0.0, 611.75, 241.25], [0.0, 0.0, 1.0]]))
+    storage.write("distortion_coefficients", np.array([coefficients]).T)
+    storage.write("avg_reprojection_error", 0.25)
+    storage.release()
+    return path
+
+
+def test_a_fisheye_of_opencvs_calibration_sample_projects_as_in_opencv(tmp_path):
+    lens = read_lens_file(opencv_sample(tmp_path / "out_camera_data.yml", 1, FISHEYE)).lens
+    assert lens == FisheyeLens(**MATRIX, coefficients=FISHEYE, fov=2.0 * math.pi)
+    rays = np.array([[1.0, 0.0, 0.0], [0.8, 0.5, -0.3], [0.5, -0.7, 0.2]])
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    points = np.stack([-rays[:, 1], -rays[:, 2], rays[:, 0]], axis=1)[:, None]
+    matrix = np.array([[612.25, 0.0, 318.5], [0.0, 611.75, 241.25], [0.0, 0.0, 1.0]])
+    pixels, _ = cv2.fisheye.projectPoints(points, np.zeros(3), np.zeros(3), matrix, np.array(FISHEYE))
+    np.testing.assert_allclose(lens.project(rays, (640, 480)), pixels[:, 0], atol=1e-6)
+
+
+def test_a_pinhole_of_opencvs_calibration_sample_is_a_brown_lens(tmp_path):
+    lens = read_lens_file(opencv_sample(tmp_path / "out_camera_data.yml", 0, PLUMB_BOB)).lens
+    assert lens == BrownLens(**MATRIX, coefficients=PLUMB_BOB, fov=math.radians(160.0))
+
+
+@pytest.mark.parametrize("key", ["dist_coeff", "dist_coeffs", "distCoeffs", "distortion_coeffs"])
+def test_no_name_of_the_coefficients_is_ignored(write, key):
+    text = f"camera_matrix: [500, 0, 320, 0, 500, 240, 0, 0, 1]\n{key}: {list(PLUMB_BOB)}\n"
+    assert read_lens_file(write(text)).lens.coefficients == PLUMB_BOB
+
+
+ECHO = """\
+header:
+  stamp:
+    sec: 1767225600
+    nanosec: 250000000
+  frame_id: camera_optical
+height: 480
+width: 640
+distortion_model: plumb_bob
+d:
+- -0.35
+- 0.125
+- 0.0005
+- -0.00025
+- 0.01
+k:
+- 612.25
+- 0.0
+- 318.5
+- 0.0
+- 611.75
+- 241.25
+- 0.0
+- 0.0
+- 1.0
+binning_x: 0
+binning_y: 0
+roi:
+  x_offset: 0
+  y_offset: 0
+  height: 0
+  width: 0
+  do_rectify: false
+---
+"""
+
+
+def test_what_ros2_topic_echo_prints_is_read(write):
+    expected = BrownLens(**MATRIX, coefficients=PLUMB_BOB, fov=math.radians(160.0))
+    assert read_lens_file(write(ECHO)).lens == expected
+
+
 def test_without_a_model_eight_coefficients_are_rational():
     table = {"K": [500, 0, 320, 0, 500, 240, 0, 0, 1], "D": list(RATIONAL)}
     assert lens_from_calibration(table).coefficients == RATIONAL
@@ -243,6 +323,19 @@ WRONG = {
     "unknown model": (camera_info("plum_bob", PLUMB_BOB), "'plum_bob'.*'plumb_bob'"),
     "too many coefficients": (camera_info("plumb_bob", (*RATIONAL, 0.1, 0, 0, 0)), "coefficients, not 9"),
     "too few coefficients": (camera_info("equidistant", FISHEYE[:3]), "coefficients, not 3"),
+    "two messages of ros2 topic echo": (ECHO + ECHO, "line 34: several documents .*--once"),
+    "a key meant for the coefficients": (
+        camera_info("plumb_bob", ()) + "dist_coefs: [-0.3, 0.1, 0, 0]\n",
+        "'dist_coeffs'",
+    ),
+    "two models": (
+        camera_info("plumb_bob", PLUMB_BOB) + "fisheye_model: 1\n",
+        "contradicts distortion_model 'plumb_bob'",
+    ),
+    "fisheye_model 7": (
+        camera_info("fisheye", FISHEYE) + "fisheye_model: 7\n",
+        "fisheye_model must be 0 or 1, not '7'",
+    ),
     "skew": (camera_info("plumb_bob", PLUMB_BOB).replace("[612.25, 0,", "[612.25, 0.5,"), "skew"),
     "cut matrix": (camera_info("plumb_bob", PLUMB_BOB).replace(", 0, 0, 1]", "]"), "camera_matrix must be 9"),
     "matrix without data": ("camera_matrix: {rows: 3, cols: 3}\n", "camera_matrix"),
