@@ -47,7 +47,11 @@ def add_pose(parser: argparse.ArgumentParser, description: str) -> None:
     """Add the options for lens and orientation. description: shown in the help."""
     pose = parser.add_argument_group("lens and orientation", description)
     pose.add_argument(
-        "--lens", type=Path, metavar="FILE", help="lens file: YAML of the reference or of a calibration, or TOML"
+        "--lens",
+        type=Path,
+        metavar="FILE",
+        help="lens file: YAML of the reference or of a calibration, or TOML; its Hoc gives the orientation unless "
+        "--height does",
     )
     pose.add_argument(
         "--height",

@@ -4,8 +4,8 @@ The robot has no YAML package. OpenCV's reader rejects sequences that start in t
 most programs write them.
 
 Supported: nested block mappings and sequences; flow sequences and mappings, also over several lines; plain and quoted
-scalars; comments. Skipped: a `%YAML` line, a `---` before and after the document, and tags. Rejected: anchors, aliases, block scalars, several
-documents, and duplicate keys.
+scalars; comments. Skipped: a `%YAML` line, one `---` before the document and one after it, and tags. Rejected: anchors,
+aliases, block scalars, several documents, and duplicate keys.
 
 A recursive descent: each function below `read_yaml` gets a position (a line, or a column in a flow value) and returns
 the value that begins there with the position after it. `depth` counts the nesting.

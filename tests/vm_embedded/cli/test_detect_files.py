@@ -76,6 +76,35 @@ def test_a_video_is_read_to_its_end(tmp_path, lens):
     assert len(list(tmp_path.glob("clip-*.npz"))) == 5
 
 
+def beside(image):
+    return image.with_name(image.name.replace("image", "lens")).with_suffix(".yaml")
+
+
+def test_a_given_lens_file_with_hoc_gives_the_orientation(tmp_path):
+    """Of a picture without a lens file beside it, and of the frames of a video."""
+    photo, clip = tmp_path / "photo.jpg", tmp_path / "clip.avi"
+    shutil.copy(IMAGES[0], photo)
+    writer = cv2.VideoWriter(str(clip), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, (640, 512))
+    writer.write(cv2.imread(str(IMAGES[0])))
+    writer.release()
+    (expected,) = lines(detect(IMAGES[0]))
+    (found,) = lines(detect(photo, "--lens", beside(IMAGES[0])))
+    assert found["detections"] == expected["detections"]
+    (of_video,) = lines(detect(clip, "--lens", beside(IMAGES[0])))
+    assert of_video["points"] == expected["points"]
+    socket = ("--status-socket", tmp_path / "vm-detect.sock")
+    played = lines(detect(clip, "--live", "--lens", beside(IMAGES[0]), *socket))
+    assert [each["points"] for each in played if each["type"] == "frame"] == [expected["points"]]
+
+
+def test_a_height_takes_precedence_over_hoc_of_the_lens_file(tmp_path):
+    photo = tmp_path / "photo.jpg"
+    shutil.copy(IMAGES[0], photo)
+    (low,) = lines(detect(photo, "--lens", beside(IMAGES[0]), "--height", 0.5, "--pitch", "30deg"))
+    (high,) = lines(detect(photo, "--lens", beside(IMAGES[0])))
+    assert low["points"] != high["points"]
+
+
 def test_saved_points_are_the_mesh_on_screen(tmp_path):
     (line,) = lines(detect(IMAGES[0], "--save-points", tmp_path / "points"))
     with np.load(tmp_path / "points" / f"{IMAGES[0].stem}.npz") as saved:
