@@ -53,6 +53,9 @@ _SWITCH_INTERVAL = 0.0005
 _HEARTBEAT = 1.0
 """Longest pause between two messages [s]."""
 
+_RECORDING_S = 3.5
+"""Longest wait for a recording when the daemon stops [s]; the unit's TimeoutStopSec is 5 s."""
+
 _CLOCK_JUMP = 0.5
 """Change of the wall clock relative to the monotonic clock that is logged [s]."""
 
@@ -79,7 +82,7 @@ class Daemon:
         configuration = configure()
         detector = load_checked_detector(configuration)
         camera, status = configuration.camera, configuration.status
-        self.recorder = Recorder(configuration.recorder, lambda event, folder: log(event, folder=folder))
+        self.recorder = Recorder(configuration.recorder, lambda event, level, folder: log(event, level, folder=folder))
         self.last: Message | None = None
         self.counters = Counters()
         self.state, self.reason = "", ""
@@ -281,6 +284,7 @@ class Daemon:
     async def _close(self) -> None:
         for part in self._parts:
             await part.close()
-        self.recorder.close(0.3)
+        # In a thread, so that a second signal still ends the process at once.
+        await asyncio.to_thread(self.recorder.close, _RECORDING_S)
         self.grabber.stop(0.3)
         self._notifier.close()

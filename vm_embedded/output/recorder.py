@@ -11,7 +11,7 @@ import shutil
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,8 +27,12 @@ from ..geometry.lens_files import format_lens_file
 from ..geometry.orientation import Orientation
 from .messages import Message, to_json_line
 
-_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1)
+# Smaller and faster than the default strategy for pictures with noise.
+_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY)
 CONFIGURATION, MESSAGES = "vm.toml", "recording.jsonl"
+
+_LAST_FRAME = 0.3
+"""How long a closed recorder waits for the frame that is being written [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,15 +70,16 @@ class Moment:
 class Recorder:
     """Keeps the moments of the last seconds and writes them in a separate thread.
 
-    report: gets an event and its detail; that thread calls it.
+    report: gets an event, its level and its detail; that thread calls it.
     """
 
-    def __init__(self, settings: RecorderSettings, report: Callable[[str, str], None]) -> None:
+    def __init__(self, settings: RecorderSettings, report: Callable[[str, str, str], None]) -> None:
         self.settings = settings
         self._report = report
         self._moments: deque[Moment] = deque()
         self._nbytes = 0
-        self._closing = False
+        self._closing = False  # hurry up
+        self._closed = False  # keep what is written, and end
         self._writer: threading.Thread | None = None
         self._last_trigger = -float("inf")  # when a class last triggered a recording [s]
 
@@ -121,25 +126,52 @@ class Recorder:
         return f"recording {len(moments)} frames to {folder}"
 
     def _write(self, folder: Path, moments: Sequence[Moment], configuration: str) -> None:
+        """Write a recording. If it can't be completed, keep the frames that were written.
+
+        Each frame's message follows its files at once, so vm-detect reads even the folder of a process that was killed.
+        """
         part = folder.with_name(folder.name + ".part")
+        written, trouble = 0, ""
         try:
             part.mkdir(parents=True)
-            written = 0
-            for index, each in enumerate(moments):
-                if self._closing:
-                    raise InputError("the detector is stopping")
-                written += _write_moment(part, index, each)
-                if written > 2**20 * self.settings.disk_mib:
-                    raise InputError(f"it is larger than [recorder] disk_mib, {self.settings.disk_mib:g} MiB")
             (part / CONFIGURATION).write_text(configuration, encoding="utf-8")
-            (part / MESSAGES).write_bytes(b"".join(to_json_line(each.message) for each in moments))
-            part.rename(folder)
-            delete_oldest_recordings(folder.parent, 2**20 * self.settings.disk_mib)
+            with (part / MESSAGES).open("wb") as messages:
+                for written, nbytes in enumerate(self._write_moments(part, moments), start=1):
+                    messages.write(to_json_line(moments[written - 1].message))
+                    messages.flush()
+                    if nbytes > 2**20 * self.settings.disk_mib:
+                        raise InputError(f"it is larger than [recorder] disk_mib, {self.settings.disk_mib:g} MiB")
+                if self._closed:
+                    raise InputError("the detector has stopped")
         except (OSError, InputError) as error:
-            shutil.rmtree(part, ignore_errors=True)
-            self._report("recording failed", f"{folder}: {getattr(error, 'strerror', None) or error}")
+            trouble = getattr(error, "strerror", None) or str(error)
+        try:
+            self._finish(part, folder, written)
+        except OSError as error:
+            written, trouble = 0, error.strerror or str(error)
+        if written == 0:
+            self._report("recording failed", "error", f"{folder}: {trouble}")
+        elif written < len(moments):
+            self._report("recorded", "warning", f"{folder}: only {written} of {len(moments)} frames: {trouble}")
         else:
-            self._report("recorded", str(folder))
+            self._report("recorded", "info", str(folder))
+
+    def _write_moments(self, part: Path, moments: Sequence[Moment]) -> Iterator[int]:
+        """Write the files of each moment, and yield the size of all images so far [bytes]. Ends early when closed."""
+        nbytes = 0
+        for index, each in enumerate(moments):
+            if self._closed:
+                return
+            nbytes += _write_moment(part, index, each, self._closing)
+            yield nbytes
+
+    def _finish(self, part: Path, folder: Path, written: int) -> None:
+        """Give the folder its final name and delete old recordings, or remove it if it has no frames."""
+        if written == 0:
+            shutil.rmtree(part, ignore_errors=True)
+            return
+        part.rename(folder)
+        delete_oldest_recordings(folder.parent, 2**20 * self.settings.disk_mib)
 
     def clear(self) -> None:
         """Drop all moments; call it when settings change, since a recording has one vm.toml."""
@@ -147,19 +179,26 @@ class Recorder:
         self._nbytes = 0
 
     def close(self, seconds: float) -> None:
-        """Abort a recording in progress, and wait up to `seconds` until its files are deleted."""
+        """Finish a recording in progress, without compression. After `seconds`, keep the frames that are written."""
         self._closing = True
         if self._writer is not None:
             self._writer.join(seconds)
+            self._closed = True
+            self._writer.join(_LAST_FRAME)
 
 
-def _write_moment(folder: Path, index: int, moment: Moment) -> int:
-    """Write image and lens file of a moment, and return the size of the image [bytes]."""
+def _write_moment(folder: Path, index: int, moment: Moment, quick: bool) -> int:
+    """Write image and lens file of a moment, and return the size of the image [bytes].
+
+    quick: write a BMP, which takes a thirtieth of the time of a PNG.
+    """
     encoded = moment.shot.encoded
-    if encoded is None:
-        content, suffix = encode_png(moment.shot.image), "png"
-    else:
+    if encoded is not None:
         content, suffix = encoded, "jpg"
+    elif quick:
+        content, suffix = cv2.imencode(".bmp", moment.shot.image)[1].tobytes(), "bmp"
+    else:
+        content, suffix = encode_png(moment.shot.image), "png"
     (folder / f"image{index:07d}.{suffix}").write_bytes(content)
     (folder / f"lens{index:07d}.yaml").write_text(format_lens_file(moment.lens, moment.orientation), encoding="utf-8")
     return len(content)

@@ -38,17 +38,78 @@ def test_the_sight_of_a_class_and_a_signal_make_recordings(tmp_path):
     assert len(list(kept.iterdir())) == 2
 
 
-def test_a_recording_that_is_being_written_and_reads_that_hang_do_not_delay_the_end(tmp_path):
+LARGE = ("--camera-width", 1280, "--camera-height", 960, "--recorder-seconds", 60)
+
+
+def count_promised(done):
+    """The number of frames in the reply of vm-detect --record."""
+    assert done.returncode == 0, done.stderr
+    return int(done.stdout.split()[1])
+
+
+def ask_to_record(tmp_path):
+    return subprocess.run(arguments(tmp_path, "--record"), capture_output=True, text=True, timeout=60, check=False)
+
+
+def count_found(folder):
+    """The number of frames of a recording that vm-detect reads, each with detections like those in its messages."""
+    recorded = [json.loads(line) for line in (folder / "recording.jsonl").read_text().splitlines()]
+    done = subprocess.run([COMMAND, "--camera", folder], capture_output=True, text=True, timeout=120, check=True)
+    found = [json.loads(line)["detections"] for line in done.stdout.splitlines()]
+    assert found[: len(recorded)] == [each["detections"] for each in recorded]
+    return len(recorded)
+
+
+def test_a_detector_that_is_stopped_finishes_its_recording(tmp_path):
+    """Also while reads of the camera hang."""
     source, kept = tmp_path / "script.toml", tmp_path / "recordings"
     source.write_text('faults = [{ kind = "hang", at = 8.0, seconds = 100.0 }]\n')
-    large = ("--camera-width", 1280, "--camera-height", 960, "--recorder-folder", kept)
     retry = ("--camera-lost-ms", 500, "--camera-open-ms", 5000, "--camera-retry-ms", 10)
-    with running(tmp_path, "--camera", f"fault:{source}", *large, *retry) as found:
+    options = ("--camera", f"fault:{source}", "--recorder-folder", kept, *retry)
+    with running(tmp_path, *LARGE[:4], *options) as found:
         found.wait(lambda: len(found.frames) > 3)
         found.wait_for_state("camera_lost")
-        done = subprocess.run(arguments(tmp_path, "--record"), capture_output=True, text=True, timeout=60, check=False)
-        found.process.send_signal(signal.SIGTERM)
-        started = time.monotonic()
-        found.process.wait(60)
-        assert time.monotonic() - started < 1.5
-    assert done.returncode == 0, done.stderr
+        promised = count_promised(ask_to_record(tmp_path))
+        assert found.stop()[0] == 0
+        assert [each["level"] for each in found.events if each["event"] == "recorded"] == ["info"]
+    (folder,) = kept.iterdir()
+    assert count_found(folder) == promised
+
+
+def test_a_killed_detector_leaves_a_recording_that_is_read(tmp_path):
+    kept = tmp_path / "recordings"
+    with running(tmp_path, "--camera", "synthetic", *LARGE, "--recorder-folder", kept) as found:
+        found.wait(lambda: len(found.frames) > 20)
+        promised = count_promised(ask_to_record(tmp_path))
+        found.wait(lambda: len(list(kept.glob("*/lens*.yaml"))) > 2)
+        found.stop(signal.SIGKILL)
+    (folder,) = kept.iterdir()
+    assert folder.suffix == ".part"
+    assert 0 < count_found(folder) <= promised
+
+
+def test_a_recording_larger_than_its_limit_keeps_its_first_frames(tmp_path):
+    kept = tmp_path / "recordings"
+    with running(
+        tmp_path, "--camera", "synthetic", *LARGE, "--recorder-folder", kept, "--recorder-disk-mib", 5
+    ) as found:
+        found.wait(lambda: len(found.frames) > 20)
+        promised = count_promised(ask_to_record(tmp_path))
+        (event,) = found.wait(lambda: [each for each in found.events if each["event"] == "recorded"])
+        found.stop()
+    (folder,) = kept.iterdir()
+    written = count_found(folder)
+    assert 0 < written < promised
+    assert event["level"] == "warning"
+    assert f"only {written} of {promised} frames: it is larger than [recorder] disk_mib, 5 MiB" in event["folder"]
+
+
+def test_a_recording_that_can_not_be_written_is_an_error_in_the_log(tmp_path):
+    kept = tmp_path / "recordings"
+    kept.touch()
+    with running(tmp_path, "--camera", "synthetic", "--recorder-folder", kept) as found:
+        found.wait(lambda: len(found.frames) > 3)
+        ask_to_record(tmp_path)
+        (event,) = found.wait(lambda: [each for each in found.events if each["event"] == "recording failed"])
+        found.stop()
+    assert event["level"] == "error"
