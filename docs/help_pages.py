@@ -29,6 +29,9 @@ from vm_train.cli import options as train
 from vm_train.learning import configuration as training
 from vm_train.look import configuration as look
 
+_ABOUT = (argparse._HelpAction, argparse._VersionAction)
+"""Options that all programs have."""
+
 DOCS = Path(__file__).parent
 SCRIPTS = DOCS.parent / "deploy" / "robot"
 
@@ -55,11 +58,12 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
 
 def command_line() -> str:
     """The page of the command line."""
-    parts = ["# Command line\n\nMade from the help texts of the programs by `make docs`. `--help` prints the same.\n"]
+    made = "Made from the help texts of the programs by `make docs`. `--help` prints the same, `--version` the version."
+    parts = [f"# Command line\n\n{made}\n"]
     for parser in parsers().values():
         parts.append(f"## {parser.prog}\n\n{parser.description}\n")
         for group in parser._action_groups:
-            rows = [_row(action) for action in group._group_actions if not isinstance(action, argparse._HelpAction)]
+            rows = [_row(action) for action in group._group_actions if not isinstance(action, _ABOUT)]
             if rows:
                 note = f" ({group.description})" if group.description else ""
                 title = (group.title or "").capitalize()

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vm_embedded.cli.program import Parser, program
 from vm_embedded.errors import InputError, VisualMeshError, install_extra
 from vm_embedded.network.bundled import SHIPPED, model_path
 from vm_embedded.network.manifest import EDGES, LAYOUTS
@@ -22,7 +23,7 @@ EXIT_OK, EXIT_FAILED = 0, 1
 
 def parser() -> argparse.ArgumentParser:
     """The argument parser of vm-export."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="vm-export",
         description="Write a network as a self-describing ONNX file, and check its answers against torch.",
         epilog="Exit status: 0 written, 1 not written (standard error says why), 2 wrong usage.",
@@ -77,6 +78,7 @@ def parser() -> argparse.ArgumentParser:
     return parser
 
 
+@program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-export and return its exit status."""
     options = parser().parse_args(arguments)

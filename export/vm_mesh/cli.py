@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from vm_embedded.cli.program import Parser, program, version
 from vm_embedded.errors import VisualMeshError, unknown
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
@@ -73,7 +73,7 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
 
 
 def _parser(command: str, description: str) -> argparse.ArgumentParser:
-    made = argparse.ArgumentParser(prog=f"vm-mesh {command}", description=description, epilog=_EPILOG)
+    made = Parser(prog=f"vm-mesh {command}", description=description, epilog=_EPILOG)
     several = command in ("quality", "compare")
     if command != "range":
         made.add_argument(
@@ -122,6 +122,7 @@ def _add_size(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--size", metavar="WxH", help="size of the pictures [px]; default: from the lens file")
 
 
+@program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-mesh and return its exit status."""
     from .commands import COMMANDS
@@ -132,6 +133,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("usage: vm-mesh COMMAND ...\n\ncommands (vm-mesh COMMAND --help lists their options):")
         print("\n".join(f"  {name:9s}{each.description}" for name, each in known.items()))
         return EXIT_OK if given else EXIT_USAGE
+    if given[0] == "--version":
+        print(version("vm-mesh"))
+        return EXIT_OK
     if given[0] not in known:
         print(f"vm-mesh: {unknown('command', given[0], known)}", file=sys.stderr)
         return EXIT_USAGE
@@ -144,8 +148,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("vm-mesh: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader, such as head, has closed the pipe
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return EXIT_OK
 
 

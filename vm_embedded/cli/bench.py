@@ -24,6 +24,7 @@ from .bench_table import bench_table
 from .machine import describe_machine, rss_mib, sgemm_rate
 from .measuring import Run, measure, measure_cold
 from .options import ANGLES, add_model, add_pose, add_settings, read_options
+from .program import Parser, program
 from .progress import ProgressBar
 from .tuning import TUNED, fastest_settings
 from .workload import Workload, make_workload
@@ -36,7 +37,7 @@ _TUNING_FRAMES = 300
 
 def parser() -> argparse.ArgumentParser:
     """The command line of vm-bench."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="vm-bench",
         description="Measure the detector on this machine, with the poses of a simulated robot that walks: the whole "
         "call and its stages, with one thread and with more, and the extra time of a frame whose orientation or height "
@@ -73,6 +74,7 @@ def parser() -> argparse.ArgumentParser:
     return parser
 
 
+@program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-bench and return its exit status."""
     options = parser().parse_args(arguments)
@@ -82,6 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except VisualMeshError as error:
         print(f"vm-bench: {' '.join(str(error).split())}", file=sys.stderr)
         return EXIT_FAILED
+    except BrokenPipeError:
+        raise
     except OSError as error:
         print(f"vm-bench: can't write results: {error.strerror or error}", file=sys.stderr)
         return EXIT_FAILED

@@ -23,6 +23,7 @@ from ..live.load_detector import load_checked_detector
 from ..live.log import EventLog
 from .detect_files import complain, detect_in_files
 from .options import ANGLES, add_live, add_model, add_pose, add_settings, read_options
+from .program import Parser, program
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
@@ -32,7 +33,7 @@ _FILES_ONLY = ("save_boxes", "save_overlay", "save_points", "emit_points", "expl
 
 def parser() -> argparse.ArgumentParser:
     """The command line of vm-detect; its settings are the fields of Settings."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="vm-detect",
         description="Find objects in images, videos or live cameras, and print one line of JSON for each frame.",
         epilog="Exit status for files: 0, at least one frame was processed; 1, no frame was processed. For a live "
@@ -93,6 +94,7 @@ def parser() -> argparse.ArgumentParser:
     return parser
 
 
+@program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-detect and return its exit status."""
     options = parser().parse_args(arguments)
@@ -106,9 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain(str(error))
         return EXIT_FAILED
     except BrokenPipeError:
-        # The reader has left; without this, the interpreter complains when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_OK
+        raise
     except OSError as error:  # for example a full disk behind standard output
         complain(f"can't write results: {error.strerror or error}")
         return EXIT_FAILED

@@ -13,13 +13,14 @@ import cv2
 from ..errors import VisualMeshError
 from .checks import BAD, Finding, run_checks
 from .options import add_live, add_model, add_pose, add_settings, read_options
+from .program import Parser, program
 
 EXIT_OK, EXIT_FAILED = 0, 1
 
 
 def parser() -> argparse.ArgumentParser:
     """The command line of vm-doctor; it has the options of vm-detect, whose configuration it checks."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="vm-doctor",
         description="Check processor, packages, model, camera, lens and clock, and say how to fix problems.",
         epilog="Exit status: 0 no failure (there may be warnings), 1 at least one failure, 2 wrong usage.",
@@ -33,6 +34,7 @@ def parser() -> argparse.ArgumentParser:
     return parser
 
 
+@program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-doctor and return its exit status."""
     options = parser().parse_args(arguments)
@@ -46,8 +48,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except VisualMeshError as error:
         print(f"vm-doctor: {error}", file=sys.stderr)
         return EXIT_FAILED
-    except BrokenPipeError:
-        return EXIT_OK
     return worst
 
 

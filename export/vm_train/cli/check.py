@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from vm_embedded.cli.program import Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.files import atomic_write, check_writable
 from vm_workstation.option_types import at_least
@@ -44,7 +45,7 @@ _EDGES = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 def check_parser() -> argparse.ArgumentParser:
     """The options of vm-train check DATA."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-train check",
         description="Read all pictures of a folder, or of the shards in it. Print tables of their contents, and list "
         "the unusable pictures. With --boxes, do this for images with boxes. Exit status: 0 if all can be used, 1 "

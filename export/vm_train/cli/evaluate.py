@@ -10,6 +10,7 @@ from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import vm_embedded
+from vm_embedded.cli.program import program
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError, VisualMeshError, install_extra
 from vm_embedded.live.configuration import read_configuration
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
 
+@program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-evaluate and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)

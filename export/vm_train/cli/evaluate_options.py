@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 
 from vm_embedded.cli.options import add_settings
+from vm_embedded.cli.program import Parser
 from vm_workstation.option_types import at_least
 
 _EPILOG = """\
@@ -19,7 +20,7 @@ Exit status: 0 files written, 1 error (see standard error), 2 wrong usage, 130 i
 
 def parser() -> argparse.ArgumentParser:
     """The options of vm-evaluate MODEL DATA."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-evaluate",
         description="Evaluate a network on pictures with masks. Write scores of points and of objects, by distance, as "
         "JSON, CSV, plots and one HTML page.",
@@ -90,7 +91,7 @@ def _add_pictures(made: argparse.ArgumentParser) -> None:
 
 def points_parser() -> argparse.ArgumentParser:
     """The options of vm-evaluate points."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-evaluate points",
         description="Draw the number of mesh points on a ball over its distance, for the Visual Mesh and for a "
         "hexagonal mesh. The camera is like that of the paper: 1280 x 1024 px, equisolid, f = 420 px.",

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from vm_embedded.cli.program import Parser
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
@@ -24,7 +25,7 @@ _NAMED = 20
 
 def tune_config_parser() -> argparse.ArgumentParser:
     """The parser of vm-train tune-config, which has no options."""
-    return argparse.ArgumentParser(
+    return Parser(
         prog="vm-train tune-config",
         description="Print a tune.toml, the configuration of vm-train look --boxes, with all entries, their meanings, "
         "units, limits and defaults.",

@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from vm_embedded.cli.program import Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError, unknown
 
@@ -20,7 +21,7 @@ _SHOWN = 20
 
 def import_parser() -> argparse.ArgumentParser:
     """The options of vm-train import FILES... OUT."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-train import",
         description="Convert TFRecord files (plain or gzip) of the reference implementation to a folder of pictures. "
         "Images and masks are copied without any change; a file beside them holds lens and pose. Records without a "

@@ -8,6 +8,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+from vm_embedded.cli.program import Parser
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
@@ -26,7 +27,7 @@ from .training import EXIT_INTERRUPTED, EXIT_OK, stop_requests
 
 def look_parser() -> argparse.ArgumentParser:
     """The options of vm-train look."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-train look",
         description="Train the close look of a mesh network: a small network that judges a patch of the picture at "
         "each proposal of the mesh network. Or, with --boxes, fine-tune the one that a model file has. You can stop or "
@@ -93,7 +94,7 @@ def look_parser() -> argparse.ArgumentParser:
 
 def look_config_parser() -> argparse.ArgumentParser:
     """The parser of vm-train look-config, which has no options."""
-    return argparse.ArgumentParser(
+    return Parser(
         prog="vm-train look-config",
         description="Print a look.toml with all entries, their meanings, units, limits and defaults.",
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from vm_embedded.cli.program import Parser
 from vm_embedded.network.bundled import SHIPPED
 from vm_workstation.option_types import at_least
 
@@ -40,7 +41,7 @@ Exit status: 0 success, 1 failure (standard error tells why), 2 wrong usage, 130
 
 def parser() -> argparse.ArgumentParser:
     """The options of vm-train DATA."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-train",
         description="Train a network on a folder of pictures with masks, lenses and poses. It first checks all "
         "pictures. You can stop or kill it at any time: vm-train resume continues, and the final network is the same "
@@ -69,7 +70,7 @@ def parser() -> argparse.ArgumentParser:
 
 def resume_parser() -> argparse.ArgumentParser:
     """The options of vm-train resume."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-train resume",
         description="Continue a training that was stopped or killed, from its last state.",
     )
@@ -81,7 +82,7 @@ def resume_parser() -> argparse.ArgumentParser:
 
 def preview_parser() -> argparse.ArgumentParser:
     """The options of vm-train preview."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-train preview",
         description="Draw pictures with the points of the mesh in the colors of their classes, without and with "
         "augmentation. The rows below show each kind of augmentation alone.",
@@ -102,7 +103,7 @@ def preview_parser() -> argparse.ArgumentParser:
 
 def rate_parser() -> argparse.ArgumentParser:
     """The options of vm-train rate."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-train rate",
         description="Train for some steps with an increasing learning rate until the loss increases. Propose a rate.",
     )
@@ -116,7 +117,7 @@ def rate_parser() -> argparse.ArgumentParser:
 
 def config_parser() -> argparse.ArgumentParser:
     """The parser of vm-train config, which has no options."""
-    return argparse.ArgumentParser(
+    return Parser(
         prog="vm-train config",
         description="Print a train.toml with all entries, their meanings, units, limits and defaults.",
     )

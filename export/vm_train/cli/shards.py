@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from vm_embedded.cli.program import Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_workstation.option_types import at_least
 
@@ -17,7 +18,7 @@ EXIT_OK = 0
 
 def shards_parser() -> argparse.ArgumentParser:
     """The options of vm-train shards DATA OUT."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-train shards",
         description="Write a folder of pictures as tar files in the format of webdataset. vm-train reads them "
         "directly, also as a stream. To continue a run that was stopped, repeat the command.",

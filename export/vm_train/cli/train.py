@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 
+from vm_embedded.cli.program import discard_output, program
 from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import VisualMeshError, install_extra
@@ -27,7 +28,11 @@ from .training import EXIT_INTERRUPTED, EXIT_OK, find_good_pictures, read_config
 
 EXIT_FAILED = 1
 
+_TRAININGS = (None, "look", "resume")
+"""Commands whose work vm-train resume continues."""
 
+
+@program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-train and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
@@ -59,6 +64,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if _is_leader():
             print(f"vm-train: {' '.join(str(error).split())}", file=sys.stderr)
         return EXIT_FAILED
+    except BrokenPipeError:
+        discard_output()
+        if _is_leader() and command in _TRAININGS:
+            folder = options.run if command == "resume" else options.output
+            begun = folder is not None and (folder / "run.json").exists()
+            remedy = f"; continue with vm-train resume {folder}" if begun else ""
+            print(f"vm-train: stopped, because nothing reads its output{remedy}", file=sys.stderr)
+            os._exit(EXIT_INTERRUPTED)  # as below
+        return EXIT_OK
     except KeyboardInterrupt as error:
         if _is_leader():
             print(f"vm-train: {'; '.join(['stopped', *map(str, error.args)])}", file=sys.stderr)

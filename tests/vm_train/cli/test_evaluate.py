@@ -248,7 +248,7 @@ def test_what_can_t_be_used_is_named_in_one_line(capsys, data, tmp_path):
     [(), ("model.onnx",), ("model.onnx", "data"), ("m", "d", "-o", "x", "--color", "red"), ("points",)],
 )
 def test_wrong_usage_exits_with_2(arguments):
-    assert "usage: vm-evaluate" in run(*arguments, code=2).stderr
+    assert "--help lists the options" in run(*arguments, code=2).stderr
 
 
 def test_the_figure_alone_needs_no_model(tmp_path):

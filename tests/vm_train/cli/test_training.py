@@ -114,6 +114,24 @@ def test_what_is_stopped_at_any_moment_ends_with_the_same_weights(how, steps, wh
     assert (folder / "log.jsonl").read_text() == (whole[0] / "log.jsonl").read_text()
 
 
+@pytest.mark.slow
+def test_a_reader_that_leaves_loses_no_training(data, configuration, tmp_path):
+    """As in vm-train DATA -o RUN | head -1: no traceback, and the training is finished or can be resumed."""
+    folder = tmp_path / "run"
+    arguments = [*COMMAND, data, "-o", folder, "--config", configuration, "--workers", "1", "--threads", "1"]
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([str(each) for each in arguments], text=True, env=environment(), **streams) as process:
+        wait_for_steps(folder / "log.jsonl", 2, process)
+        process.stdout.close()
+        error = process.stderr.read()
+        assert process.wait(120) == 130
+    said = "vm-train: stopped, because nothing reads its output; continue with vm-train resume"
+    assert error.splitlines()[-1] == f"{said} {folder}"
+    assert "Traceback" not in error
+    run("resume", folder, "--workers", 1, "--threads", 1)
+    assert (folder / "model.pt").exists()
+
+
 def wait_for_steps(path, count, process):
     deadline = time.monotonic() + 120
     while not path.exists() or path.read_text().count("loss") < count:

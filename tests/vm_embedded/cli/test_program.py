@@ -1,0 +1,79 @@
+"""What all programs share, as a user meets it: --version, mistyped options, and a reader that leaves."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import vm_embedded
+
+TOP = Path(__file__).parents[3]
+BIN = Path(sys.executable).parent
+PROGRAMS = sorted(set(tomllib.loads((TOP / "pyproject.toml").read_text())["project"]["scripts"]) - {"vm-label"})
+
+
+def run(program, *arguments, **more):
+    command = [str(BIN / program), *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **more)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_program_prints_its_version(program):
+    done = run(program, "--version")
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"{program} {vm_embedded.__version__}\n", "")
+
+
+@pytest.mark.parametrize(
+    ("command", "mistyped", "meant"),
+    [
+        ("vm-detect", "--treads=2", "--threads"),
+        ("vm-doctor", "--jsn", "--json"),
+        ("vm-bench", "--lense", "--lens"),
+        ("vm-export model.pt", "--lok", "--look"),
+        ("vm-synth data --count 3", "--hrdi", "--hdri"),
+        ("vm-train data", "--ouput", "--output"),
+        ("vm-train check data", "--jsom", "--json"),
+        ("vm-evaluate model.pt", "--outptu", "--output"),
+        ("vm-mesh show", "--veiw", "--view"),
+    ],
+)
+def test_a_mistyped_option_is_one_line_with_the_nearest(command, mistyped, meant):
+    """Even if something else is missing, too: the mistyped option is the reason."""
+    done = run(*command.split(), mistyped, "1")
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert f"unknown option {mistyped.partition('=')[0]}: did you mean {meant}?" in line
+    suggested = re.search(r"; (vm-.*) --help lists the options", line)[1]
+    assert run(*suggested.split(), "--help").returncode == 0
+
+
+def test_an_option_like_no_other_is_named():
+    done = run("vm-detect", "--camera", "x", "--xyzzy")
+    assert done.returncode == 2
+    assert done.stderr == "vm-detect: unknown option --xyzzy; vm-detect --help lists the options\n"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        *("vm-train config", "vm-train look-config", "vm-train --help", "vm-synth config", "vm-detect --print-config"),
+        *("vm-evaluate --help", "vm-export --help", "vm-mesh quality", "vm-bench --help", "vm-doctor"),
+    ],
+)
+def test_a_reader_that_leaves_ends_a_program_quietly(command):
+    program, *arguments = command.split()
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([BIN / program, *arguments], text=True, **streams) as process:
+        process.stdout.close()
+        assert process.stderr.read() == ""
+        assert process.wait(120) in (0, 1)  # 1: vm-doctor may have found a problem
+
+
+def test_a_full_disk_is_one_line():
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([BIN / "vm-train", "config"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == "can't write standard output: No space left on device\n"
