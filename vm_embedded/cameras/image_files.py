@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import glob
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -16,6 +16,9 @@ from ..arrays import Image
 from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
 from .decoding import decode
+
+_BESIDE = ("mask", "coverage")
+"""Pictures of vm-synth that are not frames."""
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".pgm", ".ppm", ".tif", ".tiff", ".webp")
 
@@ -57,6 +60,23 @@ class Source:
     rate: float | None = None
 
 
+def open_sources(names: Sequence[str], raw: bool = False) -> Source:
+    """Open several sources by name, one after the other; images alone are in the order of their numbers.
+
+    With `raw`, images keep the channels of their files. Raises InputError as `open_source` does.
+    """
+    paths = [Path(each) for each in names]
+    if len(names) > 1 and all(each.is_file() and each.suffix.lower() in IMAGE_SUFFIXES for each in paths):
+        return _images(paths, raw)
+    opened = [open_source(each, raw) for each in names]
+    if len(opened) == 1:
+        return opened[0]
+    frames = (frame for source in opened for frame in source.frames)
+    numbered = (replace(frame, index=index) for index, frame in enumerate(frames))
+    counts = [source.count for source in opened]
+    return Source(numbered, None if None in counts else sum(each or 0 for each in counts))
+
+
 def open_source(name: str, raw: bool = False) -> Source:
     """Open a source by name. With `raw`, images keep the channels of their files.
 
@@ -71,6 +91,8 @@ def open_source(name: str, raw: bool = False) -> Source:
 def _open(name: str, path: Path, raw: bool) -> Source:
     if path.is_dir():
         found = [each for each in path.iterdir() if each.suffix.lower() in IMAGE_SUFFIXES]
+        images = {each.stem for each in found}
+        found = [each for each in found if not _belongs_to_an_image(each, images)]
         if not found:
             raise InputError(f"no images in directory {name} (looked for {', '.join(IMAGE_SUFFIXES)})")
         return _images(found, raw)
@@ -85,6 +107,11 @@ def _open(name: str, path: Path, raw: bool) -> Source:
             raise InputError(f"no images match {name}")
         return _images(found, raw)
     raise InputError(f"no such image, directory, video or camera: {name}")
+
+
+def _belongs_to_an_image(path: Path, stems: set[str]) -> bool:
+    """Whether a file is the maskX or coverageX that vm-synth writes beside imageX; stems: of all images."""
+    return any(f"image{path.stem.removeprefix(each)}" in stems for each in _BESIDE if path.stem.startswith(each))
 
 
 def _images(paths: list[Path], raw: bool) -> Source:

@@ -44,9 +44,15 @@ def parser() -> argparse.ArgumentParser:
         "130, Ctrl-C while files are processed, or before the live camera runs. " + ANGLES,
     )
     parser.add_argument(
+        "files",
+        nargs="*",
+        metavar="FILE",
+        help="the same as --camera: images, folders or videos; several are processed one after the other",
+    )
+    parser.add_argument(
         "--camera",
         metavar="SOURCE",
-        help="files, each frame once: an image, a folder or quoted glob of images, or a video; or a live camera: its "
+        help="files, each frame once: an image, a folder or glob of images, or a video; or a live camera: its "
         "number or device, an http, https or rtsp address, gstreamer:PIPELINE, synthetic, or fault:SCRIPT",
     )
     parser.add_argument(
@@ -97,7 +103,10 @@ def parser() -> argparse.ArgumentParser:
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-detect and return its exit status."""
-    options = parser().parse_args(arguments)
+    options = parser().parse_intermixed_args(arguments)
+    # A shell turns `--camera *.jpg` into the first file and further ones.
+    options.files = [*([options.camera] if options.camera is not None else []), *options.files]
+    options.camera = options.files[0] if options.files else None
     # vm-detect reports problems with files and cameras itself, so OpenCV and FFmpeg stay silent.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
@@ -134,7 +143,9 @@ def _run(options: argparse.Namespace) -> int:
     if options.check_config:
         return _check_configuration(given)
     if not given.camera.source:
-        parser().error("no camera: give --camera, or [camera] source in vm.toml")
+        parser().error("no camera: give a file or --camera, or [camera] source in vm.toml")
+    if len(options.files) > 1 and (options.live or any(map(is_live, options.files))):
+        raise InputError(f"only one live camera at a time is possible, not {', '.join(options.files)}")
     if options.live or is_live(given.camera.source):
         return _detect_live(options)
     return EXIT_OK if detect_in_files(options, given) else EXIT_FAILED

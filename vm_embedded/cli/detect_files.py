@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..arrays import Image
-from ..cameras.image_files import Frame, check_file_format, lens_beside, open_source
+from ..cameras.image_files import Frame, check_file_format, lens_beside, open_sources
 from ..detection.detector import Detector
 from ..errors import InputError, VisualMeshError
 from ..geometry.lens import Lens
@@ -35,7 +35,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     for name in emit_points:
         detector.manifest.column(name)
     check_file_format(format)
-    source = open_source(given.camera.source, raw=format != "bgr")
+    source = open_sources(options.files or [given.camera.source], raw=format != "bgr")
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:
             make_folder(folder)

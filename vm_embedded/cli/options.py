@@ -105,7 +105,8 @@ def _default(entry: Field[Any]) -> str:
 
 def read_options(options: argparse.Namespace) -> Configuration:
     """The configuration from vm.toml, with the options of the command line on top. Raises InputError."""
-    config = options.config or _recording_configuration(getattr(options, "camera", None))
+    alone = len(getattr(options, "files", ())) <= 1
+    config = options.config or _recording_configuration(getattr(options, "camera", None) if alone else None)
     configured = read_configuration(config) if config else Configuration()
     sections = {"orientation": (FixedPose, ""), "detector": (Settings, "")}
     sections |= {name: (section, f"{name}_") for name, section in LIVE.items()}

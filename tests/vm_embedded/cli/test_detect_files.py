@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import subprocess
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from tests.drawn_scenes import FOLDER, IMAGES, MODEL, TRUTH
 
-from .commands import detect, lines, one_complaint, run
+from .commands import COMMAND, detect, lines, one_complaint, run
 
 STAGES = ["mesh", "project", "sample", "infer", "cluster", "field", "total"]
 
@@ -55,6 +56,38 @@ def test_directory_glob_and_image_agree(folder):
     for a, b in zip(by_directory, by_glob, strict=True):
         assert a["detections"] == b["detections"]
     assert lines(detect(folder / IMAGES[1].name))[0]["detections"] == by_directory[1]["detections"]
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["--camera image*.jpg", "image*.jpg", "--threads 1 image*.jpg", "image*0.jpg --threads 1 image*1.jpg"],
+)
+def test_unquoted_globs_and_files_without_an_option_agree_with_the_folder(command, folder):
+    """As a shell passes them on."""
+    shell = f"{COMMAND} --model {MODEL} {command}"
+    done = subprocess.run(shell, shell=True, cwd=folder, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    found, expected = lines(done), lines(detect(folder))
+    assert [line["frame"] for line in found] == [0, 1]
+    assert [line["detections"] for line in found] == [line["detections"] for line in expected]
+
+
+def test_a_folder_and_a_file_are_processed_one_after_the_other(folder):
+    found = lines(run(folder, folder / IMAGES[0].name, "--model", MODEL))
+    assert [line["frame"] for line in found] == [0, 1, 2]
+    assert found[0]["detections"] == found[2]["detections"]
+
+
+def test_of_several_sources_none_may_be_live():
+    one_complaint(run("synthetic", IMAGES[0], code=1), "only one live camera")
+
+
+def test_the_other_pictures_of_a_set_of_vm_synth_are_no_frames(folder):
+    for name in ("mask0000000.png", "coverage0000000.png"):
+        cv2.imwrite(str(folder / name), np.zeros((512, 640), np.uint8))
+    done = detect(folder)
+    assert [line["source"] for line in lines(done)] == [each.name for each in IMAGES[:2]]
+    assert done.stderr == ""
 
 
 def test_frames_are_in_natural_order(folder, lens):
