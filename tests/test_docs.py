@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import vm_embedded
+from vm_synth.scene.configuration import SceneConfiguration
 
 from .rooms import ROOMS
 
@@ -75,6 +76,16 @@ def test_the_python_of_the_readme_works(monkeypatch, capsys):
     monkeypatch.chdir(TOP)
     exec(program, {})
     assert capsys.readouterr().out.startswith("ball 0.")
+
+
+def test_the_training_of_the_readme_uses_the_radii_of_its_pictures():
+    """vm-synth draws balls of several radii, so that one radius for all pictures would be wrong."""
+    low, high = SceneConfiguration().ball.radius
+    assert low < high
+    commands = [line for line in shell_lines(README) if line.startswith(("vm-train data", "vm-evaluate "))]
+    assert len(commands) == 2
+    assert "--set mesh.radius_of=scene" in commands[0]
+    assert "--radius-of scene" in commands[1]
 
 
 def test_the_python_of_the_page_of_meshes_works(monkeypatch, capsys):

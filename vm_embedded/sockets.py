@@ -21,12 +21,12 @@ _UMASK = 0o117
 class UnixListener:
     """A Unix stream socket that listens at a path.
 
-    It replaces a socket file on which no process listens anymore. Raises InputError if another process listens there,
-    or if the socket can't be created.
+    option: of vm-detect that gives another path, for the error message. It replaces a socket file on which no process
+    listens anymore. Raises InputError if another process listens there, or if the socket can't be created.
     """
 
-    def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
+    def __init__(self, path: str | Path, option: str) -> None:
+        self.path, self._option = Path(path), option
         if len(os.fsencode(self.path)) > _MAX_PATH_BYTES:
             raise InputError(f"the path of a socket must have at most {_MAX_PATH_BYTES} bytes: {path}")
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
@@ -63,7 +63,8 @@ class UnixListener:
                 self.path.unlink(missing_ok=True)
                 return
         raise InputError(
-            f"can't listen at {self.path}: another process already does; stop the other vm-detect or give another path"
+            f"can't listen at {self.path}: another process already does; stop the other vm-detect, or give another "
+            f"path with {self._option}"
         )
 
     def close(self) -> None:

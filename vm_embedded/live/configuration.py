@@ -176,6 +176,10 @@ def with_overrides(configuration: Configuration, sections: Mapping[str, Mapping[
 
 
 def recording_toml(configuration: Configuration) -> str:
-    """The vm.toml of a recording: the network's full path and its settings. Raises InputError for an unknown name."""
-    path = Path(model_path(configuration.model)).resolve()
-    return to_commented_toml(Configuration(model=str(path), detector=configuration.detector))
+    """The vm.toml of a recording: the network and its settings. Raises InputError for an unknown name.
+
+    A network of the package has its name, so that the recording can be used on another machine; others a full path.
+    """
+    path = model_path(configuration.model).resolve()
+    model = next((name for name in SHIPPED if model_path(name).resolve() == path), str(path))
+    return to_commented_toml(Configuration(model=model, detector=configuration.detector))

@@ -47,7 +47,7 @@ class ControlServer:
 
     async def open(self) -> None:
         """Listen. Raises InputError."""
-        self._file = UnixListener(self._path)
+        self._file = UnixListener(self._path, "--status-socket")
         self._server = await asyncio.start_unix_server(self._reply, sock=self._file.socket, limit=1024)
 
     async def _reply(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -46,7 +46,7 @@ class HttpServer:
     async def open(self) -> None:
         """Listen. Raises InputError."""
         if self._where.startswith("unix:"):
-            self._file = UnixListener(self._where.removeprefix("unix:"))
+            self._file = UnixListener(self._where.removeprefix("unix:"), "--status-metrics")
             self._server = await asyncio.start_unix_server(self._serve, sock=self._file.socket, limit=8192)
             return
         host, port = parse_address(self._where, "[status] page or metrics", "127.0.0.1:8080")

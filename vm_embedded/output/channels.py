@@ -216,7 +216,7 @@ class UnixChannel:
     @classmethod
     async def open(cls, path: str | Path, backlog: int) -> UnixChannel:
         """Listen at a path. Raises InputError."""
-        channel = cls(UnixListener(path), backlog)
+        channel = cls(UnixListener(path, "--output-unix"), backlog)
         channel._server = await asyncio.start_unix_server(channel._serve, sock=channel._listener.socket)
         return channel
 

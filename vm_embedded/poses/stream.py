@@ -43,7 +43,7 @@ class PoseStream:
         kind, _, rest = self.settings.source.partition(":")
         loop = asyncio.get_running_loop()
         if kind == "unix":
-            self._listener = UnixListener(rest)
+            self._listener = UnixListener(rest, "--pose-source")
             self._server = await asyncio.start_unix_server(
                 self._serve, sock=self._listener.socket, limit=MAX_LINE_BYTES
             )

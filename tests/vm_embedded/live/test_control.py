@@ -1,6 +1,7 @@
 """The control socket of a real vm-detect."""
 
 import json
+import re
 import socket
 import subprocess
 
@@ -18,7 +19,11 @@ def test_a_socket_that_was_left_behind_is_replaced_and_one_in_use_is_not(tmp_pat
             arguments(tmp_path, "--camera", "synthetic"), capture_output=True, text=True, timeout=60, check=False
         )
         assert other.returncode == 78
-        assert "another process already does; stop the other vm-detect or give another path" in other.stderr
+        assert "another process already does; stop the other vm-detect, or give another path" in other.stderr
+        (option,) = re.findall(r"give another path with (--[a-z-]+)", other.stderr)
+        with running(tmp_path, "--camera", "synthetic", option, tmp_path / "second") as second:
+            second.wait_for_state("ok")
+            second.stop()
         assert json.loads(ask(tmp_path / "control", "status"))["state"] == "ok"
         found.stop()
 

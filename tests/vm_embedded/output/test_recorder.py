@@ -20,6 +20,7 @@ def test_a_recording_is_detected_in_again_bit_by_bit(tmp_path):
     (folder,) = kept.iterdir()
     recorded = [json.loads(line) for line in (folder / "recording.jsonl").read_text().splitlines()]
     assert len(recorded) > 3
+    assert '\nmodel = "ball"\n' in (folder / "vm.toml").read_text()  # on another machine, it is elsewhere
     done = subprocess.run([COMMAND, "--camera", folder], capture_output=True, text=True, timeout=60, check=True)
     again = [json.loads(line) for line in done.stdout.splitlines()]
     assert [each["detections"] for each in again] == [each["detections"] for each in recorded]
