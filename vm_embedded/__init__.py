@@ -16,6 +16,7 @@ from .geometry.planes import GROUND, Plane, Pose
 from .geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from .geometry.sphere import Sphere
 from .mesh.models import build_mesh
+from .output.overlay import draw_overlay
 
 __all__ = [
     "GROUND",
@@ -50,6 +51,7 @@ __all__ = [
     "VisualMeshError",
     "build_mesh",
     "detect_views",
+    "draw_overlay",
     "read_lens_file",
 ]
 

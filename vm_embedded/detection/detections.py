@@ -48,6 +48,12 @@ class Detection:
     points: int
     reason: str | None = None
 
+    def __repr__(self) -> str:
+        x, y, z = self.position
+        reason = "" if self.reason is None else f" rejected: {self.reason}"
+        place = f"{self.distance:.2f} m at ({x:.2f}, {y:.2f}, {z:.2f})"
+        return f"<{self.class_name} {self.confidence:.2f} {place}{reason}>"
+
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON: pixels to 0.1, meters to 0.001."""
         data: dict[str, Any] = {
@@ -110,6 +116,23 @@ class Detections:
 
     def __getitem__(self, index: int) -> Detection:
         return self.objects[index]
+
+    def __repr__(self) -> str:
+        return f"<{len(self.objects)} detections, {len(self.pixels)} points: {list(self.objects)}>"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON, with the fields of a line of vm-detect: points, detections, field, timing_ms [ms].
+
+        `field` is missing for a network without classes of the field.
+        """
+        data: dict[str, Any] = {
+            "points": len(self.pixels),
+            "detections": [each.as_dict() for each in self],
+        }
+        if self.field is not None:
+            data["field"] = self.field.as_dict()
+        data["timing_ms"] = {stage: round(value, 3) for stage, value in self.timing_ms.items()}
+        return data
 
     @property
     def manifest(self) -> Manifest:

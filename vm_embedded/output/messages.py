@@ -29,9 +29,8 @@ def frame_fields(detections: Detections, emit_points: Sequence[str] = (), explai
     emit_points: classes whose points are listed, with bearings (unit vectors in the plane's frame) and probabilities.
     explain: list rejected clusters too.
     """
-    fields: Message = {"points": len(detections.pixels), "detections": [each.as_dict() for each in detections]}
-    if detections.field is not None:
-        fields["field"] = detections.field.as_dict()
+    fields: Message = detections.as_dict()
+    timing = fields.pop("timing_ms")  # the last entry of a message
     if emit_points:
         fields["class_points"] = {
             name: {
@@ -43,8 +42,7 @@ def frame_fields(detections: Detections, emit_points: Sequence[str] = (), explai
         }
     if explain:
         fields["rejected"] = [each.as_dict() for each in detections.rejected]
-    fields["timing_ms"] = {stage: round(value, 3) for stage, value in detections.timing_ms.items()}
-    return fields
+    return fields | {"timing_ms": timing}
 
 
 def file_message(
