@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from vm_embedded.cli.program import Parser, program, version
 from vm_embedded.errors import VisualMeshError, install_extra, unknown
 from vm_workstation.option_types import at_least
 
@@ -77,7 +77,7 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
 
 
 def _parser(command: str, description: str, output: str = "lens file to write, .yaml") -> argparse.ArgumentParser:
-    made = argparse.ArgumentParser(prog=f"vm-calibrate {command}", description=description, epilog=_EPILOG)
+    made = Parser(prog=f"vm-calibrate {command}", description=description, epilog=_EPILOG)
     made.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help=output)
     return made
 
@@ -109,6 +109,7 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
     )
 
 
+@program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-calibrate and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
@@ -117,6 +118,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("usage: vm-calibrate COMMAND ...\n\ncommands (vm-calibrate COMMAND --help lists their options):")
         print("\n".join(f"  {name:9s}{each.description}" for name, each in known.items()))
         return EXIT_OK if given else EXIT_USAGE
+    if given[0] == "--version":
+        print(version("vm-calibrate"))
+        return EXIT_OK
     if given[0] not in known:
         print(f"vm-calibrate: {unknown('command', given[0], known)}", file=sys.stderr)
         return EXIT_USAGE
@@ -135,8 +139,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("vm-calibrate: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader, such as head, has closed the pipe
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return EXIT_OK
 
 

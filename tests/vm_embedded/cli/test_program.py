@@ -39,6 +39,7 @@ def test_a_program_prints_its_version(program):
         ("vm-train check data", "--jsom", "--json"),
         ("vm-evaluate model.pt", "--outptu", "--output"),
         ("vm-mesh show", "--veiw", "--view"),
+        ("vm-calibrate lens clip.avi", "--ouput", "--output"),
     ],
 )
 def test_a_mistyped_option_is_one_line_with_the_nearest(command, mistyped, meant):
