@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from vm_embedded.cli.program import Parser
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.files import atomic_write
 from vm_embedded.geometry.make_shape import make_shape
@@ -28,7 +29,7 @@ _NAMED = 40
 
 def import_boxes_parser() -> argparse.ArgumentParser:
     """The options of vm-train import-boxes DIR OUT."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-train import-boxes",
         description="Convert frames with boxes, lens and pose to a folder of pictures with masks, to train a mesh "
         "network on. The object that stands on the plane in the direction of a box gives the labels. Boxes whose size "
