@@ -1,7 +1,8 @@
-"""Reads a model file without trusting it: finds its manifest, and refuses references to other files.
+"""Reads a model file without trusting it: finds its manifest, and refuses parts that vm-export never writes.
 
-ONNX Runtime would follow a tensor's path to another file, so this module looks for such paths first. An .onnx file is
-one Protocol Buffers message; the walk below knows the wire format and the few fields that matter here.
+ONNX Runtime would follow a tensor's path to another file, and would run a loop that never ends. So this module looks
+for external data and for inner graphs first. An .onnx file is one Protocol Buffers message; the walk below knows the
+wire format and the few fields that matter here.
 """
 
 from __future__ import annotations
@@ -19,18 +20,30 @@ from .manifest import METADATA_KEY, Manifest
 
 # Fields of a message that hold further messages, by the numbers of onnx.proto: every place that can hold a tensor.
 _INNER: dict[str, dict[int, str]] = {
-    "Model": {7: "Graph", 20: "Training", 25: "Function"},
-    "Training": {1: "Graph", 2: "Graph"},
+    "Model": {7: "Graph"},
     "Graph": {1: "Node", 5: "Tensor", 15: "SparseTensor"},
-    "Function": {7: "Node", 11: "Attribute"},
     "Node": {5: "Attribute"},
-    "Attribute": {5: "Tensor", 6: "Graph", 10: "Tensor", 11: "Graph", 22: "SparseTensor", 23: "SparseTensor"},
+    "Attribute": {5: "Tensor", 10: "Tensor", 22: "SparseTensor", 23: "SparseTensor"},
     "SparseTensor": {1: "Tensor", 2: "Tensor"},
     "Tensor": {},
 }
+
+_INNER_GRAPH = "contains operators with an inner graph, such as Loop, If or Scan, which may never end"
+_REFUSED = {
+    ("Model", 20): "contains steps of a training",
+    ("Model", 25): "contains functions, which may grow without limit",
+    ("Attribute", 6): _INNER_GRAPH,
+    ("Attribute", 11): _INNER_GRAPH,
+}
+"""Fields that make a model file unusable, and why. vm-export never writes them."""
+
 _METADATA_PROPS = 14
 _EXTERNAL_DATA, _DATA_LOCATION = 13, 14
-_DEEPEST = 64
+_MOST_FIELDS = 500_000
+"""Most fields of a model file; the networks of the package have a few thousand."""
+
+_Budget = Iterator[int]
+"""Gives one number for each field that may still follow."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +62,8 @@ class ModelFile:
 def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
     """Read and check a model file.
 
-    Raises ModelError if it is missing, larger than `max_mib` [MiB], not an ONNX file, refers to external data, or lacks
-    a manifest of this format.
+    Raises ModelError if it is missing, larger than `max_mib` [MiB], not an ONNX file, refers to external data, contains
+    inner graphs (control flow) or functions, or lacks a manifest of this format.
     """
     path = Path(path)
     try:
@@ -89,35 +102,38 @@ def _inner_file(metadata: dict[str, str], key: str, name: str, contract: LookCon
 
 
 def _metadata(content: bytes) -> dict[str, str]:
-    """The metadata of an ONNX file. Raises ModelError for other files and for references to external data."""
+    """The metadata of an ONNX file. Raises ModelError for other files and for parts that are refused."""
     metadata: dict[str, str] = {}
     graphs = 0
-    for number, value in _fields(memoryview(content)):
+    budget: _Budget = iter(range(_MOST_FIELDS))
+    for number, value in _fields(memoryview(content), budget):
         if number == _METADATA_PROPS and isinstance(value, memoryview):
-            entry = {key: bytes(text) for key, text in _fields(value) if isinstance(text, memoryview)}
+            entry = {key: bytes(text) for key, text in _fields(value, budget) if isinstance(text, memoryview)}
             metadata[_text(entry.get(1, b""))] = _text(entry.get(2, b""))
         graphs += number == 7
     if not graphs:
         raise ModelError("not an ONNX file")
-    _refuse_external("Model", memoryview(content), 0)
+    _refuse_parts("Model", memoryview(content), budget)
     return metadata
 
 
-def _refuse_external(message: str, data: memoryview, depth: int) -> None:
-    if depth > _DEEPEST:
-        raise ModelError(f"nested more than {_DEEPEST} deep")
-    for number, value in _fields(data):
+def _refuse_parts(message: str, data: memoryview, budget: _Budget) -> None:
+    for number, value in _fields(data, budget):
         if message == "Tensor" and (number == _EXTERNAL_DATA or (number == _DATA_LOCATION and value != 0)):
             raise ModelError("refers to external data; a model must be one file")
+        if (message, number) in _REFUSED:
+            raise ModelError(f"{_REFUSED[message, number]}; vm-export writes no such file")
         inner = _INNER[message].get(number)
         if inner and isinstance(value, memoryview):
-            _refuse_external(inner, value, depth + 1)
+            _refuse_parts(inner, value, budget)
 
 
-def _fields(data: memoryview) -> Iterator[tuple[int, int | memoryview]]:
-    """Fields of a Protocol Buffers message as (number, whole number or bytes)."""
+def _fields(data: memoryview, budget: _Budget) -> Iterator[tuple[int, int | memoryview]]:
+    """Fields of a Protocol Buffers message as (number, whole number or bytes). Raises ModelError."""
     position = 0
     while position < len(data):
+        if next(budget, None) is None:
+            raise ModelError(f"not a model file: it has more than {_MOST_FIELDS} fields")
         tag, position = _varint(data, position)
         if tag >> 32:  # other readers would truncate it to another field's number
             raise ModelError("not an ONNX file")

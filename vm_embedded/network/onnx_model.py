@@ -62,6 +62,8 @@ class OnnxModel:
         # The number of points changes with every frame, so remembered memory patterns would only accumulate.
         options.enable_mem_pattern = False
         options.log_severity_level = 4
+        # A file may also be in ONNX Runtime's own format; without this, it would run as a network that nobody checked.
+        options.add_session_config_entry("session.load_model_format", "ONNX")
         options.add_session_config_entry("session.intra_op.allow_spinning", "1" if spinning else "0")
         try:
             self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])

@@ -177,41 +177,7 @@ def test_a_model_cut_short_anywhere_is_refused(folder):
             read_model(path)
 
 
-def if_node(tensor):
-    """A condition, one of whose branches gives the tensor."""
-    info = [helper.make_tensor_value_info("out", FLOAT, [3])]
-    branches = {
-        name: helper.make_graph([helper.make_node("Constant", [], ["out"], value=value)], name, [], info)
-        for name, value in (("then_branch", tensor), ("else_branch", inside("out")))
-    }
-    return helper.make_node("If", ["condition"], ["weight"], **branches)
-
-
-def deeper(tensor):
-    """A condition within a condition."""
-    info = [helper.make_tensor_value_info("weight", FLOAT, [3])]
-    branches = {
-        "then_branch": helper.make_graph([if_node(tensor)], "outer", [], info),
-        "else_branch": helper.make_graph([if_node(inside())], "other", [], info),
-    }
-    return helper.make_node("If", ["condition"], ["weight"], **branches)
-
-
 ADD = helper.make_node("Add", ["points", "weight"], ["probabilities"])
-CONDITION = numpy_helper.from_array(np.array(True), "condition")
-
-
-def in_function(tensor):
-    body = [helper.make_node("Constant", [], ["y"], value=tensor)]
-    return helper.make_function("own", "Weight", [], ["y"], body, [helper.make_opsetid("", 17)])
-
-
-def in_function_default(tensor):
-    attribute = helper.make_attribute("value", tensor)
-    body = [helper.make_node("Identity", ["x"], ["y"])]
-    return helper.make_function(
-        "own", "Weight", ["x"], ["y"], body, [helper.make_opsetid("", 17)], attribute_protos=[attribute]
-    )
 
 
 def in_sparse(tensor):
@@ -228,26 +194,12 @@ def in_sparse_indices(tensor):
     return made
 
 
-def in_training(tensor):
-    made = model(initializers=[inside()])
-    made.training_info.add().algorithm.initializer.append(tensor)
-    return made
-
-
-def in_training_start(tensor):
-    made = model(initializers=[inside()])
-    made.training_info.add().initialization.initializer.append(tensor)
-    return made
-
-
 def in_attribute(name):
     def made(tensor):
         node = helper.make_node("Own", ["points"], ["probabilities"], domain="own")
         attribute = node.attribute.add(name="hidden")
         if name == "tensors":
             attribute.tensors.append(tensor)
-        elif name == "graphs":
-            attribute.graphs.add().initializer.append(tensor)
         elif name == "sparse_tensor":
             attribute.sparse_tensor.values.CopyFrom(tensor)
         else:
@@ -260,15 +212,9 @@ def in_attribute(name):
 PLACES = {
     "initializer": lambda tensor: model(initializers=[inside("other"), tensor]),
     "constant": lambda tensor: model([helper.make_node("Constant", [], ["weight"], value=tensor), ADD]),
-    "subgraph of an If": lambda tensor: model([if_node(tensor), ADD], [CONDITION]),
-    "subgraph of a subgraph": lambda tensor: model([deeper(tensor), ADD], [CONDITION]),
     "sparse initializer": in_sparse,
     "sparse indices": in_sparse_indices,
-    "function": lambda tensor: model(initializers=[inside()], functions=[in_function(tensor)]),
-    "default of a function": lambda tensor: model(initializers=[inside()], functions=[in_function_default(tensor)]),
-    "training": in_training,
-    "start of training": in_training_start,
-    **{f"attribute {name}": in_attribute(name) for name in ("tensors", "graphs", "sparse_tensor", "sparse_tensors")},
+    **{f"attribute {name}": in_attribute(name) for name in ("tensors", "sparse_tensor", "sparse_tensors")},
 }
 
 
@@ -347,15 +293,6 @@ def test_a_graph_in_two_pieces_is_looked_through_in_both(write):
     second = onnx.GraphProto(initializer=[outside("late")]).SerializeToString()
     with pytest.raises(ModelError, match="external data"):
         read_model(write(VALID + field(7, second)))
-
-
-def test_messages_nested_too_deeply_are_refused(write):
-    graph = onnx.GraphProto(name="inner").SerializeToString()
-    for _ in range(100):
-        graph = field(1, field(5, field(6, graph)))
-    made = model(initializers=[inside()])
-    with pytest.raises(ModelError, match="deep"):
-        read_model(write(made.SerializeToString() + field(7, graph)))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,148 @@
+"""Model files that were made to hang the runtime, or to show it another network than the one that was checked."""
+
+import struct
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper, numpy_helper
+
+from vm_embedded.errors import ModelError
+from vm_embedded.network.bundled import model_path
+from vm_embedded.network.model_file import read_model
+from vm_embedded.network.onnx_model import OnnxModel
+
+onnxruntime = pytest.importorskip("onnxruntime")
+
+LARGE = 0x01520028
+"""Where the second network begins, in the file that is two [bytes]: the first bytes of the file are its address."""
+
+
+def ball_small():
+    return onnx.load(model_path("ball-small"))
+
+
+def identity(inputs, outputs, kind):
+    """An inner graph that passes its inputs on."""
+    nodes = [helper.make_node("Identity", [a], [b]) for a, b in zip(inputs, outputs, strict=True)]
+    described = [[helper.make_tensor_value_info(each, kind, None) for each in names] for names in (inputs, outputs)]
+    return helper.make_graph(nodes, "inner", *described)
+
+
+def endless_loop():
+    """The last answer goes through a loop whose condition stays true."""
+    made = ball_small()
+    last = next(node for node in made.graph.node if "probabilities" in node.output)
+    last.output[0] = "before"
+    body = identity(["condition", "value"], ["condition_out", "value_out"], TensorProto.FLOAT)
+    body.input.insert(0, helper.make_tensor_value_info("number", TensorProto.INT64, []))
+    for each in (body.input[1], body.output[0]):
+        each.CopyFrom(helper.make_tensor_value_info(each.name, TensorProto.BOOL, []))
+    made.graph.initializer.append(numpy_helper.from_array(np.array(True), "yes"))
+    made.graph.node.append(helper.make_node("Loop", ["", "yes", "before"], ["probabilities"], body=body))
+    return made
+
+
+def condition():
+    made = ball_small()
+    branch = helper.make_graph([], "branch", [], [])
+    made.graph.node.append(helper.make_node("If", ["yes"], ["nothing"], then_branch=branch, else_branch=branch))
+    return made
+
+
+def scan():
+    made = ball_small()
+    body = identity(["a"], ["b"], TensorProto.FLOAT)
+    made.graph.node.append(helper.make_node("Scan", ["points"], ["nothing"], body=body, num_scan_inputs=1))
+    return made
+
+
+def nested_functions():
+    """Each function calls the next one twice, so the graph doubles at each of 40 levels."""
+    made = ball_small()
+    for level in range(40):
+        inner = [helper.make_node(f"F{level + 1}", [a], [b], domain="own") for a, b in ("xy", "yz")]
+        opsets = [helper.make_opsetid("own", 1)]
+        made.functions.append(helper.make_function("own", f"F{level}", ["x"], ["z"], inner, opsets))
+    return made
+
+
+def training():
+    made = ball_small()
+    made.training_info.add()
+    return made
+
+
+@pytest.mark.parametrize(
+    ("made", "says"),
+    [
+        (endless_loop, "inner graph"),
+        (condition, "inner graph"),
+        (scan, "inner graph"),
+        (nested_functions, "functions"),
+        (training, "training"),
+    ],
+)
+def test_attack_3_models_that_never_end_are_refused_before_they_are_loaded(made, says, tmp_path):
+    path = tmp_path / "model.onnx"
+    onnx.save(made(), path)
+    with pytest.raises(ModelError, match=rf"model\.onnx: contains .*{says}.*vm-export writes no such file"):
+        read_model(path)
+
+
+def test_attack_3_a_file_of_millions_of_tiny_fields_is_refused(tmp_path):
+    path = tmp_path / "model.onnx"
+    path.write_bytes(model_path("ball-small").read_bytes() + b"\x28\x01" * 4_000_000)
+    with pytest.raises(ModelError, match="more than 500000 fields"):
+        read_model(path)
+
+
+def doubled(wanted, points):
+    """A network of the mesh's kind that gives its points, times a number, as the answer."""
+    graph = helper.make_graph(
+        [helper.make_node("Mul", ["points", "factor"], ["probabilities"])],
+        "test",
+        [helper.make_tensor_value_info("points", TensorProto.FLOAT, ["n", points])],
+        [helper.make_tensor_value_info("probabilities", TensorProto.FLOAT, ["n", points])],
+        [numpy_helper.from_array(np.array(wanted, dtype=np.float32), "factor")],
+    )
+    made = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    return made.SerializeToString()
+
+
+def varint(value):
+    encoded = b""
+    while value > 127:
+        encoded += bytes([value & 127 | 128])
+        value >>= 7
+    return encoded + bytes([value])
+
+
+def in_both_formats(checked, hidden, folder):
+    """A file that is the network `checked` as ONNX, and `hidden` in ONNX Runtime's own format.
+
+    That format begins with the address of its data and the letters ORTM. As ONNX these are unknown fields.
+    """
+    options = onnxruntime.SessionOptions()
+    options.optimized_model_filepath = str(folder / "hidden.ort")
+    options.add_session_config_entry("session.save_model_format", "ORT")
+    onnxruntime.InferenceSession(hidden, options, providers=["CPUExecutionProvider"])
+    data = (folder / "hidden.ort").read_bytes()
+    root = struct.unpack("<I", data[:4])[0]
+    head = struct.pack("<I", LARGE) + b"ORT" + b"M" + bytes(83)
+    start = LARGE - root  # where the data must begin
+    # The rest of the file after the ONNX fields is one more unknown field, padded to that place.
+    before = len(head) + len(checked) + 1
+    length = next(n for n in range(2, 6) if len(varint(start - before - n + len(data))) == n)
+    content = bytes(start - before - length) + data
+    return head + checked + b"\x7a" + varint(len(content)) + content
+
+
+def test_attack_7_the_model_that_was_checked_is_the_one_that_runs(tmp_path):
+    content = in_both_formats(doubled(1.0, 3), doubled(2.0, 3), tmp_path)
+    points = np.ones((2, 3), dtype=np.float32)
+    as_before = onnxruntime.InferenceSession(content, providers=["CPUExecutionProvider"])
+    assert as_before.run(None, {"points": points})[0][0, 0] == 2.0  # the attack works without the setting
+    interface = {"points": ("tensor(float)", [3]), "probabilities": ("tensor(float)", [3])}
+    model = OnnxModel("both", content, interface, "probabilities", threads=1, spinning=False)
+    assert model.run({"points": points})[0, 0] == 1.0
