@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from vm_embedded.errors import InputError, ModelError, one_line
 from vm_embedded.network.manifest import Manifest
@@ -53,9 +55,24 @@ class Checkpoint:
         content = load_values(path, "a checkpoint")
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
             raise InputError(f"{path} is not a checkpoint of format {_FORMAT!r}; train the network again")
+        missing = [key for key in ("network", "state", "manifest", "grid") if not isinstance(content.get(key), dict)]
+        if missing:
+            raise InputError(f"{path} is not a whole checkpoint: it lacks {', '.join(missing)}")
+        try:
+            return cls._from_dict(content)
+        except (InputError, ModelError) as error:
+            raise type(error)(f"{path}: {error}") from error
+
+    @classmethod
+    def _from_dict(cls, content: Mapping[str, Any]) -> Checkpoint:
+        """Inverse of what `save` writes. Raises InputError or ModelError."""
         network = Network(NetworkShape.from_dict(content["network"]))
         try:
             network.load_state_dict(content["state"])
-        except (RuntimeError, KeyError) as error:
-            raise InputError(f"{path}: the weights do not fit the network: {one_line(error)}") from error
-        return cls(network.eval(), Manifest.from_json(json.dumps(content["manifest"])), Grid(**content["grid"]))
+        except (RuntimeError, KeyError, TypeError, AttributeError) as error:
+            raise InputError(f"the weights do not fit the network: {one_line(error)}") from error
+        try:
+            grid, manifest = Grid(**content["grid"]), json.dumps(content["manifest"])
+        except (TypeError, ValueError) as error:
+            raise InputError(f"its grid or manifest can't be read: {one_line(error)}") from error
+        return cls(network.eval(), Manifest.from_json(manifest), grid)

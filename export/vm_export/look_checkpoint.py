@@ -82,7 +82,7 @@ class LookCheckpoint:
             raise InputError(f"{path} is not a checkpoint of format {_FORMAT!r}; its format is {found!r}")
         try:
             return cls._from_dict(content)
-        except (RuntimeError, KeyError, TypeError, AttributeError) as error:
+        except (RuntimeError, KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"{path}: its parts do not fit each other: {one_line(error)}") from error
         except (InputError, ModelError) as error:
             raise type(error)(f"{path}: {error}") from error

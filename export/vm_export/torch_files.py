@@ -23,10 +23,21 @@ def save_values(path: str | Path, content: Mapping[str, Any]) -> None:
 
 
 def load_values(path: str | Path, what: str) -> Any:
-    """Read a file of `save_values` without executing anything in it. Raises InputError if it is not `what`."""
+    """Read a file of `save_values` without executing anything in it. Raises InputError if it is not `what`.
+
+    torch's own message advises to load the file without this protection, so it is not passed on.
+    """
     try:
         return torch.load(path, map_location="cpu", weights_only=True)
     except OSError as error:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
-    except (pickle.UnpicklingError, RuntimeError, EOFError, ValueError, KeyError) as error:
-        raise InputError(f"{path} is not {what}: {one_line(error)}") from error
+    except pickle.UnpicklingError as error:
+        reason = "it is damaged, or contains more than plain values and tensors; use only files that you trust"
+        raise InputError(f"{path} is not {what}: {reason}") from error
+    except Exception as error:  # a damaged file makes torch raise errors of many types
+        raise InputError(f"{path} is not {what}: {_first_sentence(error)}") from error
+
+
+def _first_sentence(error: Exception) -> str:
+    """What torch says is wrong, without its advice."""
+    return one_line(error).partition(". ")[0]

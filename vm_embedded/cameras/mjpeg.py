@@ -75,7 +75,7 @@ class MjpegCamera:
         deadline, self._begun = time.monotonic() + 1e-3 * limit, True
         try:
             content = self._read_part(deadline)
-        except (OSError, ValueError, http.client.HTTPException) as error:
+        except (OSError, ValueError, OverflowError, http.client.HTTPException) as error:  # overflow: a chunk's length
             raise CameraError(f"{self._name}: {one_line(error)}") from error
         captured = time.monotonic() - 1e-3 * self.settings.latency_ms
         return Shot(decode_frame(content, self._raw), captured, content)

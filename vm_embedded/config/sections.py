@@ -7,7 +7,6 @@ TOML, and `to_commented_toml` turns it back into text (see toml_writer.py).
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, fields
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any, TypeVar
 
 from ..errors import InputError, VisualMeshError, unknown
 from .entries import EntryError
+from .toml_reader import parse_toml
 
 Configuration = TypeVar("Configuration")
 
@@ -35,8 +35,8 @@ def read_sections(
     text = _read_text(path, noun) if path else ""
     where = f"{noun} {path}" if path else noun
     try:
-        table: dict[str, Any] = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        table = parse_toml(text)
+    except InputError as error:
         raise InputError(f"{where}: {error}") from error
     for name, entries in (overrides or {}).items():
         table[name] = {**_checked_section(name, table.get(name, {})), **entries}
@@ -101,8 +101,8 @@ def parse_overrides(given: Sequence[str], example: str) -> dict[str, dict[str, A
         if not (equals and dot and entry):
             raise InputError(f"--set {each!r} must have the form SECTION.ENTRY=VALUE, as in {example}")
         try:
-            value = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
+            value = parse_toml(f"value = {text}")["value"]
+        except InputError:
             value = text.strip()
         sections.setdefault(section, {})[entry] = value
     return sections

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
 from ..files import atomic_write, check_writable
+from .toml_reader import parse_toml
 
 
 def check_editable(path: Path, section: str, names: Sequence[str]) -> None:
@@ -32,15 +32,15 @@ def _edited_file(path: Path, section: str, entries: Mapping[str, Any]) -> str:
     """The new text of a file, checked to have the new entries and to keep all others."""
     try:
         text = path.read_bytes().decode("utf-8") if path.exists() else ""
-        before = tomllib.loads(text)
+        before = parse_toml(text)
     except UnicodeDecodeError as error:
         raise InputError(f"configuration {path} is not a text file") from error
-    except (OSError, tomllib.TOMLDecodeError) as error:
+    except (OSError, InputError) as error:
         raise InputError(f"can't read configuration {path}: {error}") from error
     edited = edit_section(text, section, entries)
     try:
-        after = tomllib.loads(edited)
-    except tomllib.TOMLDecodeError:
+        after = parse_toml(edited)
+    except InputError:
         after = {}
     table = before.get(section, {})
     if not isinstance(table, dict) or after != {**before, section: {**table, **entries}}:

@@ -49,6 +49,10 @@ def monotone_radius(distortion: tuple[float, float]) -> float:
     k0, k1 = distortion
     if k0 == 0.0 and k1 == 0.0:
         return math.inf
-    roots = np.roots([5.0 * k1, 3.0 * k0, 1.0]) if k1 else np.array([-1.0 / (3.0 * k0)])
-    turning = [root.real for root in roots if abs(root.imag) < 1e-12 * abs(root) and root.real > 0]
-    return math.sqrt(min(turning)) if turning else math.inf
+    # The slope 1 + 3 k0 s + 5 k1 s^2 with s = r_d^2, solved for 1 / s. This stays exact where k0 or k1 is tiny.
+    discriminant = 9.0 * k0 * k0 - 20.0 * k1
+    if discriminant < 0.0:
+        return math.inf
+    root = math.sqrt(discriminant)
+    largest = (root - 3.0 * k0) / 2.0 if k0 <= 0.0 else -10.0 * k1 / (root + 3.0 * k0)
+    return 1.0 / math.sqrt(largest) if largest > 0.0 else math.inf

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..config.toml_reader import parse_toml
 from ..config.yaml_reader import read_yaml
 from ..errors import InputError, VisualMeshError, unknown
 from .calibrated_lenses import BrownLens, CalibratedLens, FisheyeLens
@@ -64,7 +64,7 @@ def read_lens_file(path: str | Path) -> LensFile:
         raise InputError(f"can't read lens file {path}: {getattr(error, 'strerror', None) or error}") from error
     try:
         if path.suffix.lower() == ".toml":
-            table = tomllib.loads(text)
+            table = parse_toml(text)
             return LensFile(lens_from_table(table.get("lens", table)), None)
         table = read_yaml(text)
         if not isinstance(table, dict):
@@ -75,8 +75,6 @@ def read_lens_file(path: str | Path) -> LensFile:
             return LensFile(lens_from_table(table), None if hoc is None else Orientation.from_hoc(hoc))
         hoc = table.pop("Hoc", None)
         return LensFile(lens_from_calibration(table), None if hoc is None else Orientation.from_hoc(hoc))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"lens file {path}: {error}") from error
     except VisualMeshError as error:
         raise InputError(f"lens file {path}: {error}") from error
 

@@ -18,6 +18,9 @@ from ..errors import InputError, unknown
 from .distortion import distort, monotone_radius, undistort
 from .lens import Lens, Size
 
+_STRONGEST = 1e6
+"""Largest k0 [px^-2] and k1 [px^-4]; real lenses stay far below 1."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RadialLens(Lens):
@@ -26,7 +29,8 @@ class RadialLens(Lens):
     focal_length: focal length [px]. center: image center minus optical center, as x and y [px]. distortion: k0 [px^-2]
     and k1 [px^-4] of r_u = r_d (1 + k0 r_d^2 + k1 r_d^4), from distorted to undistorted radius.
 
-    Raises InputError for a focal length that is not above 0 and for numbers that are not finite.
+    Raises InputError for a focal length that is not above 0, for numbers that are not finite, and for a distortion
+    beyond 1e6.
     """
 
     focal_length: float
@@ -39,6 +43,8 @@ class RadialLens(Lens):
             raise InputError(f"lens focal length must be above 0 px, not {self.focal_length}")
         if not np.isfinite([*self.center, *self.distortion]).all():
             raise InputError(f"lens center {self.center} and distortion {self.distortion} must be finite numbers")
+        if max(map(abs, self.distortion)) > _STRONGEST:
+            raise InputError(f"lens distortion must be from -{_STRONGEST:g} to {_STRONGEST:g}, not {self.distortion}")
 
     @property
     def scale(self) -> float:

@@ -1,6 +1,7 @@
 """Motion JPEG from a real HTTP server that dies and comes back."""
 
 import json
+import socket
 import threading
 import time
 
@@ -96,3 +97,26 @@ def test_passwords_of_cameras_are_not_shown(tmp_path):
         found.stop()
     assert "secret" not in json.dumps([found.messages, found.events])
     assert "no response from http://127.0.0.1:9/x" in json.dumps(found.messages)
+
+
+@pytest.mark.parametrize("length", [b"f" * 16, b"7" + b"f" * 15, b"-5", b"x", b"9" * 5000])
+def test_attack_8_a_chunk_of_any_length_is_a_camera_error(length):
+    """The server sends its stream in chunks; the length of the second one is hostile."""
+    listening = socket.create_server(("127.0.0.1", 0))
+
+    def serve():
+        connection, _ = listening.accept()
+        with connection:
+            connection.recv(4096)
+            head = b"HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\n"
+            connection.sendall(
+                head + b"Transfer-Encoding: chunked\r\n\r\n9\r\n--frame\r\n\r\n" + length + b"\r\nab\r\n"
+            )
+
+    threading.Thread(target=serve, daemon=True).start()
+    settings = CameraSettings(source=f"http://127.0.0.1:{listening.getsockname()[1]}/", lost_ms=500)
+    with listening:
+        camera = MjpegCamera(settings)
+        with pytest.raises(CameraError, match=r"http://127\.0\.0\.1"):
+            camera.read()
+        camera.close()

@@ -403,3 +403,16 @@ def test_no_table_raises_anything_but_input_error(table):
 def test_no_calibration_raises_anything_but_input_error(table):
     lens = attempt(InputError, lens_from_calibration, table)
     assert isinstance(lens, InputError) or min(lens.focal_lengths) > 0
+
+
+@pytest.mark.parametrize("k", ["[-1e308, 640]", "[640, -1e308]", "[1e308, 1e308]", "[-1e6, 1e-320]", "[1e6, -1e6]"])
+@pytest.mark.parametrize("projection", ["RECTILINEAR", "EQUISOLID", "EQUIDISTANT"])
+def test_attack_8_a_distortion_of_any_size_is_refused_or_works(k, projection, tmp_path):
+    path = tmp_path / "lens.yaml"
+    path.write_text(f"projection: {projection}\nfocal_length: 400\ncentre: [0, 0]\nk: {k}\nfov: 1.5\n")
+    found = attempt(InputError, read_lens_file, path)
+    if isinstance(found, InputError):
+        assert "from -1e+06 to 1e+06" in str(found)
+        assert "308" in k
+    else:
+        assert 0.0 < found.lens.limit <= 0.75
