@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import os
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +68,13 @@ class OnnxModel:
         options.add_session_config_entry("session.load_model_format", "ONNX")
         options.add_session_config_entry("session.intra_op.allow_spinning", "1" if spinning else "0")
         try:
-            self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+            # After an error it would print to standard output, among the messages, and try the same again. Versions
+            # before 1.18 do so whatever they are told.
+            with redirect_stdout(io.StringIO()):
+                self._session = onnxruntime.InferenceSession(
+                    content, options, providers=["CPUExecutionProvider"], enable_fallback=0
+                )
+            self._session.disable_fallback()
             found = {
                 node.name: (node.type, [size for size in node.shape if isinstance(size, int)])
                 for node in (*self._session.get_inputs(), *self._session.get_outputs())

@@ -1,5 +1,6 @@
 """Model files that were made to hang the runtime, or to show it another network than the one that was checked."""
 
+import random
 import struct
 
 import numpy as np
@@ -146,3 +147,17 @@ def test_attack_7_the_model_that_was_checked_is_the_one_that_runs(tmp_path):
     interface = {"points": ("tensor(float)", [3]), "probabilities": ("tensor(float)", [3])}
     model = OnnxModel("both", content, interface, "probabilities", threads=1, spinning=False)
     assert model.run({"points": points})[0, 0] == 1.0
+
+
+def test_attack_10_a_damaged_model_prints_nothing_to_standard_output(capfd):
+    whole, chance = model_path("ball-small").read_bytes(), random.Random(3)
+    refused = 0
+    for _ in range(200):
+        content = bytearray(whole)
+        content[chance.randrange(4000)] ^= 1 << chance.randrange(8)
+        try:
+            OnnxModel("damaged", bytes(content), {}, "probabilities", threads=1, spinning=False)
+        except ModelError:
+            refused += 1
+    assert refused == 200  # also the readable ones: they have other inputs than {}
+    assert capfd.readouterr() == ("", "")
