@@ -16,6 +16,7 @@ from ..config.entries import check_entries, number, switch, text_line
 from ..errors import VisualMeshError
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
+from .image_header import MAX_MEGAPIXELS
 
 
 class CameraError(VisualMeshError):
@@ -76,6 +77,9 @@ class CameraSettings:
         0.0, "time from exposure to arrival, for cameras that report no capture time", "ms", (0, 1000)
     )
     loop: bool = switch(False, "restart files at their end")
+    max_megapixels: float = number(
+        MAX_MEGAPIXELS, "larger images, of a camera or a file, are not decoded", "Mpx", (0.01, 1000)
+    )
     max_age_ms: float = number(250.0, "frames older than this are not reported", "ms", (1, 10000))
     lost_ms: float = number(
         1000.0, "time without a new frame after which the camera is lost and opened again", "ms", (50, 60000)

@@ -25,7 +25,7 @@ class FileCamera:
 
     def _open(self) -> Iterator[Frame]:
         try:
-            source = open_source(self.settings.source, self._raw)
+            source = open_source(self.settings.source, self._raw, self.settings.max_megapixels)
         except InputError as error:
             raise CameraError(str(error)) from error
         self._period = 1.0 / (self.settings.fps or source.rate or RATE)

@@ -16,6 +16,7 @@ from ..arrays import Image
 from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
 from .decoding import decode
+from .image_header import MAX_MEGAPIXELS
 
 _BESIDE = ("mask", "coverage")
 """Pictures of vm-synth that are not frames."""
@@ -60,15 +61,16 @@ class Source:
     rate: float | None = None
 
 
-def open_sources(names: Sequence[str], raw: bool = False) -> Source:
+def open_sources(names: Sequence[str], raw: bool = False, max_megapixels: float = MAX_MEGAPIXELS) -> Source:
     """Open several sources by name, one after the other; images alone are in the order of their numbers.
 
-    With `raw`, images keep the channels of their files. Raises InputError as `open_source` does.
+    With `raw`, images keep the channels of their files. Larger images are not decoded [Mpx]. Raises InputError as
+    `open_source` does.
     """
     paths = [Path(each) for each in names]
     if len(names) > 1 and all(each.is_file() and each.suffix.lower() in IMAGE_SUFFIXES for each in paths):
-        return _images(paths, raw)
-    opened = [open_source(each, raw) for each in names]
+        return _images(paths, partial(read_image, raw=raw, max_megapixels=max_megapixels))
+    opened = [open_source(each, raw, max_megapixels) for each in names]
     if len(opened) == 1:
         return opened[0]
     frames = (frame for source in opened for frame in source.frames)
@@ -77,27 +79,27 @@ def open_sources(names: Sequence[str], raw: bool = False) -> Source:
     return Source(numbered, None if None in counts else sum(each or 0 for each in counts))
 
 
-def open_source(name: str, raw: bool = False) -> Source:
-    """Open a source by name. With `raw`, images keep the channels of their files.
+def open_source(name: str, raw: bool = False, max_megapixels: float = MAX_MEGAPIXELS) -> Source:
+    """Open a source by name. With `raw`, images keep the channels of their files. Larger images are not decoded [Mpx].
 
     Raises InputError if the source does not exist, contains no images or can't be opened.
     """
     try:
-        return _open(name, Path(name), raw)
+        return _open(name, Path(name), partial(read_image, raw=raw, max_megapixels=max_megapixels))
     except OSError as error:
         raise InputError(f"can't open {name[:200]}: {error.strerror or error}") from error
 
 
-def _open(name: str, path: Path, raw: bool) -> Source:
+def _open(name: str, path: Path, read: Callable[[Path], Image]) -> Source:
     if path.is_dir():
         found = [each for each in path.iterdir() if each.suffix.lower() in IMAGE_SUFFIXES]
         images = {each.stem for each in found}
         found = [each for each in found if not _belongs_to_an_image(each, images)]
         if not found:
             raise InputError(f"no images in directory {name} (looked for {', '.join(IMAGE_SUFFIXES)})")
-        return _images(found, raw)
+        return _images(found, read)
     if path.is_file() and path.suffix.lower() in IMAGE_SUFFIXES:
-        return _images([path], raw)
+        return _images([path], read)
     if path.exists() or name.isdigit():
         return _video(name)
     if glob.has_magic(name):
@@ -105,7 +107,7 @@ def _open(name: str, path: Path, raw: bool) -> Source:
         found = [Path(each) for each in matches if Path(each).suffix.lower() in IMAGE_SUFFIXES]
         if not found:
             raise InputError(f"no images match {name}")
-        return _images(found, raw)
+        return _images(found, read)
     raise InputError(f"no such image, directory, video or camera: {name}")
 
 
@@ -114,9 +116,9 @@ def _belongs_to_an_image(path: Path, stems: set[str]) -> bool:
     return any(f"image{path.stem.removeprefix(each)}" in stems for each in _BESIDE if path.stem.startswith(each))
 
 
-def _images(paths: list[Path], raw: bool) -> Source:
+def _images(paths: list[Path], read: Callable[[Path], Image]) -> Source:
     paths = sorted(paths, key=_natural)
-    frames = (Frame(index, path.name, partial(read_image, path, raw), path) for index, path in enumerate(paths))
+    frames = (Frame(index, path.name, partial(read, path), path) for index, path in enumerate(paths))
     return Source(frames, len(paths))
 
 
@@ -125,15 +127,18 @@ def _natural(path: Path) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
-def read_image(path: str | Path, raw: bool = False) -> Image:
-    """Read an image file as BGR, or with `raw` in its own channels. Raises InputError if it is missing or broken."""
+def read_image(path: str | Path, raw: bool = False, max_megapixels: float = MAX_MEGAPIXELS) -> Image:
+    """Read an image file as BGR, or with `raw` in its own channels.
+
+    Raises InputError if it is missing, broken, or larger than `max_megapixels` [Mpx].
+    """
     path = Path(path)
     try:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
     try:
-        return decode(content, raw)
+        return decode(content, raw, max_megapixels)
     except InputError as error:
         raise InputError(f"{path} {error}") from error
 

@@ -70,7 +70,7 @@ class MjpegCamera:
         return without_password(self.settings.source)
 
     def read(self) -> Shot:
-        """Return the next shot. Raises CameraError at the end of the stream, BrokenFrameError for half an image."""
+        """Return the next shot. Raises CameraError at the end of the stream, BrokenFrameError for a bad image."""
         limit = self.settings.lost_ms if self._begun else max(self.settings.open_ms, self.settings.lost_ms)
         deadline, self._begun = time.monotonic() + 1e-3 * limit, True
         try:
@@ -78,7 +78,7 @@ class MjpegCamera:
         except (OSError, ValueError, OverflowError, http.client.HTTPException) as error:  # overflow: a chunk's length
             raise CameraError(f"{self._name}: {one_line(error)}") from error
         captured = time.monotonic() - 1e-3 * self.settings.latency_ms
-        return Shot(decode_frame(content, self._raw), captured, content)
+        return Shot(decode_frame(content, self._raw, self.settings.max_megapixels), captured, content)
 
     def _read_part(self, deadline: float) -> bytes:
         """The content of the next part."""

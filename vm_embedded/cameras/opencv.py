@@ -79,7 +79,7 @@ class OpenCvCamera:
         captured = self._captured(arrived)
         if self._motion_jpeg:
             content = image.tobytes()
-            return Shot(decode_frame(content, self._raw), captured, content)
+            return Shot(decode_frame(content, self._raw, self.settings.max_megapixels), captured, content)
         if image.dtype != np.uint8 or image.size == 0:
             raise BrokenFrameError(f"frame has {image.dtype} values of shape {image.shape}, not an 8-bit image")
         return Shot(np.asarray(image), captured)

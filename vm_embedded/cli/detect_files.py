@@ -35,7 +35,8 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     for name in emit_points:
         detector.manifest.column(name)
     check_file_format(format)
-    source = open_sources(options.files or [given.camera.source], raw=format != "bgr")
+    sources, largest = options.files or [given.camera.source], given.camera.max_megapixels
+    source = open_sources(sources, format != "bgr", largest)
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:
             make_folder(folder)

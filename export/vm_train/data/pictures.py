@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Image
+from vm_embedded.cameras.decoding import decode_as
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens_files import LensFile, read_lens_file
 
@@ -105,18 +106,10 @@ def decode_picture(raw: RawPicture, classes: Classes, names: tuple[str, str, str
 
 
 def _decoded(data: bytes, name: str, how: int) -> Image:
-    # OpenCV reads files that are cut short without an error, and fills in the missing rows.
-    jpeg_cut = data.startswith(b"\xff\xd8") and b"\xff\xd9" not in data[-1024:]
-    png_cut = data.startswith(b"\x89PNG") and b"IEND" not in data[-1024:]
-    if jpeg_cut or png_cut:
-        raise PictureFault(f"{name}: is cut short")
     try:
-        picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), how) if data else None
-    except cv2.error:
-        picture = None
-    if picture is None:
-        raise PictureFault(f"{name}: can't be read as a picture")
-    return np.asarray(picture)
+        return decode_as(data, how)  # type: ignore[return-value]  # the caller checks the type of a mask's values
+    except InputError as error:
+        raise PictureFault(f"{name}: {error}") from error
 
 
 def parse_lens(text: str, name: str) -> LensFile:

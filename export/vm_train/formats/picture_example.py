@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from vm_embedded.arrays import Image
+from vm_embedded.cameras.decoding import decode_as
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens_files import format_lens_file
 from vm_embedded.geometry.orientation import Orientation
@@ -120,13 +120,10 @@ class _Features:
         suffix = next((suffix for start, suffix in SUFFIXES.items() if data.startswith(start)), None)
         if suffix is None:
             raise InputError(f"{key} is neither a JPEG nor a PNG file")
-        decoded: Image | None
         try:
-            decoded = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)  # type: ignore[assignment]
-        except cv2.error:
-            decoded = None
-        if decoded is None:
-            raise InputError(f"{key} can't be decoded")
+            decoded = decode_as(data, flags)
+        except InputError as error:
+            raise InputError(f"{key} {error}") from error
         if decoded.ndim != 3 or decoded.dtype != np.uint8:
             raise InputError(f"{key} is not an RGB or RGBA picture of 8 bits")
         return data, suffix, (decoded.shape[1], decoded.shape[0])

@@ -42,6 +42,29 @@ def test_a_picture_that_is_cut_short_is_not_taken_and_the_next_one_is(pictures):
         server.kill()
 
 
+def test_attacks_2_and_4_a_huge_or_half_picture_is_not_taken_and_the_next_one_is(pictures, capfd):
+    at = pictures[0].index(b"\xff\xc0") + 5
+    spoiled = iter(
+        (
+            pictures[0][:at] + b"\x7f\xff\x7f\xff" + pictures[0][at + 4 :],
+            pictures[0],
+            pictures[0][: len(pictures[0]) // 2] + b"\xff\xd9",
+            *[pictures[0]] * 1000,
+        )
+    )
+    server = Server(pictures, spoil=lambda _: next(spoiled), rate=100.0)
+    try:
+        camera = MjpegCamera(CameraSettings(source=server.address))
+        for says in ("32767 x 32767 px, 1074 Mpx; at most 50 Mpx", "cut short or damaged"):
+            with pytest.raises(BrokenFrameError, match=says):
+                camera.read()
+            assert camera.read().image.shape == (SIZE[1], SIZE[0], 3)
+        camera.close()
+    finally:
+        server.kill()
+    assert capfd.readouterr() == ("", "")
+
+
 def test_a_server_that_falls_silent_is_given_up_in_time(pictures):
     stop = threading.Event()
     server = Server(pictures, spoil=lambda part: stop.wait(20.0) or part)

@@ -47,6 +47,15 @@ def cut(path, share=0.6):
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
 
 
+def enlarge(folder):
+    """Let the image declare 65500 x 16000 px."""
+    path = folder / "image0000001.jpg"
+    content = bytearray(path.read_bytes())
+    at = content.index(b"\xff\xc0") + 5
+    content[at : at + 4] = struct.pack(">HH", 16000, 65500)
+    path.write_bytes(content)
+
+
 def picture_file(folder, name, picture):
     assert cv2.imwrite(str(folder / name), np.asarray(picture))
 
@@ -60,11 +69,17 @@ FAULTS = {
     "no lens": ("missing", "lens0000001.yaml: is missing", lambda f: (f / "lens0000001.yaml").unlink()),
     "no JPEG": (
         "damaged",
-        "image0000001.jpg: can't be read as a picture",
+        "image0000001.jpg: can't be decoded as an image",
         lambda f: (f / "image0000001.jpg").write_bytes(b"no picture"),
     ),
-    "empty": ("damaged", "image0000001.jpg: can't be read", lambda f: (f / "image0000001.jpg").write_bytes(b"")),
+    "empty": ("damaged", "image0000001.jpg: can't be decoded", lambda f: (f / "image0000001.jpg").write_bytes(b"")),
     "cut JPEG": ("damaged", "image0000001.jpg: is cut short", lambda f: cut(f / "image0000001.jpg")),
+    "attack 4: cut JPEG with an end": (
+        "damaged",
+        "image0000001.jpg: is cut short or damaged",
+        lambda f: cut(f / "image0000001.jpg") or (f / "image0000001.jpg").open("ab").write(b"\xff\xd9"),
+    ),
+    "attack 2: huge JPEG": ("damaged", "image0000001.jpg: has 65500 x 16000 px, 1048 Mpx", lambda f: enlarge(f)),
     "cut PNG": ("damaged", "mask0000001.png: is cut short", lambda f: cut(f / "mask0000001.png")),
     "other size": (
         "size",

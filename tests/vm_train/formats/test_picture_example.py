@@ -143,7 +143,7 @@ FAULTS = {
     "image is neither a JPEG nor a PNG file": {"image": BytesList((b"GIF89a",))},
     "image is not one string of bytes": {"image": BytesList((IMAGE, IMAGE))},
     "image can't be decoded": {"image": BytesList((IMAGE[:20],))},
-    "mask can't be decoded": {"mask": BytesList((MASK[:30],))},
+    "mask is cut short": {"mask": BytesList((MASK[:30],))},
     "mask is not a PNG file": {"mask": BytesList((IMAGE,))},
     "mask is not an RGB or RGBA picture": {"mask": BytesList((encoded(".png", np.zeros((24, 32), np.uint8)),))},
     "mask has 30 x 24 px, but the image has 32 x 24 px": {

@@ -187,7 +187,7 @@ def test_pictures_at_fault_are_named_and_skipped(place, shards, tmp_path, capfd)
     training = begun(place, tmp_path / "run", shards)
     trained(training)
     said = capfd.readouterr().err
-    assert "skipped: picture 0001 of the stream: image: can't be read as a picture" in said
+    assert "skipped: picture 0001 of the stream: image: can't be decoded as an image" in said
     assert "skipped: picture 0003 of the stream: lens: " in said
     assert "pictures-000001.tar: picture 0004 lacks its mask" in said
 

@@ -1,0 +1,62 @@
+"""The lines that libjpeg prints to standard error while it decodes.
+
+It reports damage only there: it fills the rest of the picture with gray, and OpenCV reports success.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+_STDERR = 2
+
+_WARNING = re.compile(
+    r"Corrupt JPEG data|Premature end of JPEG|Invalid SOS parameters|Inconsistent progression|Unknown Adobe|"
+    r"Warning: unknown JFIF"
+)
+"""First words of libjpeg's warnings. It prints the first warning about each image."""
+
+_LOCK = threading.Lock()
+"""Only one thread at a time may redirect standard error."""
+
+
+@contextmanager
+def library_messages() -> Iterator[list[str]]:
+    """Collect the lines that libjpeg prints in this block; the list is complete after the block.
+
+    Lines of other threads go to standard error when the block ends.
+    """
+    found: list[str] = []
+    with _LOCK:
+        file = os.memfd_create("messages")
+        try:
+            before = _duplicate()
+            os.dup2(file, _STDERR)
+            try:
+                yield found
+            finally:
+                if before is None:
+                    os.close(_STDERR)
+                else:
+                    os.dup2(before, _STDERR)
+                    os.close(before)
+            written = os.pread(file, 2**16, 0)
+        finally:
+            os.close(file)
+    if written:
+        lines = written.decode("utf-8", "replace").splitlines(keepends=True)
+        found += [line.strip() for line in lines if _WARNING.match(line)]
+        others = "".join(line for line in lines if line.strip() and not _WARNING.match(line))
+        if others and before is not None:
+            os.write(_STDERR, others.encode())
+
+
+def _duplicate() -> int | None:
+    """A copy of the descriptor of standard error, None if it is closed."""
+    try:
+        return os.dup(_STDERR)
+    except OSError:
+        return None
