@@ -1,7 +1,8 @@
-"""Unix sockets to listen on, and addresses and sockets for UDP."""
+"""Unix sockets to listen on, a limit for connections, and addresses and sockets for UDP."""
 
 from __future__ import annotations
 
+import asyncio
 import os
 import socket
 import stat
@@ -13,6 +14,12 @@ from .errors import InputError
 
 _MAX_PATH_BYTES = 107
 """Longest path of a Unix socket on Linux [bytes]."""
+
+BACKLOG = 16
+"""Connections that may wait to be accepted, and that are accepted at a time."""
+
+MOST_CONNECTIONS = 64
+"""Largest number of connections to a socket."""
 
 _UMASK = 0o117
 """Gives the socket's file mode 0660."""
@@ -37,7 +44,7 @@ class UnixListener:
                 self.socket.bind(str(self.path))
             finally:
                 os.umask(mask)
-            self.socket.listen(16)
+            self.socket.listen(BACKLOG)
             self.socket.setblocking(False)
             self._inode = self.path.stat().st_ino
         except OSError as error:
@@ -75,6 +82,41 @@ class UnixListener:
                 self.path.unlink()
         except OSError:
             return
+
+
+class Connections:
+    """The open connections of a socket that listens, at most MOST_CONNECTIONS: no program can use up all descriptors.
+
+    A connection beyond the limit replaces the oldest one that has sent nothing useful. If there is none, it is closed
+    at once.
+    """
+
+    def __init__(self) -> None:
+        self._silent: dict[asyncio.StreamWriter, None] = {}  # in the order of their arrival
+        self._useful: set[asyncio.StreamWriter] = set()
+
+    def admit(self, writer: asyncio.StreamWriter) -> bool:
+        """Add a new connection, or close it and return False. Call `remove` at the end of one that was admitted."""
+        if len(self._silent) + len(self._useful) >= MOST_CONNECTIONS:
+            oldest = next(iter(self._silent), None)
+            if oldest is None:
+                writer.transport.abort()
+                return False
+            del self._silent[oldest]
+            oldest.transport.abort()
+        self._silent[writer] = None
+        return True
+
+    def keep(self, writer: asyncio.StreamWriter) -> None:
+        """From now on, no other connection replaces this one: it has sent something useful."""
+        if writer in self._silent:
+            del self._silent[writer]
+            self._useful.add(writer)
+
+    def remove(self, writer: asyncio.StreamWriter) -> None:
+        """Forget a connection that has ended."""
+        self._silent.pop(writer, None)
+        self._useful.discard(writer)
 
 
 def checked_address(entry: Field[Any], value: object) -> str:

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..errors import InputError
-from ..sockets import UnixListener
+from ..sockets import BACKLOG, Connections, UnixListener
 
 NAME = "vm-detect.sock"
 
@@ -44,20 +44,25 @@ class ControlServer:
         self._path, self._commands = path, commands
         self._file: UnixListener | None = None
         self._server: asyncio.Server | None = None
+        self._connections = Connections()
 
     async def open(self) -> None:
         """Listen. Raises InputError."""
         self._file = UnixListener(self._path, "--status-socket")
-        self._server = await asyncio.start_unix_server(self._reply, sock=self._file.socket, limit=1024)
+        self._server = await asyncio.start_unix_server(self._reply, sock=self._file.socket, limit=1024, backlog=BACKLOG)
 
     async def _reply(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if not self._connections.admit(writer):
+            return
         # asyncio logs a traceback for a canceled handler, so suppress that too.
         with suppress(OSError, ValueError, TimeoutError, asyncio.CancelledError):
             word = (await asyncio.wait_for(reader.readline(), _TIMEOUT)).decode("ascii", "replace").strip()
             command = self._commands.get(word)
+            self._connections.keep(writer)
             reply = command() if command else f"unknown command {word!r}; allowed: {', '.join(self._commands)}"
             writer.write(reply.encode() + b"\n")
             await asyncio.wait_for(writer.drain(), _TIMEOUT)
+        self._connections.remove(writer)
         writer.close()
 
     async def close(self) -> None:
@@ -72,10 +77,11 @@ def ask(path: Path, word: str) -> str:
     """Send a command to the detector that listens at a path, and return its reply. Raises InputError without one."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as connection:
         connection.settimeout(_TIMEOUT)
+        deadline = time.monotonic() + _TIMEOUT
         try:
-            connection.connect(str(path))
+            _connect(connection, path, deadline)
             connection.sendall(word.encode() + b"\n")
-            reply, deadline = b"", time.monotonic() + _TIMEOUT
+            reply = b""
             while (part := connection.recv(65536)) and len(reply) < _LARGEST_REPLY:
                 reply += part
                 connection.settimeout(max(deadline - time.monotonic(), 1e-3))
@@ -83,3 +89,15 @@ def ask(path: Path, word: str) -> str:
             reason = getattr(error, "strerror", None) or str(error) or "no reply"
             raise InputError(f"no detector replies at {path}: {reason}") from error
     return reply.decode("utf-8", "replace").strip()
+
+
+def _connect(connection: socket.socket, path: Path, deadline: float) -> None:
+    """Connect, and try again until the deadline [s] if too many others wait to be accepted. Raises OSError."""
+    while True:
+        try:
+            connection.connect(str(path))
+            return
+        except BlockingIOError:
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(0.005)

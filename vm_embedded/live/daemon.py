@@ -18,12 +18,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from ..cameras.camera import without_password
 from ..cameras.grabber import MOST_HANGING, Grabber
 from ..cameras.open_camera import camera_opener
-from ..errors import InputError, VisualMeshError
+from ..errors import InputError, VisualMeshError, one_line
 from ..output.channels import Channels
 from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
@@ -119,6 +119,7 @@ class Daemon:
             loop.add_signal_handler(number, self._stop)
         loop.add_signal_handler(signal.SIGHUP, self.reload)
         loop.add_signal_handler(signal.SIGUSR1, self.record)
+        loop.set_exception_handler(self._log_loop_error)
         self._loop = loop
         try:
             for part in self._parts:
@@ -145,6 +146,11 @@ class Daemon:
         status, reason = self._exit_status()
         self._log("stopped", frames=self.counters.outcomes.frames, reason=reason)
         return status
+
+    def _log_loop_error(self, _: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """Log what asyncio would report as a traceback, such as too many open files, in a line."""
+        error = context.get("exception")
+        self._log("internal error", "error", where=context.get("message", ""), reason=one_line(error) if error else "")
 
     def _exit_status(self) -> tuple[int, str]:
         """The exit status, and the reason why the daemon stops."""

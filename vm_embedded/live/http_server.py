@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from ipaddress import ip_address
 
 from ..errors import InputError
-from ..sockets import UnixListener, parse_address
+from ..sockets import BACKLOG, Connections, UnixListener, parse_address
 
 _TIMEOUT = 5.0
 """How long a browser may take to send its request, and to receive each part of the response [s]."""
 
-_MOST_CONNECTIONS = 16
+_MOST_STREAMS = 16
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,16 @@ class HttpServer:
         self._file: UnixListener | None = None
         self._server: asyncio.Server | None = None
         self._tasks: set[asyncio.Task[None]] = set()
+        self._connections = Connections()
+        self._streaming = 0  # number of streams
 
     async def open(self) -> None:
         """Listen. Raises InputError."""
         if self._where.startswith("unix:"):
             self._file = UnixListener(self._where.removeprefix("unix:"), "--status-metrics")
-            self._server = await asyncio.start_unix_server(self._serve, sock=self._file.socket, limit=8192)
+            self._server = await asyncio.start_unix_server(
+                self._serve, sock=self._file.socket, limit=8192, backlog=BACKLOG
+            )
             return
         host, port = parse_address(self._where, "[status] page or metrics", "127.0.0.1:8080")
         try:
@@ -58,6 +62,8 @@ class HttpServer:
             raise InputError(f"can't listen at {self._where}: {reason}") from error
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if not self._connections.admit(writer):
+            return
         task = asyncio.current_task()
         assert task is not None
         self._tasks.add(task)
@@ -65,9 +71,11 @@ class HttpServer:
             # asyncio logs a traceback for a canceled handler, so suppress that too.
             with suppress(OSError, ValueError, EOFError, asyncio.LimitOverrunError, asyncio.CancelledError):
                 head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _TIMEOUT)
+                self._connections.keep(writer)
                 await self._respond(head.decode("latin-1").split("\r\n"), writer)
         finally:
             self._tasks.discard(task)
+            self._connections.remove(writer)
             writer.close()
 
     async def _respond(self, head: list[str], writer: asyncio.StreamWriter) -> None:
@@ -84,8 +92,12 @@ class HttpServer:
         elif path in self._pages:
             response = self._pages[path]()
             await write(_encode("200 OK", response if isinstance(response, Response) else await response))
-        elif path in self._streams and len(self._tasks) <= _MOST_CONNECTIONS:
-            await self._streams[path](write)
+        elif path in self._streams and self._streaming < _MOST_STREAMS:
+            self._streaming += 1
+            try:
+                await self._streams[path](write)
+            finally:
+                self._streaming -= 1
         else:
             await write(_encode("404 Not Found", Response("text/plain", b"page not found\n")))
 

@@ -6,19 +6,32 @@ import json
 import os
 import sys
 import time
+from dataclasses import dataclass
 from typing import Any, TextIO
+
+_MOST_LINES, _PERIOD = 50, 10.0
+"""Most lines about one kind of event in a period [s]."""
 
 
 class EventLog:
-    """Writes events. If the log can't be written, it is silent from then on; the detector keeps running."""
+    """Writes events, at most 50 of a kind in ten seconds; the next one then counts those that were left out.
+
+    If the log can't be written, it is silent from then on; the detector keeps running.
+    """
 
     def __init__(self, program: str, stream: TextIO | None = None) -> None:
         self.program = program
         self._stream = stream or sys.stderr or open(os.devnull, "w")  # noqa: SIM115, PTH123
         self._text = self._stream.isatty()
+        self._recent: dict[str, _Recent] = {}
 
     def __call__(self, event: str, level: str = "info", **fields: Any) -> None:
         """Log an event with its fields. The text form leaves out empty ones."""
+        left_out = self._recent.setdefault(event, _Recent()).count(time.monotonic())
+        if left_out is None:
+            return
+        if left_out:
+            fields["left_out"] = left_out
         if self._text:
             details = ", ".join(f"{name} {value}" for name, value in fields.items() if value not in (None, ""))
             line = f"{time.strftime('%H:%M:%S')} {level:7} {event}{': ' if details else ''}{details}"
@@ -29,3 +42,23 @@ class EventLog:
             print(" ".join(line.split("\n")), file=self._stream, flush=True)
         except (OSError, ValueError):  # a full disk, a closed terminal
             self._stream = open(os.devnull, "w")  # noqa: SIM115, PTH123
+
+
+@dataclass
+class _Recent:
+    """The events of one kind in the current period, and how many of them were left out."""
+
+    since: float = 0.0
+    lines: int = 0
+    left_out: int = 0
+
+    def count(self, now: float) -> int | None:
+        """Count an event at this time [s]. None: leave it out; else: how many were left out before it."""
+        if now - self.since > _PERIOD:
+            self.since, self.lines = now, 0
+        self.lines += 1
+        if self.lines > _MOST_LINES:
+            self.left_out += 1
+            return None
+        before, self.left_out = self.left_out, 0
+        return before

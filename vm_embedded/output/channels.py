@@ -1,4 +1,4 @@
-"""The channels that send messages: standard output, a file, UDP, and a Unix socket with any number of readers.
+"""The channels that send messages: standard output, a file, UDP, and a Unix socket with many readers.
 
 A slow reader never blocks the detector: messages that exceed its backlog are dropped whole, and counted.
 """
@@ -17,7 +17,7 @@ from typing import Protocol
 
 from ..config.entries import check_entries, entry, number, one_of, switch, text_line
 from ..errors import InputError
-from ..sockets import UnixListener, checked_address, datagram_socket, parse_address
+from ..sockets import BACKLOG, MOST_CONNECTIONS, UnixListener, checked_address, datagram_socket, parse_address
 from .binary_form import to_binary
 from .messages import Message, to_json_line, to_ros
 
@@ -204,7 +204,7 @@ class DatagramChannel:
 
 
 class UnixChannel:
-    """A Unix socket with any number of readers."""
+    """A Unix socket with up to MOST_CONNECTIONS readers; it disconnects further ones at once."""
 
     def __init__(self, listener: UnixListener, backlog: int) -> None:
         self.dropped = 0
@@ -217,10 +217,15 @@ class UnixChannel:
     async def open(cls, path: str | Path, backlog: int) -> UnixChannel:
         """Listen at a path. Raises InputError."""
         channel = cls(UnixListener(path, "--output-unix"), backlog)
-        channel._server = await asyncio.start_unix_server(channel._serve, sock=channel._listener.socket)
+        channel._server = await asyncio.start_unix_server(
+            channel._serve, sock=channel._listener.socket, backlog=BACKLOG
+        )
         return channel
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if len(self._writers) >= MOST_CONNECTIONS:
+            writer.transport.abort()
+            return
         self._writers.add(writer)
         try:
             while await reader.read(4096):  # readers send nothing; an empty read means that they left

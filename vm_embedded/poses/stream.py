@@ -11,7 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from ..errors import InputError, VisualMeshError
-from ..sockets import UnixListener, datagram_socket, parse_address
+from ..sockets import BACKLOG, Connections, UnixListener, datagram_socket, parse_address
 from .buffer import PoseBuffer
 from .parsing import MAX_LINE_BYTES, parse_pose_line
 from .settings import UDP_EXAMPLE, PoseSettings
@@ -37,6 +37,7 @@ class PoseStream:
         self._listener: UnixListener | None = None
         self._server: asyncio.Server | None = None
         self._tasks: set[asyncio.Task[None]] = set()
+        self._connections = Connections()
 
     async def open(self) -> None:
         """Start to listen. Raises InputError if the source is not available."""
@@ -45,7 +46,7 @@ class PoseStream:
         if kind == "unix":
             self._listener = UnixListener(rest, "--pose-source")
             self._server = await asyncio.start_unix_server(
-                self._serve, sock=self._listener.socket, limit=MAX_LINE_BYTES
+                self._serve, sock=self._listener.socket, limit=MAX_LINE_BYTES, backlog=BACKLOG
             )
         elif kind == "udp":
             host, port = parse_address(rest, "pose source", UDP_EXAMPLE)
@@ -70,15 +71,19 @@ class PoseStream:
         task = asyncio.current_task()
         assert task is not None
         self._keep(task)
+        if not self._connections.admit(writer):
+            return
         with suppress(asyncio.CancelledError):  # asyncio would report it as a failure
-            await self._take_lines(reader)
+            await self._take_lines(reader, lambda: self._connections.keep(writer))
+        self._connections.remove(writer)
         writer.close()
 
-    async def _take_lines(self, reader: asyncio.StreamReader) -> None:
-        """Take lines until the end, except those that are too long."""
+    async def _take_lines(self, reader: asyncio.StreamReader, at_pose: Callable[[], None] = lambda: None) -> None:
+        """Take lines until the end, except those that are too long. at_pose: called after each accepted pose."""
         with suppress(ConnectionError):
             while line := await self._read_line(reader):
-                self.take(line)
+                if self.take(line):
+                    at_pose()
 
     async def _read_line(self, reader: asyncio.StreamReader) -> bytes:
         try:
@@ -87,19 +92,20 @@ class PoseStream:
             self._reject(f"pose line has more than {MAX_LINE_BYTES} bytes")
             return b"\n"
 
-    def take(self, line: bytes) -> None:
-        """Parse a received line and add its pose; report and count it if it is bad."""
+    def take(self, line: bytes) -> bool:
+        """Parse a received line, add its pose, and return True; report and count it if it is bad."""
         now = time.monotonic()
         if not line.strip():
-            return
+            return False
         try:
             read = parse_pose_line(line, self.settings.frame == "optical")
             self.poses.add(self._time(read.time, now), read.orientation)
         except VisualMeshError as error:
             self._reject(str(error))
-            return
+            return False
         self.received += 1
         self.arrived.set()
+        return True
 
     def _reject(self, reason: str) -> None:
         self.bad += 1
@@ -143,7 +149,7 @@ def _is_waitable(descriptor: int) -> bool:
 class _Datagrams(asyncio.DatagramProtocol):
     """Passes on each line of each datagram."""
 
-    def __init__(self, take: Callable[[bytes], None]) -> None:
+    def __init__(self, take: Callable[[bytes], bool]) -> None:
         self._take = take
 
     def datagram_received(self, data: bytes, _: object) -> None:
