@@ -16,6 +16,7 @@ from vm_embedded.arrays import Image, Singles
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY, LookContract, LookTest
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
+from vm_embedded.network.model_file import SEAL_KEY, sealed
 
 from .look_checkpoint import LookCheckpoint
 from .look_graph import look_model
@@ -77,13 +78,14 @@ def _answers(network: LookNetwork, patches: Image) -> Singles:
 
 
 def _with_metadata(content: bytes, manifest: Manifest, files: Mapping[str, bytes]) -> bytes:
-    """A model file's bytes with another manifest and these inner files. The graph and other metadata stay as they are.
+    """A model file's bytes with another manifest, these inner files, and a new seal. All else stays as it is.
 
     files: of the look network and its glance, by key.
     """
     model = onnx.load_from_string(content)
-    metadata = {each.key: each.value for each in model.metadata_props if each.key not in (LOOK_KEY, GLANCE_KEY)}
+    replaced = (LOOK_KEY, GLANCE_KEY, SEAL_KEY)
+    metadata = {each.key: each.value for each in model.metadata_props if each.key not in replaced}
     metadata[METADATA_KEY] = manifest.as_json()
     metadata |= {key: base64.b64encode(file).decode() for key, file in files.items()}
     helper.set_model_props(model, metadata)
-    return bytes(model.SerializeToString(deterministic=True))
+    return sealed(bytes(model.SerializeToString(deterministic=True)))

@@ -9,6 +9,8 @@ import numpy.typing as npt
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
+from vm_embedded.network.model_file import sealed
+
 _OPSETS = {"": 17, "ai.onnx.ml": 3}
 _IR_VERSION = 8
 """ONNX Runtime reads this version since 1.12: a robot may have an older one than the workstation."""
@@ -48,7 +50,7 @@ class OnnxGraph:
         return self.node("ArrayFeatureExtractor", [table, columns], output, domain="ai.onnx.ml")
 
     def model(self, inputs: Tensors, outputs: Tensors, metadata: dict[str, str], doc: str) -> bytes:
-        """The bytes of a model file with this graph. The same graph gives the same bytes."""
+        """The bytes of a model file with this graph, sealed if it has metadata. The same graph gives the same bytes."""
         takes, gives = (
             [helper.make_tensor_value_info(name, kind, shape) for name, (kind, shape) in each.items()]
             for each in (inputs, outputs)
@@ -63,4 +65,5 @@ class OnnxGraph:
         )
         helper.set_model_props(model, metadata)
         onnx.checker.check_model(model, full_check=True)
-        return bytes(model.SerializeToString(deterministic=True))
+        content = bytes(model.SerializeToString(deterministic=True))
+        return sealed(content) if metadata else content

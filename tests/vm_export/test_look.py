@@ -15,7 +15,7 @@ from tests.vm_export.checkpoints import checkpoint, manifest
 from tests.vm_export.looks import SHAPE, glancing_checkpoint, look_checkpoint, look_network
 from vm_embedded.errors import InputError, ModelError
 from vm_embedded.network.close_look import CloseLook
-from vm_embedded.network.model_file import read_model
+from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
 from vm_embedded.network.session import Session
 from vm_export import attach_look, export
 from vm_export.checkpoint import Checkpoint
@@ -301,11 +301,12 @@ def test_a_checkpoint_keeps_its_glance(tmp_path):
 def test_other_metadata_of_a_model_file_stays(tmp_path):
     export.export(ball_checkpoint(), tmp_path / "model.onnx")
     model = onnx.load(tmp_path / "model.onnx")
+    assert model.metadata_props.pop().key == SEAL_KEY
     model.metadata_props.add(key="author", value="Zoë")
-    onnx.save(model, tmp_path / "model.onnx")
+    (tmp_path / "model.onnx").write_bytes(sealed(model.SerializeToString()))
     export.change_look(tmp_path / "model.onnx", tmp_path / "other.onnx", look_checkpoint())
     kept = {each.key: each.value for each in onnx.load(tmp_path / "other.onnx").metadata_props}
-    assert sorted(kept) == ["author", "visual_mesh", "visual_mesh_look"]
+    assert sorted(kept) == ["author", "visual_mesh", "visual_mesh_look", "visual_mesh_sha256"]
     assert kept["author"] == "Zoë"
 
 

@@ -37,6 +37,9 @@ _REFUSED = {
 }
 """Fields that make a model file unusable, and why. vm-export never writes them."""
 
+SEAL_KEY = "visual_mesh_sha256"
+"""Key of the seal in the metadata of a model file: the SHA-256 of everything else in the file."""
+
 _METADATA_PROPS = 14
 _EXTERNAL_DATA, _DATA_LOCATION = 13, 14
 _MOST_FIELDS = 500_000
@@ -63,7 +66,8 @@ def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
     """Read and check a model file.
 
     Raises ModelError if it is missing, larger than `max_mib` [MiB], not an ONNX file, refers to external data, contains
-    inner graphs (control flow) or functions, or lacks a manifest of this format.
+    inner graphs (control flow) or functions, lacks a manifest of this format, or is not what its seal says: a damaged
+    network could still pass its self-test, and find nothing.
     """
     path = Path(path)
     try:
@@ -74,13 +78,17 @@ def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
         raise ModelError(f"can't read the model {path}: {getattr(error, 'strerror', None) or error}") from error
     try:
-        metadata = _metadata(content)
+        metadata, digest = _read_fields(content)
         if METADATA_KEY not in metadata:
             raise ModelError("no Visual Mesh manifest in its metadata; was it written by vm-export?")
         manifest = Manifest.from_json(metadata[METADATA_KEY])
         contract = manifest.look
         look = _inner_file(metadata, LOOK_KEY, "close look", contract)
         glance = _inner_file(metadata, GLANCE_KEY, "glance", contract and contract.glance)
+        if SEAL_KEY not in metadata:
+            raise ModelError("has no checksum: it was written by an older release; export it again with this release")
+        if metadata[SEAL_KEY] != digest:
+            raise ModelError("its checksum is wrong: it was damaged or changed; copy or export it again")
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from error
     return ModelFile(path, content, manifest, hashlib.sha256(content).hexdigest(), look, glance)
@@ -95,26 +103,48 @@ def _inner_file(metadata: dict[str, str], key: str, name: str, contract: LookCon
         return None
     try:
         content = base64.b64decode(metadata[key], validate=True)
-        _metadata(content)
+        _read_fields(content)
     except (ModelError, binascii.Error, ValueError) as error:
         raise ModelError(f"its {name} can't be read: {error}") from error
     return content
 
 
-def _metadata(content: bytes) -> dict[str, str]:
-    """The metadata of an ONNX file. Raises ModelError for other files and for parts that are refused."""
+def sealed(content: bytes) -> bytes:
+    """An ONNX file without a seal, with its seal. Raises ModelError for other content."""
+    _, digest = _read_fields(content)
+    entry = b"".join(_field(number, text.encode()) for number, text in ((1, SEAL_KEY), (2, digest)))
+    return content + _field(_METADATA_PROPS, entry)
+
+
+def _field(number: int, content: bytes) -> bytes:
+    """A field of a Protocol Buffers message, of at most 127 bytes."""
+    return bytes([number << 3 | 2, len(content)]) + content
+
+
+def _read_fields(content: bytes) -> tuple[dict[str, str], str]:
+    """The metadata of an ONNX file, and the SHA-256 of all its fields except the seal.
+
+    Raises ModelError for other files and for parts that are refused.
+    """
     metadata: dict[str, str] = {}
+    digest = hashlib.sha256()
     graphs = 0
     budget: _Budget = iter(range(_MOST_FIELDS))
     for number, value in _fields(memoryview(content), budget):
         if number == _METADATA_PROPS and isinstance(value, memoryview):
             entry = {key: bytes(text) for key, text in _fields(value, budget) if isinstance(text, memoryview)}
-            metadata[_text(entry.get(1, b""))] = _text(entry.get(2, b""))
+            key = _text(entry.get(1, b""))
+            metadata[key] = _text(entry.get(2, b""))
+            if key == SEAL_KEY:
+                continue
         graphs += number == 7
+        length = len(value) if isinstance(value, memoryview) else value
+        digest.update(f"{number}:{type(value).__name__}:{length};".encode())
+        digest.update(value if isinstance(value, memoryview) else b"")
     if not graphs:
         raise ModelError("not an ONNX file")
     _refuse_parts("Model", memoryview(content), budget)
-    return metadata
+    return metadata, digest.hexdigest()
 
 
 def _refuse_parts(message: str, data: memoryview, budget: _Budget) -> None:

@@ -17,7 +17,7 @@ from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.manifest import METADATA_KEY
-from vm_embedded.network.model_file import read_model
+from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
 from vm_embedded.network.plain_layout import PlainLayout
 from vm_embedded.network.runs_layout import RunsLayout
 from vm_export.checkpoint import Checkpoint
@@ -184,7 +184,9 @@ def changed(path, change, source=MODEL):
     """A copy of a model with something changed in it."""
     model = onnx.load(source)
     change(model)
-    onnx.save(model, path)
+    kept = {each.key: each.value for each in model.metadata_props if each.key != SEAL_KEY}
+    helper.set_model_props(model, kept)
+    path.write_bytes(sealed(model.SerializeToString()))
     return path
 
 

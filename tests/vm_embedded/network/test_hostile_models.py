@@ -1,5 +1,7 @@
 """Model files that were made to hang the runtime, or to show it another network than the one that was checked."""
 
+import base64
+import math
 import random
 import struct
 
@@ -8,9 +10,11 @@ import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
+from tests.vm_embedded.cli.commands import one_complaint, run
 from vm_embedded.errors import ModelError
-from vm_embedded.network.bundled import model_path
-from vm_embedded.network.model_file import read_model
+from vm_embedded.network.bundled import SHIPPED, model_path
+from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY
+from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
 from vm_embedded.network.onnx_model import OnnxModel
 
 onnxruntime = pytest.importorskip("onnxruntime")
@@ -161,3 +165,54 @@ def test_attack_10_a_damaged_model_prints_nothing_to_standard_output(capfd):
             refused += 1
     assert refused == 200  # also the readable ones: they have other inputs than {}
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_attack_1_every_changed_bit_is_refused(name, tmp_path):
+    whole, chance = model_path(name).read_bytes(), random.Random(1)
+    path = tmp_path / "model.onnx"
+    for _ in range(150):
+        content = bytearray(whole)
+        content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+        path.write_bytes(content)
+        with pytest.raises(ModelError):
+            read_model(path)
+    path.write_bytes(whole)
+    assert read_model(path).content == whole
+
+
+def weights_of(model, key):
+    """A network of a model file, by its key in the metadata; None: the mesh network itself."""
+    if key is None:
+        return model, lambda: None
+    entry = next(each for each in model.metadata_props if each.key == key)
+    inner = onnx.load_from_string(base64.b64decode(entry.value))
+
+    def store():
+        entry.value = base64.b64encode(inner.SerializeToString()).decode()
+
+    return inner, store
+
+
+@pytest.mark.parametrize("value", [0.0, math.nan, None], ids=["zero", "NaN", "random"])
+@pytest.mark.parametrize("key", [None, LOOK_KEY, GLANCE_KEY])
+def test_attack_1_a_network_with_other_weights_is_refused_by_vm_detect(key, value, tmp_path):
+    made = ball_small()
+    network, store = weights_of(made, key)
+    for each in network.graph.initializer:
+        if each.data_type == TensorProto.FLOAT and "kernel" in each.name:
+            shape = numpy_helper.to_array(each).shape
+            new = np.random.default_rng(0).random(shape) if value is None else np.full(shape, value)
+            each.CopyFrom(numpy_helper.from_array(new.astype(np.float32), each.name))
+    store()
+    path = tmp_path / "model.onnx"
+    onnx.save(made, path)
+    one_complaint(run("--check-config", "--model", path, code=1), str(path), "its checksum is wrong")
+
+
+def test_a_file_is_sealed_once_and_its_seal_covers_all_else():
+    content = model_path("ball-small").read_bytes()
+    model = onnx.load_from_string(content)
+    seal = model.metadata_props.pop()
+    assert seal.key == SEAL_KEY
+    assert sealed(model.SerializeToString(deterministic=True)) == content

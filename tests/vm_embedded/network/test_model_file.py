@@ -11,7 +11,7 @@ from onnx import TensorProto, helper, numpy_helper
 from tests.manifests import ball_manifest
 from vm_embedded.errors import ModelError
 from vm_embedded.network.manifest import METADATA_KEY, Manifest, ObjectClass
-from vm_embedded.network.model_file import read_model
+from vm_embedded.network.model_file import read_model, sealed
 
 from ..strategies import attempt
 
@@ -45,7 +45,7 @@ def model(nodes=None, initializers=(), metadata=None, **parts):
     return made
 
 
-VALID = model(initializers=[inside()]).SerializeToString()
+VALID = sealed(model(initializers=[inside()]).SerializeToString())
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,13 @@ def test_the_model_of_these_tests_is_valid_onnx():
 
 def test_other_metadata_does_not_matter(write):
     metadata = {"author": "somebody", METADATA_KEY: MANIFEST.as_json(), "zzz": "ü"}
-    assert read_model(write(model(initializers=[inside()], metadata=metadata))).manifest == MANIFEST
+    content = sealed(model(initializers=[inside()], metadata=metadata).SerializeToString())
+    assert read_model(write(content)).manifest == MANIFEST
+
+
+def test_a_model_of_an_older_release_without_a_checksum_is_refused_with_advice(write):
+    with pytest.raises(ModelError, match=r"model\.onnx: has no checksum.*export it again"):
+        read_model(write(model(initializers=[inside()])))
 
 
 def test_a_model_of_the_exporter_is_read(write):
@@ -226,7 +232,7 @@ def test_external_data_is_refused_wherever_it_hides(write, place):
 
 @pytest.mark.parametrize("place", PLACES.values(), ids=PLACES)
 def test_data_inside_of_the_file_is_accepted_in_the_same_places(write, place):
-    assert read_model(write(place(inside()))).manifest == MANIFEST
+    assert read_model(write(sealed(place(inside()).SerializeToString()))).manifest == MANIFEST
 
 
 def test_external_data_as_the_onnx_package_saves_it_is_refused(folder):
