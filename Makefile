@@ -69,6 +69,8 @@ data: .venv/synth ## render a training set: make data HDRI=folder-of-maps [OUT=d
 networks: .venv/dev ## train the networks of the package from their seeds: make networks HDRI=folder-of-maps (hours)
 	$(MAKE) data OUT=data/soccer COUNT=16000 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
+	$(BIN)/python -c "from pathlib import Path; from vm_train.tuning.rendered_patches import RENDERED, write_rendered; \
+		from vm_train.tuning.rendered_sample import sample_run; write_rendered(RENDERED, sample_run(Path('$(BUILD)/ball-look')))"
 
 $(BUILD)/mesh/model.pt $(BUILD)/soccer/model.pt: $(BUILD)/%/model.pt: export/networks/%.toml
 	if test -e $(BUILD)/$*/run.json; then $(BIN)/vm-train resume $(BUILD)/$*; \

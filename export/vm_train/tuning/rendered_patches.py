@@ -1,7 +1,7 @@
 """Rendered patches that a fine-tuning learns from besides the user's own, so that the network forgets nothing.
 
-They are a sample of those that the shipped networks learned from, in one small file of the package: pictures of 32 x 32
-patches each, compressed as WebP.
+They are a sample of those that the look of `ball` learned from, in one small file of the package: pictures of 32 x 32
+patches each, compressed as WebP. `make networks` writes it.
 """
 
 from __future__ import annotations
