@@ -188,6 +188,9 @@ def _render(options: argparse.Namespace) -> int:
     maps = _maps(options, configuration)
     rooms = () if maps else tuple(HELD_OUT_ROOMS if options.held_out else ROOMS)
     load_mitsuba()
+    on_field = configuration.object.is_ball and configuration.ground.photographed
+    if maps and on_field and not any(path.stem in configuration.maps.floors for path in maps):
+        print("vm-synth: none of the maps has an entry in [maps.floors], so all pictures show a field", file=sys.stderr)
     read_assets(configuration)
     try:
         options.out.mkdir(parents=True, exist_ok=True)
@@ -232,11 +235,7 @@ def _maps(options: argparse.Namespace, configuration: SceneConfiguration) -> lis
     missing = missing_held_out(options.hdri, configuration.maps)
     if missing:
         print(f"vm-synth: held-out maps that are not in {options.hdri}: {', '.join(missing)}", file=sys.stderr)
-    maps = _valid_maps(found, configuration)
-    on_field = configuration.object.is_ball and configuration.ground.photographed
-    if on_field and not any(path.stem in configuration.maps.floors for path in maps):
-        print("vm-synth: none of the maps has an entry in [maps.floors], so all pictures show a field", file=sys.stderr)
-    return maps
+    return _valid_maps(found, configuration)
 
 
 def _valid_maps(paths: Sequence[Path], configuration: SceneConfiguration) -> list[Path]:

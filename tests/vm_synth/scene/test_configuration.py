@@ -33,7 +33,9 @@ def kind_of(entry):
         return None
     if isinstance(entry.default, tuple):
         return "names" if "allowed" in entry.metadata else "range"
-    return "name" if "allowed" in entry.metadata else "number"
+    if isinstance(entry.default, str):
+        return "name" if "allowed" in entry.metadata else "text"
+    return "number"
 
 
 RANGES = [each for each in ENTRIES if kind_of(each.values[1]) == "range"]
@@ -80,8 +82,12 @@ def values_of(entry):
         return st.tuples(between(entry), between(entry)).map(lambda ends: tuple(float(each) for each in sorted(ends)))
     if kind_of(entry) == "number":
         return between(entry)
+    if entry.name == "solid":
+        return st.sampled_from([each for each in metadata["allowed"] if each != "file"])
     if kind_of(entry) == "name":
         return st.sampled_from(metadata["allowed"])
+    if kind_of(entry) == "text":
+        return st.just("") if entry.name == "file" else st.sampled_from(["a", "cup_2", "Ball"])
     return st.lists(st.sampled_from(metadata["allowed"]), min_size=1, unique=True).map(tuple)
 
 
@@ -129,7 +135,8 @@ def test_every_entry_says_what_it_is(section, entry):
 UNITS = {
     "m": "camera.height ball.radius ball.distance ball.off_plane_height things.distance field.length field.line_width "
     "field.border field.goal_height field.goal_width bodies.clutter_size bodies.shoe_length bodies.furniture_size "
-    "bodies.robot_height bodies.person_height bodies.distractor_radius",
+    "bodies.robot_height bodies.person_height bodies.distractor_radius object.radius object.height object.distance "
+    "table.length table.texture_size",
     "deg": "camera.rectilinear_view camera.fisheye_view camera.pitch camera.steep_pitch camera.roll field.hue "
     "maps.floors",
     "px": "camera.picture_width camera.picture_height sensor.defocus sensor.motion sensor.fringe",

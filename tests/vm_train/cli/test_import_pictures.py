@@ -28,8 +28,15 @@ def test_the_command_shows_the_first_faults_only_and_fails_if_nothing_was_import
     assert said[-1] == "vm-train: skipped 3 more records"
 
 
-@pytest.mark.parametrize("key", ["lens/fov", "lens/fov=", "fov=x"])
-def test_a_renaming_that_is_none_is_wrong_usage(key, capsys):
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("lens/fov", "OURS=THEIRS"),
+        ("lens/fov=", "OURS=THEIRS"),
+        ("fov=x", "unknown key 'fov'; did you mean 'lens/fov'?"),
+    ],
+)
+def test_a_renaming_that_is_none_is_wrong_usage(key, said, capsys):
     with pytest.raises(SystemExit):
         import_parser().parse_args(["a", "out", "--key", key])
-    assert "OURS=THEIRS" in capsys.readouterr().err
+    assert said in capsys.readouterr().err

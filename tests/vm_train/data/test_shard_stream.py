@@ -26,7 +26,7 @@ def test_a_stream_gives_all_pictures_in_order(shards, pictures):
     found = list(stream(shards))
     assert found == [each.raw() for each in pictures]
     assert (decode_picture(found[2], CLASSES).labels == read_picture(pictures[2], CLASSES).labels).all()
-    with pytest.raises(PictureFault, match="mask of 000: can't be read"):
+    with pytest.raises(PictureFault, match="mask of 000: can't be decoded as an image"):
         decode_picture(found[0]._replace(mask=b"none"), CLASSES)
 
 

@@ -4,10 +4,10 @@ import json
 import shutil
 
 import numpy as np
-from vm_workstation.sphere_outline import sphere_outline
 
 from tests.vm_train.drawn import RADIUS, SIZE, draw_set
 from vm_embedded.geometry.lens_files import read_lens_file
+from vm_workstation.outlines import sphere_outline
 
 
 def true_box(folder, number):

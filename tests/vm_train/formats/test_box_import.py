@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from vm_workstation.sphere_outline import sphere_outline
 
 from tests.manifests import ball_manifest
 from tests.vm_train.commands import run, run_module
@@ -33,6 +32,7 @@ from vm_train.data.classes import Classes
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.object_truth import read_scene, true_objects
 from vm_train.formats.box_masks import MaskRule, mask_of
+from vm_workstation.outlines import sphere_outline
 
 TWO_CLASSES = """
 [classes]
@@ -247,7 +247,7 @@ def test_a_network_of_the_package_is_fine_tuned_as_a_user_types_it(frames, tmp_p
     done = run("import-boxes", days, out, "--names", "0=ball", "--from", "ball", "--object-radius", RADIUS)
     assert "40 pictures, 4 of them in validation.txt" in done.stdout
     scene = read_scene(next(out.glob("scene*.json")))
-    assert (scene.ball_radius, scene.in_mask) == (RADIUS, True)
+    assert (scene.radius, scene.in_mask) == (RADIUS, True)
 
     mixed.mkdir()
     subprocess.run(["cp", "-rs", f"{frames[1]}/.", f"{out}/.", mixed], check=True)
