@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import threading
 import time
 from dataclasses import dataclass
 from typing import Any, TextIO
@@ -16,7 +17,8 @@ _MOST_LINES, _PERIOD = 50, 10.0
 class EventLog:
     """Writes events, at most 50 of a kind in ten seconds; the next one then counts those that were left out.
 
-    If the log can't be written, it is silent from then on; the detector keeps running.
+    Any thread may log; each event is one whole line. If the log can't be written, it is silent from then on; the
+    detector keeps running.
     """
 
     def __init__(self, program: str, stream: TextIO | None = None) -> None:
@@ -24,9 +26,14 @@ class EventLog:
         self._stream = stream or sys.stderr or open(os.devnull, "w")  # noqa: SIM115, PTH123
         self._text = self._stream.isatty()
         self._recent: dict[str, _Recent] = {}
+        self._lock = threading.Lock()
 
     def __call__(self, event: str, level: str = "info", **fields: Any) -> None:
         """Log an event with its fields. The text form leaves out empty ones."""
+        with self._lock:
+            self._write(event, level, fields)
+
+    def _write(self, event: str, level: str, fields: dict[str, Any]) -> None:
         left_out = self._recent.setdefault(event, _Recent()).count(time.monotonic())
         if left_out is None:
             return
@@ -39,7 +46,8 @@ class EventLog:
             now = round(time.time(), 3)
             line = json.dumps({"time": now, "level": level, "event": event, **fields}, default=str)
         try:
-            print(" ".join(line.split("\n")), file=self._stream, flush=True)
+            self._stream.write(" ".join(line.split("\n")) + "\n")
+            self._stream.flush()
         except (OSError, ValueError):  # a full disk, a closed terminal
             self._stream = open(os.devnull, "w")  # noqa: SIM115, PTH123
 

@@ -1,7 +1,11 @@
-"""The two forms of the log."""
+"""The two forms of the log, and events of several threads."""
 
 import io
 import json
+import sys
+import threading
+
+import pytest
 
 from vm_embedded.live.log import EventLog
 
@@ -18,3 +22,33 @@ def test_text_leaves_out_empty_fields_and_json_keeps_them():
     EventLog("vm-detect", file)("state", **fields)
     assert terminal.getvalue().endswith(" state: state ok, was starting, frames 0\n")
     assert fields.items() <= json.loads(file.getvalue()).items()
+
+
+@pytest.fixture
+def hasty():
+    """Threads take turns after each few instructions."""
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(usual)
+
+
+def test_events_of_several_threads_are_whole_lines(hasty, tmp_path):
+    """Without a buffer, as with PYTHONUNBUFFERED: a line and its end could be two writes."""
+    written = tmp_path / "log"
+    with written.open("wb", buffering=0) as file, io.TextIOWrapper(file, write_through=True) as stream:
+        log = EventLog("vm-detect", stream)
+
+        def tell(thread):
+            for number in range(400):
+                log(f"thread {thread}, part {number // 40}", number=number)
+
+        threads = [threading.Thread(target=tell, args=(number,)) for number in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    events = [json.loads(line) for line in written.read_text().splitlines()]
+    assert sorted((each["event"], each["number"]) for each in events) == sorted(
+        (f"thread {thread}, part {number // 40}", number) for thread in range(8) for number in range(400)
+    )
