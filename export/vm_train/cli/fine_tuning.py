@@ -73,18 +73,20 @@ def _begin(options: argparse.Namespace) -> int:
     example = "training.epochs=5"
     configuration = read_sections(TuningConfiguration, options.config, parse_overrides(options.set, example))
     source = BoxSource(options.boxes.resolve(), options.format, parse_names(options.names))
-    run, found = begin_tuning(
+    found = source.read()
+    _complain(found.faults, options.boxes)
+    if options.strict and found.faults:
+        raise InputError("some boxes can't be used, see above: repair them, or leave out --strict to skip them")
+    run = begin_tuning(
         options.output,
         source,
+        found,
         configuration,
         model_path(options.model),
         str(options.model),
         options.rendered,
         options.threads or 1,
     )
-    _complain(found.faults, options.boxes)
-    if options.strict and found.faults:
-        raise InputError("some boxes can't be used, see above: repair them, or leave out --strict to skip them")
     recordings = len({each.recording for each in run.pictures})
     count = len(run.split.training), len(run.split.validation)
     print(

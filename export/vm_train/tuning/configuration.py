@@ -1,4 +1,4 @@
-"""tune.toml: boxes, patches, training and augmentation of a fine-tuning, a section each."""
+"""tune.toml: data, patches, training and augmentation of a fine-tuning, a section each."""
 
 from __future__ import annotations
 

@@ -104,8 +104,10 @@ class TuningRun:
 
     @property
     def contract(self) -> LookContract:
-        """The contract of the look network that it began with. Raises ModelError if there is none."""
-        return look_of(self.before).contract
+        """The contract of the look network that it began with."""
+        contract = self.before.manifest.look
+        assert contract is not None  # begin_tuning refuses a model file without one
+        return contract
 
     @property
     def object_class(self) -> str:
@@ -130,21 +132,22 @@ class TuningRun:
 def begin_tuning(
     folder: Path,
     boxes: BoxSource,
+    found: BoxedSet,
     configuration: TuningConfiguration,
     model: Path,
     name: str,
     rendered: Path | None = None,
     threads: int = 1,
-) -> tuple[TuningRun, BoxedSet]:
-    """Write the files of a new fine-tuning, and return it with the boxes that were read.
+) -> TuningRun:
+    """Write the files of a new fine-tuning.
 
-    model: a model file with a close look; name: as the user named it. rendered: folder of the training of that look;
-    None: the patches of the package. Raises InputError, also if the folder holds a training, and ModelError.
+    found: what `boxes` has. model: a model file with a close look; name: as the user named it. rendered: folder of the
+    training of that look; None: the patches of the package. Raises InputError, also if the folder holds a training,
+    and ModelError.
     """
     check_unused(folder, _FILES)
     before = read_model(model)
     look = look_of(before)
-    found = boxes.read()
     check_boxes(found, look.contract.object_class, str(boxes.folder))
     check_rendered(look.contract, rendered)
     split = split_by_recording(found.pictures, configuration.data.validation, configuration.data.split_seed)
@@ -160,7 +163,7 @@ def begin_tuning(
     write_rendered_for(run.rendered_path, rendered)
     _write(folder / "tune.toml", to_commented_toml(configuration))
     _write(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
-    return run, found
+    return run
 
 
 def is_tuning(folder: Path) -> bool:

@@ -168,6 +168,15 @@ def test_mistakes_are_told_in_one_line(complaint, frames, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+def test_strict_refuses_faults_before_it_writes_anything(frames, tmp_path, tune):
+    damaged = shutil.copytree(frames, tmp_path / "damaged")
+    next(path for path in sorted(damaged.glob("*.txt")) if path.read_text()).write_text("0 0.5\n")
+    error = tune(tmp_path / "run", "--boxes", damaged, "--strict", code=1).stderr
+    assert "has 2 entries" in error
+    assert "leave out --strict" in error
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_class_without_rendered_patches_needs_a_run(whole, tmp_path, complaint, frames):
     shown = look_of(read_model(model_path("ball-small")))
     assert shown.contract.object_class == "ball"
