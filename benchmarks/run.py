@@ -132,19 +132,18 @@ def whole_calls(models: Models, work: list[Frame], rounds: int) -> dict[str, Any
     found: dict[str, Any] = {}
     for name in NETWORKS:
         frame = median_frame(models, work, name)
-        for sampling in ("exact", "fast"):
-            detector = models.detector(name, sampling=sampling)
-            seen = detector.detect(frame.image, frame.orientation, frame.lens)
-            calls = {
-                "whole": lambda d=detector, f=frame: d.detect(f.image, f.orientation, f.lens),
-                "session": session_call(detector, mesh_on_screen(detector, frame)),
-            }
-            times = interleaved(calls, rounds)  # type: ignore[arg-type]
-            row: dict[str, Any] = dict(times)
-            row |= {"frame": frame.name, "points": len(seen.pixels), "slots": len(seen.observation.layout)}
-            row["whole_over_session"] = round(row["whole"]["p50"] / row["session"]["p50"], 2)
-            row["p99_over_p50"] = round(row["whole"]["p99"] / row["whole"]["p50"], 2)
-            found[f"{name} {sampling}"] = row
+        detector = models.detector(name)
+        seen = detector.detect(frame.image, frame.orientation, frame.lens)
+        calls = {
+            "whole": lambda d=detector, f=frame: d.detect(f.image, f.orientation, f.lens),
+            "session": session_call(detector, mesh_on_screen(detector, frame)),
+        }
+        times = interleaved(calls, rounds)  # type: ignore[arg-type]
+        row: dict[str, Any] = dict(times)
+        row |= {"frame": frame.name, "points": len(seen.pixels), "slots": len(seen.observation.layout)}
+        row["whole_over_session"] = round(row["whole"]["p50"] / row["session"]["p50"], 2)
+        row["p99_over_p50"] = round(row["whole"]["p99"] / row["whole"]["p50"], 2)
+        found[name] = row
     return found
 
 
@@ -173,14 +172,13 @@ def peers(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
     """
     frame = median_frame(models, work, "5x4")
     calls: dict[str, Callable[[], object]] = {}
-    kinds = [(name, sampling) for name in ("5x4", "9x4") for sampling in ("exact", "fast")]
     # Each of ours follows a peer, so that all find the processor's caches as a large network leaves them.
-    for peer, kind in zip_longest(PEERS, kinds):
+    for peer, name in zip_longest(PEERS, ("5x4", "9x4")):
         detector = PeerDetector(peer)
         calls[peer.name] = lambda d=detector: d.detect(frame.image)  # type: ignore[misc]
-        if kind:
-            ours = models.detector(kind[0], sampling=kind[1])
-            calls[f"Visual Mesh {kind[0]} {kind[1]}"] = lambda d=ours: d.detect(  # type: ignore[misc]
+        if name:
+            ours = models.detector(name)
+            calls[f"Visual Mesh {name}"] = lambda d=ours: d.detect(  # type: ignore[misc]
                 frame.image, frame.orientation, frame.lens
             )
     times = interleaved(calls, max(rounds // 20, 3), row=30)
@@ -251,7 +249,7 @@ def walks(models: Models, work: list[Frame], seconds: float) -> dict[str, Any]:
 
 def soak(models: Models, work: list[Frame], count: int) -> dict[str, Any]:
     """Resident memory over many frames with random orientations, for a five-layer network."""
-    detector = models.detector("5x4", sampling="fast", cache_mib=16.0)
+    detector = models.detector("5x4", cache_mib=16.0)
     random = np.random.default_rng(0)
     frame = median_frame(models, work, "5x4")
     started, marks = perf_counter(), []

@@ -32,7 +32,7 @@ def model(shared, tmp_path_factory):
 @pytest.fixture(scope="module")
 def points(shared, model, tmp_path_factory):
     folder = tmp_path_factory.mktemp("points")
-    exact = ("--sampling", "exact", "--height-tolerance", 0)
+    exact = ("--height-tolerance", 0)
     run("vm-detect", "--camera", shared / "reference/images", "--model", model, "--save-points", folder, *exact)
     return folder
 
@@ -116,7 +116,7 @@ def score(shared, model, *options):
     return len(hits), len(truth), false, errors
 
 
-@pytest.mark.parametrize("options", [(), ("--sampling", "fast"), ("--height-tolerance", "0")], ids=str)
+@pytest.mark.parametrize("options", [(), ("--height-tolerance", "0")], ids=str)
 def test_the_authors_network_finds_the_balls(shared, model, options):
     hits, balls, false, errors = score(shared, model, *options)
     assert balls == 14

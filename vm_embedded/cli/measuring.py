@@ -45,7 +45,6 @@ class Run:
         return {
             "threads": self.detector.session.threads,
             "spinning": settings.spinning,
-            "sampling": settings.sampling,
             "total_ms": _quantiles(self.total),
             "stages_ms": {
                 name: {**_quantiles(values), "share": round(float(values.sum() / self.total.sum()), 3)}

@@ -21,7 +21,7 @@ from ..mesh.mesh import Mesh
 from ..network.choose_layout import choose_layout
 from ..network.layout import Layout
 from ..network.manifest import Manifest
-from .footprint import Levels, footprint_levels
+from .footprint import Levels, levels_for
 from .prepared_view import PreparedView
 from .projection import may_be_on_screen
 from .settings import Settings
@@ -34,16 +34,16 @@ _ROUNDING = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class PreparedPoints:
-    """The part of a mesh that a bucket keeps: the points that may be on screen, in the network's order, and for
-    footprints the picture that each of them is sampled from."""
+    """The part of a mesh that a bucket keeps: the points that may be on screen, in the network's order, and the picture
+    of the pyramid that colors each of them."""
 
     layout: Layout
-    levels: Levels | None
+    levels: Levels
 
     @property
     def nbytes(self) -> int:
         """Memory that it holds [bytes]."""
-        return self.layout.nbytes + sum(each.nbytes for each in self.levels or ())
+        return self.layout.nbytes + self.levels.nbytes
 
 
 class MeshCache:
@@ -131,7 +131,7 @@ class MeshCache:
 
     def _prepared(self, mesh: Mesh, height: float, lens: Lens) -> PreparedPoints:
         layout = choose_layout(mesh, self.manifest)
-        return PreparedPoints(layout, footprint_levels(self.manifest, layout.rays, height, lens))
+        return PreparedPoints(layout, levels_for(self.manifest, layout.rays, height, lens))
 
     def _look_up(self, key: Hashable, make: Callable[[], _Kept], counted: bool = True) -> _Kept:
         kept: _Kept | None = self._kept.get(key)

@@ -23,12 +23,13 @@ def normalize_colors(colors: Singles, kind: str, counted: Mask | None = None) ->
 
     Sums are in double precision, so the digits don't depend on the order of the points.
     """
-    if kind == "absolute":
+    planes = colors.T
+    seen = planes if counted is None else planes.compress(counted, axis=1)
+    if kind == "absolute" or not seen.size:
         return
-    for column in colors.T:
-        seen = column if counted is None else column[counted]
-        if len(seen):
-            mean = seen.mean(dtype=np.float64)
-            deviation = max(float(seen.std(dtype=np.float64)), _LEAST_DEVIATION)
-            column -= np.float32(mean)
-            column *= np.float32(1.0 / deviation)
+    deviations = seen.astype(np.float64)
+    mean = deviations.mean(axis=1, keepdims=True)
+    deviations -= mean
+    deviation = np.sqrt(np.square(deviations, out=deviations).mean(axis=1, keepdims=True))
+    planes -= mean.astype(np.float32)
+    planes *= (1.0 / np.maximum(deviation, _LEAST_DEVIATION)).astype(np.float32)

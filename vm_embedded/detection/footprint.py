@@ -8,33 +8,69 @@ at the point, so an object looks alike at every distance.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats
+from ..arrays import Floats, frozen
 from ..geometry.lens import Lens
 from ..geometry.shape import Shape
 from ..network.manifest import Manifest
 
-Levels = tuple[npt.NDArray[np.intp], ...]
-"""For each picture of the pyramid the points that it colors. Each picture is half as large as the one before."""
+BLOCK = 64
+"""Points that are sampled together; each level has whole blocks."""
 
 _MOST_HALVINGS = 7
 """Nothing is left of a picture after more."""
 
 
-def footprint_levels(manifest: Manifest, rays: Floats, height: float, lens: Lens) -> Levels | None:
-    """The points (n,) with rays (n, 3) that each picture colors, or None if the network samples single pixels.
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """Which picture of the pyramid colors each of n points. Each picture is half as large as the one before.
+
+    order (p,): the points, those of the first picture first. The share of each picture is filled up to whole blocks:
+    its last point is repeated. ends: for each picture, the number of blocks up to the end of its share.
+    """
+
+    order: npt.NDArray[np.intp]
+    ends: tuple[int, ...]
+
+    @classmethod
+    def of(cls, level: npt.NDArray[np.integer]) -> Levels:
+        """For points with these levels (n,): the picture halved so many times colors a point."""
+        shares = [np.flatnonzero(level == each) for each in range(int(level.max(initial=0)) + 1)]
+        filled = [np.pad(share, (0, -len(share) % BLOCK), mode="edge") if len(share) else share for share in shares]
+        blocks = np.cumsum([len(each) // BLOCK for each in filled])
+        return cls(frozen(np.concatenate(filled)), tuple(blocks.tolist()))
+
+    def shares(self) -> Iterator[tuple[int, slice]]:
+        """The pictures that color points: how often each was halved, and its blocks."""
+        start = 0
+        for level, end in enumerate(self.ends):
+            if end > start:
+                yield level, slice(start, end)
+            start = end
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it holds [bytes]."""
+        return self.order.nbytes
+
+
+def levels_for(manifest: Manifest, rays: Floats, height: float, lens: Lens) -> Levels:
+    """The levels of points with rays (n, 3). A network that samples single pixels takes all from the whole picture.
 
     height: of the camera that the mesh is made for [m]. lens: fitted to the image.
     """
     if manifest.sampling == "bilinear":
-        return None
-    return levels_of(rays, manifest.mesh_shape, height, manifest.intersections, lens.scale)
+        return uniform_levels(len(rays), 1.0)
+    return footprint_levels(rays, manifest.mesh_shape, height, manifest.intersections, lens.scale)
 
 
-def levels_of(rays: Floats, shape: Shape, height: float, intersections: float, scale: float) -> Levels:
-    """The points (n,) with rays (n, 3) of a mesh that each picture colors.
+def footprint_levels(rays: Floats, shape: Shape, height: float, intersections: float, scale: float) -> Levels:
+    """The levels of a mesh's points with rays (n, 3).
 
     The mesh is made for a shape seen from a height [m], with `intersections` rings k across an object. At an
     inclination phi the object's angular radius is r cos(phi) / (h - c), with c the height of its center. So rings are
@@ -42,12 +78,14 @@ def levels_of(rays: Floats, shape: Shape, height: float, intersections: float, s
     axis [px/rad].
     """
     widest = 2.0 * shape.radius * scale / (intersections * (height - shape.center_height))
-    width = widest * np.maximum(np.nan_to_num(-rays[:, 2]), 0.0)
-    level = np.clip(np.floor(np.log2(np.maximum(width, 1.0))), 0, _MOST_HALVINGS).astype(np.intp)
-    return tuple(np.flatnonzero(level == each) for each in range(int(level.max(initial=0)) + 1))
+    return Levels.of(_level_of(widest * np.maximum(np.nan_to_num(-rays[:, 2]), 0.0)))
 
 
 def uniform_levels(count: int, width: float) -> Levels:
     """The levels of `count` points that are all `width` apart [px]."""
-    level = int(np.clip(np.floor(np.log2(max(width, 1.0))), 0, _MOST_HALVINGS))
-    return (*(np.empty(0, dtype=np.intp) for _ in range(level)), np.arange(count))
+    return Levels.of(_level_of(np.full(count, width)))
+
+
+def _level_of(width: Floats) -> npt.NDArray[np.integer]:
+    """The smallest picture whose pixels are at most `width` (n,) [px] wide."""
+    return np.clip(np.floor(np.log2(np.maximum(width, 1.0))), 0, _MOST_HALVINGS).astype(np.int8)

@@ -102,7 +102,7 @@ def classify(
     shown = projected.only(layout.original)
     points = layout.new_points()
     colors = layout.colors_of(points)  # a view: writing to it fills `points`
-    sample(pyramid, projected.pixels, settings.sampling, colors, view.levels)
+    sample(pyramid, projected.pixels, view.levels, colors)
     normalize_colors(colors, manifest.colors, shown.on_screen)
     watch.lap("sample")
     probabilities = network.run(layout, points, projected.on_screen)

@@ -1,4 +1,4 @@
-"""The colors of the picture at the points of the mesh.
+"""The colors of the picture at the points of the mesh, bilinear in floating point.
 
 They are the network's input (paper: section "Graph Structure of the Mesh").
 """
@@ -7,72 +7,61 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from ..arrays import Floats, Image, Singles
-from .footprint import Levels
+from ..arrays import Floats, Singles
+from .footprint import BLOCK, Levels
 from .pyramid import Pyramid
 
-SAMPLINGS = ("exact", "fast")
-"""exact: bilinear in floating point. fast: by OpenCV in 8 bits, rounded to whole gray levels and 1/32 px."""
 
-_FOLD = 256  # remap takes tables of at most 32766 a side, so the list of points is folded into rows
-
-
-def sample(pyramid: Pyramid, pixels: Floats, sampling: str, out: Singles, levels: Levels | None = None) -> None:
+def sample(pyramid: Pyramid, pixels: Floats, levels: Levels, out: Singles) -> None:
     """Write the RGB colors, from 0 to 1, at pixels (n, 2) of the frame into `out` (n, 3).
 
-    sampling: one of SAMPLINGS. levels: the points that each level of the pyramid colors, for footprints. The color is
-    arbitrary where one of the four pixels around a point is outside of the image.
+    levels: which picture of the pyramid colors each point. The color is arbitrary where one of the four pixels around a
+    point is outside of the image.
     """
-    take = _exact if sampling == "exact" else _fast
+    if not len(levels.order):
+        return
     with np.errstate(invalid="ignore", over="ignore"):  # pixels outside of the lens's view may be NaN
-        if levels is None:
-            planes = take(pyramid.level(0), pixels)
-            for column, channel in enumerate(pyramid.channels):
-                np.multiply(planes[channel], np.float32(1.0 / 255.0), out=out[:, column])
-            return
-        for level, points in enumerate(levels):
-            if len(points):
-                image = pyramid.level(level)
-                planes = take(image, _in_halved(pixels[points], level, image))
-                for column, channel in enumerate(pyramid.channels):
-                    out[points, column] = planes[channel] * np.float32(1.0 / 255.0)
+        places = _in_pictures(pyramid, pixels, levels)
+        whole = np.floor(places)
+        right, down = (places - whole).astype(np.float32)
+        corners = _corners(pyramid, levels, whole.astype(np.int16))
+    left = corners[..., 0, :]
+    rows = left + right[:, None] * (corners[..., 1, :] - left)
+    upper = rows[:, :, 0]
+    values = (upper + down * (rows[:, :, 1] - upper)) * np.float32(1.0 / 255.0)
+    for column, channel in enumerate(pyramid.channels):
+        out[levels.order, column] = values[channel].reshape(-1)
 
 
-def _in_halved(pixels: Floats, level: int, image: Image) -> Floats:
-    """Pixels (n, 2) of the whole picture, in `image`, which was halved `level` times; clipped to its border."""
-    if not level:
-        return pixels
-    return np.clip((pixels + 0.5) / 2.0**level - 0.5, 0.0, (image.shape[1] - 1.0, image.shape[0] - 1.0))
+def _in_pictures(pyramid: Pyramid, pixels: Floats, levels: Levels) -> Floats:
+    """Pixels (2, blocks, BLOCK), x and y, of the points, each in its picture; clipped to the border of halved ones."""
+    places = np.stack([axis[levels.order] for axis in pixels.T]).reshape(2, -1, BLOCK)
+    for level, share in levels.shares():
+        if level:
+            height, width = pyramid.level(level).shape[:2]
+            for axis, last in zip(places[:, share], (width - 1.0, height - 1.0), strict=True):
+                axis += 0.5
+                axis *= 0.5**level
+                axis -= 0.5
+                np.clip(axis, 0.0, last, out=axis)
+    return places
 
 
-def _exact(image: Image, pixels: Floats) -> Singles:
-    """Values (channels, n), 0 to 255, bilinear in floating point."""
-    x, y = pixels.T
-    left, upper = np.floor(x), np.floor(y)
-    right, down = (x - left).astype(np.float32), (y - upper).astype(np.float32)
-    corners = np.empty((2, 2, len(pixels), 2), dtype=np.float32)
-    corners[..., 0] = left, left + 1.0
-    corners[0, ..., 1], corners[1, ..., 1] = upper, upper + 1.0
-    values = _remapped(image, corners.reshape(-1, 2), cv2.INTER_NEAREST)
-    rows = values.reshape(len(values), 2, 2, len(pixels))
-    above, below = (row[:, 0] + right * (row[:, 1] - row[:, 0]) for row in (rows[:, 0], rows[:, 1]))
-    return np.asarray(above + down * (below - above))
+def _corners(pyramid: Pyramid, levels: Levels, whole: np.ndarray) -> Singles:
+    """Values (channels, blocks, 2, 2, BLOCK), 0 to 255, of the upper and lower, left and right pixel around each place.
 
-
-def _fast(image: Image, pixels: Floats) -> Singles:
-    """Values (channels, n), 0 to 255, by OpenCV's table of 1/32 px."""
-    return _remapped(image, pixels, cv2.INTER_LINEAR)
-
-
-def _remapped(image: Image, pixels: npt.NDArray[np.floating], interpolation: int) -> Singles:
-    """Values (channels, n), 0 to 255, at pixels (n, 2)."""
-    rows = -(-len(pixels) // _FOLD)
-    if rows == 0:
-        return np.empty((image.shape[2] if image.ndim == 3 else 1, 0), dtype=np.float32)
-    table = np.zeros((rows * _FOLD, 2), dtype=np.float32)
-    table[: len(pixels)] = pixels
-    values = cv2.remap(image, table.reshape(rows, _FOLD, 2), None, interpolation)  # type: ignore[call-overload]
+    whole (2, blocks, BLOCK): x and y of the upper left one.
+    """
+    count = whole.shape[1]
+    table = np.empty((count, 2, 2, BLOCK, 2), dtype=np.int16)
+    for side in range(2):
+        np.add(whole[0, :, None], side, out=table[:, :, side, :, 0])
+        np.add(whole[1, :, None], side, out=table[:, side, :, :, 1])
+    table = table.reshape(count, 4 * BLOCK, 2)
+    frame = pyramid.level(0)
+    values = np.empty((count, 4 * BLOCK, *frame.shape[2:]), dtype=np.uint8)
+    for level, share in levels.shares():
+        cv2.remap(pyramid.level(level), table[share], None, cv2.INTER_NEAREST, dst=values[share])  # type: ignore[call-overload]
     planes = cv2.dnn.blobFromImage(values)  # one plane for each channel, as float32
-    return np.asarray(planes.reshape(-1, rows * _FOLD)[:, : len(pixels)])
+    return np.asarray(planes).reshape(-1, count, 2, 2, BLOCK)

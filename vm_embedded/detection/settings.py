@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from ..config.entries import check_entries, number, one_of, share, switch
 from .pixel_formats import FORMATS
-from .sampling import SAMPLINGS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,7 +18,6 @@ class Settings:
     threads: int = number(1, "threads of the network, at most the cores that the process may use", "", (1, 256))
     spinning: bool = switch(False, "let idle threads spin: saves microseconds, occupies whole cores")
     format: str = one_of(FORMATS, "bgr", "pixel format of the frames")
-    sampling: str = one_of(SAMPLINGS, "exact", "how to read colors between pixels")
     height_tolerance: float = number(
         0.5,
         "a new camera height gets its own mesh if the number of rings across an object changes by more than this; "

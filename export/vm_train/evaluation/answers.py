@@ -38,7 +38,7 @@ from vm_embedded.network.session import Session
 from vm_export.grid import VISUAL, Grid
 
 from ..data.pictures import Picture
-from ..graphs.labeled_graph import levels_for, plane_distances
+from ..graphs.labeled_graph import levels_of, plane_distances
 from ..graphs.seen_points import seen_points
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ def _view(picture: Picture, layout: Layout, manifest: Manifest, grid: Grid) -> P
     orientation = _orientation(picture)
     return PreparedView(
         layout=layout,
-        levels=levels_for(picture, layout.rays, manifest, grid),
+        levels=levels_of(picture, layout.rays, manifest, grid),
         shape=manifest.object_shape,
         rings=manifest.rings_across(orientation.height, orientation.height),
         height=orientation.height,

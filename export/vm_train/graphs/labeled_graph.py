@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Indices, Singles
 from vm_embedded.detection.color_normalization import normalize_colors
-from vm_embedded.detection.footprint import Levels, footprint_levels, uniform_levels
+from vm_embedded.detection.footprint import Levels, levels_for, uniform_levels
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.sampling import sample
 from vm_embedded.network.layout import OFF_SCREEN
@@ -55,8 +55,8 @@ def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> Label
     height, width = picture.labels.shape
     shown = seen_points(picture.lens, (width, height), manifest, grid)
     points = np.full((len(shown) + 1, 3), OFF_SCREEN, dtype=np.float32)
-    levels = levels_for(picture, shown.graph.rays, manifest, grid)
-    sample(Pyramid(picture.image, "bgr"), shown.pixels, "exact", points[:-1], levels)
+    levels = levels_of(picture, shown.graph.rays, manifest, grid)
+    sample(Pyramid(picture.image, "bgr"), shown.pixels, levels, points[:-1])
     normalize_colors(points[:-1], manifest.colors)
     x, y = np.rint(shown.pixels).astype(np.intp).T
     assert picture.lens.orientation is not None
@@ -64,16 +64,15 @@ def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> Label
     return LabeledGraph(points, shown.graph.neighbors, picture.labels[y, x], distances, shown.pixels)
 
 
-def levels_for(picture: Picture, rays: Floats, manifest: Manifest, grid: Grid) -> Levels | None:
-    """The points with rays (n, 3) that each halved picture colors, or None if the network samples single pixels."""
+def levels_of(picture: Picture, rays: Floats, manifest: Manifest, grid: Grid) -> Levels:
+    """Which picture of the pyramid colors each of the points with rays (n, 3)."""
     height, width = picture.labels.shape
     if grid.is_visual:
         assert picture.lens.orientation is not None
         lens = picture.lens.lens.for_image((width, height))
-        return footprint_levels(manifest, rays, picture.lens.orientation.height, lens)
-    if manifest.sampling == "bilinear":
-        return None
-    return uniform_levels(len(rays), math.sqrt(height * width / max(len(rays), 1)))
+        return levels_for(manifest, rays, picture.lens.orientation.height, lens)
+    single = manifest.sampling == "bilinear"
+    return uniform_levels(len(rays), 1.0 if single else math.sqrt(height * width / max(len(rays), 1)))
 
 
 def plane_distances(rays: Floats, height: float) -> Floats:

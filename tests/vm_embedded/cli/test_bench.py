@@ -58,11 +58,11 @@ def test_command_takes_the_user_s_frame_lens_and_orientation():
 
 def test_tuned_settings_are_written_and_read_by_vm_detect(tmp_path):
     path = tmp_path / "vm.toml"
-    path.write_text('# ours\nmodel = "ball.onnx"\n\n[detector]\nthreads = 7 # too many\nsampling = "fast"\n')
+    path.write_text('# ours\nmodel = "ball.onnx"\n\n[detector]\nthreads = 7 # too many\nmax_proposals = 9\n')
     out = run("--model", MODEL, "--frames", 300, "--up-to", 1, "--size", "320x240", "--tune", path).stdout
     assert "pitch_step" in out
     settings = read_configuration(path).detector
-    assert (settings.threads, settings.sampling) == (1, "fast")
+    assert (settings.threads, settings.max_proposals) == (1, 9)
     assert settings.pitch_step == settings.roll_step
     assert "# ours" in path.read_text()
     assert "# too many" in path.read_text()

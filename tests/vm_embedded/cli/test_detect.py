@@ -31,7 +31,7 @@ def test_models_that_are_none_are_refused(tmp_path):
     one_complaint(unknown, "'ball-smaller'", "did you mean 'ball-small'")
 
 
-@pytest.mark.parametrize("arguments", [(), ("--camera",), ("--camera", "x", "--threads", "many"), ("--sampling", "no")])
+@pytest.mark.parametrize("arguments", [(), ("--camera",), ("--camera", "x", "--threads", "many"), ("--format", "no")])
 def test_wrong_usage_exits_with_2(arguments):
     one_complaint(run(*arguments, code=2), "vm-detect: ", "; vm-detect --help lists the options")
 

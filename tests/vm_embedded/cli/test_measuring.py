@@ -10,7 +10,7 @@ from vm_embedded.cli.workload import draw_empty_field, walk
 
 def test_detectors_are_measured_on_every_frame():
     lens = Rectilinear(focal_length=150.0, fov=1.8)
-    detectors = [Detector.from_file(MODEL, Settings(sampling=sampling)) for sampling in ("exact", "fast")]
+    detectors = [Detector.from_file(MODEL, Settings(cache_mib=cache)) for cache in (16.0, 64.0)]
     steps = walk(Orientation.from_roll_pitch(0.6, 0.0, 0.4), 0.1, 0.02, 7)
     runs = measure(detectors, draw_empty_field((320, 240), "bgr"), lens, steps)
     assert [run.detector for run in runs] == detectors

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vm_embedded.detection.footprint import uniform_levels
 from vm_embedded.detection.pixel_formats import FORMATS, checked_image
 from vm_embedded.detection.pyramid import Pyramid
-from vm_embedded.detection.sampling import SAMPLINGS, sample
+from vm_embedded.detection.sampling import sample
 from vm_embedded.errors import InputError
 
 from ..strategies import seeds
@@ -16,9 +17,9 @@ COLOR_ORDERS = {"bgr": (2, 1, 0), "rgb": (0, 1, 2), "bgra": (2, 1, 0), "rgba": (
 BAYER = ("bayer_rggb", "bayer_bggr", "bayer_grbg", "bayer_gbrg")
 
 
-def sampled(image, pixels, format, sampling):
+def sampled(image, pixels, format):
     out = np.full((len(pixels), 3), np.nan, dtype=np.float32)
-    sample(Pyramid(checked_image(image, format), format), pixels, sampling, out)
+    sample(Pyramid(checked_image(image, format), format), pixels, uniform_levels(len(pixels), 1.0), out)
     return out
 
 
@@ -53,82 +54,68 @@ shapes = st.tuples(st.integers(2, 30), st.integers(2, 30))
 
 
 @given(shapes, st.sampled_from(sorted(COLOR_ORDERS)), st.integers(0, 40), seeds)
-def test_exact_sampling_is_bilinear_to_the_last_digits(shape, format, count, seed):
+def test_sampling_is_bilinear_to_the_last_digits(shape, format, count, seed):
     random = np.random.default_rng(seed)
     image = noise(random, *shape, 4 if format.endswith("a") else 3)
     pixels = pixels_in(random, count, *shape)
     expected = bilinear(image, pixels)[:, COLOR_ORDERS[format]] / 255.0
-    np.testing.assert_allclose(sampled(image, pixels, format, "exact"), expected, atol=1e-5)
+    np.testing.assert_allclose(sampled(image, pixels, format), expected, atol=1e-5)
 
 
 @given(shapes, seeds)
-def test_exact_sampling_of_gray_is_bilinear_and_the_same_in_all_colors(shape, seed):
+def test_sampling_of_gray_is_bilinear_and_the_same_in_all_colors(shape, seed):
     random = np.random.default_rng(seed)
     image = noise(random, *shape, 1)
     pixels = pixels_in(random, 20, *shape)
-    values = sampled(image, pixels, "gray", "exact")
+    values = sampled(image, pixels, "gray")
     np.testing.assert_allclose(values, np.repeat(bilinear(image, pixels) / 255.0, 3, axis=1), atol=1e-5)
 
 
-@pytest.mark.parametrize("sampling", SAMPLINGS)
 @given(shapes, seeds)
-def test_whole_pixels_are_read_as_they_are(sampling, shape, seed):
+def test_whole_pixels_are_read_as_they_are(shape, seed):
     random = np.random.default_rng(seed)
     image = noise(random, *shape, 3)
     rows, columns = np.mgrid[: shape[0] - 1, : shape[1] - 1].reshape(2, -1)
     pixels = np.stack([columns, rows], axis=1).astype(np.float64)
     expected = image[rows, columns].astype(np.float32) / np.float32(255.0)
-    np.testing.assert_allclose(sampled(image, pixels, "rgb", sampling), expected, atol=1e-7)
+    np.testing.assert_allclose(sampled(image, pixels, "rgb"), expected, atol=1e-7)
 
 
-@given(shapes, st.sampled_from(["rgb", "gray"]), st.integers(0, 600), seeds)
-def test_fast_sampling_is_off_by_a_gray_level_and_a_32nd_pixel_at_most(shape, format, count, seed):
-    random = np.random.default_rng(seed)
-    image = noise(random, *shape, 3 if format == "rgb" else 1)
-    pixels = pixels_in(random, count, *shape)
-    exact, fast = (sampled(image, pixels, format, sampling) for sampling in ("exact", "fast"))
-    wide = image.astype(float)
-    slope = [np.abs(np.diff(wide, axis=axis)).max(initial=0.0) for axis in (0, 1)]
-    assert np.abs(fast - exact).max(initial=0.0) <= (1.0 + sum(slope) / 32.0) / 255.0 + 1e-6
-
-
-@given(seeds, st.sampled_from([0, 1, 255, 256, 257, 1000]))
-def test_fast_sampling_reads_any_number_of_points(seed, count):
+@given(seeds, st.sampled_from([0, 1, 63, 64, 65, 1000]))
+def test_sampling_reads_any_number_of_points(seed, count):
     random = np.random.default_rng(seed)
     image = noise(random, 20, 30, 3)
     pixels = pixels_in(random, count, 20, 30)
-    values = sampled(image, pixels, "rgb", "fast")
+    values = sampled(image, pixels, "rgb")
     assert values.shape == (count, 3)
-    one_by_one = [sampled(image, pixels[i : i + 1], "rgb", "fast")[0] for i in range(min(count, 10))]
+    one_by_one = [sampled(image, pixels[i : i + 1], "rgb")[0] for i in range(min(count, 10))]
     np.testing.assert_array_equal(values[:10], np.array(one_by_one).reshape(-1, 3))
 
 
-@pytest.mark.parametrize("sampling", SAMPLINGS)
 @given(shapes, seeds)
-def test_all_color_formats_of_one_scene_give_the_same_colors(sampling, shape, seed):
+def test_all_color_formats_of_one_scene_give_the_same_colors(shape, seed):
     random = np.random.default_rng(seed)
     rgb = noise(random, *shape, 3)
     alpha = noise(random, *shape, 1)
     pixels = pixels_in(random, 20, *shape)
-    expected = sampled(rgb, pixels, "rgb", sampling)
+    expected = sampled(rgb, pixels, "rgb")
     scenes = {
         "bgr": rgb[:, :, ::-1],
         "rgba": np.concatenate([rgb, alpha], axis=2),
         "bgra": np.concatenate([rgb[:, :, ::-1], alpha], axis=2),
     }
     for format, image in scenes.items():
-        np.testing.assert_array_equal(sampled(image, pixels, format, sampling), expected, err_msg=format)
+        np.testing.assert_array_equal(sampled(image, pixels, format), expected, err_msg=format)
 
 
-@pytest.mark.parametrize("sampling", SAMPLINGS)
 @given(shapes, seeds)
-def test_a_gray_scene_looks_gray_in_every_format(sampling, shape, seed):
+def test_a_gray_scene_looks_gray_in_every_format(shape, seed):
     random = np.random.default_rng(seed)
     gray = noise(random, *shape, 1)
     pixels = pixels_in(random, 20, *shape)
-    expected = sampled(np.repeat(gray, 3, axis=2), pixels, "rgb", sampling)
+    expected = sampled(np.repeat(gray, 3, axis=2), pixels, "rgb")
     for image in (gray, gray[:, :, 0]):
-        np.testing.assert_array_equal(sampled(image, pixels, "gray", sampling), expected)
+        np.testing.assert_array_equal(sampled(image, pixels, "gray"), expected)
 
 
 def mosaic(rgb, format):
@@ -140,19 +127,18 @@ def mosaic(rgb, format):
     return raw
 
 
-@pytest.mark.parametrize("sampling", SAMPLINGS)
 @pytest.mark.parametrize("format", BAYER)
 @given(seeds)
-def test_a_mosaic_of_a_smooth_scene_gives_the_scene_s_colors(sampling, format, seed):
+def test_a_mosaic_of_a_smooth_scene_gives_the_scene_s_colors(format, seed):
     random = np.random.default_rng(seed)
     y, x = np.mgrid[:24, :32]
     # Three slopes, so different that no two colors can be taken for each other.
     slopes = random.permutation([[3.0, 0.0], [-1.5, 1.5], [0.0, -3.0]])
     rgb = np.stack([130.0 + a * (x - 16) + b * (y - 12) for a, b in slopes], axis=2).round().astype(np.uint8)
     pixels = 2.0 + random.random((50, 2)) * (27.0, 19.0)
-    expected = sampled(rgb, pixels, "rgb", "exact")
+    expected = sampled(rgb, pixels, "rgb")
     for raw in (mosaic(rgb, format), mosaic(rgb, format)[:, :, None]):
-        np.testing.assert_allclose(sampled(raw, pixels, format, sampling), expected, atol=3.0 / 255.0)
+        np.testing.assert_allclose(sampled(raw, pixels, format), expected, atol=3.0 / 255.0)
 
 
 def views(image):
@@ -171,36 +157,33 @@ def views(image):
     yield "read-only", read_only
 
 
-@pytest.mark.parametrize("sampling", SAMPLINGS)
 @pytest.mark.parametrize("format", FORMATS)
-def test_memory_order_changes_no_color(format, sampling):
+def test_memory_order_changes_no_color(format):
     random = np.random.default_rng(7)
     channels = {"bgr": 3, "rgb": 3, "bgra": 4, "rgba": 4}.get(format, 1)
     image = noise(random, 12, 18, channels)
     pixels = pixels_in(random, 30, 12, 18)
-    expected = sampled(image, pixels, format, sampling)
+    expected = sampled(image, pixels, format)
     for name, view in views(image):
-        np.testing.assert_array_equal(sampled(view, pixels, format, sampling), expected, err_msg=name)
+        np.testing.assert_array_equal(sampled(view, pixels, format), expected, err_msg=name)
 
 
-@pytest.mark.parametrize("sampling", SAMPLINGS)
-def test_sampling_writes_into_a_part_of_a_larger_array(sampling):
+def test_sampling_writes_into_a_part_of_a_larger_array():
     random = np.random.default_rng(3)
     image, pixels = noise(random, 8, 9, 3), pixels_in(random, 5, 8, 9)
     points = np.full((6, 3), -1.0, dtype=np.float32)
-    sample(Pyramid(image, "rgb"), pixels, sampling, out=points[:-1])
-    np.testing.assert_array_equal(points[:-1], sampled(image, pixels, "rgb", sampling))
+    sample(Pyramid(image, "rgb"), pixels, uniform_levels(5, 1.0), out=points[:-1])
+    np.testing.assert_array_equal(points[:-1], sampled(image, pixels, "rgb"))
     np.testing.assert_array_equal(points[-1], [-1.0] * 3)
 
 
-@pytest.mark.parametrize("sampling", SAMPLINGS)
 @pytest.mark.parametrize("format", FORMATS)
 @given(seeds)
-def test_colors_are_from_0_to_1(format, sampling, seed):
+def test_colors_are_from_0_to_1(format, seed):
     random = np.random.default_rng(seed)
     channels = {"bgr": 3, "rgb": 3, "bgra": 4, "rgba": 4}.get(format, 1)
     image = noise(random, 10, 10, channels) // 128 * 255
-    values = sampled(image, pixels_in(random, 40, 10, 10), format, sampling)
+    values = sampled(image, pixels_in(random, 40, 10, 10), format)
     assert (values >= 0.0).all()
     assert (values <= 1.0).all()
 
@@ -224,21 +207,20 @@ FAR = [
 """Where a lens may put what it does not see."""
 
 
-@pytest.mark.parametrize("sampling", SAMPLINGS)
 @pytest.mark.parametrize("format", FORMATS)
 @given(st.integers(0, 300), seeds)
-def test_pixels_off_screen_have_any_color_and_disturb_no_other(format, sampling, count, seed):
+def test_pixels_off_screen_have_any_color_and_disturb_no_other(format, count, seed):
     random = np.random.default_rng(seed)
     channels = {"bgr": 3, "rgb": 3, "bgra": 4, "rgba": 4}.get(format, 1)
     image = noise(random, 12, 18, channels)
     pixels = pixels_in(random, count, 12, 18)
-    expected = sampled(image, pixels, format, sampling)
+    expected = sampled(image, pixels, format)
     off_screen = random.random(count) < 0.5
     near = random.uniform(-30.0, 40.0, (count, 2))
     pixels[off_screen] = np.where(random.random((count, 2)) < 0.5, random.choice(FAR, (count, 2)), near)[off_screen]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        values = sampled(image, pixels, format, sampling)
+        values = sampled(image, pixels, format)
     assert values.shape == expected.shape
     np.testing.assert_array_equal(values[~off_screen], expected[~off_screen])
 

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from vm_embedded.config.entries import checked
 from vm_embedded.detection.pixel_formats import FORMATS
-from vm_embedded.detection.sampling import SAMPLINGS
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
 
@@ -90,8 +89,8 @@ def test_a_switch_is_true_or_false(value):
         Settings(spinning=value)
 
 
-def test_the_choices_are_those_of_sampling():
-    assert CHOICES == {"format": FORMATS, "sampling": SAMPLINGS}
+def test_the_only_choice_is_the_pixel_format():
+    assert CHOICES == {"format": FORMATS}
 
 
 @pytest.mark.parametrize(("name", "value"), [(name, value) for name, allowed in CHOICES.items() for value in allowed])
@@ -101,7 +100,7 @@ def test_every_choice_is_accepted(name, value):
 
 @pytest.mark.parametrize(
     ("name", "wrong", "near"),
-    [("format", "grey", "gray"), ("format", "bayer_rgbg", "bayer_rggb"), ("sampling", "fats", "fast")],
+    [("format", "grey", "gray"), ("format", "bayer_rgbg", "bayer_rggb")],
 )
 def test_an_unknown_choice_names_the_nearest(name, wrong, near):
     with pytest.raises(InputError, match=rf"{name} '{wrong}'.*'{near}'"):

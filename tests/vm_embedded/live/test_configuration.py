@@ -32,7 +32,6 @@ roll = -0.05
 threads = 2
 spinning = true
 format = "bayer_rggb"
-sampling = "fast"
 height_tolerance = 0
 pitch_step = 0.02
 roll_step = 0.03
@@ -73,7 +72,6 @@ def test_a_full_configuration_is_read(write):
         "threads": 2,
         "spinning": True,
         "format": "bayer_rggb",
-        "sampling": "fast",
         "height_tolerance": 0,
         "pitch_step": 0.02,
         "roll_step": 0.03,
@@ -155,7 +153,7 @@ WRONG = {
     "threads of many digits": (f"[detector]\nthreads = {'9' * 400}\n", "threads .*from 1 to 256"),
     "threshold out of range": ("[detector]\nthreshold = 1.5\n", "threshold .*from 0 to 1, not 1.5"),
     "step out of range": ("[detector]\npitch_step = 0\n", "pitch_step .*from 0.001 to 1 rad, not 0"),
-    "number for a word": ("[detector]\nsampling = 1\n", "sampling 1 .*exact, fast"),
+    "number for a word": ("[detector]\nformat = 1\n", "format 1 .*bgr, rgb"),
     "word for a switch": ("[detector]\nspinning = 'yes'\n", "spinning must be true or false, not 'yes'"),
     "unknown format": ("[detector]\nformat = 'grey'\n", "format 'grey'.*'gray'"),
     "not TOML": ("model = ball.onnx\n", "line 1"),
