@@ -240,6 +240,7 @@ def walks(models: Models, work: list[Frame], seconds: float) -> dict[str, Any]:
                 if number == 30:
                     cache.hits = cache.misses = 0
                 cache.view(orientation, lens, frame.size)
+                cache.prepare_nearby(orientation, lens, frame.size)
                 largest = max(largest, cache.nbytes / 2**20)
             rows.append({"height_m": height, "hit_rate": round(cache.hit_rate, 4), "cache_mib": round(largest, 1)})
         orientations = [each.orientation for each in work for _ in range(4)]

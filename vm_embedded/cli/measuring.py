@@ -84,6 +84,8 @@ def measure(
             found = detectors[number].detect(image, orientation, lens)
             timings[number].append(found.timing_ms)
             points[number].append(len(found.observation))
+            # As vm-detect does between frames.
+            detectors[number].prepare_nearby(orientation, lens, (image.shape[1], image.shape[0]))
         progress(frame)
     return [
         Run(

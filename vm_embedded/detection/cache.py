@@ -7,6 +7,7 @@ user sets.
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
@@ -49,7 +50,7 @@ class PreparedPoints:
 class MeshCache:
     """Keeps meshes and parts of meshes up to a limit of memory; it drops the least recently used first.
 
-    `hits`, `misses` and `nbytes` [bytes] may be read at any time.
+    `hits`, `misses`, `prepared` (buckets that `prepare_nearby` made) and `nbytes` [bytes] may be read at any time.
     """
 
     def __init__(self, manifest: Manifest, settings: Settings) -> None:
@@ -58,6 +59,7 @@ class MeshCache:
         self.shape = manifest.mesh_shape
         self.hits = 0
         self.misses = 0
+        self.prepared = 0
         self.nbytes = 0
         self._limit = settings.cache_mib * 2**20
         self._kept: OrderedDict[Hashable, Any] = OrderedDict()
@@ -94,6 +96,32 @@ class MeshCache:
             lens=lens,
             size=size,
         )
+
+    def prepare_nearby(self, orientation: Orientation, lens: Lens, size: Size) -> bool:
+        """Prepare the nearest bucket that is missing around an orientation's own; return whether there was one.
+
+        A walking robot soon needs it. Only buckets that touch the orientation's own one count. lens: fitted to an image
+        of that size [px]. It drops nothing from the memory. It does nothing if memory is short, if the orientation's
+        own bucket is not kept, or if the height tolerance is 0. Raises GeometryError if the camera is too low for the
+        mesh's shape.
+        """
+        height = self.mesh_height(orientation.height)
+        up, lean = orientation.pitch / self.settings.pitch_step, orientation.roll / self.settings.roll_step
+        own = self._kept.get((height, round(up), round(lean), lens, size))
+        if own is None or height not in self._kept or self.nbytes + 1.5 * own.nbytes > self._limit:
+            return False
+        around = [(round(up) + i, round(lean) + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+        for pitch, roll in sorted(around, key=lambda bucket: math.hypot(bucket[0] - up, bucket[1] - lean)):
+            key = (height, pitch, roll, lens, size)
+            if key not in self._kept:
+                points = self._prepare(height, pitch, roll, lens, size)
+                if self.nbytes + points.nbytes > self._limit:
+                    return False
+                self._kept[key] = points
+                self.nbytes += points.nbytes
+                self.prepared += 1
+                return True
+        return False
 
     def mesh_height(self, height: float) -> float:
         """Height [m] of the mesh for a camera height [m], within the tolerance of the settings."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..arrays import Image
-from ..geometry.lens import Lens
+from ..geometry.lens import Lens, Size
 from ..geometry.orientation import Orientation
 from ..network.bundled import model_path
 from ..network.close_look import CloseLook
@@ -57,6 +57,16 @@ class Detector:
         Raises InputError for an image or lens that doesn't fit, GeometryError for a camera too low for the object.
         """
         return self.locate(self.observe(image, orientation, lens), explain)
+
+    def prepare_nearby(self, orientation: Orientation, lens: Lens, size: Size) -> bool:
+        """Prepare one bucket of orientations beside a frame's, and return whether one was missing.
+
+        Call it between frames, when there is time: it takes as long as a call of `detect`. When the camera moves on,
+        the frame that needs the bucket is then as fast as the others. lens, orientation: of the last frame; size: of
+        its image, as width and height [px]. Raises InputError for a lens that doesn't fit, GeometryError for a camera
+        too low for the object.
+        """
+        return self.cache.prepare_nearby(orientation, lens.for_image(size), size)
 
     def observe(self, image: Image, orientation: Orientation, lens: Lens) -> Observation:
         """Classify the mesh points in an image: the first step of `detect`, with the same arguments and errors."""

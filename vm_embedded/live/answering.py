@@ -71,6 +71,11 @@ class Answerer:
         self._counters.add_answer(detections, time.perf_counter() - started, now - shot.captured)
         return Answer(shot, lens, orientation, detections, now)
 
+    def prepare(self, answer: Answer) -> None:
+        """Prepare for the orientations beside an answer's, one bucket each time. It takes a few milliseconds."""
+        height, width = answer.shot.image.shape[:2]
+        self.detector.prepare_nearby(answer.orientation, answer.lens, (width, height))
+
     def _refuse_late(self, shot: Shot) -> bool:
         """Count and report a shot that is too old. Return whether it is."""
         age, limit = time.monotonic() - shot.captured, self.configuration.camera.max_age_ms

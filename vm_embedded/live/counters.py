@@ -43,6 +43,7 @@ _HELP = {
     "reconnects": "times that the camera was opened again",
     "cache_hits": "frames whose mesh was in the cache",
     "cache_misses": "frames whose mesh had to be prepared",
+    "cache_prepared": "meshes that were prepared between frames",
 }
 
 
@@ -70,7 +71,8 @@ class Counters:
         """All metrics in Prometheus's text format. answered: monotonic time of the last answered frame [s]."""
 
         now = time.monotonic()
-        counts = {**self.counts(camera), "cache_hits": cache.hits, "cache_misses": cache.misses}
+        cached = {"cache_hits": cache.hits, "cache_misses": cache.misses, "cache_prepared": cache.prepared}
+        counts = {**self.counts(camera), **cached}
         gauges = {
             "frame_age_seconds": ("time since the last frame was answered", now - max(answered, self._started)),
             "resident_bytes": ("memory of the process", resident_bytes()),

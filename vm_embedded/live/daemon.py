@@ -185,6 +185,8 @@ class Daemon:
             answer = await self.answerer.answer(shot)
             if answer is not None:
                 self._report(answer)
+                if not self.grabber.has_shot:
+                    self.answerer.prepare(answer)
         if time.monotonic() - self._sent > _HEARTBEAT:
             self._send(state_message(self.state, self.reason))
         # A signal during this step goes first: it ends the daemon with EXIT_OK.

@@ -199,9 +199,9 @@ def test_nbytes_is_what_is_held(layout):
     cache = MeshCache(manifest(layout=layout), Settings())
     first = cache.view(Orientation.from_roll_pitch(0.8, pitch=0.4), LENS, SIZE)
     whole = built(cache, cache.mesh_height(0.8))
-    assert cache.nbytes == whole.nbytes + first.layout.nbytes
+    assert cache.nbytes == whole.nbytes + first.layout.nbytes + first.levels.nbytes
     second = cache.view(Orientation.from_roll_pitch(0.8, pitch=1.2), LENS, SIZE)
-    assert cache.nbytes == whole.nbytes + first.layout.nbytes + second.layout.nbytes
+    assert cache.nbytes == whole.nbytes + first.layout.nbytes + first.levels.nbytes + second.layout.nbytes + second.levels.nbytes
 
 
 def test_the_least_recently_used_mesh_goes_first():
@@ -255,3 +255,58 @@ def test_a_camera_that_wanders_is_answered_right(seed):
     for _ in range(5):
         matrix = matrix @ rotation(0.4 * random_direction(random))
         assert_same_as_without(cache, Orientation(random.uniform(0.3, 1.2), matrix), LENS, SIZE)
+
+
+def touching(orientation, settings):
+    """The middles of the bucket of an orientation and of the eight around it."""
+    pitch, roll = round(orientation.pitch / settings.pitch_step), round(orientation.roll / settings.roll_step)
+    return [
+        Orientation.from_roll_pitch(
+            orientation.height, (roll + lean) * settings.roll_step, (pitch + up) * settings.pitch_step
+        )
+        for up in (-1, 0, 1)
+        for lean in (-1, 0, 1)
+    ]
+
+
+@given(reals(-0.5, 1.2), reals(-0.3, 0.3))
+def test_all_buckets_that_touch_an_orientation_are_prepared_nearest_first(pitch, roll):
+    cache = MeshCache(manifest(), Settings())
+    orientation = Orientation.from_roll_pitch(0.8, roll, pitch)
+    cache.view(orientation, LENS, SIZE)
+    held = []
+    while cache.prepare_nearby(orientation, LENS, SIZE):
+        held.append(cache.nbytes)
+    assert cache.prepared == len(held) == 8
+    assert held == sorted(held)
+    assert (cache.hits, cache.misses) == (0, 1)
+    for beside in touching(orientation, cache.settings):
+        assert_same_as_without(cache, beside, LENS, SIZE)
+    assert (cache.hits, cache.misses) == (9, 1)
+
+
+def test_the_bucket_that_the_camera_moves_to_is_prepared_first():
+    cache = MeshCache(manifest(), Settings())
+    cache.view(Orientation.from_roll_pitch(0.8, 0.0, 0.42), LENS, SIZE)  # 0.4 is the middle of its bucket
+    cache.prepare_nearby(Orientation.from_roll_pitch(0.8, 0.0, 0.42), LENS, SIZE)
+    cache.view(Orientation.from_roll_pitch(0.8, 0.0, 0.43), LENS, SIZE)
+    assert (cache.hits, cache.misses) == (1, 1)
+
+
+@given(reals(0.0, 2.0))
+def test_preparing_drops_nothing(cache_mib):
+    prepared, plain = (MeshCache(manifest(), Settings(cache_mib=cache_mib)) for _ in range(2))
+    for pitch in (0.4, 0.4, 0.45, 0.4, 0.4, 0.35, 0.45, 0.4):
+        orientation = Orientation.from_roll_pitch(0.8, 0.0, pitch)
+        for cache in (prepared, plain):
+            cache.view(orientation, LENS, SIZE)
+        before = set(prepared._kept)
+        prepared.prepare_nearby(orientation, LENS, SIZE)
+        assert before <= set(prepared._kept)
+        assert prepared.nbytes <= cache_mib * 2**20
+    assert prepared.misses <= plain.misses
+
+
+def test_nothing_is_prepared_without_tolerance():
+    cache = MeshCache(manifest(), Settings(height_tolerance=0.0))
+    assert not cache.prepare_nearby(Orientation.from_roll_pitch(0.8, 0.0, 0.4), LENS, SIZE)

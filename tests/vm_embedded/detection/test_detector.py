@@ -55,8 +55,9 @@ def without_bucket(detector, image, orientation, lens):
 
     def whole(orientation, lens, size):
         view = prepared(orientation, lens, size)
-        mesh = fresh.cache._build(fresh.cache.mesh_height(orientation.height))
-        return view._replace(layout=choose_layout(mesh, fresh.manifest))
+        height = fresh.cache.mesh_height(orientation.height)
+        layout = choose_layout(fresh.cache._build(height), fresh.manifest)
+        return view._replace(layout=layout, levels=levels_for(fresh.manifest, layout.rays, height, lens))
 
     fresh.cache.view = whole
     return fresh.detect(image, orientation, lens)

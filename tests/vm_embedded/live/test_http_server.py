@@ -22,6 +22,23 @@ def test_a_busy_port_and_an_unknown_host_are_named_once():
         asyncio.run(HttpServer("host.invalid:1", {}).open())
 
 
+def test_orientations_beside_the_camera_s_are_prepared_between_frames(tmp_path):
+    local = ("--status-metrics", f"unix:{tmp_path / 'figures'}")
+    with running(tmp_path, "--camera", "synthetic", *local) as found:
+
+        def prepared():
+            with socket.socket(socket.AF_UNIX) as connection:
+                connection.settimeout(10.0)
+                connection.connect(str(tmp_path / "figures"))
+                connection.sendall(b"GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                text = b"".join(iter(lambda: connection.recv(65536), b"")).decode()
+            return int(text.split("\nvm_cache_prepared_total ")[1].split("\n")[0])
+
+        found.wait_for_state("ok")
+        found.wait(lambda: prepared() >= 4)
+        found.stop()
+
+
 def test_figures_are_given_by_address_only_and_nothing_else_is(tmp_path):
     with socket.socket() as made:
         made.bind(("127.0.0.1", 0))
