@@ -13,6 +13,7 @@ from onnx import helper
 from tests.drawn_scenes import CHECKPOINT, FOLDER, IMAGES, MODEL
 from vm_embedded import Detector, GeometryError, InputError, ModelError, Orientation, Settings, read_lens_file
 from vm_embedded.cameras.image_files import read_image
+from vm_embedded.detection.footprint import levels_for
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.choose_layout import choose_layout
