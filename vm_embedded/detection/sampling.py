@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from ..arrays import Floats, Singles
 from .footprint import BLOCK, Levels
@@ -48,20 +49,20 @@ def _in_pictures(pyramid: Pyramid, pixels: Floats, levels: Levels) -> Floats:
     return places
 
 
-def _corners(pyramid: Pyramid, levels: Levels, whole: np.ndarray) -> Singles:
+def _corners(pyramid: Pyramid, levels: Levels, whole: npt.NDArray[np.int16]) -> Singles:
     """Values (channels, blocks, 2, 2, BLOCK), 0 to 255, of the upper and lower, left and right pixel around each place.
 
     whole (2, blocks, BLOCK): x and y of the upper left one.
     """
     count = whole.shape[1]
-    table = np.empty((count, 2, 2, BLOCK, 2), dtype=np.int16)
+    places = np.empty((count, 2, 2, BLOCK, 2), dtype=np.int16)
     for side in range(2):
-        np.add(whole[0, :, None], side, out=table[:, :, side, :, 0])
-        np.add(whole[1, :, None], side, out=table[:, side, :, :, 1])
-    table = table.reshape(count, 4 * BLOCK, 2)
+        np.add(whole[0, :, None], side, out=places[:, :, side, :, 0])
+        np.add(whole[1, :, None], side, out=places[:, side, :, :, 1])
+    table = places.reshape(count, 4 * BLOCK, 2)
     frame = pyramid.level(0)
     values = np.empty((count, 4 * BLOCK, *frame.shape[2:]), dtype=np.uint8)
     for level, share in levels.shares():
         cv2.remap(pyramid.level(level), table[share], None, cv2.INTER_NEAREST, dst=values[share])  # type: ignore[call-overload]
-    planes = cv2.dnn.blobFromImage(values)  # one plane for each channel, as float32
-    return np.asarray(planes).reshape(-1, count, 2, 2, BLOCK)
+    planes = np.asarray(cv2.dnn.blobFromImage(values), dtype=np.float32)  # one for each channel
+    return planes.reshape(-1, count, 2, 2, BLOCK)
