@@ -12,7 +12,7 @@ BUILD ?= build/networks
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
 
-.PHONY: help setup demo test lint bundle deb deploy logs lock bench bench-synth bench-train data networks test-data score choices look-choices fixtures docs site clean
+.PHONY: help setup demo test lint bundle deb deploy logs lock bench bench-external bench-synth bench-train data networks test-data score choices look-choices fixtures docs site clean
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -61,6 +61,10 @@ lock: ## choose the robot's packages, and write their hashes to deploy/robot.txt
 bench: .venv/bench ## measure the speed, also of other detectors; write docs/performance.md (10 minutes)
 	$(BIN)/python -m benchmarks.run
 	$(BIN)/python -m benchmarks.report
+
+bench-external: .venv/runtime ## compare with another program, see benchmarks/external.py: make bench-external PEER='./engine' [MODEL=ball]
+	@test -n "$(PEER)" || { echo "make bench-external needs PEER='command'"; exit 1; }
+	$(BIN)/python -m benchmarks.external '$(PEER)' $(if $(MODEL),--model '$(MODEL)')
 
 data: .venv/synth ## render a training set: make data HDRI=folder-of-maps [OUT=data/train] [COUNT=8000] [SEED=1] [SCENES=a.toml]
 	@test -n "$(HDRI)" || { echo 'make data needs HDRI=folder-of-maps'; exit 1; }

@@ -15,12 +15,17 @@ _TOP = Path(__file__).parents[1]
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame with all that a detector needs."""
+    """A frame with all that a detector needs, and the files that it comes from."""
 
-    name: str
+    path: Path
+    lens_path: Path
     image: Image
     lens: Lens
     orientation: Orientation
+
+    @property
+    def name(self) -> str:
+        return self.path.name
 
     @property
     def size(self) -> tuple[int, int]:
@@ -48,7 +53,8 @@ def demo_frames() -> list[Frame]:
 def _read(folder: Path) -> list[Frame]:
     found = []
     for path in sorted(folder.glob("image*.jpg")):
-        file = read_lens_file(path.with_name(f"lens{path.stem[5:]}.yaml"))
+        lens_path = path.with_name(f"lens{path.stem[5:]}.yaml")
+        file = read_lens_file(lens_path)
         assert file.orientation is not None
-        found.append(Frame(path.name, read_image(path), file.lens, file.orientation))
+        found.append(Frame(path, lens_path, read_image(path), file.lens, file.orientation))
     return found
