@@ -4,6 +4,9 @@ from .detection.detections import ClassPoints, Detection, Detections
 from .detection.detector import Detector
 from .detection.multi_view import CameraView, Sighting, detect_views
 from .detection.settings import Settings
+from .detection.track import Track
+from .detection.track_settings import TrackSettings
+from .detection.tracker import Tracker
 from .errors import GeometryError, InputError, ModelError, VisualMeshError
 from .field.features import Border, CenterCircle, Crossing, FieldFeatures, Segment, Upright
 from .geometry.calibrated_lenses import BrownLens, FisheyeLens
@@ -47,6 +50,9 @@ __all__ = [
     "Settings",
     "Sighting",
     "Sphere",
+    "Track",
+    "TrackSettings",
+    "Tracker",
     "Upright",
     "VisualMeshError",
     "build_mesh",

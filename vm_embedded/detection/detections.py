@@ -12,6 +12,7 @@ from ..arrays import Floats, Singles
 from ..field.features import FieldFeatures
 from ..network.manifest import Manifest
 from .observation import Observation
+from .track import Track
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +32,7 @@ class Detection:
     close look saw; without one, from the size that fits the points best. distance_by_angle [m]: distance that follows
     from `angular_radius` and the real radius. distances_agree: whether the two distances agree: they differ by at most
     20 % with a close look, otherwise by less than the mesh can resolve. points: number of mesh points inside its
-    outline. reason: why it was rejected, or None.
+    outline. reason: why it was rejected, or None. track: of the object over several frames, if a Tracker follows it.
     """
 
     class_name: str
@@ -47,6 +48,7 @@ class Detection:
     distances_agree: bool
     points: int
     reason: str | None = None
+    track: Track | None = None
 
     def __repr__(self) -> str:
         x, y, z = self.position
@@ -71,6 +73,8 @@ class Detection:
         }
         if self.reason is not None:
             data["reason"] = self.reason
+        if self.track is not None:
+            data["track"] = self.track.as_dict()
         return data
 
 

@@ -1,0 +1,167 @@
+"""Follow objects over the frames of a camera: each gets a number, a smoothed position and a velocity.
+
+`follow` is the whole method, a pure function; a Tracker keeps the tracks between two calls of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Floats
+from ..errors import InputError
+from ..geometry.orientation import rotation_z
+from .detections import Detection, Detections
+from .kalman import correct, predict, squared_distances
+from .place_error import place_errors
+from .stopwatch import Stopwatch
+from .track import Track
+from .track_settings import TrackSettings
+
+Move = tuple[float, float, float]
+"""How the origin of the plane's frame has moved: x, y [m] and the turn around z [rad], in the old frame."""
+
+_KICK = 0.15
+"""A track may change its velocity at once while its last detection is not older than this [s]. Later, an object that
+appears somewhere near is more likely another one."""
+
+
+class Tracker:
+    """Gives each detected object a track: a number, a smoothed position and a velocity.
+
+        tracker = Tracker()
+        for time, image in frames:
+            for ball in tracker.update(detector.detect(image, orientation, lens), time):
+                print(ball.track.id, ball.track.position, ball.track.velocity)
+
+    A Kalman filter with constant velocity smooths the places. The uncertainty of each detection follows from its
+    bearing and distance. All places are in the plane's frame, whose origin is below the camera. So objects that lie
+    still have a velocity while the robot walks, unless `update` is told how the robot has moved. The frame must not
+    turn with the camera: give orientations with their yaw.
+    """
+
+    def __init__(self, settings: TrackSettings | None = None) -> None:
+        self.settings = settings or TrackSettings()
+        self._tracks: tuple[Track, ...] = ()
+        self._used = 0  # the largest number of a track so far
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """The current tracks, also of objects that the last frame did not show, each at its last detection."""
+        return self._tracks
+
+    def update(self, detections: Detections, time: float, moved: Move | None = None) -> Detections:
+        """The same detections, each object with its track.
+
+        time: of the frame [s], on any clock; if it jumps by more than `forget`, all tracks start anew. moved: how the
+        robot has moved since the last call, by its odometry: x and y [m], and the turn [rad] (counterclockwise), in the
+        plane's frame of the last call.
+
+        Raises InputError if a number is not finite.
+        """
+        if not all(map(math.isfinite, (time, *(moved or ())))):
+            raise InputError(f"time and moved must be finite numbers, not {time} and {moved}")
+        watch = Stopwatch()
+        tracks = [each if moved is None else _seen_from(each, moved) for each in self._tracks]
+        found, rest = follow(tracks, detections.objects, time, self.settings, self._used + 1)
+        self._tracks = (*found, *rest)
+        self._used = max([self._used, *(each.id for each in found)])
+        objects = tuple(replace(each, track=track) for each, track in zip(detections.objects, found, strict=True))
+        watch.lap("track")
+        timing = {**detections.timing_ms, **watch.stages}
+        timing["total"] = timing.pop("total", 0.0) + watch.stages["track"]  # the total stays the last
+        return replace(detections, objects=objects, timing_ms=timing)
+
+
+def follow(
+    tracks: Sequence[Track], objects: Sequence[Detection], time: float, settings: TrackSettings, first_id: int
+) -> tuple[list[Track], list[Track]]:
+    """The track of each object of a frame at a time [s], and the tracks without an object that are not forgotten yet.
+
+    first_id: number of the first new track. Objects continue tracks of the same class in three steps:
+
+    1. Each track predicts where its object is now. An object within the gate continues the track; the likeliest pairs
+       are chosen first.
+    2. The other tracks that were seen a moment ago may have been kicked: their velocity becomes unknown, up to
+       `max_speed`, and they get a second chance.
+    3. Each of the remaining objects starts a track of unknown velocity.
+    """
+    rest = [each for each in tracks if abs(time - each.time) <= settings.forget]
+    places, errors = np.array([each.position[:2] for each in objects]).reshape(-1, 2), place_errors(objects, settings)
+    found: dict[int, Track] = {}
+    for kicked in (False, True):
+        waiting = [each for each in rest if not kicked or time - each.time <= _KICK]
+        expected = [_expected(_kicked(each, settings) if kicked else each, time, settings) for each in waiting]
+        costs = np.full((len(waiting), len(objects)), math.inf)
+        for row, track in enumerate(waiting):
+            squares, costs[row] = squared_distances(*expected[row], places, errors)
+            costs[row, squares > settings.gate**2] = math.inf
+            other = [each for each, one in enumerate(objects) if one.class_name != track.class_name]
+            costs[row, [*other, *found]] = math.inf
+        for row, column in _cheapest_pairs(costs):
+            now = correct(*expected[row], places[column], errors[column])
+            found[column] = _continued(waiting[row], objects[column], time, *now)
+            rest.remove(waiting[row])
+    fresh = [each for each in range(len(objects)) if each not in found]
+    for number, column in enumerate(fresh, start=first_id):
+        found[column] = _started(number, objects[column], time, errors[column], settings)
+    return [found[column] for column in range(len(objects))], rest
+
+
+def _cheapest_pairs(costs: Floats) -> Iterator[tuple[int, int]]:
+    """Pairs of a row and a column of costs (n, m), the cheapest first, each row and column at most once; inf: never."""
+    costs = costs.copy()
+    while costs.size and math.isfinite(costs.min()):
+        row, column = divmod(int(costs.argmin()), costs.shape[1])
+        costs[row], costs[:, column] = math.inf, math.inf
+        yield row, column
+
+
+def _expected(track: Track, time: float, settings: TrackSettings) -> tuple[Floats, Floats]:
+    """State (4,) and covariance (4, 4) of a track's object at a time [s]."""
+    elapsed = max(time - track.time, 0.0)  # a camera's clock may go back by some milliseconds
+    return predict(np.append(track.position[:2], track.velocity), track.covariance, elapsed, settings.wander)
+
+
+def _kicked(track: Track, settings: TrackSettings) -> Track:
+    """The track with an unknown velocity."""
+    return replace(track, velocity=np.zeros(2), covariance=_unknown_velocity(track.covariance[:2, :2], settings))
+
+
+def _unknown_velocity(error: Floats, settings: TrackSettings) -> Floats:
+    """The covariance (4, 4) of a place with this covariance (2, 2) and a velocity of up to `max_speed`."""
+    covariance = (settings.max_speed / settings.gate) ** 2 * np.eye(4)
+    covariance[:2, :2] = error
+    return covariance
+
+
+def _started(number: int, detection: Detection, time: float, error: Floats, settings: TrackSettings) -> Track:
+    covariance = _unknown_velocity(error, settings)
+    return Track(number, detection.class_name, time, detection.position, np.zeros(2), covariance, 1)
+
+
+def _continued(track: Track, detection: Detection, time: float, state: Floats, covariance: Floats) -> Track:
+    return replace(
+        track,
+        time=max(time, track.time),
+        position=np.append(state[:2], detection.position[2]),
+        velocity=state[2:],
+        covariance=covariance,
+        count=track.count + 1,
+    )
+
+
+def _seen_from(track: Track, moved: Move) -> Track:
+    """The track in the plane's frame after the robot has moved."""
+    x, y, turn = moved
+    back = rotation_z(-turn)
+    both = np.kron(np.eye(2), back[:2, :2])
+    return replace(
+        track,
+        position=back @ (track.position - (x, y, 0.0)),
+        velocity=back[:2, :2] @ track.velocity,
+        covariance=both @ track.covariance @ both.T,
+    )
