@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import glob
+import json
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -17,6 +19,9 @@ from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
 from .decoding import decode
 from .image_header import MAX_MEGAPIXELS
+
+MESSAGES = "recording.jsonl"
+"""The file with the messages of a recording, one line for each image."""
 
 _BESIDE = ("mask", "coverage")
 """Pictures of vm-synth that are not frames."""
@@ -42,7 +47,7 @@ class Frame:
 
     index: its number, from 0. source: its name in messages. read: returns the image, BGR, or in the file's own channels
     if the pixel format is another; raises InputError. path: its image file; None for a frame of a video. stamp: time
-    within its video [s].
+    within its video or recording [s], or None.
     """
 
     index: int
@@ -97,7 +102,7 @@ def _open(name: str, path: Path, read: Callable[[Path], Image]) -> Source:
         found = [each for each in found if not _belongs_to_an_image(each, images)]
         if not found:
             raise InputError(f"no images in directory {name} (looked for {', '.join(IMAGE_SUFFIXES)})")
-        return _images(found, read)
+        return _images(found, read, _recorded_times(path / MESSAGES))
     if path.is_file() and path.suffix.lower() in IMAGE_SUFFIXES:
         return _images([path], read)
     if path.exists() or name.isdigit():
@@ -116,10 +121,25 @@ def _belongs_to_an_image(path: Path, stems: set[str]) -> bool:
     return any(f"image{path.stem.removeprefix(each)}" in stems for each in _BESIDE if path.stem.startswith(each))
 
 
-def _images(paths: list[Path], read: Callable[[Path], Image]) -> Source:
-    paths = sorted(paths, key=_natural)
-    frames = (Frame(index, path.name, partial(read, path), path) for index, path in enumerate(paths))
+def _images(paths: list[Path], read: Callable[[Path], Image], times: Mapping[str, float] | None = None) -> Source:
+    """The frames of image files. times: of some of them, by the names of the files without suffix [s]."""
+    paths, times = sorted(paths, key=_natural), times or {}
+    frames = (
+        Frame(index, path.name, partial(read, path), path, times.get(path.stem)) for index, path in enumerate(paths)
+    )
     return Source(frames, len(paths))
+
+
+def _recorded_times(messages: Path) -> dict[str, float]:
+    """When the images of a recording were taken, since the first [s], by their names without suffix.
+
+    Empty for other folders. A recording that was cut off may lack the messages of its last images.
+    """
+    times: list[float] = []
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        for line in messages.read_text(encoding="utf-8").splitlines():
+            times.append(float(json.loads(line)["t"]))
+    return {f"image{index:07d}": time - times[0] for index, time in enumerate(times)}
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:

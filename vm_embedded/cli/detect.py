@@ -22,7 +22,7 @@ from ..live.daemon import EXIT_CONFIGURATION, Daemon
 from ..live.load_detector import load_checked_detector
 from ..live.log import EventLog
 from .detect_files import complain, detect_in_files
-from .options import ANGLES, add_live, add_model, add_pose, add_settings, read_options
+from .options import ANGLES, add_live, add_model, add_pose, add_settings, add_track, read_options
 from .program import Parser, program
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
@@ -96,6 +96,7 @@ def parser() -> argparse.ArgumentParser:
         "--explain", action="store_true", help="add rejected proposals or clusters to the JSON, with reasons"
     )
     add_settings(parser)
+    add_track(parser)
     add_live(parser)
     return parser
 

@@ -10,7 +10,9 @@ from dataclasses import dataclass, replace
 
 from ..arrays import Image
 from ..cameras.image_files import Frame, check_file_format, lens_beside, open_sources
+from ..detection.detections import Detections
 from ..detection.detector import Detector
+from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError
 from ..geometry.lens import Lens
 from ..geometry.lens_files import read_lens_file
@@ -40,13 +42,16 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:
             make_folder(folder)
+    follow = _Follow(Tracker(given.track), given.camera.fps) if given.track.on else None
     boxes = BoxWriter(options.save_boxes, _object_classes(detector)) if options.save_boxes is not None else None
 
     processed = 0
     bar = ProgressBar(source.count)
     for frame in source.frames:
+        if follow is not None and frame.index == 0:
+            follow.time(frame)  # without times, no frame can be processed
         try:
-            line = _process(frame, detector, pose, options, emit_points, boxes)
+            line = _process(frame, detector, pose, follow, options, emit_points, boxes)
         except VisualMeshError as error:
             bar.clear()
             complain(str(error))
@@ -80,6 +85,20 @@ class _DefaultPose:
         return lens, orientation
 
 
+@dataclass(frozen=True)
+class _Follow:
+    """A tracker, and the frame rate of images without times [1/s]; 0: unknown."""
+
+    tracker: Tracker
+    rate: float
+
+    def time(self, frame: Frame) -> float:
+        """The time of a frame [s]. Raises InputError if it is not known."""
+        if frame.stamp is None and not self.rate:
+            raise InputError("--track needs the time of each frame: give --camera-fps, the frame rate of the images")
+        return frame.index / self.rate if frame.stamp is None else frame.stamp
+
+
 def _object_classes(detector: Detector) -> tuple[str, ...]:
     return tuple(each.name for each in detector.manifest.classes if each.kind == "object")
 
@@ -88,6 +107,7 @@ def _process(
     frame: Frame,
     detector: Detector,
     pose: _DefaultPose,
+    follow: _Follow | None,
     options: argparse.Namespace,
     emit_points: Sequence[str],
     boxes: BoxWriter | None,
@@ -98,7 +118,7 @@ def _process(
     """
     image = frame.read()  # its errors name the file
     try:
-        return _detect(image, frame, detector, pose, options, emit_points, boxes)
+        return _detect(image, frame, detector, pose, follow, options, emit_points, boxes)
     except VisualMeshError as error:
         raise InputError(f"{frame.source}: {error}") from error
 
@@ -108,12 +128,15 @@ def _detect(
     frame: Frame,
     detector: Detector,
     pose: _DefaultPose,
+    follow: _Follow | None,
     options: argparse.Namespace,
     emit_points: Sequence[str],
     boxes: BoxWriter | None,
 ) -> str:
     lens, orientation = pose.of(frame)
     detections = detector.detect(image, orientation, lens, explain=options.explain or boxes is not None)
+    if follow is not None:
+        detections = follow.tracker.update(detections, follow.time(frame))
     if boxes is not None:
         boxes.write(frame, image, lens, orientation, detections)
         if not options.explain:

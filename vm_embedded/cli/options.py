@@ -9,12 +9,20 @@ from pathlib import Path
 from typing import Any
 
 from ..cameras.camera import CameraSettings
+from ..cameras.image_files import MESSAGES
 from ..detection.settings import Settings
 from ..geometry.lens_files import read_lens_file
-from ..live.configuration import Configuration, FixedPose, StatusSettings, read_configuration, with_overrides
+from ..live.configuration import (
+    Configuration,
+    FixedPose,
+    StatusSettings,
+    TrackSection,
+    read_configuration,
+    with_overrides,
+)
 from ..network.bundled import DEFAULT, SHIPPED
 from ..output.channels import OutputSettings
-from ..output.recorder import CONFIGURATION, MESSAGES, RecorderSettings
+from ..output.recorder import CONFIGURATION, RecorderSettings
 from ..poses.settings import PoseSettings
 
 LIVE = {
@@ -74,6 +82,11 @@ def add_live(parser: argparse.ArgumentParser) -> None:
         add_section(group, section, f"{name}_", ("source",) if name == "camera" else ())
 
 
+def add_track(parser: argparse.ArgumentParser) -> None:
+    """Add an option for each entry of [track]; --track switches it on."""
+    add_section(parser.add_argument_group("[track]"), TrackSection, "track_")
+
+
 def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, skip: Sequence[str] = ()) -> None:
     """Add an option for each entry of a section, except those in `skip`. prefix: first part of the option names."""
     for each in fields(section):
@@ -81,14 +94,16 @@ def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, skip:
             continue
         unit = f" [{each.metadata['unit']}]" if each.metadata["unit"] else ""
         help = f"{each.metadata['help']}{unit}{_default(each)}".replace("%", "%%")
-        option = "--" + (prefix + each.name).replace("_", "-")
+        name = prefix + each.name
+        option = "--" + name.removesuffix("_on").replace("_", "-")
         if "allowed" in each.metadata:
-            group.add_argument(option, choices=each.metadata["allowed"], help=help)
+            group.add_argument(option, dest=name, choices=each.metadata["allowed"], help=help)
         elif isinstance(each.default, bool):
-            group.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=help)
+            group.add_argument(option, dest=name, action=argparse.BooleanOptionalAction, default=None, help=help)
         else:
             kind = str if isinstance(each.default, str) else int if isinstance(each.default, int) else float
-            group.add_argument(option, type=kind, metavar={str: "TEXT", int: "N", float: "X"}[kind], help=help)
+            letter = {str: "TEXT", int: "N", float: "X"}[kind]
+            group.add_argument(option, dest=name, type=kind, metavar=letter, help=help)
 
 
 def _default(entry: Field[Any]) -> str:
@@ -108,7 +123,7 @@ def read_options(options: argparse.Namespace) -> Configuration:
     alone = len(getattr(options, "files", ())) <= 1
     config = options.config or _recording_configuration(getattr(options, "camera", None) if alone else None)
     configured = read_configuration(config) if config else Configuration()
-    sections = {"orientation": (FixedPose, ""), "detector": (Settings, "")}
+    sections = {"orientation": (FixedPose, ""), "detector": (Settings, ""), "track": (TrackSection, "track_")}
     sections |= {name: (section, f"{name}_") for name, section in LIVE.items()}
     given = {name: _given_entries(options, section, prefix) for name, (section, prefix) in sections.items()}
     if getattr(options, "camera", None) is not None:

@@ -41,7 +41,7 @@ def place_errors(detections: Sequence[Detection], settings: TrackSettings) -> Fl
     beside = np.column_stack([-ahead[:, 1], ahead[:, 0]])
     along = (distances * angle / sine) ** 2 + (settings.height_error * level / sine) ** 2
     across = (distances * angle) ** 2
-    return along[:, None, None] * _squares(ahead) + across[:, None, None] * _squares(beside)
+    return np.asarray(along[:, None, None] * _squares(ahead) + across[:, None, None] * _squares(beside))
 
 
 def _squares(directions: Floats) -> Floats:

@@ -11,6 +11,7 @@ import cv2
 from ..cameras.camera import Shot
 from ..detection.detections import Detections
 from ..detection.detector import Detector
+from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError, one_line
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
@@ -33,7 +34,7 @@ class Answer:
 
 
 class Answerer:
-    """Answers shots with the current configuration, which the daemon replaces on reload, and counts the outcomes."""
+    """Answers shots with the current configuration, and counts the outcomes."""
 
     def __init__(
         self,
@@ -45,6 +46,12 @@ class Answerer:
     ) -> None:
         self.configuration, self.detector = configuration, detector
         self._poses, self._counters, self._health = poses, counters, health
+        self._tracker = Tracker(configuration.track)
+
+    def reload(self, configuration: Configuration, detector: Detector) -> None:
+        """Use another configuration and its detector from now on. Tracks continue."""
+        self.configuration, self.detector = configuration, detector
+        self._tracker.settings = configuration.track
 
     async def answer(self, shot: Shot) -> Answer | None:
         """Detect the objects in a shot; None if it is too old, has no pose, or the detection fails."""
@@ -55,6 +62,8 @@ class Answerer:
             self._health.pose_trouble = ""
             started = time.perf_counter()
             detections = self.detector.detect(shot.image, orientation, lens)
+            if self.configuration.track.on:
+                detections = self._tracker.update(detections, shot.captured)
         except StalePoseError as error:
             self._counters.outcomes.stale += 1
             self._health.pose_trouble = str(error)

@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from ..cameras.camera import CameraSettings
-from ..config.entries import EntryError, check_entries, entry, number, text_line
+from ..config.entries import EntryError, check_entries, entry, number, switch, text_line
 from ..config.sections import read_sections
 from ..config.toml_writer import to_commented_toml
 from ..config.units import angle, length
 from ..detection.settings import Settings
+from ..detection.track_settings import TrackSettings
 from ..errors import InputError, VisualMeshError
 from ..geometry.lens_files import LensFile, lens_from_table, read_lens_file
 from ..geometry.orientation import Orientation
@@ -55,6 +56,13 @@ class FixedPose:
                 raise InputError("pitch and roll need a height: give --height")
             return None
         return Orientation.from_roll_pitch(self.height, self.roll or 0.0, self.pitch or 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackSection(TrackSettings):
+    """Section [track]: whether objects are followed over the frames, and how."""
+
+    on: bool = switch(False, "follow each object: add its number, smoothed position and velocity to its detections")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,6 +140,7 @@ class Configuration:
     lens: LensFile | None = field(default=None, metadata={"read": _read_lens, "to_commented_toml": _commented_lens})
     orientation: FixedPose = field(default_factory=FixedPose)
     detector: Settings = field(default_factory=Settings)
+    track: TrackSection = field(default_factory=TrackSection)
     camera: CameraSettings = field(default_factory=CameraSettings)
     pose: PoseSettings = field(default_factory=PoseSettings)
     output: OutputSettings = field(default_factory=OutputSettings)
@@ -176,10 +185,10 @@ def with_overrides(configuration: Configuration, sections: Mapping[str, Mapping[
 
 
 def recording_toml(configuration: Configuration) -> str:
-    """The vm.toml of a recording: the network and its settings. Raises InputError for an unknown name.
+    """The vm.toml of a recording: the network, its settings and those of tracks. Raises InputError for an unknown name.
 
     A network of the package has its name, so that the recording can be used on another machine; others a full path.
     """
     path = model_path(configuration.model).resolve()
     model = next((name for name in SHIPPED if model_path(name).resolve() == path), str(path))
-    return to_commented_toml(Configuration(model=model, detector=configuration.detector))
+    return to_commented_toml(Configuration(model=model, detector=configuration.detector, track=configuration.track))

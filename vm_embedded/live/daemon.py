@@ -279,7 +279,7 @@ class Daemon:
             self._log("reload refused", "error", reason=str(error))
             return
         self.recorder.clear()
-        self.answerer.configuration, self.answerer.detector = new.configuration, new.detector
+        self.answerer.reload(new.configuration, new.detector)
         self._recording_toml = new.recording_toml
         self._log("reloaded", model=new.configuration.model, needs_restart=new.needs_restart)
 

@@ -7,6 +7,7 @@ a text: the names of the frame's classes, one per line, or the reason of a state
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -16,7 +17,7 @@ import numpy.typing as npt
 
 from .messages import STATES, Message
 
-VERSION = 1
+VERSION = 2
 """Second field of the header. Any change of the layout changes it."""
 
 HEADER = struct.Struct("<I4B2d2I3f10H")
@@ -27,7 +28,8 @@ _UPRIGHT = "class:<u4 confidence:<f4 position:(2,)<f4 distance:<f4 bearing:(3,)<
 
 _FIELDS = {
     "detections": "class:<u4 confidence:<f4 position:(3,)<f4 distance:<f4 bearing:(3,)<f4 center:(2,)<f4 radius:<f4 "
-    "angular_radius:<f4 distance_by_angle:<f4 distances_agree:<u4 points:<u4",
+    "angular_radius:<f4 distance_by_angle:<f4 distances_agree:<u4 points:<u4 track:<u4 track_position:(3,)<f4 "
+    "track_velocity:(2,)<f4 track_position_error:<f4 track_velocity_error:<f4",
     "posts": _UPRIGHT,
     "goals": "left:<u4 right:<u4",
     "robots": _UPRIGHT,
@@ -40,7 +42,15 @@ _FIELDS = {
 RECORDS = {name: np.dtype([tuple(each.split(":")) for each in text.split()]) for name, text in _FIELDS.items()}
 """The fields of each kind of record, with the names of the JSON form. class: line of the text, from 0. left, right:
 indices in posts, from 0. kind of a crossing: the code of the letter L, T or X. circle: one record or none. border: one
-record per point."""
+record per point. track: its id; 0, and NaN in the fields after it, for an object without a track."""
+
+_NO_TRACK: Mapping[str, Any] = {
+    "id": 0,
+    "position": [math.nan] * 3,
+    "velocity": [math.nan] * 2,
+    "position_error": math.nan,
+    "velocity_error": math.nan,
+}
 
 _MOST = 0xFFFF
 """Most records of a kind, and most bytes of the text: their numbers have two bytes."""
@@ -51,7 +61,7 @@ def to_binary(message: Message) -> bytes:
     field = message.get("field") or {}
     codes: dict[str, int] = {}
     records = [
-        _records(RECORDS["detections"], message.get("detections", ()), codes),
+        _records(RECORDS["detections"], map(_with_track_fields, message.get("detections", ())), codes),
         _records(RECORDS["posts"], field.get("posts", ()), codes),
         np.array([tuple(each) for each in field.get("goals", ())], RECORDS["goals"]),
         _records(RECORDS["robots"], field.get("robots", ()), codes),
@@ -85,6 +95,12 @@ def _records(
 
     names = dtype.names or ()
     return np.array([tuple(code(name, each[name]) for name in names) for each in values], dtype)
+
+
+def _with_track_fields(detection: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A detection whose track is in fields of its own."""
+    track = detection.get("track", _NO_TRACK)
+    return {**detection, "track": track["id"], **{f"track_{name}": track[name] for name in _NO_TRACK}}
 
 
 def _border_records(border: Mapping[str, Any] | None) -> npt.NDArray[np.void]:

@@ -105,7 +105,7 @@ def _ros_detection(header: Message, detection: Mapping[str, Any]) -> Message:
     x, y = detection["center"]
     return {
         "header": header,
-        "id": "",
+        "id": str(detection["track"]["id"]) if "track" in detection else "",
         "results": [
             {
                 "hypothesis": {"class_id": detection["class"], "score": detection["confidence"]},

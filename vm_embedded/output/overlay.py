@@ -15,6 +15,9 @@ _OBJECT, _REJECTED = (60, 220, 255), (90, 90, 255)
 _UPRIGHT, _OTHER = (255, 120, 60), (140, 140, 140)
 _AREAS = ((255, 255, 255), (190, 255, 170), (230, 160, 230), (220, 220, 120))
 
+_AHEAD = 0.5
+"""Arrows of tracks lead to where the objects will be after this time [s]."""
+
 _FARTHEST = 1e4
 """Largest pixel of an outline that is drawn: OpenCV cannot draw far outside of an image."""
 
@@ -22,6 +25,8 @@ _FARTHEST = 1e4
 def draw_overlay(image: Image, detections: Detections) -> Image:
     """A copy of a BGR, BGRA or gray image with mesh points in the color of their class, objects with outline,
     confidence and distance, and the features of the field.
+
+    A tracked object also has its number and speed, and, if it moves, an arrow to where it will be after half a second.
 
     The paper's fig:ball_detection_images has such pictures; there, the colors are confidences.
     """
@@ -35,6 +40,7 @@ def draw_overlay(image: Image, detections: Detections) -> Image:
     drawn = [(each, color) for each, color in drawn if np.abs(each.outline).max(initial=0.0) < _FARTHEST]
     for each, color in reversed(drawn):
         _draw_outline(canvas, each, color, scale)
+        _draw_arrow(canvas, each, detections, scale)
     labels = Labels(canvas, scale)
     for each, _ in drawn:
         labels.avoid(each.center, each.radius)
@@ -73,8 +79,24 @@ def _draw_outline(canvas: Image, detection: Detection, color: Color, scale: floa
     cv2.polylines(canvas, [points], True, color, thickness, cv2.LINE_AA, shift=4)
 
 
+def _draw_arrow(canvas: Image, detection: Detection, detections: Detections, scale: float) -> None:
+    """Draw the motion of a tracked object, unless it may stand still."""
+    track = detection.track
+    if track is None or np.hypot(*track.velocity) < 2.0 * track.velocity_error:
+        return
+    places = np.array([track.position[:2], track.position_at(track.time + _AHEAD)[:2]])
+    pixels = detections.observation.view.plane_pixels(places)
+    if (np.abs(pixels) < _FARTHEST).all():
+        start, end = np.rint(pixels).astype(int).tolist()
+        thickness = max(1, round(2 * scale))
+        cv2.arrowedLine(canvas, start, end, INK, thickness + 2, cv2.LINE_AA, tipLength=0.2)
+        cv2.arrowedLine(canvas, start, end, _OBJECT, thickness, cv2.LINE_AA, tipLength=0.2)
+
+
 def _label(labels: Labels, detection: Detection, color: Color) -> None:
     text = f"{detection.class_name} {detection.confidence:.2f}  {detection.distance:.2f} m"
     if detection.reason is not None:
         text = f"{detection.class_name}? {detection.confidence:.2f}"
+    if detection.track is not None:
+        text += f"  #{detection.track.id} {np.hypot(*detection.track.velocity):.1f} m/s"
     labels.write(text, detection.center, detection.radius, color)

@@ -20,6 +20,7 @@ import cv2
 
 from ..arrays import Image
 from ..cameras.camera import Shot
+from ..cameras.image_files import MESSAGES
 from ..config.entries import check_entries, number, text_line
 from ..errors import InputError
 from ..geometry.lens import Lens
@@ -29,7 +30,7 @@ from .messages import Message, to_json_line
 
 # Smaller and faster than the default strategy for pictures with noise.
 _PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY)
-CONFIGURATION, MESSAGES = "vm.toml", "recording.jsonl"
+CONFIGURATION = "vm.toml"
 
 _LAST_FRAME = 0.3
 """How long a closed recorder waits for the frame that is being written [s]."""
