@@ -137,8 +137,8 @@ def _recorded_times(messages: Path) -> dict[str, float]:
     """
     times: list[float] = []
     with suppress(OSError, ValueError, KeyError, TypeError):
-        for line in messages.read_text(encoding="utf-8").splitlines():
-            times.append(float(json.loads(line)["t"]))
+        lines = messages.read_text(encoding="utf-8").splitlines()
+        times.extend(float(json.loads(line)["t"]) for line in lines)
     return {f"image{index:07d}": time - times[0] for index, time in enumerate(times)}
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 from ..arrays import Image
 from ..cameras.image_files import Frame, check_file_format, lens_beside, open_sources
-from ..detection.detections import Detections
 from ..detection.detector import Detector
 from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError
