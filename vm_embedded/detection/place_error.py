@@ -26,7 +26,7 @@ def place_errors(detections: Sequence[Detection], settings: TrackSettings) -> Fl
     The angle e has three independent causes, which are added as squares: the center that the network found is off by a
     share of the angular radius (`center_error`) and by a part of a pixel (`pixel_error`), and the camera's orientation
     is not exact (`pose_error`). With a camera 0.8 m above the ground and the default settings, a ball at 3 m is
-    uncertain by 2 cm across the bearing and by 7 cm along it, a ball at 6 m by 3 cm and 27 cm.
+    uncertain by 2 cm across the bearing and by 8 cm along it, a ball at 6 m by 3 cm and 29 cm.
     """
     bearings = np.array([each.bearing for each in detections]).reshape(-1, 3)
     distances = np.array([each.distance for each in detections])
