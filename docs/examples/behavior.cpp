@@ -7,6 +7,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <exception>
 #include <string>
 #include <thread>
 
@@ -30,7 +31,7 @@ std::string decide(const vm_detect::Client& detector) {
     const State state = detector.state();
     if (state != State::ok && state != State::degraded)
         return std::string("stand: ") + vm_detect::name(state) + ": " + detector.reason();
-    const vm_detect::Frame* frame = detector.frame(0.25);
+    const vm_detect::Frame* frame = detector.frame(0.3);
     if (frame == nullptr) return "stand: no frame is new enough";
     const vm_detect::Detection* nearest = nullptr;
     for (const vm_detect::Detection& each : frame->detections)
@@ -45,7 +46,7 @@ std::string decide(const vm_detect::Client& detector) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
     std::signal(SIGINT, [](int) { stopped = 1; });
     std::signal(SIGTERM, [](int) { stopped = 1; });
     vm_detect::Client detector(argc > 1 ? argv[1] : "/run/vm-detect/lines.sock");
@@ -63,4 +64,7 @@ int main(int argc, char** argv) {
         std::this_thread::sleep_until(next);
     }
     return 0;
+} catch (const std::exception& error) {
+    std::fprintf(stderr, "behavior: %s\n", error.what());
+    return 2;
 }

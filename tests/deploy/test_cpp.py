@@ -1,0 +1,283 @@
+"""The C++ client: what it decodes, and the example behavior on a real vm-detect that fails, hangs and comes back."""
+
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import threading
+import time
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.vm_embedded.live.running import PATIENCE, running
+from tests.vm_embedded.output.features import demo_frame, full, scene
+from vm_embedded import Tracker
+from vm_embedded.cameras.camera import Shot
+from vm_embedded.output.binary_form import RECORDS, VERSION, to_binary
+from vm_embedded.output.messages import STATES, live_message, state_message
+
+CHECKOUT = Path(__file__).parents[2]
+HEADER = CHECKOUT / "deploy" / "cpp" / "vm_detect.hpp"
+EXAMPLE = CHECKOUT / "docs" / "examples" / "behavior.cpp"
+STRICT = ("-std=c++17", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wshadow", "-pedantic")
+BINARY = ("--output-unix-format", "binary")
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory):
+    """Compiles a program with the header, and returns its path."""
+    if shutil.which("g++") is None:
+        pytest.skip("needs g++")
+    folder = tmp_path_factory.mktemp("cpp")
+
+    def build(source, *options):
+        target = folder / f"{source.stem}{len(options)}"
+        if not target.exists():
+            command = ["g++", *STRICT, *options, "-I", HEADER.parent, source, "-o", target]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, done.stderr
+        return target
+
+    return build
+
+
+@pytest.fixture(scope="module")
+def dump(compiled):
+    """What the header decodes from bytes, as lines; with the compiler's checks of memory and undefined behavior."""
+    program = compiled(
+        CHECKOUT / "tests/deploy/cpp/dump.cpp", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"
+    )
+
+    def read(content):
+        done = subprocess.run([program], input=content, capture_output=True, timeout=PATIENCE, check=False)
+        assert done.returncode == 0, done.stderr.decode()
+        return done.stdout.decode(errors="replace").splitlines()
+
+    return read
+
+
+@pytest.fixture(scope="module")
+def messages():
+    """Messages with all that a frame can have, and one with nothing."""
+    image, detections = demo_frame(6)
+    now = time.monotonic()
+    shot = Shot(image, now - 0.02, arrived=now - 0.01)
+    view = detections.observation.view
+    tracked = Tracker().update(replace(detections, field=scene(view)), 1.0)
+    results = [detections, tracked, replace(detections, field=full(view)), replace(detections, objects=())]
+    frames = [live_message(number, "ok", shot, each, now) for number, each in enumerate(results, start=2**32 + 5)]
+    return [*frames, state_message("camera_lost", "no new frame for 1.0 s - 10 µs late"), state_message("ok", "")]
+
+
+def expected_lines(message):
+    """What dump.cpp prints for a message: names, and numbers."""
+
+    def upright(name, each):
+        yield f"{name}.class", each["class"]
+        yield name, [each["confidence"], each["distance"], each["width"]]
+        for part in ("position", "bearing", "pixel"):
+            yield name, each[part]
+
+    yield "state", f"{message['state']} {message.get('reason', '')}"
+    if message["type"] == "state":
+        return
+    yield "times", [message["t"], message["wall"]]
+    yield "frame", [message["frame"] % 2**32, message["points"]]
+    yield "ms", [message["age_ms"], message["latency_ms"], message["timing_ms"]["total"]]
+    for each in message["detections"]:
+        yield "detection.class", each["class"]
+        names = ("confidence", "distance", "radius", "angular_radius", "distance_by_angle", "distances_agree", "points")
+        yield "detection", [float(each[name]) for name in names]
+        for name in ("position", "bearing", "center"):
+            yield f"detection.{name}", each[name]
+        if "track" in each:
+            yield "track", [each["track"][name] for name in ("id", "position_error", "velocity_error")]
+            for name in ("position", "velocity"):
+                yield f"track.{name}", each["track"][name]
+    yield "field", [int("field" in message)]
+    field = message.get("field", dict.fromkeys(("posts", "goals", "robots", "lines", "crossings"), ()))
+    for each in field["posts"]:
+        yield from upright("post", each)
+    for each in field["goals"]:
+        yield "goal", each
+    for each in field["robots"]:
+        yield from upright("robot", each)
+    for each in field["lines"]:
+        yield from (("line.end", pair) for pair in each["ends"])
+        yield from (("line.pixel", pair) for pair in each["pixels"])
+        yield "line", [each["confidence"]]
+    if circle := field.get("circle"):
+        yield "circle", [circle["radius"], circle["arc"], circle["confidence"]]
+        yield "circle.center", circle["center"]
+    for each in field["crossings"]:
+        yield "crossing.kind", each["kind"]
+        yield "crossing", [*each["position"], each["heading"]]
+    if border := field.get("border"):
+        for point, pixel in zip(border["points"], border["pixels"], strict=True):
+            yield "border", point
+            yield "border.pixel", pixel
+
+
+def test_it_decodes_the_numbers_of_the_json(dump, messages):
+    lines = dump(b"".join(map(to_binary, messages)))
+    expected = [each for message in messages for each in expected_lines(message)]
+    assert len(lines) == len(expected) > 500
+    for line, (name, values) in zip(lines, expected, strict=True):
+        found, _, rest = line.partition(" ")
+        assert found == name
+        if isinstance(values, str):
+            assert rest == values
+        else:
+            numbers = np.array(values, float)  # null is NaN
+            np.testing.assert_allclose([float(each) for each in rest.split()], numbers, rtol=1e-6, err_msg=line)
+
+
+def test_its_layout_is_that_of_the_detector():
+    text = HEADER.read_text()
+    (sizes,) = re.findall(r"record_bytes\{([\d, ]+)\}", text)
+    assert [int(each) for each in sizes.split(",")] == [each.itemsize for each in RECORDS.values()]
+    assert f"version = {VERSION};" in text
+    (states,) = re.findall(r"enum class State : std::uint8_t \{ ([\w, ]+) \}", text)
+    assert states.split(", ") == [*STATES, "unreachable"]
+
+
+@settings(max_examples=60)
+@given(st.data())
+def test_damaged_messages_are_errors_and_touch_no_foreign_memory(dump, messages, data):
+    content = bytearray(to_binary(data.draw(st.sampled_from(messages))))
+    for _ in range(data.draw(st.integers(1, 4))):
+        place = data.draw(st.integers(0, min(len(content), 200) - 1))
+        content[place] = data.draw(st.integers(0, 255))
+    dump(bytes(content[: data.draw(st.integers(1, len(content)))]))
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"{", 'lines of JSON; set [output] unix_format = "binary"'),
+        (b"\xff\xff\xff\xff", "is this vm-detect?"),
+        (b"\0\0\0\0", "a message of 4 bytes"),
+    ],
+)
+def test_it_says_what_is_wrong(dump, content, says):
+    (line,) = dump(content)
+    assert line.startswith("error ")
+    assert says in line
+
+
+def test_another_version_is_an_error(dump, messages):
+    content = bytearray(to_binary(messages[0]))
+    content[4] = VERSION + 1
+    (line,) = dump(bytes(content))
+    assert f"version {VERSION + 1} of the binary form" in line
+
+
+class Behaving:
+    """The example behavior as a process, and the actions that it prints."""
+
+    def __init__(self, process):
+        self.process, self.actions = process, []
+        self._passed = 0
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
+
+    def _listen(self):
+        for line in self.process.stdout:
+            self.actions.append(line.split(" ", 1)[1].strip())
+
+    def wait_for(self, start):
+        """Wait until an action starts so, after those that were waited for before."""
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            for number, action in enumerate(self.actions[self._passed :], start=self._passed + 1):
+                if action.startswith(start):
+                    self._passed = number
+                    return action
+            assert self.process.poll() is None
+            time.sleep(0.02)
+        raise AssertionError(f"waited in vain for {start}: {self.actions[-5:]}")
+
+
+@contextmanager
+def behaving(compiled, path):
+    """The example behavior while the block runs; it must stop when it is asked to."""
+    with subprocess.Popen([compiled(EXAMPLE), str(path)], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            yield Behaving(process)
+            assert process.poll() is None
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(PATIENCE) == 0
+        finally:
+            process.kill()
+
+
+def test_a_behavior_walks_to_the_ball_and_stands_while_the_camera_is_lost(compiled, tmp_path):
+    source, path = tmp_path / "script.toml", tmp_path / "lines"
+    source.write_text('faults = [{ kind = "unplug", at = 4.0, seconds = 4.0 }]\n')
+    camera = ("--camera", f"fault:{source}", "--camera-lost-ms", 500, "--camera-retry-ms", 50, "--track")
+    with behaving(compiled, path) as robot:
+        robot.wait_for("stand: unreachable: can't connect")
+        with running(tmp_path, *camera, "--output-unix", path, *BINARY):
+            assert re.match(r"walk: the ball is -?\d\.\d m ahead", robot.wait_for("walk: "))
+            robot.wait_for("stand: camera_lost")
+            robot.wait_for("walk: ")
+
+
+def test_a_behavior_goes_on_while_the_detector_hangs_dies_and_comes_back(compiled, tmp_path):
+    path = tmp_path / "lines"
+    options = ("--camera", "synthetic", "--output-unix", path, *BINARY)
+    with behaving(compiled, path) as robot:
+        with running(tmp_path, *options) as found:
+            robot.wait_for("walk: ")
+            found.process.send_signal(signal.SIGSTOP)
+            robot.wait_for("stand: no frame is new enough")
+            robot.wait_for("stand: unreachable: vm-detect is silent")
+            found.process.send_signal(signal.SIGCONT)
+            robot.wait_for("walk: ")
+            found.stop(signal.SIGKILL)
+        robot.wait_for("stand: unreachable: ")
+        with running(tmp_path, *options):
+            robot.wait_for("walk: ")
+
+
+def test_a_behavior_survives_what_is_no_detector(compiled, tmp_path, messages):
+    path = tmp_path / "lines"
+    whole = to_binary(state_message("pose_stale", "no pose received yet"))
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(path))
+        listening.listen()
+        listening.settimeout(PATIENCE)
+        with behaving(compiled, path) as robot:
+            for content, start in (
+                (b'{"type": "state"}\n', "stand: unreachable: the socket sends lines of JSON"),
+                (b"\xff" * 1000, "stand: unreachable: a message of"),
+                (whole[:-3], "stand: unreachable: vm-detect has closed the connection"),
+                (np.random.default_rng(0).bytes(64), "stand: unreachable: "),
+            ):
+                connection, _ = listening.accept()
+                with connection:
+                    connection.sendall(content)
+                    if content != whole[:-3]:
+                        robot.wait_for(start)
+                if content == whole[:-3]:
+                    robot.wait_for(start)
+            connection, _ = listening.accept()
+            with connection:
+                for each in whole:  # byte by byte
+                    connection.sendall(bytes([each]))
+                robot.wait_for("stand: pose_stale: no pose received yet")
+
+
+def test_a_path_that_is_too_long_is_an_error(compiled, tmp_path):
+    done = subprocess.run([compiled(EXAMPLE), "/tmp/" + "x" * 200], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("behavior: the path of a socket must have 1 to 107 bytes: /tmp/x")
