@@ -33,6 +33,7 @@ OTHERS: dict[str, type] = {
 
 GROUPS = {
     "Detect": ("Detector", "Settings", "Detections", "Detection", "ClassPoints", "Observation", "draw_overlay"),
+    "Tracks": ("Tracker", "TrackSettings", "Track"),
     "Features of the field": (
         "FieldFeatures",
         "Upright",

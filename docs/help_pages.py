@@ -2,6 +2,7 @@
 
 - docs/command-line.md from the parsers and from the usage texts of the robot's scripts,
 - docs/vm.toml, scene.toml, train.toml and look.toml from the entries of configurations,
+- docs/messages.schema.json, the JSON Schema of the messages,
 - docs/api.md from the docstrings (api_page.py).
 
 `python docs/help_pages.py` writes them; a test checks that they are current.
@@ -10,6 +11,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import re
 from pathlib import Path
 
@@ -19,6 +21,7 @@ from vm_calibrate import cli as calibrate
 from vm_embedded.cli import bench, detect, doctor
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.live import configuration as detection
+from vm_embedded.output.message_schema import message_schema
 from vm_export import cli as export
 from vm_label import cli as label
 from vm_mesh import cli as mesh
@@ -41,6 +44,7 @@ def pages() -> dict[Path, str]:
     return {
         DOCS / "command-line.md": command_line(),
         DOCS / "api.md": api_page.page(),
+        DOCS / "messages.schema.json": json.dumps(message_schema(), indent=1) + "\n",
         DOCS / "vm.toml": to_commented_toml(detection.Configuration(), detection.HEADER),
         DOCS / "scene.toml": to_commented_toml(scene.SceneConfiguration(), scene.HEADER),
         DOCS / "train.toml": to_commented_toml(training.TrainConfiguration(), training.HEADER),

@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.messages import read_message
+
 COMMANDS = Path(sys.executable).parent
 SAME_POINTS = (0, 1, 3, 7, 8, 9, 11, 12, 13, 14)
 RECEPTIVE_STEPS = 13
@@ -104,7 +106,7 @@ def score(shared, model, *options):
     lines = run("vm-detect", "--camera", shared / "reference/images", "--model", model, *options).splitlines()
     assert len(lines) == 15
     hits, false, errors = set(), 0, []
-    for line in map(json.loads, lines):
+    for line in map(read_message, lines):
         ball = truth.get(line["source"])
         for found in line["detections"]:
             near = ball and np.hypot(found["center"][0] - ball["cx"], found["center"][1] - ball["cy"]) < ball["r_px"]

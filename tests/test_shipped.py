@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.messages import read_message
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
 from vm_embedded.live.configuration import read_configuration
@@ -23,7 +24,7 @@ def detect(*arguments):
     command = [str(Path(sys.executable).with_name("vm-detect")), *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    return [json.loads(line) for line in done.stdout.splitlines()]
+    return [read_message(line) for line in done.stdout.splitlines()]
 
 
 @pytest.mark.parametrize("name", SHIPPED)

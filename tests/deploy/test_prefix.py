@@ -1,6 +1,5 @@
 """The real bundle under a prefix, without network and systemd: installed, run, upgraded, and upgraded badly."""
 
-import json
 import os
 import signal
 import socket
@@ -8,6 +7,8 @@ import subprocess
 import time
 
 import pytest
+
+from tests.messages import read_message
 
 from .bundles import changed
 
@@ -95,7 +96,7 @@ def test_it_runs_as_systemd_runs_it(prefix, tmp_path):
             heard = []
             while not {"READY=1", "WATCHDOG=1", "STATUS=ok"} <= set(heard):
                 heard += told.recv(4096).decode().split("\n")
-            lines = (json.loads(line) for line in process.stdout)
+            lines = (read_message(line) for line in process.stdout)
             found = next(line for line in lines if line.get("detections"))
             assert found["detections"][0]["class"] == "ball"
             process.send_signal(signal.SIGTERM)

@@ -3,13 +3,14 @@
 After each bad upgrade, and each kill, the release that runs must be whole and well.
 """
 
-import json
 import os
 import re
 import subprocess
 import time
 
 import pytest
+
+from tests.messages import read_message
 
 from .bundles import CHECKOUT, changed
 from .robots import booted
@@ -71,7 +72,7 @@ class Team:
         """What the detector says of itself, or nothing."""
         command = [f"{CURRENT}/venv/bin/vm-detect", "--status", "--status-socket", "/run/vm-detect/vm-detect.sock"]
         _, said = self.robot.run(*command, check=False)
-        return json.loads(said) if said.startswith("{") else {"state": said}
+        return read_message(said) if said.startswith("{") else {"state": said}
 
     def check(self, *releases):
         """One of these releases is current and whole, and one of them runs and is well."""
@@ -110,7 +111,7 @@ def team(bundle, tmp_path_factory):
 def test_it_is_watched_and_says_what_it_sees(team):
     team.check("1-first")
     _, line = team.robot.run("python3", "-c", READER)
-    assert json.loads(line)["type"] in ("frame", "state")
+    assert read_message(line)["type"] in ("frame", "state")
     deadline = time.monotonic() + 30.0
     while not (team.status().get("last") or {}).get("detections"):
         assert time.monotonic() < deadline

@@ -1,6 +1,5 @@
 """Video files that are played as a camera would deliver them."""
 
-import json
 import subprocess
 import time
 
@@ -8,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.messages import read_message
 from tests.vm_embedded.live.running import DEMO, LENS, arguments, running
 from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cameras.grabber import same_image
@@ -46,5 +46,5 @@ def test_files_may_be_played_as_a_camera_gives_them_and_end(tmp_path):
     done = subprocess.run(arguments(tmp_path, *options), capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stderr
     assert time.monotonic() - started > 12 / 20
-    frames = [json.loads(line) for line in done.stdout.splitlines()]
+    frames = [read_message(line) for line in done.stdout.splitlines()]
     assert 0 < sum(each["type"] == "frame" for each in frames) <= 12

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from tests.drawn_scenes import MODEL
+from tests.messages import checked
 
 COMMAND = Path(sys.executable).parent / "vm-detect"
 
@@ -25,7 +26,7 @@ def lines(done):
     def no_constant(name):
         raise AssertionError(f"{name} is no JSON")
 
-    return [json.loads(line, parse_constant=no_constant) for line in done.stdout.splitlines()]
+    return [checked(json.loads(line, parse_constant=no_constant)) for line in done.stdout.splitlines()]
 
 
 def one_complaint(done, *parts):

@@ -1,6 +1,5 @@
 """vm-detect --track: on a live camera, on its recording, on a video and on images."""
 
-import json
 import shutil
 import subprocess
 
@@ -8,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.messages import read_message
 from tests.vm_embedded.cli.commands import COMMAND, lines, one_complaint, run
 from tests.vm_embedded.live.running import DEMO, arguments, running
 from vm_embedded.cameras.camera import CameraSettings
@@ -42,7 +42,7 @@ def test_a_live_camera_and_its_recording_have_tracks(tmp_path):
     assert np.median(speeds) < 0.5
     (folder,) = kept.iterdir()
     replayed = lines(run("--camera", folder))
-    recorded = [json.loads(line) for line in (folder / "recording.jsonl").read_text().splitlines()]
+    recorded = [read_message(line) for line in (folder / "recording.jsonl").read_text().splitlines()]
     times = [each["t"] - recorded[0]["t"] for each in recorded]
     assert [each["stamp"] for each in replayed] == pytest.approx(times, abs=2e-6)
     assert tracks(replayed)[0]["id"] == 1

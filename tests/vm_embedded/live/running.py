@@ -10,6 +10,8 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
+from tests.messages import checked
+
 COMMAND = Path(sys.executable).parent / "vm-detect"
 DEMO = Path(__file__).parents[2] / "fixtures" / "demo"
 LENS = '[lens]\nprojection = "rectilinear"\nfocal_length = 448\nfov = 1.75\n[orientation]\nheight = 0.8\npitch = 0.4\n'
@@ -94,6 +96,8 @@ def running(tmp_path, *options, env=None, **more):
     try:
         yield found
         assert not found.errors, found.errors
+        for each in list(found.messages):
+            checked(each)
     finally:
         process.kill()
         process.wait()

@@ -1,10 +1,10 @@
 """The control socket of a real vm-detect."""
 
-import json
 import re
 import socket
 import subprocess
 
+from tests.messages import read_message
 from tests.vm_embedded.live.running import COMMAND, arguments, running
 from vm_embedded.live.control import ask
 
@@ -24,7 +24,7 @@ def test_a_socket_that_was_left_behind_is_replaced_and_one_in_use_is_not(tmp_pat
         with running(tmp_path, "--camera", "synthetic", option, tmp_path / "second") as second:
             second.wait_for_state("ok")
             second.stop()
-        assert json.loads(ask(tmp_path / "control", "status"))["state"] == "ok"
+        assert read_message(ask(tmp_path / "control", "status"))["state"] == "ok"
         found.stop()
 
 

@@ -1,6 +1,5 @@
 """vm-detect on a live camera: a real process, its messages, states and signals."""
 
-import json
 import signal
 import socket
 import stat
@@ -10,6 +9,7 @@ import time
 import numpy as np
 import pytest
 
+from tests.messages import read_message
 from tests.vm_embedded.live.running import DEMO, arguments, running
 from vm_embedded.cameras.synthetic import Motion
 from vm_embedded.live.control import ask
@@ -17,7 +17,7 @@ from vm_embedded.live.control import ask
 
 def counts(tmp_path):
     """What the running detector counts."""
-    return json.loads(ask(tmp_path / "control", "status"))["counts"]
+    return read_message(ask(tmp_path / "control", "status"))["counts"]
 
 
 def test_a_drawn_camera_is_watched_and_its_ball_is_where_it_is(tmp_path):
@@ -88,7 +88,7 @@ def test_a_camera_that_is_not_there_yet_is_waited_for(tmp_path):
         found.wait(lambda: counts(tmp_path)["reconnects"] > 2)
         asked = subprocess.run(arguments(tmp_path, "--status"), capture_output=True, text=True, timeout=60, check=False)
         assert asked.returncode == 1
-        assert json.loads(asked.stdout)["state"] == "camera_lost"
+        assert read_message(asked.stdout)["state"] == "camera_lost"
         assert found.stop()[0] == 0
     assert found.frames == []
 

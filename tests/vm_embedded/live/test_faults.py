@@ -1,6 +1,5 @@
 """Everything that cameras do wrong, over and over: the detector says so, reports nothing stale, and is well again."""
 
-import json
 import os
 import threading
 import time
@@ -9,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.messages import read_message
 from tests.vm_embedded.live.running import running
 from vm_embedded.cameras.fault import KINDS, FaultScript
 from vm_embedded.live.control import ask
@@ -97,7 +97,7 @@ def test_two_hundred_faults_in_any_order_leave_nothing_behind(tmp_path):
             time.sleep(1.0)
         found.wait_for_state("ok", 20.0)
         found.wait(lambda: open_things(pid) <= before, 20.0)
-        counts = json.loads(ask(tmp_path / "control", "status"))["counts"]
+        counts = read_message(ask(tmp_path / "control", "status"))["counts"]
         status, seconds = found.stop()
     assert status == 0
     assert seconds < 1.0

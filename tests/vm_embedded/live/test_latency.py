@@ -1,11 +1,10 @@
 """Newest frames first, and no waiting: shown on real processes."""
 
-import json
-
 import cv2
 import numpy as np
 import pytest
 
+from tests.messages import read_message
 from tests.vm_embedded.live.running import running
 from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cameras.synthetic import SyntheticCamera
@@ -32,7 +31,7 @@ def test_a_detector_five_times_slower_than_its_camera_works_on_the_newest_frame(
     slow = ("--object-radius", 0.008, "--output-file", tmp_path / "lines", "--camera-loop", "--live")
     with running(tmp_path, "--config", tmp_path / "vm.toml", "--camera", video, *slow) as found:
         found.wait(lambda: len(found.frames) > 40)
-        counts = json.loads(ask(tmp_path / "control", "status"))["counts"]
+        counts = read_message(ask(tmp_path / "control", "status"))["counts"]
         found.stop()
     assert counts["grabbed"] > 5 * counts["frames"]
     assert counts["skipped"] > 4 * counts["frames"]

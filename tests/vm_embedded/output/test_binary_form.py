@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.messages import checked
 from tests.vm_embedded.live.running import running
 from tests.vm_embedded.output.features import demo_frame, full, scene
+from vm_embedded import Tracker
 from vm_embedded.cameras.camera import Shot
 from vm_embedded.output.binary_form import HEADER, RECORDS, VERSION, to_binary
 from vm_embedded.output.messages import STATES, live_message, state_message, to_json_line
@@ -50,19 +52,22 @@ def read(tmp_path, *messages):
     return variables
 
 
-def frame_message(make):
+def frame_message(make, tracked=True):
     image, detections = demo_frame(6)
     now = time.monotonic()
     field = make and make(detections.observation.view)
     shot = Shot(image, now - 0.02, arrived=now - 0.01)
-    return live_message(2**32 + 812, "degraded", shot, replace(detections, field=field), now)
+    found = replace(detections, field=field)
+    return checked(live_message(2**32 + 812, "degraded", shot, Tracker().update(found, 1.0) if tracked else found, now))
 
 
 def assert_same(record, expected, names):
     """The fields of a record are the numbers of the JSON form."""
     for name in record.dtype.names:
-        value = expected[name]
-        if name == "class":
+        value = expected["track"][name.removeprefix("track_")] if name.startswith("track_") else expected[name]
+        if name == "track":
+            assert record[name] == value["id"] > 0
+        elif name == "class":
             assert names[record[name]] == value
         elif name == "kind":
             assert chr(record[name]) == value
@@ -108,6 +113,13 @@ def test_a_network_without_classes_of_the_field_has_no_field(tmp_path):
     assert {name for name, records in got["found"].items() if len(records)} == {"detections"}
 
 
+def test_an_object_without_a_track_has_the_number_0(tmp_path):
+    (record,) = read(tmp_path, frame_message(None, tracked=False))["found"]["detections"]
+    assert record["track"] == 0
+    for name in ("track_position", "track_velocity", "track_position_error", "track_velocity_error"):
+        assert np.isnan(record[name]).all()
+
+
 def test_a_pixel_that_the_lens_does_not_see_is_nan():
     message = frame_message(scene)
     message["field"]["robots"] = [message["field"]["robots"][0] | {"pixel": [None, None]}]
@@ -135,7 +147,7 @@ def test_a_text_that_is_too_long_is_cut(tmp_path):
 
 
 def test_the_tables_of_the_documentation_are_the_layout(tmp_path):
-    assert VERSION == 1
+    assert VERSION == 2
     assert read(tmp_path, state_message("ok", ""))["TYPES"] == RECORDS
     section = PAGE.split("### Binary form")[1].split("\n## ")[0]
     sizes = {name: int(size) for name, size in re.findall(r"^\| `(\w+)` \| (\d+) \|", section, re.MULTILINE)}

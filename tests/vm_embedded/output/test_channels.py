@@ -1,9 +1,9 @@
 """Messages of a real vm-detect on a Unix socket, in a file and by UDP."""
 
-import json
 import signal
 import socket
 
+from tests.messages import read_message
 from tests.vm_embedded.live.running import running
 from vm_embedded.live.control import ask
 
@@ -20,14 +20,14 @@ def test_many_read_the_socket_and_one_that_sleeps_holds_nobody_up(tmp_path):
             each.connect(str(path))
         heard = [each.makefile() for each in readers]
         # As many lines as the sleeper's buffers can't hold.
-        lines = [[json.loads(file.readline()) for _ in range(20)] for file in heard]
+        lines = [[read_message(file.readline()) for _ in range(20)] for file in heard]
         for each in lines[1:]:
             assert {one["frame"] for one in each if "frame" in one} & {
                 one["frame"] for one in lines[0] if "frame" in one
             }
         found.wait(
             lambda: (
-                json.loads(ask(tmp_path / "control", "status"))["counts"]["dropped"] > 0 or heard[0].readline() == ""
+                read_message(ask(tmp_path / "control", "status"))["counts"]["dropped"] > 0 or heard[0].readline() == ""
             )
         )
         for each in (*heard, *readers, sleeper):
@@ -44,19 +44,19 @@ def test_lines_also_go_to_a_file_and_by_udp(tmp_path):
         with running(tmp_path, "--camera", "synthetic", *where, "--output-format", "ros") as found:
             message = {"detections": {"detections": []}}
             while not message["detections"]["detections"]:
-                message = json.loads(listening.recv(65536))
+                message = read_message(listening.recv(65536))
             found.process.send_signal(signal.SIGTERM)
             assert found.process.wait(30) == 0
     detection = message["detections"]["detections"][0]
     assert detection["results"][0]["hypothesis"]["class_id"] == "ball"
     assert message["points"][0]["point"] == detection["results"][0]["pose"]["pose"]["position"]
     assert message["detections"]["header"]["frame_id"] == "base_footprint"
-    kept = [json.loads(line) for line in (tmp_path / "lines.jsonl").read_text().splitlines()]
+    kept = [read_message(line) for line in (tmp_path / "lines.jsonl").read_text().splitlines()]
     assert message in kept
 
 
 def test_what_is_wrong_with_an_output_shows_in_the_state(tmp_path):
     with running(tmp_path, "--camera", "synthetic", "--output-file", "/dev/full") as found:
         found.wait_for_state("degraded")
-        found.wait(lambda: "No space left" in json.loads(ask(tmp_path / "control", "status"))["reason"])
+        found.wait(lambda: "No space left" in read_message(ask(tmp_path / "control", "status"))["reason"])
         found.stop()

@@ -1,10 +1,10 @@
 """Recordings of a real vm-detect."""
 
-import json
 import signal
 import subprocess
 import time
 
+from tests.messages import read_message
 from tests.vm_embedded.live.running import COMMAND, arguments, running
 
 
@@ -18,11 +18,11 @@ def test_a_recording_is_detected_in_again_bit_by_bit(tmp_path):
         found.wait(lambda: [each for each in found.events if each["event"] == "recorded"])
         found.stop()
     (folder,) = kept.iterdir()
-    recorded = [json.loads(line) for line in (folder / "recording.jsonl").read_text().splitlines()]
+    recorded = [read_message(line) for line in (folder / "recording.jsonl").read_text().splitlines()]
     assert len(recorded) > 3
     assert '\nmodel = "ball"\n' in (folder / "vm.toml").read_text()  # on another machine, it is elsewhere
     done = subprocess.run([COMMAND, "--camera", folder], capture_output=True, text=True, timeout=60, check=True)
-    again = [json.loads(line) for line in done.stdout.splitlines()]
+    again = [read_message(line) for line in done.stdout.splitlines()]
     assert [each["detections"] for each in again] == [each["detections"] for each in recorded]
     assert any(each["detections"] for each in again)
 
@@ -54,9 +54,9 @@ def ask_to_record(tmp_path):
 
 def count_found(folder):
     """The number of frames of a recording that vm-detect reads, each with detections like those in its messages."""
-    recorded = [json.loads(line) for line in (folder / "recording.jsonl").read_text().splitlines()]
+    recorded = [read_message(line) for line in (folder / "recording.jsonl").read_text().splitlines()]
     done = subprocess.run([COMMAND, "--camera", folder], capture_output=True, text=True, timeout=120, check=True)
-    found = [json.loads(line)["detections"] for line in done.stdout.splitlines()]
+    found = [read_message(line)["detections"] for line in done.stdout.splitlines()]
     assert found[: len(recorded)] == [each["detections"] for each in recorded]
     return len(recorded)
 

@@ -10,6 +10,7 @@ import time
 import numpy as np
 import pytest
 
+from tests.messages import read_message
 from tests.vm_embedded.live.running import arguments, running
 from tests.vm_embedded.poses.test_parsing import quaternion
 from vm_embedded.cameras.synthetic import Motion
@@ -145,7 +146,7 @@ def test_ten_thousand_bad_poses_change_nothing(tmp_path):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
 
             def bad():
-                return json.loads(ask(tmp_path / "control", "status"))["counts"]["poses_bad"]
+                return read_message(ask(tmp_path / "control", "status"))["counts"]["poses_bad"]
 
             sent = 0
             while sent < 10000:
@@ -167,7 +168,7 @@ def test_what_the_line_of_a_pose_lacks_is_said_in_the_state(tmp_path):
     with running(tmp_path, "--camera", "synthetic", "--pose-source", f"udp:127.0.0.1:{port}") as found:
         found.wait_for_state("pose_stale")
         asked = subprocess.run(arguments(tmp_path, "--status"), capture_output=True, text=True, timeout=60, check=False)
-        assert json.loads(asked.stdout)["reason"] == "no pose received yet"
+        assert read_message(asked.stdout)["reason"] == "no pose received yet"
         found.stop()
 
 
