@@ -19,7 +19,10 @@ from .rooms import ROOMS
 TOP = Path(__file__).parents[1]
 DOCS = TOP / "docs"
 README = TOP / "README.md"
-OUTSIDE = [README, TOP / "CHANGELOG.md", TOP / "deploy" / "README.md", TOP / "benchmarks" / "README.md"]
+OUTSIDE = [
+    *(README, TOP / "CHANGELOG.md", TOP / "deploy" / "README.md", TOP / "benchmarks" / "README.md"),
+    TOP / ".github" / "CONTRIBUTING.md",
+]
 PAGES = [*OUTSIDE, *sorted(DOCS.glob("*.md"))]
 
 

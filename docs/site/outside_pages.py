@@ -21,6 +21,7 @@ PAGES = {
     "CHANGELOG.md": "changelog.md",
     "deploy/README.md": "deploy.md",
     "benchmarks/README.md": "benchmarks.md",
+    ".github/CONTRIBUTING.md": "contributing.md",
 }
 """Path in the repository, and path in the site."""
 
