@@ -104,11 +104,13 @@ def test_hangup_reads_the_configuration_again_and_keeps_the_old_one_if_it_is_bad
         assert "line 2" in refused[0]["reason"]
         before = len(found.frames)
         found.wait(lambda: len(found.frames) > before + 5)
-        path.write_text('model = "ball-small"\n[camera]\nsource = "synthetic"\n')
+        assert not any("track" in each for frame in found.frames for each in frame["detections"])
+        path.write_text('model = "ball-small"\n[camera]\nsource = "synthetic"\n[track]\non = true\n')
         found.process.send_signal(signal.SIGHUP)
         found.wait(lambda: [each for each in found.events if each["event"] == "reloaded"])
         before = len(found.frames)
         found.wait(lambda: len(found.frames) > before + 5)
+        found.wait(lambda: any("track" in each for each in found.frames[-1]["detections"]))
         found.stop()
 
 

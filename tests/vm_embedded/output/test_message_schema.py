@@ -50,6 +50,7 @@ def test_each_message_is_of_one_kind(messages):
     assert [kind_of(each) for each in messages] == ["frame", "state", "ros", "ros"]
     for each in messages:
         validator("").validate(each)
+    assert messages[2]["detections"]["detections"][0]["id"] == str(messages[0]["detections"][0]["track"]["id"])
 
 
 def test_files_with_all_options_and_a_status_fit(tmp_path):
