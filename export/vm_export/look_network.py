@@ -97,7 +97,7 @@ class LookNetwork(nn.Module):
 
     @property
     def typed_convolutions(self) -> list[nn.Conv2d]:
-        """The convolutions with their types."""
+        """The Conv2d layers, typed for mypy."""
         return [layer for layer in self.convolutions if isinstance(layer, nn.Conv2d)]
 
     def logits(self, patches: torch.Tensor) -> torch.Tensor:

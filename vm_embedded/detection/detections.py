@@ -30,9 +30,10 @@ class Detection:
     observation plane, at the height of the object's center. distance [m]: from the camera to this center.
     angular_radius [rad]: angle from its center to its outline. With a close look, it follows from the size that the
     close look saw; without one, from the size that fits the points best. distance_by_angle [m]: distance that follows
-    from `angular_radius` and the real radius. distances_agree: whether the two distances agree: they differ by at most
-    20 % with a close look, otherwise by less than the mesh can resolve. points: number of mesh points inside its
-    outline. reason: why it was rejected, or None. track: of the object over several frames, if a Tracker follows it.
+    from `angular_radius` and the real radius. distances_agree: whether the apparent size is near the size expected at
+    `distance`, within 20 % with a close look, otherwise within one ring spacing of the mesh. points: number of mesh
+    points inside its outline. reason: why it was rejected, or None. track: of the object over several frames, if a
+    Tracker follows it.
     """
 
     class_name: str

@@ -1,4 +1,4 @@
-"""The straight line from a frame and an orientation to detections."""
+"""The detector: from a frame and the camera's orientation to detections."""
 
 from __future__ import annotations
 

@@ -129,7 +129,7 @@ def look_closely(
 def look_at(places: Places, look: Look) -> Singles:
     """Look at n places, as often as the contracts of look and glance say, and move them to where an object was seen.
 
-    From the second look on, the answers to a patch and to its mirror image are averaged. Returns the last answers
+    From the second pass on, the answers to a patch and to its mirror image are averaged. Returns the last answers
     (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError if a network does not run.
     """
     networks = [each for each in (look.glance, look) if each for _ in range(each.contract.passes)]

@@ -60,10 +60,11 @@ def detect_views(
     - the camera is the same, the planes differ, and the angle between the detections' directions is less than the
       larger of their angular radii.
 
-    The detections nearest to each other, relative to these limits, are joined first. An object has at most one
-    detection of each camera on each plane. In the second case, only one plane can be right. For each plane, the
-    confidences of all its detections of this object, from all cameras, are added. The largest sum wins. A camera behind
-    a plane, or too near it for the mesh, sees nothing on it.
+    The detections nearest to each other, relative to these limits, are joined first. Joining is transitive: two
+    detections may also become one object through a third. An object has at most one detection of each camera on each
+    plane. In the second case, only one plane can be right. For each plane, the confidences of all its detections of
+    this object, from all cameras, are added. The largest sum wins. A camera behind a plane, or too near it for the
+    mesh, sees nothing on it.
 
     Raises InputError for no planes, planes with equal names, or a picture that does not fit.
     """
@@ -88,7 +89,8 @@ def _sightings(detector: Detector, camera: str, view: CameraView, plane: Plane) 
     except GeometryError:
         return
     observation = detector.observe(view.image, orientation, view.lens)
-    for each in locate(observation, detector.look, detector.settings, Stopwatch())[0]:  # without features of the field
+    # Not detector.locate, which would also search for features of the field.
+    for each in locate(observation, detector.look, detector.settings, Stopwatch())[0]:
         position = plane.to_world(each.position[None], view.pose)[0]
         away = position - view.pose.position
         yield Sighting(camera, plane.name, each, position, away / np.linalg.norm(away))

@@ -1,8 +1,8 @@
 """From an observation to objects on the plane.
 
-With a close look, the likely points propose places, and a second network judges each of them (`looking.py`). Without
-one, clusters of likely points are candidates, and their points decide: propose, fit, judge (`candidates.py`,
-`fitting.py`, `judging.py`).
+For the class of the close look, the likely points propose places, and a second network judges each of them
+(`looking.py`). For any other class, clusters of likely points are candidates, and their points decide: propose, fit,
+judge (`candidates.py`, `fitting.py`, `judging.py`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .settings import Settings
 from .stopwatch import Stopwatch
 
 _SAME_SIZE = 0.2
-"""With a close look, two distances agree if the apparent size differs from the expected one by less than this share."""
+"""With a close look, two distances agree if the apparent size differs from the expected one by at most this share."""
 
 
 def locate(
@@ -79,7 +79,8 @@ def _describe_candidate(observation: Observation, candidate: Candidate) -> Detec
         candidate.center,
         confidence=float(inside.mean()) if len(inside) else 0.0,
         scale=scale,
-        distances_agree=abs(scale - 1.0) <= view.spacing,  # a ring more or less on each side
+        # The outline that fits best is at most one ring spacing larger or smaller; both are in expected radii.
+        distances_agree=abs(scale - 1.0) <= view.spacing,
         points=len(inside),
         reason=candidate.reason,
     )

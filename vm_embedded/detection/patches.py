@@ -1,8 +1,9 @@
 """Patches: the picture around places where an object may be, in which an object has the same size at every distance.
 
 A patch is a square in the plane that touches the unit sphere around the camera in the direction of the object. One
-axis is level, the other one points up. Its side is a fixed number of the object's apparent radii. So a ball at one
-meter gets as many samples as a ball at ten: the paper's constant sample density, one level deeper.
+axis is level and points right; the other one points down. The side of the square is a fixed number of the object's
+apparent radii. So a ball at one meter gets as many samples as a ball at ten: the paper's constant sample density, one
+level deeper.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from .prepared_view import PreparedView
 from .pyramid import Pyramid
 
 _NODES = 4
-"""Rays along a side that go through the lens. A cubic polynomial through their pixels gives those of all samples."""
+"""Number of rays along a side that the lens projects exactly. A cubic polynomial through their pixels gives the pixels
+of all samples."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -104,8 +104,8 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     camera[:, 2] *= inward
     camera[:, 0] = cosine
     # If the view is wider than half a sphere, the shortest way of a turn may lead through directions behind the camera,
-    # out of the view. Around the edge of the view the way is at most pi / 2 times as long, and at most twice as long
-    # again because of points that were moved to the edge.
+    # out of the view. Around the edge of the view the way is at most pi / 2 times as long. Moving points to the edge at
+    # most doubles it. Together: pi.
     detour = 1.0 if reach <= np.pi / 2 else np.pi
     margin = detour * slack * _pixels_per_radian(lens, size)
     possible = np.zeros(len(mesh), dtype=bool)
@@ -148,5 +148,5 @@ def _pixels_per_radian(lens: Lens, size: Size) -> float:
 
     outward = np.linalg.norm(at(theta, around) - at(theta - step, around), axis=1) / step
     sideways = np.linalg.norm(at(theta, around + step) - at(theta, around), axis=1) / (step * np.sin(theta))
-    # The square root covers turns in both directions at once; 2 % the gaps between the 200 angles.
+    # hypot covers a turn in both directions at once; the 2 % cover the gaps between the 200 angles.
     return 1.02 * float(np.hypot(outward, sideways).max())

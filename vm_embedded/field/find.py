@@ -1,4 +1,4 @@
-"""From classified points to field features, in one straight line."""
+"""From classified points to field features: all steps in order."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ _Coordinate = Callable[[Floats, Floats | float], Floats]
 
 
 class Grid(MeshModel):
-    """A lattice of one of KINDS, row by row: the points that chains of links connect to the point below the camera.
+    """A lattice of one of KINDS, row by row. It keeps only the points that a path of links connects to the nadir.
 
     A point has a column and a row, and its neighbors are `steps` away. With four or eight neighbors u = column / k and
     v = row / k. With six neighbors each row is shifted by half a step, and rows are closer than columns:
@@ -199,9 +199,9 @@ def _border(kind: str, shape: Shape, height: float, max_distance: float) -> Floa
 def _within(points: Floats, border: Floats) -> Mask:
     """Which points (n, 2) of a quarter lie within its border (m, 2) or up to two steps beyond it; both are in steps.
 
-    This is a coarse filter, so that few points must be solved for; `_quarter` drops exactly those beyond the border.
-    The border runs from the first axis to the second. It is drawn as a polygon, and each point looks up its pixel. No
-    point may lie more than one step beyond the largest u and v of the border.
+    This filter is coarse. It only saves `_positions` from computing most points outside; `_quarter` then drops every
+    point beyond max_distance. The border runs from the first axis to the second. It is drawn as a polygon, and each
+    point looks up its pixel. No point may lie more than one step beyond the largest u and v of the border.
     """
     width, height = (math.ceil(each) + 3 for each in border.max(axis=0))
     outline = np.concatenate([[[0.0, 0.0]], border])

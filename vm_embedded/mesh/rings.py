@@ -26,7 +26,8 @@ _GROUPS = {
     6: (("left", "itself", "right"), ("top left", "top right"), ("bottom left", "bottom right")),
     8: (("left", "itself", "right"), ("top left", "top right"), ("top",), ("bottom left", "bottom right"), ("bottom",)),
 }
-"""`MeshModel.groups` by name. With eight neighbors, top is also top left or top right, so it has its own group."""
+"""`MeshModel.groups` by name. With eight neighbors, top is the same point as top left or top right, and bottom the same
+as bottom left or bottom right. A run can't hold a point twice, so top and bottom are groups of their own."""
 
 # Subtracted before rounding up, so that float noise above a whole number does not add a point to a ring.
 _CEIL_EPSILON = 1e-9
@@ -93,7 +94,10 @@ def ring_places(counts: Indices) -> tuple[Indices, Indices]:
 
 
 class _Ring(NamedTuple):
-    """A ring for each point, its own or the next one: the ring's first point (n,) and number of points (n,)."""
+    """One ring for each point: the point's own ring, the next one inwards or the next one outwards.
+
+    first (n,): the ring's first point. size (n,): its number of points.
+    """
 
     first: Indices
     size: Indices
@@ -108,7 +112,8 @@ def ring_neighbors(counts: Indices, start: Indices, place: Indices, width: int, 
 
     counts: (rings,) number of points in each ring. start, place: from `ring_places`. width: 4, 6 or 8 neighbors.
     nudge: added to all places before rings are compared, so that float noise does not choose between two neighbors at
-    the same distance. That happens where the sizes of two rings have a common divisor; only cap6 needs it.
+    the same distance. Only cap6 needs it: the sizes of its inner rings have a common divisor, so many of its points
+    have two such neighbors.
 
     A point is linked to the two adjacent points of its ring, and to the points of the next rings at the same fraction
     of the circle. In each of these rings, width 6 links the nearest two, and width 4 only the nearest one. Width 8

@@ -56,11 +56,11 @@ class LookContract:
     size: samples along each side of a patch, 8 to 128.
     extent: half the side of a patch [expected radii], 0.5 to 8.
     above: probability above which a mesh point counts for a proposal, 0 to 0.99.
-    passes: largest number of looks at a proposal, 1 to 4; each further look judges a new patch around
-        the center that the previous look found, and its mirror image.
+    passes: how often a proposal is judged at most, 1 to 4; each further pass judges a new patch around the center that
+        the previous pass found, and its mirror image.
     channels: of the network's convolutions at each resolution; the runtime does not use them.
     glance: of a smaller look network for the same class, which judges each proposal first; this one judges only what
-        is left. A glance has none.
+        the glance passes on. A glance has none.
     self_test: an example with its answers, which each loading of the model file runs.
     provenance: origin of the network; the runtime does not use it.
 

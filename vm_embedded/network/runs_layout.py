@@ -45,7 +45,8 @@ _GAP = 1
 
 _GAPS_BEFORE = 3
 _GAPS_BEHIND = 2
-"""The table has no windows around the last two slots; vm_export/runs_graph.py says why."""
+"""Each group has m - 1 columns, and column j is the window around slot j - 1. So the slots m - 2 and m - 1 have no
+window."""
 
 _Positions = npt.NDArray[np.int64]
 
@@ -110,8 +111,8 @@ def group_offsets(group: tuple[int, ...]) -> range:
 def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Positions, _Positions]:
     """Arranges a mesh's points in slots, from their neighbors (n + 1, N).
 
-    Returns the point in each slot (m,), n in gaps; the slot of each point (n,); and (G, m) for each group, and for the
-    point in each slot, the slot in its group's middle, which is _GAP for gaps.
+    Returns three arrays: the point in each slot (m,), n in gaps; the slot of each point (n,); and middles (G, m): for
+    the point in each slot, the slot of the middle of each of its groups, _GAP in gaps.
     """
     n = len(neighbors) - 1
     # A second gap at the end. `_found_in_runs` reads two slots after the last point, if that is the first of a
@@ -180,7 +181,7 @@ def _in_runs(left: Indices, right: Indices) -> _Positions:
 
     order, ends_run = _chained(follower)
     lengths = (ends - starts + 1)[order]
-    # Of each piece, then the number of all slots. A gap follows each piece that ends a run.
+    # The first slot of each piece; the last entry is the number of slots. One gap follows each piece that ends a run.
     first_slot = _GAPS_BEFORE + np.cumsum(np.append(0, lengths + ends_run))
     runs = np.full(first_slot[-1], n)
     within = np.arange(n) - np.repeat(np.cumsum(lengths) - lengths, lengths)  # place of a point in its piece

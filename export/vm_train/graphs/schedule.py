@@ -45,7 +45,7 @@ def steps_an_epoch(training: int, batch: int) -> int:
 def schedule(
     seed: tuple[int, ...], epochs: int, batch: int, training: int, validation: int, looks: int = 1
 ) -> Iterator[Batch]:
-    """All batches of a training: each epoch looks `looks` times at all pictures, shuffled, and then validates.
+    """All batches of a training: each epoch uses all pictures `looks` times, shuffled, and then validates.
 
     Positions below `training` are training pictures; the `validation` positions after them are validation pictures.
     """

@@ -1,8 +1,8 @@
 """The rounds of a training.
 
 Each round trains a new network, from random weights or from those of a trained network (start.py). After each epoch the
-validation pictures score it, and the round keeps its best epoch in a checkpoint. A stopped training continues from the
-state that it saves every few seconds.
+validation pictures score it, and the round keeps its best epoch in a checkpoint. A stopped training continues from its
+state, which is saved twice a minute.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class TrainingOutcome:
 def train(run: TrainingRun, hardware: Hardware, stop_requested: Callable[[], bool]) -> TrainingOutcome:
     """Train until the end, or until `stop_requested` returns True. Raises InputError.
 
-    The final weights are the same however often the training was stopped or killed.
+    With one computing thread on a CPU, the final weights are the same however often the training was stopped or killed.
     """
     began = perf_counter()
     progress = TrainingProgress()
@@ -163,7 +163,7 @@ class _Round:
             self.save()
 
     def stop(self, batch: Batch) -> None:
-        """Save before a stop. A validation that was stopped begins again; its state is saved already."""
+        """Save before a stop. A stopped validation starts again; the state before it is saved already."""
         if not batch.validates:
             self.save()
         self._bar.clear()
@@ -196,7 +196,8 @@ class _Round:
         unseen = bool(objects) and not known.keys() & set(objects)
         if unseen and self._progress.validated == 1 and self._hardware.is_leader:
             print(
-                f"vm-train: the validation shows no {' or '.join(objects)}: all classes choose the best network",
+                f"vm-train: the validation pictures show no {' or '.join(objects)}: the score is the mean average "
+                "precision of all classes",
                 file=sys.stderr,
             )
 
@@ -228,7 +229,9 @@ def _round_trainer(run: TrainingRun, hardware: Hardware, progress: TrainingProgr
     network = Network(run.configuration.network_shape)
     if run.start is not None:
         network.load_state_dict(run.start.checkpoint.network.state_dict())
+    # The networks of earlier rounds: their errors raise the chance of a point to be selected.
     graders = [Checkpoint.load(run.round_path(each)).network for each in range(1, progress.round)]
+    # looks: how often an epoch uses each picture
     total = recipe.epochs * steps_an_epoch(recipe.looks * run.data.pictures_per_epoch, recipe.batch)
     shares, weights = run.shares_and_weights(progress.round)
     teacher = None if run.teacher is None else run.teacher.network

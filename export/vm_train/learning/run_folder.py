@@ -76,7 +76,10 @@ class TrainingRun:
 
     @property
     def configuration_sha256(self) -> str:
-        """Digest of configuration and split. The name mentions only the first, but run.json and model files use it."""
+        """Digest of configuration and split.
+
+        The name says only "configuration", but it can't change: run.json and model files contain it.
+        """
         text = json.dumps([asdict(self.configuration), asdict(self.data.split)])
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -175,7 +178,7 @@ def read_run(folder: Path) -> TrainingRun:
         counts = np.array(list(content["points"].values()), dtype=np.int64)
         pictures, unpacked, stream = Path(content["data"]), content["unpacked"], content["source"]
         configuration_sha256, teacher_sha256 = content["configuration_sha256"], content["teacher_sha256"]
-        started = content.get("start")  # trainings of before this entry began with random weights
+        started = content.get("start")  # an older run.json lacks this entry; its training began with random weights
         start_name, start_sha256 = (None, None) if started is None else (str(started["file"]), started["sha256"])
         source = None if stream is None else StreamSource(**(stream | {"shards": tuple(stream["shards"])}))
     except OSError as error:

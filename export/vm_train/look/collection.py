@@ -29,7 +29,7 @@ CHUNK = 100
 """Pictures in a file of patches."""
 
 _NEARLY_WORTH = 0.1 * WORTH
-"""The glance leaves less in the pictures that it was trained on; with this limit, about as much as in others."""
+"""The glance passes on less in the pictures that it was trained on; with this limit, about as much as in others."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,8 +49,8 @@ class PatchSettings:
     )
     passes: int = number(
         3,
-        "on the robot: largest number of looks at a proposal; each further look cuts a new patch "
-        "around the center that the previous look found",
+        "on the robot: how often a proposal is judged at most; each further pass cuts a new patch "
+        "around the center that the previous pass found",
         "",
         (1, 4),
     )

@@ -1,6 +1,6 @@
 """The places that patches are cut at: proposals of the mesh network, places beside true objects, and random places.
 
-With a glance, the proposals are those that it leaves, at the centers that it found.
+With a glance, the proposals are those that it passes on, at the centers that it found.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def proposed_places(
 ) -> Places:
     """The proposals of a class from the slots' probabilities (m,), best first.
 
-    above: probability above which the glance leaves a proposal. Raises ModelError if the glance does not run.
+    above: probability above which the glance passes a proposal on. Raises ModelError if the glance does not run.
     """
     centers = propose_places(observation, probabilities, settings.above, settings.proposals)
     if glance is not None:

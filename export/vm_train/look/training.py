@@ -139,7 +139,7 @@ class _Training:
         name, training, validation = self._run.object_class, found.training, found.validation
         print(f"training: {len(training)} patches, {training.objects} of them show the object {name}")
         print(f"validation: {len(validation)} proposals, {validation.objects} of them show the object {name}")
-        proposer = "the glance leaves" if self._run.glance_sha256 else "the mesh network proposes"
+        proposer = "the glance passes on" if self._run.glance_sha256 else "the mesh network proposes"
         share = 100.0 * found.proposed / found.objects if found.objects else math.nan
         print(f"{proposer} {found.proposed} of {found.objects} visible objects ({share:.0f} %)", flush=True)
 

@@ -33,7 +33,7 @@ def search_radii(objects: Windows) -> Floats:
 
 
 def find_candidates(pyramid: Pyramid, size: Size, look: Look, radii: Floats, above: float, most: int) -> Windows:
-    """The windows that look most like an object to a network's first look, best first.
+    """The windows that look most like an object in a network's first pass, best first.
 
     size: of the frame [px]. radii (s,): to look for [px]. above: lowest probability of a candidate. most: number of
     candidates. Of candidates that overlap, the better one stays. Raises ModelError if the network does not run.

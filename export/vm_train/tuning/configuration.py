@@ -36,7 +36,7 @@ class WindowSettings:
     candidates: int = number(
         30, "largest number of patches at the network's own candidates, found at all places and sizes", "", (1, 1000)
     )
-    above: float = number(0.005, "lowest probability of such a candidate in the first look", "", (0.0, 0.99))
+    above: float = number(0.005, "lowest probability of such a candidate in the first pass", "", (0.0, 0.99))
     seed: int = number(0, "seed of the places", "", (0, 2**31))
 
     def __post_init__(self) -> None:

@@ -102,7 +102,7 @@ def test_the_second_look_cancels_errors_to_one_side(scene):
     assert (np.linalg.norm(once - centers, axis=1) > 0.15 * scene.view.shape.radius).all()
 
 
-def test_a_look_sees_only_what_its_glance_leaves_where_it_saw_it(scene):
+def test_a_look_sees_only_what_its_glance_passes_on_where_it_saw_it(scene):
     class Strict(BrightDisk):
         """Gives no chance to what is not a ball."""
 
@@ -129,7 +129,7 @@ def test_only_proposals_with_a_chance_are_looked_at_again(scene):
     look = BrightDisk()
     bare = replace(scene, slot_probabilities=np.full_like(scene.slot_probabilities, 0.5))
     found_in(bare, look, max_proposals=30)
-    assert look.seen == [30, 60]  # 0.05 is a chance; each second look also sees the mirror image
+    assert look.seen == [30, 60]  # 0.05 is a chance; each second pass also sees the mirror image
 
     class Sure(BrightDisk):
         def run(self, patches):

@@ -93,11 +93,11 @@ def test_the_next_command_attaches_it_to_its_mesh_network(whole):
     (folder / "model.onnx").unlink()
 
 
-def test_a_look_learns_from_what_its_glance_leaves(whole, look, tmp_path):
+def test_a_look_learns_from_what_its_glance_passes_on(whole, look, tmp_path):
     glance = whole[0] / "look.pt"
     folder = tmp_path / "run"
     lines = look(folder, "--glance", glance).stdout.splitlines()
-    assert re.fullmatch(r"the glance leaves \d+ of \d+ visible objects \(\d+ %\)", lines[3])
+    assert re.fullmatch(r"the glance passes on \d+ of \d+ visible objects \(\d+ %\)", lines[3])
     fewer, all_proposals = (int(re.search(r"validation: (\d+)", each)[1]) for each in (lines[2], whole[1].stdout))
     assert fewer < all_proposals
     made = LookCheckpoint.load(folder / "look.pt")
