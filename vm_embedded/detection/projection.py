@@ -103,9 +103,9 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     camera[:, 1] *= inward
     camera[:, 2] *= inward
     camera[:, 0] = cosine
-    # If the view is wider than half a sphere, the shortest way of a turn may lead through directions behind the camera,
-    # out of the view. Around the edge of the view the way is at most pi / 2 times as long. Moving points to the edge at
-    # most doubles it. Together: pi.
+    # A turn moves a ray along a great arc. In a view wider than half a sphere, this arc may leave the view and pass
+    # behind the camera. A way along the edge of the view is at most pi / 2 times as long. Points outside of the view
+    # were moved to its edge, which at most doubles the way between two points. Both together: pi.
     detour = 1.0 if reach <= np.pi / 2 else np.pi
     margin = detour * slack * _pixels_per_radian(lens, size)
     possible = np.zeros(len(mesh), dtype=bool)

@@ -9,10 +9,11 @@ The words that this file uses:
   of ring6 are left, the point itself and right; top left and top right; bottom left and bottom right. The first group
   of every mesh is left, itself and right: it says which points a run joins.
 - The *middle* of a group is the second slot of a group of three, and the first slot of a shorter group.
-- A *column* is a position in a layer's table (vm_export/runs_graph.py). It holds, for each group, m - 1 weighted sums
-  over windows of three adjacent slots; slots outside of the group have the weight 0. Column s + 1 is the window around
-  slot s. The first two columns are not used, and the last two slots, which are gaps, have no window. So a point looks
-  up one value for each group, not for each neighbor.
+- A layer's *table* (vm_export/runs_graph.py) holds, for each group, m - 1 weighted sums over windows of three adjacent
+  slots; slots outside of the group have the weight 0. So a point looks up one sum for each group, not one value for
+  each neighbor.
+- A *column* is the position of a sum in the table. Within a group, column s + 1 is the window around slot s. The first
+  two columns of each group are not used, and the last two slots, which are gaps, have no window.
 
 An example. Points 0 1 2 are a part of a ring, points 3 4 5 6 the whole next ring. The groups are left, self and right,
 and two upper neighbors: 3 4 above point 0, 4 5 above point 1, 6 3 above point 2. The m = 23 slots are:

@@ -49,7 +49,7 @@ _FILES = ("train.toml", "pictures.json", _TEACHER, *_STARTS.values(), "state.pt"
 class TrainingRun:
     """A training as its folder describes it; `begin_run` and `read_run` make it.
 
-    counts (C,): number of points of each class in the pictures that `data.counted` names. start: the network that each
+    counts (C,): number of points of each class in as many pictures as `data.counted` says. start: the network that each
     round begins with; None: random weights.
     """
 
