@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..arrays import Image
-from ..cameras.image_files import Frame, check_file_format, lens_beside, open_sources
+from ..cameras.image_files import Frame, Source, check_file_format, joined, lens_beside, open_source, open_sources
 from ..detection.detector import Detector
 from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError
@@ -20,6 +20,7 @@ from ..live.configuration import Configuration
 from ..output.box_files import BoxWriter
 from ..output.messages import file_message
 from ..output.result_files import make_folder, save_overlay, save_points
+from ..ros.bags import BagReading, is_bag, open_bag
 from .progress import ProgressBar
 
 
@@ -36,8 +37,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     for name in emit_points:
         detector.manifest.column(name)
     check_file_format(format)
-    sources, largest = options.files or [given.camera.source], given.camera.max_megapixels
-    source = open_sources(sources, format != "bgr", largest)
+    source = _open(options.files or [given.camera.source], given)
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:
             make_folder(folder)
@@ -63,6 +63,22 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     return processed
 
 
+def _open(names: Sequence[str], given: Configuration) -> Source:
+    """The frames of images, folders, videos and bags. Raises InputError."""
+    raw, largest = given.detector.format != "bgr", given.camera.max_megapixels
+    if not any(map(is_bag, names)):
+        return open_sources(names, raw, largest)
+    reading = BagReading(
+        ros=given.ros,
+        pose=given.pose,
+        lens=given.lens.lens if given.lens else None,
+        orientation=given.fixed_orientation(),
+        raw=raw,
+        max_megapixels=largest,
+    )
+    return joined([open_bag(each, reading) if is_bag(each) else open_source(each, raw, largest) for each in names])
+
+
 @dataclass(frozen=True)
 class _DefaultPose:
     """Lens and orientation for frames without a lens file; None if the user gave none."""
@@ -72,6 +88,8 @@ class _DefaultPose:
 
     def of(self, frame: Frame) -> tuple[Lens, Orientation]:
         """Lens and orientation of a frame; the lens file beside it takes precedence. Raises InputError without one."""
+        if frame.lens is not None and frame.orientation is not None:
+            return frame.lens, frame.orientation
         lens, orientation = self.lens, self.orientation
         beside = lens_beside(frame.path)
         if beside is not None:

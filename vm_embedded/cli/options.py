@@ -24,6 +24,7 @@ from ..network.bundled import DEFAULT, SHIPPED
 from ..output.channels import OutputSettings
 from ..output.recorder import CONFIGURATION, RecorderSettings
 from ..poses.settings import PoseSettings
+from ..ros.settings import RosSettings
 
 LIVE = {
     "camera": CameraSettings,
@@ -31,6 +32,7 @@ LIVE = {
     "output": OutputSettings,
     "status": StatusSettings,
     "recorder": RecorderSettings,
+    "ros": RosSettings,
 }
 """Sections for live cameras."""
 
@@ -78,7 +80,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 def add_live(parser: argparse.ArgumentParser) -> None:
     """Add an option for each entry of the sections for live cameras."""
     for name, section in LIVE.items():
-        group = parser.add_argument_group(f"[{name}], for live cameras")
+        group = parser.add_argument_group(f"[{name}], for {'ROS 2' if name == 'ros' else 'live cameras'}")
         add_section(group, section, f"{name}_", ("source",) if name == "camera" else ())
 
 

@@ -31,6 +31,21 @@ def rotation_z(angle: float) -> Floats:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def rotation_from_quaternion(quaternion: Sequence[float]) -> Floats:
+    """Rotation (3, 3) of a quaternion (w, x, y, z). Raises GeometryError if its length differs from 1 by over 1e-3."""
+    q = np.asarray(quaternion, dtype=np.float64)
+    if q.shape != (4,) or not np.isfinite(q).all() or abs(float(q @ q) - 1.0) > 2e-3:
+        raise GeometryError(f"quaternion must be (w, x, y, z) of length 1, not {list(quaternion)}")
+    w, x, y, z = q / np.linalg.norm(q)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Orientation:
     """Height and rotation of a camera over the observation plane.
@@ -86,17 +101,7 @@ class Orientation:
 
         Raises GeometryError if its length differs from 1 by more than 1e-3.
         """
-        q = np.asarray(quaternion, dtype=np.float64)
-        if q.shape != (4,) or not np.isfinite(q).all() or abs(float(q @ q) - 1.0) > 2e-3:
-            raise GeometryError(f"quaternion must be (w, x, y, z) of length 1, not {list(quaternion)}")
-        w, x, y, z = q / np.linalg.norm(q)
-        rotation = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        rotation = rotation_from_quaternion(quaternion)
         return cls(height, rotation @ OPTICAL_TO_CAMERA.T if optical else rotation)
 
     @cached_property

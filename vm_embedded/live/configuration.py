@@ -26,6 +26,7 @@ from ..network.bundled import DEFAULT, SHIPPED, model_path
 from ..output.channels import OutputSettings
 from ..output.recorder import RecorderSettings
 from ..poses.settings import PoseSettings
+from ..ros.settings import RosSettings
 from ..sockets import checked_address
 from .deploy_settings import DeploySettings
 
@@ -146,6 +147,7 @@ class Configuration:
     output: OutputSettings = field(default_factory=OutputSettings)
     status: StatusSettings = field(default_factory=StatusSettings)
     recorder: RecorderSettings = field(default_factory=RecorderSettings)
+    ros: RosSettings = field(default_factory=RosSettings)
     deploy: DeploySettings = field(default_factory=DeploySettings)
 
     def fixed_orientation(self) -> Orientation | None:
