@@ -20,13 +20,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Protocol
 
-from ..cameras.camera import without_password
+from ..cameras.camera import CameraSettings, without_password
 from ..cameras.grabber import MOST_HANGING, Grabber
-from ..cameras.open_camera import camera_opener
+from ..cameras.open_camera import Opener, camera_opener
 from ..errors import InputError, VisualMeshError, one_line
 from ..output.channels import Channels
 from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
+from ..poses.settings import is_of_ros
 from ..poses.stream import PoseStream
 from .answering import Answer, Answerer
 from .configuration import Configuration, recording_toml
@@ -70,16 +71,36 @@ class Part(Protocol):
         """Release all resources."""
 
 
+class Bridge(Protocol):
+    """Connects the daemon to other robot software, such as ROS: it may open the camera, and gets every message."""
+
+    def opener(self, settings: CameraSettings, raw: bool) -> Opener:
+        """Return a function that opens the camera, as `camera_opener` does."""
+
+    async def open(self, poses: PoseStream) -> None:
+        """Connect; from now on, poses may go to `poses`. Raises InputError."""
+
+    def publish(self, message: Message, answer: Answer | None) -> None:
+        """Publish a message. answer: that of its frame; None for a message with a state only."""
+
+    async def close(self) -> None:
+        """Disconnect."""
+
+
 class Daemon:
     """Runs until a signal stops it, the camera ends, or too many reads of the camera hang.
 
     configure: reads the configuration; called at the start and for each reload. Raises VisualMeshError.
+    bridge: to other robot software.
     """
 
-    def __init__(self, configure: Callable[[], Configuration], log: EventLog) -> None:
+    def __init__(self, configure: Callable[[], Configuration], log: EventLog, bridge: Bridge | None = None) -> None:
         self._configure = configure
         self._log = log
+        self._bridge = bridge
         configuration = configure()
+        if bridge is None and is_of_ros(configuration.pose.source):
+            raise InputError(f"pose source {configuration.pose.source} works only with vm-ros and bags")
         detector = load_checked_detector(configuration)
         camera, status = configuration.camera, configuration.status
         self.recorder = Recorder(configuration.recorder, lambda event, level, folder: log(event, level, folder=folder))
@@ -94,7 +115,7 @@ class Daemon:
         self._notifier = SystemdNotifier()
         self._hung = False  # whether so many reads of the camera hang that only a new process helps
         self._wakeup = asyncio.Event()
-        opener = camera_opener(camera, raw=configuration.detector.format != "bgr")
+        opener = (bridge.opener if bridge else camera_opener)(camera, configuration.detector.format != "bgr")
         self.grabber = Grabber(opener, camera, self._wake)
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
         self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health)
@@ -124,6 +145,8 @@ class Daemon:
         try:
             for part in self._parts:
                 await part.open()
+            if self._bridge is not None:
+                await self._bridge.open(self.poses)
         except InputError:
             await self._close()
             raise
@@ -204,7 +227,7 @@ class Daemon:
         self._update_state()
         shot, detections = answer.shot, answer.detections
         self.last = live_message(self.counters.outcomes.frames, self.state, shot, detections, answer.time)
-        self._send(self.last)
+        self._send(self.last, answer)
         self.page.show(shot.image, detections)
         self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._recording_toml)
 
@@ -230,9 +253,11 @@ class Daemon:
             self._send(state_message(state, reason))
             self._notifier.send(STATUS=f"{state}{': ' if reason else ''}{reason}")
 
-    def _send(self, message: Message) -> None:
+    def _send(self, message: Message, answer: Answer | None = None) -> None:
         self._sent = time.monotonic()
         self.outputs.send(message)
+        if self._bridge is not None:
+            self._bridge.publish(message, answer)
 
     def _status(self) -> Message:
         """State, counts, and the last frame's message."""
@@ -290,6 +315,8 @@ class Daemon:
         self._wakeup.set()
 
     async def _close(self) -> None:
+        if self._bridge is not None:
+            await self._bridge.close()
         for part in self._parts:
             await part.close()
         # In a thread, so that a second signal still ends the process at once.

@@ -13,7 +13,8 @@ from vm_embedded.cameras.synthetic import SyntheticCamera
 from vm_embedded.geometry.calibrated_lenses import BrownLens
 from vm_embedded.geometry.lens_files import format_lens_file
 from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA
-from vm_embedded.ros.bag_types import bag_types, full_name, typestore
+from vm_embedded.ros.bag_types import bag_types, typestore
+from vm_embedded.ros.message_fields import MESSAGES
 
 TYPES = bag_types()
 START = 1_800_000_000
@@ -133,6 +134,6 @@ def write_messages(folder, messages, storage=StoragePlugin.MCAP):
     with Writer(folder, version=9, storage_plugin=storage) as writer:
         for time, topic, kind, message in messages:
             if topic not in connections:
-                connections[topic] = writer.add_connection(topic, full_name(kind), typestore=store)
-            data = store.serialize_cdr(message, full_name(kind))
+                connections[topic] = writer.add_connection(topic, MESSAGES[kind], typestore=store)
+            data = store.serialize_cdr(message, MESSAGES[kind])
             writer.write(connections[topic], START * 10**9 + round(1e9 * time), data)
