@@ -140,9 +140,8 @@ class Node:
         return self._tree.at(self._ros.plane_frame, self._camera_frame, captured).translation[:2]
 
     def _publish_state(self, message: Message) -> None:
-        values: dict[str, object] = {
-            name: message[name] for name in ("frame", "age_ms", "latency_ms", "points") if name in message
-        }
+        names = ("frame", "age_ms", "latency_ms", "points")
+        values: dict[str, object] = {name: message[name] for name in names if name in message}
         self._diagnostics.publish(
             diagnostic_array(
                 self._types,

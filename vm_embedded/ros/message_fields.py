@@ -18,7 +18,8 @@ FIELDS = {
     "geometry_msgs/msg/Transform": "Vector3 translation, Quaternion rotation",
     "geometry_msgs/msg/TransformStamped": "Header header, string child_frame_id, Transform transform",
     "tf2_msgs/msg/TFMessage": "TransformStamped[] transforms",
-    "sensor_msgs/msg/RegionOfInterest": "uint32 x_offset, uint32 y_offset, uint32 height, uint32 width, bool do_rectify",
+    "sensor_msgs/msg/RegionOfInterest": "uint32 x_offset, uint32 y_offset, uint32 height, uint32 width, "
+    "bool do_rectify",
     "sensor_msgs/msg/CameraInfo": "Header header, uint32 height, uint32 width, string distortion_model, float64[] d, "
     "float64[9] k, float64[9] r, float64[12] p, uint32 binning_x, uint32 binning_y, RegionOfInterest roi",
     "sensor_msgs/msg/Image": "Header header, uint32 height, uint32 width, string encoding, uint8 is_bigendian, "
