@@ -27,7 +27,7 @@ from .program import Parser, program
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
-_FILES_ONLY = ("save_boxes", "save_overlay", "save_points", "emit_points", "explain")
+_FILES_ONLY = ("save_mcap", "save_boxes", "save_overlay", "save_points", "emit_points", "explain")
 """Options that a live camera rejects."""
 
 
@@ -90,6 +90,12 @@ def parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="write each image, its lens and pose, and the boxes of its objects as NAME.txt in YOLO format, for "
         "annotation tools and vm-label; near misses go to candidates.jsonl; DIR must be new or empty",
+    )
+    output.add_argument(
+        "--save-mcap",
+        type=Path,
+        metavar="FILE",
+        help="write images, lenses, poses, detections and states as FILE.mcap, for Foxglove and ROS 2",
     )
     output.add_argument("--emit-points", metavar="CLASS,...", help="add the points of these classes to the JSON")
     output.add_argument(

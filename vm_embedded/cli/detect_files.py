@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
 from ..arrays import Image
@@ -21,6 +22,7 @@ from ..output.box_files import BoxWriter
 from ..output.messages import file_message
 from ..output.result_files import make_folder, save_overlay, save_points
 from ..ros.bags import BagReading, is_bag, open_bag
+from ..ros.mcap_file import McapFile
 from .progress import ProgressBar
 
 
@@ -46,19 +48,22 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
 
     processed = 0
     bar = ProgressBar(source.count)
-    for frame in source.frames:
-        if follow is not None and frame.index == 0:
-            follow.time(frame)  # without times, no frame can be processed
-        try:
-            line = _process(frame, detector, pose, follow, options, emit_points, boxes)
-        except VisualMeshError as error:
+    with McapFile(options.save_mcap, given.ros.plane_frame) if options.save_mcap else nullcontext() as mcap:
+        for frame in source.frames:
+            if follow is not None and frame.index == 0:
+                follow.time(frame)  # without times, no frame can be processed
+            try:
+                line = _process(frame, detector, pose, follow, options, emit_points, boxes, mcap)
+            except VisualMeshError as error:
+                bar.clear()
+                complain(str(error))
+                if mcap is not None:
+                    mcap.write_state(frame, "degraded", str(error))
+                continue
             bar.clear()
-            complain(str(error))
-            continue
-        bar.clear()
-        print(line, flush=True)
-        processed += 1
-        bar.show(frame.index + 1)
+            print(line, flush=True)
+            processed += 1
+            bar.show(frame.index + 1)
     bar.clear()
     return processed
 
@@ -128,6 +133,7 @@ def _process(
     options: argparse.Namespace,
     emit_points: Sequence[str],
     boxes: BoxWriter | None,
+    mcap: McapFile | None,
 ) -> str:
     """Detect in a frame, save the files that the options ask for, and return its line of JSON.
 
@@ -135,7 +141,7 @@ def _process(
     """
     image = frame.read()  # its errors name the file
     try:
-        return _detect(image, frame, detector, pose, follow, options, emit_points, boxes)
+        return _detect(image, frame, detector, pose, follow, options, emit_points, boxes, mcap)
     except VisualMeshError as error:
         raise InputError(f"{frame.source}: {error}") from error
 
@@ -149,6 +155,7 @@ def _detect(
     options: argparse.Namespace,
     emit_points: Sequence[str],
     boxes: BoxWriter | None,
+    mcap: McapFile | None,
 ) -> str:
     lens, orientation = pose.of(frame)
     detections = detector.detect(image, orientation, lens, explain=options.explain or boxes is not None)
@@ -162,6 +169,8 @@ def _detect(
         save_points(options.save_points, frame, detections)
     if options.save_overlay is not None:
         save_overlay(options.save_overlay, frame, image, detections)
+    if mcap is not None:
+        mcap.write(frame, image, lens, orientation, detections)
     return json.dumps(file_message(frame, detections, emit_points, options.explain), allow_nan=False)
 
 

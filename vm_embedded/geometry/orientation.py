@@ -46,6 +46,24 @@ def rotation_from_quaternion(quaternion: Sequence[float]) -> Floats:
     )
 
 
+def quaternion_from_rotation(rotation: Floats) -> tuple[float, float, float, float]:
+    """The quaternion (w, x, y, z) of a rotation (3, 3), with w >= 0."""
+    # Each product of two components is a sum of entries of the rotation; the largest square gives the best precision.
+    r, trace = rotation, float(np.trace(rotation))
+    squares = [1.0 + trace, *(1.0 - trace + 2.0 * r[i, i] for i in range(3))]
+    products = np.array(
+        [
+            [squares[0], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
+            [r[2, 1] - r[1, 2], squares[1], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
+            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], squares[2], r[1, 2] + r[2, 1]],
+            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[3]],
+        ]
+    )
+    row = products[int(np.argmax(squares))]
+    w, x, y, z = row / math.copysign(float(np.linalg.norm(row)), row[0])
+    return float(w), float(x), float(y), float(z)
+
+
 @dataclass(frozen=True, eq=False)
 class Orientation:
     """Height and rotation of a camera over the observation plane.

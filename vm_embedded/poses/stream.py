@@ -31,6 +31,8 @@ class PoseStream:
         self.settings = settings
         self.poses = PoseBuffer(settings)
         self.received = 0
+        self.rejection = ""
+        """Why the last pose was rejected; empty if it was accepted."""
         self.bad = 0
         self.arrived = asyncio.Event()
         self._report = report
@@ -113,12 +115,14 @@ class PoseStream:
             self.reject(str(error))
             return False
         self.received += 1
+        self.rejection = ""
         self.arrived.set()
         return True
 
     def reject(self, reason: str) -> None:
         """Count a pose that can't be used, and report why."""
         self.bad += 1
+        self.rejection = reason
         self._report(reason)
 
     def _time(self, t: float | None, now: float) -> float:

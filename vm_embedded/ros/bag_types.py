@@ -1,11 +1,12 @@
-"""The message types of bags: those of the library rosbags, with vision_msgs, which it lacks.
+"""The message types of bags: those of the library rosbags, with those that it lacks.
 
-rosbags is an optional package. Only functions of this module import it.
+rosbags is an optional package. Only functions import it.
 """
 
 from __future__ import annotations
 
 import re
+import struct
 from functools import cache
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -28,13 +29,24 @@ def import_rosbags() -> ModuleType:
     return rosbags
 
 
+def damage_errors() -> tuple[type[Exception], ...]:
+    """What rosbags and its libraries raise for a damaged bag."""
+    import apsw
+    from rosbags.highlevel import AnyReaderError
+    from rosbags.rosbag2 import ReaderError, reader
+
+    zstd_error: type[Exception] = reader.zstd.ZstdError  # type: ignore[attr-defined]
+    library = (AnyReaderError, ReaderError, apsw.Error, zstd_error, RuntimeError)  # the last is that of lz4
+    return (*library, OSError, ValueError, KeyError, IndexError, OverflowError, MemoryError, struct.error)
+
+
 @cache
 def typestore() -> Any:
-    """rosbags' types of ROS 2 Humble, with vision_msgs. Raises InputError if rosbags is not installed."""
+    """rosbags' types of ROS 2 Humble, with further messages of this project. Raises InputError without rosbags."""
     typesys = import_rosbags().typesys
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     for full in FIELDS:
-        if full.startswith("vision_msgs/"):
+        if full not in store.types:
             store.register(typesys.get_types_from_msg(_definition(full), full))
     return store
 

@@ -20,7 +20,7 @@ from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from ..poses.buffer import PoseBuffer, StalePoseError
 from ..poses.settings import PoseSettings
-from .bag_types import import_rosbags, typestore
+from .bag_types import damage_errors, import_rosbags, typestore
 from .camera_poses import newest_pose, orientation_of
 from .images import image_of
 from .lens import lens_of
@@ -65,7 +65,7 @@ def open_bag(name: str, reading: BagReading) -> Source:
     try:
         reader = rosbags.highlevel.AnyReader([Path(name)], default_typestore=typestore())
         reader.open()
-    except (rosbags.highlevel.AnyReaderError, OSError, ValueError, KeyError) as error:
+    except damage_errors() as error:
         raise InputError(f"can't read bag {name}: {one_line(error)}") from error
     try:
         images = _image_topic(name, reader, reading.ros.image)
@@ -132,6 +132,8 @@ class _BagFrames:
             while waiting:
                 self._has_pose(waiting[0])
                 yield self._frame(waiting.popleft())
+        except damage_errors() as error:
+            raise InputError(f"bag {self._name} is damaged: {one_line(error)}") from error
         finally:
             self._reader.close()
 

@@ -13,7 +13,12 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import InputError, unknown
-from ..geometry.orientation import rotation_from_quaternion
+from ..geometry.orientation import (
+    OPTICAL_TO_CAMERA,
+    Orientation,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+)
 from ..poses.buffer import interpolate_rotation
 
 _KEPT = 10.0
@@ -152,3 +157,19 @@ class TransformTree:
 def _plain(frame: str) -> str:
     """The name of a frame without the slash that ROS 1 put before it."""
     return frame.lstrip("/")
+
+
+def transform_message(types: Any, header: Any, camera_frame: str, orientation: Orientation) -> Any:
+    """The geometry_msgs/TransformStamped of a camera above the plane; its frame has optical axes.
+
+    header: with the frame of the plane.
+    """
+    w, x, y, z = quaternion_from_rotation(orientation.rotation @ OPTICAL_TO_CAMERA)
+    return types.TransformStamped(
+        header=header,
+        child_frame_id=camera_frame,
+        transform=types.Transform(
+            translation=types.Vector3(x=0.0, y=0.0, z=float(orientation.height)),
+            rotation=types.Quaternion(x=x, y=y, z=z, w=w),
+        ),
+    )
