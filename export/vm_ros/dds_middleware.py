@@ -22,16 +22,15 @@ from cyclonedds.util import duration
 from vm_embedded.errors import InputError, one_line
 
 from .dds_messages import message_classes
-from .middleware import FIXED_TRANSFORMS, SENSOR, TRANSFORMS
+from .middleware import DETECTIONS, FIXED_TRANSFORMS, SENSOR, TRANSFORMS
 
 _RELIABLE = Policy.Reliability.Reliable(duration(milliseconds=20))
 _QOS = {
     SENSOR: Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(1)),
     TRANSFORMS: Qos(_RELIABLE, Policy.History.KeepLast(100)),
     FIXED_TRANSFORMS: Qos(_RELIABLE, Policy.History.KeepLast(100), Policy.Durability.TransientLocal),
+    DETECTIONS: Qos(_RELIABLE, Policy.History.KeepLast(10)),
 }
-_PUBLISHED = Qos(_RELIABLE, Policy.History.KeepLast(10))
-
 _TICK = 0.1
 """Longest time after which the thread sees that it should end [s]."""
 
@@ -79,9 +78,9 @@ class DdsMiddleware:
         self._readers.append((reader, take))
         self._conditions.append(condition)  # the wait set does not keep it alive
 
-    def publisher(self, topic: str, message: str) -> DdsPublisher:
-        """A reliable publisher."""
-        return DdsPublisher(DataWriter(self._participant, self._topic(topic, message), _PUBLISHED))
+    def publisher(self, topic: str, message: str, kind: str = DETECTIONS) -> DdsPublisher:
+        """A publisher of messages with a short name."""
+        return DdsPublisher(DataWriter(self._participant, self._topic(topic, message), _QOS[kind]))
 
     def _topic(self, topic: str, message: str) -> Topic[Any]:
         return Topic(self._participant, f"rt{topic}", getattr(self.types, message))

@@ -7,8 +7,9 @@ from typing import Any, Protocol
 
 from vm_embedded.errors import InputError, install_extra
 
-SENSOR, TRANSFORMS, FIXED_TRANSFORMS = "sensor", "transforms", "fixed transforms"
-"""Kinds of topics, with the quality of service that ROS uses for each: images and lenses; tf; tf_static."""
+SENSOR, TRANSFORMS, FIXED_TRANSFORMS, DETECTIONS = "sensor", "transforms", "fixed transforms", "detections"
+"""Kinds of topics, for the quality of service that ROS uses: images and lenses; tf and poses; tf_static; what vm-ros
+publishes."""
 
 
 class Publisher(Protocol):
@@ -34,7 +35,7 @@ class Middleware(Protocol):
     def subscribe(self, topic: str, message: str, take: Callable[[Any], None], kind: str = SENSOR) -> None:
         """Have `take` called, in another thread, with each message of a topic. message: its short name."""
 
-    def publisher(self, topic: str, message: str) -> Publisher:
+    def publisher(self, topic: str, message: str, kind: str = DETECTIONS) -> Publisher:
         """A publisher of messages with a short name."""
 
     def start(self) -> None:

@@ -19,7 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 from vm_embedded.errors import InputError
 from vm_embedded.ros.message_fields import FIELDS
 
-from .middleware import FIXED_TRANSFORMS, SENSOR, TRANSFORMS
+from .middleware import DETECTIONS, FIXED_TRANSFORMS, SENSOR, TRANSFORMS
 
 _PROFILES = {
     SENSOR: QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
@@ -27,6 +27,7 @@ _PROFILES = {
     FIXED_TRANSFORMS: QoSProfile(
         depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
     ),
+    DETECTIONS: QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE),
 }
 
 
@@ -59,9 +60,9 @@ class RclpyMiddleware:
         """Have `take` called with each message of a topic."""
         self._node.create_subscription(getattr(self.types, message), topic, take, _PROFILES[kind])
 
-    def publisher(self, topic: str, message: str) -> RclpyPublisher:
-        """A reliable publisher."""
-        return RclpyPublisher(self._node.create_publisher(getattr(self.types, message), topic, 10))
+    def publisher(self, topic: str, message: str, kind: str = DETECTIONS) -> RclpyPublisher:
+        """A publisher of messages with a short name."""
+        return RclpyPublisher(self._node.create_publisher(getattr(self.types, message), topic, _PROFILES[kind]))
 
     def start(self) -> None:
         """Begin to receive."""

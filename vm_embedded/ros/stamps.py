@@ -35,7 +35,7 @@ class StampClock:
     def monotonic(self, seconds: float, now: float) -> float:
         """The monotonic time of a stamp of a message that arrives at `now`, both in seconds."""
         if self._wall:
-            return seconds + (now - time.time())
+            return seconds + (time.monotonic() - time.time())
         offset = now - seconds
         if self._offset is None or abs(offset - self._offset) > _JUMP:
             self._offset = offset
