@@ -21,6 +21,7 @@ from ..live.control import REFUSED, ask, default_socket_path
 from ..live.daemon import EXIT_CONFIGURATION, Daemon
 from ..live.load_detector import load_checked_detector
 from ..live.log import EventLog
+from ..ros.bags import is_bag
 from .detect_files import complain, detect_in_files
 from .options import ANGLES, add_live, add_model, add_pose, add_settings, add_track, read_options
 from .program import Parser, program
@@ -189,6 +190,8 @@ def _detect_live(options: argparse.Namespace) -> int:
                     f"--{name.replace('_', '-')} works only with files, not with a live camera; make a "
                     "recording, and give its folder"
                 )
+        if any(map(is_bag, options.files)):
+            raise InputError("a bag can't be played with --live; give it without --live, or play it for vm-ros")
         daemon = Daemon(lambda: read_options(options), EventLog("vm-detect"))
         return asyncio.run(daemon.run())
     except VisualMeshError as error:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, install_extra
-from .message_fields import FIELDS, MESSAGES, fields_of
+from .message_fields import MESSAGES, fields_of
 
 
 def import_rosbags() -> ModuleType:
@@ -45,7 +45,7 @@ def typestore() -> Any:
     """rosbags' types of ROS 2 Humble, with further messages of this project. Raises InputError without rosbags."""
     typesys = import_rosbags().typesys
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-    for full in FIELDS:
+    for full in MESSAGES.values():
         if full not in store.types:
             store.register(typesys.get_types_from_msg(_definition(full), full))
     return store

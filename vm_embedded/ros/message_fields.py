@@ -1,7 +1,7 @@
 """The messages of ROS 2 that this project reads and writes: their fields in the order of their .msg files.
 
-vision_msgs is that of ROS 2 Humble and later; foxglove_msgs draws over the images of Foxglove. Tests compare the bytes
-of each message with those of the library rosbags.
+vision_msgs is that of ROS 2 Humble and later. Tests compare the bytes of each message with those of the library
+rosbags.
 """
 
 from __future__ import annotations
@@ -39,6 +39,11 @@ FIELDS = {
     "diagnostic_msgs/msg/DiagnosticStatus": "byte level, string name, string message, string hardware_id, "
     "KeyValue[] values",
     "diagnostic_msgs/msg/DiagnosticArray": "Header header, DiagnosticStatus[] status",
+}
+"""Type and name of each field. Messages stand below those that they contain. A type is primitive or the short name of a
+message, with [] for a sequence and [n] for n values."""
+
+FOXGLOVE_FIELDS = {
     "foxglove_msgs/msg/Color": "float64 r, float64 g, float64 b, float64 a",
     "foxglove_msgs/msg/Point2": "float64 x, float64 y",
     "foxglove_msgs/msg/CircleAnnotation": "Time timestamp, Point2 position, float64 diameter, float64 thickness, "
@@ -50,13 +55,12 @@ FIELDS = {
     "foxglove_msgs/msg/ImageAnnotations": "CircleAnnotation[] circles, PointsAnnotation[] points, "
     "TextAnnotation[] texts",
 }
-"""Type and name of each field. Messages stand below those that they contain. A type is primitive or the short name of a
-message, with [] for a sequence and [n] for n values."""
+"""The same for the messages that Foxglove draws over images. They are only in files."""
 
-MESSAGES = {full.rpartition("/")[2]: full for full in FIELDS}
+MESSAGES = {full.rpartition("/")[2]: full for full in FIELDS | FOXGLOVE_FIELDS}
 """The full name of each message by its short name, which is unique."""
 
 
 def fields_of(full: str) -> list[tuple[str, str]]:
     """Type and name of each field of a message."""
-    return [(kind, name) for kind, name in (each.split(" ") for each in FIELDS[full].split(", "))]
+    return [(kind, name) for kind, name in (each.split(" ") for each in (FIELDS | FOXGLOVE_FIELDS)[full].split(", "))]

@@ -54,6 +54,7 @@ def transform(parent, child, time, rotation, translation):
 
 def image_message(image, time, frame_id="camera_optical", encoding="bgr8"):
     height, width = image.shape[:2]
+    image = np.ascontiguousarray(image)
     return TYPES.Image(
         header=TYPES.Header(stamp=stamp(time), frame_id=frame_id),
         height=height,
@@ -61,7 +62,7 @@ def image_message(image, time, frame_id="camera_optical", encoding="bgr8"):
         encoding=encoding,
         is_bigendian=0,
         step=image.strides[0],
-        data=np.ascontiguousarray(image).reshape(-1),
+        data=image.reshape(-1),
     )
 
 
