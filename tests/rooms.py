@@ -14,7 +14,7 @@ from pathlib import Path
 CHECKOUT = Path(__file__).resolve().parents[1]
 
 ROOMS = {
-    "vm_embedded": "cli > live > ros > output > cameras > detection > field > network > mesh > poses > geometry"
+    "vm_embedded": "cli > live > output > cameras > detection > field > network > mesh > poses > geometry"
     " > config > sockets+files+errors+arrays",
     "vm_workstation": "",
     "vm_export": "",

@@ -12,15 +12,15 @@ from collections.abc import Sequence
 import cv2
 
 from vm_embedded.cameras.open_camera import ROS
+from vm_embedded.cameras.ros.settings import NODE
 from vm_embedded.cli.options import ANGLES, add_live, add_model, add_pose, add_settings, read_options
 from vm_embedded.cli.program import Parser, program
 from vm_embedded.errors import VisualMeshError
 from vm_embedded.live.configuration import Configuration, with_overrides
 from vm_embedded.live.daemon import EXIT_CONFIGURATION, Daemon
 from vm_embedded.live.log import EventLog
-from vm_embedded.ros.settings import NODE
 
-from .middleware import connect
+from .connect import connect
 from .node import Node
 
 ROS_ARGUMENTS = "--ros-args"

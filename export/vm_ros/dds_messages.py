@@ -10,7 +10,7 @@ from typing import Any
 from cyclonedds.idl import make_idl_struct
 from cyclonedds.idl import types as idl
 
-from vm_embedded.ros.message_fields import FIELDS, fields_of
+from vm_embedded.cameras.ros.message_fields import FIELDS, fields_of
 
 _PRIMITIVES: dict[str, Any] = {
     "bool": bool,

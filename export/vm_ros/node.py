@@ -17,6 +17,12 @@ import numpy as np
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.cameras.camera import CameraSettings, without_password
 from vm_embedded.cameras.open_camera import ROS, Opener, camera_opener
+from vm_embedded.cameras.ros.camera_poses import newest_pose, orientation_of
+from vm_embedded.cameras.ros.images import jpeg_message
+from vm_embedded.cameras.ros.lens import lens_of
+from vm_embedded.cameras.ros.settings import NODE, camera_info_beside
+from vm_embedded.cameras.ros.stamps import StampClock, seconds_of, stamp_of
+from vm_embedded.cameras.ros.transforms import Transform, TransformTree
 from vm_embedded.detection.detections import Detections
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.geometry.lens import Lens
@@ -24,14 +30,13 @@ from vm_embedded.live.answering import Answer
 from vm_embedded.live.configuration import Configuration
 from vm_embedded.output.messages import Message
 from vm_embedded.output.overlay import draw_overlay
+from vm_embedded.output.ros.detection_messages import (
+    detection_2d_array,
+    detection_3d_array,
+    diagnostic_array,
+    header_of,
+)
 from vm_embedded.poses.stream import PoseStream
-from vm_embedded.ros.camera_poses import newest_pose, orientation_of
-from vm_embedded.ros.detection_messages import detection_2d_array, detection_3d_array, diagnostic_array, header_of
-from vm_embedded.ros.images import jpeg_message
-from vm_embedded.ros.lens import lens_of
-from vm_embedded.ros.settings import NODE, camera_info_beside
-from vm_embedded.ros.stamps import StampClock, seconds_of, stamp_of
-from vm_embedded.ros.transforms import Transform, TransformTree
 
 from .middleware import FIXED_TRANSFORMS, SENSOR, TRANSFORMS, Middleware
 from .topic_camera import Newest, RosShot, TopicCamera

@@ -16,8 +16,8 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
+from vm_embedded.cameras.ros.message_fields import FIELDS
 from vm_embedded.errors import InputError
-from vm_embedded.ros.message_fields import FIELDS
 
 from .middleware import DETECTIONS, FIXED_TRANSFORMS, SENSOR, TRANSFORMS
 

@@ -10,9 +10,9 @@ from typing import Any
 
 from vm_embedded.arrays import Image
 from vm_embedded.cameras.camera import BrokenFrameError, CameraError, CameraSettings, Shot
+from vm_embedded.cameras.ros.images import image_of
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Lens
-from vm_embedded.ros.images import image_of
 
 _MARGIN = 0.8
 """The camera fails after this part of the time after which it counts as lost: so the status is out in time."""

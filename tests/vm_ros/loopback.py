@@ -10,8 +10,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from tests.vm_embedded.live.running import PATIENCE, Running
-from vm_embedded.ros.bag_types import typestore
-from vm_embedded.ros.message_fields import MESSAGES
+from vm_embedded.cameras.ros.bag_types import typestore
+from vm_embedded.cameras.ros.message_fields import MESSAGES
 from vm_ros.dds_middleware import DdsMiddleware
 
 COMMAND = Path(sys.executable).parent / "vm-ros"

@@ -6,9 +6,9 @@ import time
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tests.vm_embedded.ros.rolling_ball import LENS, OFFSET, SIZE, Scene
+from tests.vm_embedded.cameras.ros.rolling_ball import LENS, OFFSET, SIZE, Scene
+from vm_embedded.cameras.ros.stamps import stamp_of
 from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA
-from vm_embedded.ros.stamps import stamp_of
 from vm_ros.dds_middleware import FIXED_TRANSFORMS
 
 SECONDS, RATE = 4.0, 10.0

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from vm_embedded import __version__
-from vm_embedded.ros.message_fields import FIELDS
+from vm_embedded.cameras.ros.message_fields import FIELDS
 from vm_ros.cli import configuration, parser
 
 from .loopback import COMMAND
@@ -88,7 +88,7 @@ def test_the_package_of_ros_has_this_version_and_depends_on_all_messages():
     package = ElementTree.parse(PACKAGE / "package.xml").getroot()
     assert package.findtext("version") == __version__
     needed = {each.text for each in package.findall("exec_depend")}
-    assert {full.split("/")[0] for full in FIELDS if not full.startswith("foxglove")} <= needed
+    assert {full.split("/")[0] for full in FIELDS} <= needed
 
 
 def test_the_launch_file_gives_options_that_vm_ros_takes():

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.ros.bag_types import bag_types, typestore
-from vm_embedded.ros.message_fields import FIELDS, MESSAGES, fields_of
+from vm_embedded.cameras.ros.bag_types import bag_types, typestore
+from vm_embedded.cameras.ros.message_fields import FIELDS, MESSAGES, fields_of
 from vm_ros.dds_messages import message_classes
 
 DDS = message_classes()

@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.vm_embedded.ros.rolling_ball import LENS, OFFSET, SIZE
+from tests.vm_embedded.cameras.ros.rolling_ball import LENS, OFFSET, SIZE
 from vm_embedded import Detector, Settings
+from vm_embedded.cameras.ros.stamps import seconds_of
 from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA
-from vm_embedded.ros.stamps import seconds_of
 
 from .loopback import running
 from .robot import Robot

@@ -14,6 +14,7 @@ from pathlib import Path
 import cv2
 
 from ..cameras.open_camera import is_live
+from ..cameras.ros.bags import is_bag
 from ..config.toml_writer import to_commented_toml
 from ..errors import InputError, VisualMeshError
 from ..live.configuration import HEADER, Configuration
@@ -21,7 +22,6 @@ from ..live.control import REFUSED, ask, default_socket_path
 from ..live.daemon import EXIT_CONFIGURATION, Daemon
 from ..live.load_detector import load_checked_detector
 from ..live.log import EventLog
-from ..ros.bags import is_bag
 from .detect_files import complain, detect_in_files
 from .options import ANGLES, add_live, add_model, add_pose, add_settings, add_track, read_options
 from .program import Parser, program

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from ..arrays import Image
 from ..cameras.image_files import Frame, Source, check_file_format, joined, lens_beside, open_source, open_sources
+from ..cameras.ros.bags import BagReading, is_bag, open_bag
 from ..detection.detector import Detector
 from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError
@@ -21,8 +22,7 @@ from ..live.configuration import Configuration
 from ..output.box_files import BoxWriter
 from ..output.messages import file_message
 from ..output.result_files import make_folder, save_overlay, save_points
-from ..ros.bags import BagReading, is_bag, open_bag
-from ..ros.mcap_file import McapFile
+from ..output.ros.mcap_file import McapFile
 from .progress import ProgressBar
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..cameras.camera import CameraSettings
 from ..cameras.image_files import MESSAGES
+from ..cameras.ros.settings import RosSettings
 from ..detection.settings import Settings
 from ..geometry.lens_files import read_lens_file
 from ..live.configuration import (
@@ -24,7 +25,6 @@ from ..network.bundled import DEFAULT, SHIPPED
 from ..output.channels import OutputSettings
 from ..output.recorder import CONFIGURATION, RecorderSettings
 from ..poses.settings import PoseSettings
-from ..ros.settings import RosSettings
 
 LIVE = {
     "camera": CameraSettings,

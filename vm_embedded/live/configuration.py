@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..cameras.camera import CameraSettings
+from ..cameras.ros.settings import RosSettings
 from ..config.entries import EntryError, check_entries, entry, number, switch, text_line
 from ..config.sections import read_sections
 from ..config.toml_writer import to_commented_toml
@@ -26,7 +27,6 @@ from ..network.bundled import DEFAULT, SHIPPED, model_path
 from ..output.channels import OutputSettings
 from ..output.recorder import RecorderSettings
 from ..poses.settings import PoseSettings
-from ..ros.settings import RosSettings
 from ..sockets import checked_address
 from .deploy_settings import DeploySettings
 

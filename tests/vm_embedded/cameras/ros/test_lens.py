@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vm_embedded.cameras.ros.lens import camera_info_message, lens_of
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
 from vm_embedded.geometry.radial_lenses import Rectilinear
-from vm_embedded.ros.lens import camera_info_message, lens_of
 
 from .rolling_ball import LENS, SIZE, TYPES, camera_info, stamp
 

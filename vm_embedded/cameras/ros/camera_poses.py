@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..geometry.orientation import OPTICAL_TO_CAMERA, Orientation
+from ...geometry.orientation import OPTICAL_TO_CAMERA, Orientation
 from .transforms import Transform, TransformTree
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..errors import InputError
-from ..geometry.calibrated_lenses import CalibratedLens, FisheyeLens
-from ..geometry.lens import Lens
-from ..geometry.lens_files import lens_from_calibration
+from ...errors import InputError
+from ...geometry.calibrated_lenses import CalibratedLens, FisheyeLens
+from ...geometry.lens import Lens
+from ...geometry.lens_files import lens_from_calibration
 
 
 def lens_of(message: Any) -> Lens:

@@ -10,22 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Image
-from ..cameras.image_files import Frame
-from ..detection.detections import Detections
-from ..errors import InputError
-from ..files import check_writable
-from ..geometry.lens import Lens
-from ..geometry.orientation import Orientation
+from ...arrays import Image
+from ...cameras.image_files import Frame
+from ...cameras.ros.bag_types import bag_types, import_rosbags, typestore
+from ...cameras.ros.images import jpeg_message
+from ...cameras.ros.lens import camera_info_message
+from ...cameras.ros.message_fields import MESSAGES
+from ...cameras.ros.settings import NODE
+from ...cameras.ros.stamps import stamp_of
+from ...cameras.ros.transforms import transform_message
+from ...detection.detections import Detections
+from ...errors import InputError
+from ...files import check_writable
+from ...geometry.lens import Lens
+from ...geometry.orientation import Orientation
 from .annotations import image_annotations
-from .bag_types import bag_types, import_rosbags, typestore
 from .detection_messages import detection_2d_array, detection_3d_array, diagnostic_array, header_of
-from .images import jpeg_message
-from .lens import camera_info_message
-from .message_fields import MESSAGES
-from .settings import NODE
-from .stamps import stamp_of
-from .transforms import transform_message
 
 _CAMERA_FRAME = "camera_optical"
 _RATE = 30.0

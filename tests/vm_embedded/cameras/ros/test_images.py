@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vm_embedded.cameras.ros.images import image_of, jpeg_message
 from vm_embedded.errors import InputError
-from vm_embedded.ros.images import image_of, jpeg_message
 
 from .rolling_ball import TYPES, image_message, stamp
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, install_extra
+from ...errors import InputError, install_extra
 from .message_fields import MESSAGES, fields_of
 
 
@@ -31,12 +31,12 @@ def import_rosbags() -> ModuleType:
 
 def damage_errors() -> tuple[type[Exception], ...]:
     """What rosbags and its libraries raise for a damaged bag."""
-    import apsw
     from rosbags.highlevel import AnyReaderError
-    from rosbags.rosbag2 import ReaderError, reader
+    from rosbags.rosbag2 import ReaderError, reader, storage_sqlite3
 
     zstd_error: type[Exception] = reader.zstd.ZstdError  # type: ignore[attr-defined]
-    library = (AnyReaderError, ReaderError, apsw.Error, zstd_error, RuntimeError)  # the last is that of lz4
+    sqlite_error: type[Exception] = storage_sqlite3.apsw.Error  # type: ignore[attr-defined]
+    library = (AnyReaderError, ReaderError, zstd_error, sqlite_error, RuntimeError)  # the last is that of lz4
     return (*library, OSError, ValueError, KeyError, IndexError, OverflowError, MemoryError, struct.error)
 
 

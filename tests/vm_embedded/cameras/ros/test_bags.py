@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from rosbags.rosbag2 import StoragePlugin
 
 from tests.vm_embedded.cli.commands import lines, one_complaint, run
+from vm_embedded.cameras.ros.bags import BagReading, is_bag, open_bag
+from vm_embedded.cameras.ros.images import jpeg_message
+from vm_embedded.cameras.ros.settings import RosSettings
 from vm_embedded.errors import InputError
 from vm_embedded.poses.settings import PoseSettings
-from vm_embedded.ros.bags import BagReading, is_bag, open_bag
-from vm_embedded.ros.images import jpeg_message
-from vm_embedded.ros.settings import RosSettings
 
 from .rolling_ball import LENS, OFFSET, TYPES, Scene, quaternion, stamp, write_messages
 

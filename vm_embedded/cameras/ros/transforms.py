@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats
-from ..errors import InputError, unknown
-from ..geometry.orientation import (
+from ...arrays import Floats
+from ...errors import InputError, unknown
+from ...geometry.orientation import (
     OPTICAL_TO_CAMERA,
     Orientation,
     quaternion_from_rotation,
     rotation_from_quaternion,
 )
-from ..poses.buffer import interpolate_rotation
+from ...poses.buffer import interpolate_rotation
 
 _KEPT = 10.0
 """How long the transforms of a joint are kept [s]."""

@@ -8,6 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from vm_embedded.cameras.ros.camera_poses import newest_pose, orientation_of
+from vm_embedded.cameras.ros.transforms import Transform, TransformTree, transform_message
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.geometry.orientation import (
     OPTICAL_TO_CAMERA,
@@ -15,8 +17,6 @@ from vm_embedded.geometry.orientation import (
     quaternion_from_rotation,
     rotation_from_quaternion,
 )
-from vm_embedded.ros.camera_poses import newest_pose, orientation_of
-from vm_embedded.ros.transforms import Transform, TransformTree, transform_message
 
 from .rolling_ball import TYPES, stamp, transform
 

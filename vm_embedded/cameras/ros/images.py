@@ -7,10 +7,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..arrays import Image
-from ..cameras.decoding import decode
-from ..cameras.image_header import MAX_MEGAPIXELS
-from ..errors import InputError, unknown
+from ...arrays import Image
+from ...errors import InputError, unknown
+from ..decoding import decode
+from ..image_header import MAX_MEGAPIXELS
 
 _CHANNELS = {
     "bgr8": 3,

@@ -12,14 +12,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ..arrays import Image
-from ..cameras.image_files import Frame, Source
-from ..cameras.image_header import MAX_MEGAPIXELS
-from ..errors import InputError, VisualMeshError, one_line, unknown
-from ..geometry.lens import Lens
-from ..geometry.orientation import Orientation
-from ..poses.buffer import PoseBuffer, StalePoseError
-from ..poses.settings import PoseSettings
+from ...arrays import Image
+from ...errors import InputError, VisualMeshError, one_line, unknown
+from ...geometry.lens import Lens
+from ...geometry.orientation import Orientation
+from ...poses.buffer import PoseBuffer, StalePoseError
+from ...poses.settings import PoseSettings
+from ..image_files import Frame, Source
+from ..image_header import MAX_MEGAPIXELS
 from .bag_types import damage_errors, import_rosbags, typestore
 from .camera_poses import newest_pose, orientation_of
 from .images import image_of

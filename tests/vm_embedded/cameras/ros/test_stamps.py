@@ -6,7 +6,7 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.ros.stamps import StampClock, seconds_of, stamp_of
+from vm_embedded.cameras.ros.stamps import StampClock, seconds_of, stamp_of
 
 from .rolling_ball import TYPES
 

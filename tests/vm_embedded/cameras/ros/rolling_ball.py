@@ -9,12 +9,12 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from scipy.spatial.transform import Rotation
 
 from vm_embedded.cameras.camera import CameraSettings
+from vm_embedded.cameras.ros.bag_types import bag_types, typestore
+from vm_embedded.cameras.ros.message_fields import MESSAGES
 from vm_embedded.cameras.synthetic import SyntheticCamera
 from vm_embedded.geometry.calibrated_lenses import BrownLens
 from vm_embedded.geometry.lens_files import format_lens_file
 from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA
-from vm_embedded.ros.bag_types import bag_types, typestore
-from vm_embedded.ros.message_fields import MESSAGES
 
 TYPES = bag_types()
 START = 1_800_000_000

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..config.entries import check_entries, one_of, text_line
+from ...config.entries import check_entries, one_of, text_line
 
 CLOCKS = ("wall", "arrival")
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
+from tests.vm_embedded.cameras.ros.rolling_ball import Scene
 from tests.vm_embedded.cli.commands import COMMAND, lines, one_complaint, run
-
-from .rolling_ball import Scene
 
 
 def messages_of(path):

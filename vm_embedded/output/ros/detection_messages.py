@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats
-from ..detection.detections import Detection, Detections
-from ..geometry.orientation import OPTICAL_TO_CAMERA, Orientation
+from ...arrays import Floats
+from ...detection.detections import Detection, Detections
+from ...geometry.orientation import OPTICAL_TO_CAMERA, Orientation
 
 LEVELS = {"ok": "OK", "starting": "WARN", "degraded": "WARN", "stopping": "WARN"}
 """Levels of a DiagnosticStatus for states; the others, without detections, are errors."""
