@@ -48,12 +48,12 @@ def parser() -> argparse.ArgumentParser:
         "files",
         nargs="*",
         metavar="FILE",
-        help="the same as --camera: images, folders or videos; several are processed one after the other",
+        help="the same as --camera: images, folders, videos or bags; several are processed one after the other",
     )
     parser.add_argument(
         "--camera",
         metavar="SOURCE",
-        help="files, each frame once: an image, a folder or glob of images, or a video; or a live camera: its "
+        help="files, each frame once: an image, a folder or glob of images, a video, or a bag of ROS 2; or a live camera: its "
         "number or device, an http, https or rtsp address, gstreamer:PIPELINE, synthetic, or fault:SCRIPT",
     )
     parser.add_argument(
