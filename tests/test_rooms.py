@@ -119,7 +119,7 @@ def test_heavy_packages_are_imported_where_they_are_used():
     [
         (
             "vm_embedded.cli.detect",
-            {"torch", "onnx", "matplotlib", "yaml", "mitsuba", "scipy", "vm_export", "vm_synth"},
+            {"torch", "onnx", "matplotlib", "yaml", "mitsuba", "scipy", "rosbags", "vm_export", "vm_synth", "vm_ros"},
         ),
         ("vm_export.cli", {"torch", "onnx", "matplotlib", "yaml", "mitsuba", "vm_synth", "vm_train"}),
         ("vm_synth.cli", {"mitsuba", "drjit", "torch", "matplotlib", "onnx", "scipy", "vm_export"}),
@@ -129,6 +129,7 @@ def test_heavy_packages_are_imported_where_they_are_used():
             {"torch", "onnx", "matplotlib", "mitsuba", "vm_export", "vm_synth", "vm_train"},
         ),
         ("vm_calibrate.cli", {"torch", "onnx", "matplotlib", "mitsuba", "scipy", "vm_export", "vm_synth", "vm_train"}),
+        ("vm_ros.cli", {"torch", "onnx", "matplotlib", "scipy", "cyclonedds", "rclpy", "rosbags", "vm_export"}),
         ("vm_train.cli.train", {"mitsuba", "drjit", "matplotlib", "tensorboard"}),
         ("vm_train.cli.evaluate", {"mitsuba", "drjit", "matplotlib", "tensorboard"}),
     ],

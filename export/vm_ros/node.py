@@ -63,8 +63,8 @@ class Node:
         self._info_topic = self._ros.camera_info or camera_info_beside(image)
         self._images = Newest(image)
         self._clock = StampClock(self._ros.clock)
-        self._info: Any = None  # that was not yet read
-        self._last_info: Any = None
+        self._info: Any = None  # the newest
+        self._read_info: Any = None  # that of the lens
         self._lens: Lens | None = None
         self._tree = TransformTree()
         self._camera_frame = self._ros.camera_frame
@@ -177,9 +177,11 @@ class Node:
         """The lens of camera_info; None if the configuration has a lens. Raises InputError without any."""
         if self._has_lens:
             return None
-        info, self._info = self._info, None
-        if info is not None and info != self._last_info:
-            self._lens, self._last_info = lens_of(info), info
+        info = self._info
+        if info is not self._read_info:
+            lens = lens_of(info)
+            self._lens = self._lens if lens == self._lens else lens  # the same object, for caches
+            self._read_info = info
         if self._lens is None:
             raise InputError(f"no message on {self._info_topic} yet; publish it, or give --lens")
         return self._lens

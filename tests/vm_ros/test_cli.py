@@ -34,18 +34,6 @@ def reason(done):
     return json.loads(done.stderr.splitlines()[-1])["reason"]
 
 
-def test_the_version_is_that_of_the_package():
-    assert run("--version").stdout == f"vm-ros {__version__}\n"
-
-
-def test_a_mistyped_option_is_one_line_with_the_nearest():
-    done = run("--ros-imge", "/camera")
-    assert done.returncode == 2
-    assert (
-        done.stderr == "vm-ros: unknown option --ros-imge: did you mean --ros-image?; vm-ros --help lists the options\n"
-    )
-
-
 def test_arguments_of_ros_need_ros():
     assert reason(run("--ros-args", "-r", "__node:=eye")).startswith("--ros-args works only where ROS 2 is sourced")
 

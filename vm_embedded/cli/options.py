@@ -80,7 +80,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 def add_live(parser: argparse.ArgumentParser) -> None:
     """Add an option for each entry of the sections for live cameras."""
     for name, section in LIVE.items():
-        group = parser.add_argument_group(f"[{name}], for {'ROS 2' if name == 'ros' else 'live cameras'}")
+        group = parser.add_argument_group(f"[{name}], for {'vm-ros and bags' if name == 'ros' else 'live cameras'}")
         add_section(group, section, f"{name}_", ("source",) if name == "camera" else ())
 
 

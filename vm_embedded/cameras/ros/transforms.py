@@ -21,7 +21,7 @@ from ...geometry.orientation import (
 )
 from ...poses.buffer import interpolate_rotation
 
-_KEPT = 10.0
+_KEPT = 3.0
 """How long the transforms of a joint are kept [s]."""
 
 
@@ -115,8 +115,8 @@ class TransformTree:
 
         Raises InputError if the frames are not connected.
         """
-        joints = [*self._path(target, source)[0], *self._path(target, source)[1]]
-        return min((each.times[-1] for each in joints if each.fixed is None), default=math.inf)
+        down, up = self._path(target, source)
+        return min((each.times[-1] for each in (*down, *up) if each.fixed is None), default=math.inf)
 
     def at(self, target: str, source: str, time: float) -> Transform:
         """The transform of points of `source` into `target` at a time [s]. Raises InputError as `newest` does."""
