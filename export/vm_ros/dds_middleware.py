@@ -13,6 +13,7 @@ from typing import Any
 
 from cyclonedds.core import DDSException, InstanceState, ReadCondition, SampleState, ViewState, WaitSet
 from cyclonedds.domain import DomainParticipant
+from cyclonedds.internal import InvalidSample
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
@@ -93,7 +94,7 @@ class DdsMiddleware:
         while not self._closing.is_set():
             self._waiting.wait(duration(seconds=_TICK))
             for reader, take in self._readers:
-                for message in reader.take(N=100):
+                for message in _valid(reader):
                     take(message)
 
     def close(self) -> None:
@@ -101,6 +102,14 @@ class DdsMiddleware:
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join(10 * _TICK)
+
+
+def _valid(reader: DataReader[Any]) -> list[Any]:
+    """The new messages of a reader, without the notes that a writer has left, and without text that is not UTF-8."""
+    try:
+        return [each for each in reader.take(N=100) if not isinstance(each, InvalidSample)]
+    except UnicodeDecodeError:
+        return []
 
 
 def _domain() -> int:

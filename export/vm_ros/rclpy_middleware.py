@@ -75,7 +75,8 @@ class RclpyMiddleware:
     def close(self) -> None:
         """Stop the thread and destroy the node."""
         self._executor.shutdown()
-        self._thread.join(1.0)
+        if self._thread.is_alive():
+            self._thread.join(1.0)
         self._node.destroy_node()
         rclpy.try_shutdown()
 

@@ -17,6 +17,9 @@ from vm_embedded.geometry.lens import Lens
 _MARGIN = 0.8
 """The camera fails after this part of the time after which it counts as lost: so the status is out in time."""
 
+_OTHER_CLOCK = 10.0
+"""Age of an image [s] above which its stamp must be of another clock."""
+
 
 @dataclass(frozen=True, eq=False)
 class RosShot(Shot):
@@ -69,7 +72,12 @@ class TopicCamera:
             raise CameraError(f"no image on {self._newest.topic} for {waited:.1f} s")
         self._patience = 1e-3 * self._settings.lost_ms
         message, captured = taken
-        header = message.header
+        header, age = message.header, time.monotonic() - captured
+        if abs(age) > _OTHER_CLOCK:
+            raise BrokenFrameError(
+                f"stamp of the image is {age:.0f} s before now; if its clock is that of a bag or a simulation, give "
+                "--ros-clock arrival"
+            )
         try:
             image: Image = image_of(message, self._raw, self._settings.max_megapixels)
             return RosShot(image, captured, lens=self._lens(), stamp=header.stamp, frame_id=header.frame_id)

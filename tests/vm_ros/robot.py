@@ -18,14 +18,15 @@ SECONDS, RATE = 4.0, 10.0
 class Robot:
     """Publishes in a thread: poses at 100 Hz, images at 10 Hz, drawn for the moments of their stamps.
 
-    shown: time of each image since 1970 [s], and the image.
+    behind: by how much its clock is behind, as that of a bag that is played [s]. shown: time of each image since 1970
+    on this clock [s], and the image.
     """
 
-    def __init__(self, peer, poses="tf"):
+    def __init__(self, peer, poses="tf", behind=0.0):
         self._scene = Scene()
         draw = self._scene.camera.draw
         self._drawn = [draw(number / RATE) for number in range(int(SECONDS * RATE) + 1)]
-        self._start = 0.0
+        self._start, self._behind = 0.0, behind
         self.shown = {}
         self.has_camera = threading.Event()
         self.has_camera.set()
@@ -46,6 +47,7 @@ class Robot:
     def __exit__(self, *_):
         self._stopping.set()
         self._thread.join(10.0)
+        del self._images, self._info, self._tf, self._fixed, self._pose  # its writers leave, as those of a process do
 
     def orientation(self, now):
         """The camera's orientation at a time since 1970 [s]."""
@@ -59,9 +61,9 @@ class Robot:
         types = self._types
         link = self._transform("camera", "camera_optical", 0.0, OPTICAL_TO_CAMERA, np.zeros(3))
         self._fixed.publish(types.TFMessage(transforms=[link]))
-        self._start, due = round(time.time(), 1), 0
+        self._start, due = round(time.time() - self._behind, 1), 0
         while not self._stopping.wait(0.01):
-            now = time.time()
+            now = time.time() - self._behind
             self._publish_pose(now)
             if now > self._start + due / RATE:
                 if self.has_camera.is_set():

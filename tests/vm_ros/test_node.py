@@ -128,6 +128,38 @@ def test_a_lost_camera_is_a_status_within_a_second_and_never_an_empty_array(tmp_
 
 
 @pytest.mark.slow
+def test_a_bag_that_is_played_has_a_clock_of_its_own(tmp_path, peer):
+    peer.listen(ON_PLANE, "Detection3DArray")
+    peer.listen(STATES, "DiagnosticArray")
+    peer.middleware.start()
+    with Robot(peer, behind=1e6) as robot:
+        with running(tmp_path) as node:
+            advice = "stamp of the image is 1000000 s before now; if its clock is that of a bag or a simulation, give "
+            node.wait(lambda: any(f"{advice}--ros-clock arrival" in reason for _, _, reason, _ in states(peer)))
+            node.stop()
+        assert not peer.received(ON_PLANE)
+        with running(tmp_path, "--ros-clock", "arrival") as node:
+            node.wait(lambda: sum(bool(each.detections) for each in peer.received(ON_PLANE)) > 5)
+            node.stop()
+    assert seconds_of(peer.received(ON_PLANE)[-1].header.stamp) <= max(robot.shown)
+
+
+@pytest.mark.slow
+def test_a_robot_that_starts_anew_is_used_again(tmp_path, peer):
+    peer.listen(ON_PLANE, "Detection3DArray")
+    peer.listen(STATES, "DiagnosticArray")
+    peer.middleware.start()
+    with running(tmp_path) as node:
+        for _ in range(2):
+            begun = len(peer.received(ON_PLANE))
+            with Robot(peer) as robot:
+                node.wait(lambda: len(peer.received(ON_PLANE)) > begun + 5)  # noqa: B023
+            last = max(robot.shown)
+            node.wait(lambda: [each for each in states(peer) if each[0] > last and each[1] == "camera_lost"])  # noqa: B023
+        assert node.stop()[0] == 0
+
+
+@pytest.mark.slow
 def test_the_debug_image_is_made_for_who_subscribes(tmp_path, peer):
     peer.listen(DRAWN, "CompressedImage")
     peer.middleware.start()

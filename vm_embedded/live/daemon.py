@@ -20,9 +20,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Protocol
 
-from ..cameras.camera import CameraSettings, without_password
+from ..cameras.camera import without_password
 from ..cameras.grabber import MOST_HANGING, Grabber
-from ..cameras.open_camera import Opener, camera_opener
+from ..cameras.open_camera import camera_opener
 from ..errors import InputError, VisualMeshError, one_line
 from ..output.channels import Channels
 from ..output.messages import Message, live_message, state_message
@@ -30,6 +30,7 @@ from ..output.recorder import Moment, Recorder
 from ..poses.settings import is_of_ros
 from ..poses.stream import PoseStream
 from .answering import Answer, Answerer
+from .bridge import Bridge
 from .configuration import Configuration, recording_toml
 from .control import REFUSED, ControlServer, default_socket_path
 from .counters import Counters
@@ -69,22 +70,6 @@ class Part(Protocol):
 
     async def close(self) -> None:
         """Release all resources."""
-
-
-class Bridge(Protocol):
-    """Connects the daemon to other robot software, such as ROS: it may open the camera, and gets every message."""
-
-    def opener(self, settings: CameraSettings, raw: bool) -> Opener:
-        """Return a function that opens the camera, as `camera_opener` does."""
-
-    async def open(self, poses: PoseStream) -> None:
-        """Connect; from now on, poses may go to `poses`. Raises InputError."""
-
-    def publish(self, message: Message, answer: Answer | None) -> None:
-        """Publish a message. answer: that of its frame; None for a message with a state only."""
-
-    async def close(self) -> None:
-        """Disconnect."""
 
 
 class Daemon:
