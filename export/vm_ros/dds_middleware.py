@@ -23,11 +23,12 @@ from cyclonedds.util import duration
 from vm_embedded.errors import InputError, one_line
 
 from .dds_messages import message_classes
-from .middleware import DETECTIONS, FIXED_TRANSFORMS, SENSOR, TRANSFORMS
+from .middleware import DETECTIONS, FIXED_TRANSFORMS, POSES, SENSOR, TRANSFORMS
 
 _RELIABLE = Policy.Reliability.Reliable(duration(milliseconds=20))
 _QOS = {
     SENSOR: Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(1)),
+    POSES: Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(100)),
     TRANSFORMS: Qos(_RELIABLE, Policy.History.KeepLast(100)),
     FIXED_TRANSFORMS: Qos(_RELIABLE, Policy.History.KeepLast(100), Policy.Durability.TransientLocal),
     DETECTIONS: Qos(_RELIABLE, Policy.History.KeepLast(10)),
@@ -47,7 +48,7 @@ class DdsPublisher:
         try:
             self._writer.write(message)
         except DDSException as error:
-            if error.code != DDSException.DDS_RETCODE_TIMEOUT:
+            if error.code not in (DDSException.DDS_RETCODE_TIMEOUT, DDSException.DDS_RETCODE_OUT_OF_RESOURCES):
                 raise
 
     @property

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol
 
-SENSOR, TRANSFORMS, FIXED_TRANSFORMS, DETECTIONS = "sensor", "transforms", "fixed transforms", "detections"
-"""Kinds of topics, for the quality of service that ROS uses: images and lenses; tf and poses; tf_static; what vm-ros
+SENSOR, POSES, TRANSFORMS, FIXED_TRANSFORMS, DETECTIONS = "sensor", "poses", "tf", "tf_static", "detections"
+"""Kinds of topics, for the quality of service that ROS uses: images and lenses; poses; tf; tf_static; what vm-ros
 publishes."""
 
 

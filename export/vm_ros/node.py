@@ -38,7 +38,7 @@ from vm_embedded.output.ros.detection_messages import (
 )
 from vm_embedded.poses.stream import PoseStream
 
-from .middleware import FIXED_TRANSFORMS, SENSOR, TRANSFORMS, Middleware
+from .middleware import FIXED_TRANSFORMS, POSES, SENSOR, TRANSFORMS, Middleware
 from .topic_camera import Newest, RosShot, TopicCamera
 
 IMAGE = "/camera/image_raw"
@@ -46,6 +46,9 @@ IMAGE = "/camera/image_raw"
 
 _DIAGNOSTICS_PERIOD = 1.0
 """Longest time between two messages with the state [s]."""
+
+_FIXED_POSE_PERIOD = 0.02
+"""Time between two poses of a camera that is fixed to the plane, and whose images do not come from ROS [s]."""
 
 _CAMERA_FRAME = "camera"
 """Frame of images that do not come from ROS, if the configuration has none."""
@@ -67,7 +70,7 @@ class Node:
         self._read_info: Any = None  # that of the lens
         self._lens: Lens | None = None
         self._tree = TransformTree()
-        self._camera_frame = self._ros.camera_frame
+        self._camera_frame = self._ros.camera_frame or ("" if self._camera.source == ROS else _CAMERA_FRAME)
         self._image_time = -np.inf
         self._reported = ("", -np.inf)  # state, and when it was published
         self._drawing: asyncio.Task[None] | None = None
@@ -99,9 +102,11 @@ class Node:
                 lambda message: self._hand_over(self._take_fixed_transforms, message),
                 FIXED_TRANSFORMS,
             )
+            if self._camera.source != ROS:
+                self._follow_time()
         elif self._pose.source.startswith("topic:"):
             topic = self._pose.source.removeprefix("topic:")
-            subscribe(topic, "PoseStamped", lambda message: self._hand_over(self._take_pose, message), TRANSFORMS)
+            subscribe(topic, "PoseStamped", lambda message: self._hand_over(self._take_pose, message), POSES)
         self._middleware.start()
 
     async def close(self) -> None:
@@ -125,12 +130,16 @@ class Node:
             stamp, frame_id = shot.stamp, shot.frame_id
         else:
             stamp = stamp_of(types, shot.captured + time.time() - time.monotonic())
-            frame_id = self._camera_frame or _CAMERA_FRAME
+            frame_id = self._camera_frame
         in_image, on_plane = (header_of(types, stamp, each) for each in (frame_id, self._ros.plane_frame))
         detections = answer.detections
         self._detections_2d.publish(detection_2d_array(types, in_image, detections, answer.orientation))
-        offset = self._camera_offset(shot.captured)
-        self._detections_3d.publish(detection_3d_array(types, on_plane, detections, offset))
+        try:
+            offset = self._camera_offset(shot.captured)
+        except InputError as error:  # tf has changed since the pose of this frame
+            self._poses.reject(str(error))
+        else:
+            self._detections_3d.publish(detection_3d_array(types, on_plane, detections, offset))
         if self._debug_image.readers and (self._drawing is None or self._drawing.done()):
             drawing = asyncio.to_thread(self._publish_debug_image, in_image, shot.image, detections)
             self._drawing = asyncio.ensure_future(drawing)
@@ -139,7 +148,10 @@ class Node:
         self._debug_image.publish(jpeg_message(self._types, header, draw_overlay(image, detections)))
 
     def _camera_offset(self, captured: float) -> Floats:
-        """Where the camera is in the plane's frame (2,) [m]; zeros if its origin is below the camera."""
+        """Where the camera is in the plane's frame (2,) [m]; zeros if its origin is below the camera.
+
+        Raises InputError if tf does not know it.
+        """
         if self._pose.source != "tf":
             return np.zeros(2)
         return self._tree.at(self._ros.plane_frame, self._camera_frame, captured).translation[:2]
@@ -190,6 +202,12 @@ class Node:
         self._camera_frame = self._ros.camera_frame or frame_id
         self._image_time = captured
         self._add_tf_pose()
+
+    def _follow_time(self) -> None:
+        """Take now as the time of images that do not come from ROS, for a camera that is fixed to the plane."""
+        self._image_time = time.monotonic()
+        self._add_tf_pose()
+        self._loop.call_later(_FIXED_POSE_PERIOD, self._follow_time)
 
     def _take_transforms(self, message: Any, now: float) -> None:
         self._add_transforms(message, lambda each: self._clock.monotonic(seconds_of(each.header.stamp), now))

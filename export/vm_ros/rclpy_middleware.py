@@ -19,10 +19,11 @@ from rclpy.signals import SignalHandlerOptions
 from vm_embedded.cameras.ros.message_fields import FIELDS
 from vm_embedded.errors import InputError
 
-from .middleware import DETECTIONS, FIXED_TRANSFORMS, SENSOR, TRANSFORMS
+from .middleware import DETECTIONS, FIXED_TRANSFORMS, POSES, SENSOR, TRANSFORMS
 
 _PROFILES = {
     SENSOR: QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
+    POSES: QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT),
     TRANSFORMS: QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE),
     FIXED_TRANSFORMS: QoSProfile(
         depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL

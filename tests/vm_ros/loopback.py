@@ -13,6 +13,7 @@ from tests.vm_embedded.live.running import PATIENCE, Running
 from vm_embedded.cameras.ros.bag_types import typestore
 from vm_embedded.cameras.ros.message_fields import MESSAGES
 from vm_ros.dds_middleware import DdsMiddleware
+from vm_ros.middleware import TRANSFORMS
 
 COMMAND = Path(sys.executable).parent / "vm-ros"
 
@@ -69,7 +70,7 @@ class Peer:
             with self._lock:
                 kept.append(store.deserialize_cdr(message.bytes, full))
 
-        self.middleware.subscribe(topic, f"Raw{kind}", take, "transforms")
+        self.middleware.subscribe(topic, f"Raw{kind}", take, TRANSFORMS)
 
     def received(self, topic):
         """All messages of a topic so far."""

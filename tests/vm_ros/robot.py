@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from tests.vm_embedded.cameras.ros.rolling_ball import LENS, OFFSET, SIZE, Scene
 from vm_embedded.cameras.ros.stamps import stamp_of
 from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA
-from vm_ros.dds_middleware import FIXED_TRANSFORMS
+from vm_ros.middleware import FIXED_TRANSFORMS
 
 SECONDS, RATE = 4.0, 10.0
 """Length of the scene [s], which is shown forward and backward, and images per second [1/s]."""

@@ -6,8 +6,10 @@ import pytest
 
 from tests.vm_embedded.cameras.ros.rolling_ball import LENS, OFFSET, SIZE
 from vm_embedded import Detector, Settings
-from vm_embedded.cameras.ros.stamps import seconds_of
-from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA
+from vm_embedded.cameras.ros.stamps import seconds_of, stamp_of
+from vm_embedded.cameras.ros.transforms import transform_message
+from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA, Orientation
+from vm_ros.middleware import FIXED_TRANSFORMS
 
 from .loopback import running
 from .robot import Robot
@@ -142,6 +144,27 @@ def test_a_bag_that_is_played_has_a_clock_of_its_own(tmp_path, peer):
             node.wait(lambda: sum(bool(each.detections) for each in peer.received(ON_PLANE)) > 5)
             node.stop()
     assert seconds_of(peer.received(ON_PLANE)[-1].header.stamp) <= max(robot.shown)
+
+
+@pytest.mark.slow
+def test_another_camera_may_be_fixed_in_tf(tmp_path, peer):
+    peer.listen(ON_PLANE, "Detection3DArray")
+    fixed = peer.middleware.publisher("/tf_static", "TFMessage", FIXED_TRANSFORMS)
+    peer.middleware.start()
+    pose = Orientation.from_roll_pitch(height=0.8, pitch=0.4)
+    header = peer.types.Header(stamp=stamp_of(peer.types, 0.0), frame_id="base_footprint")
+    link = transform_message(peer.types, header, "eye", pose)
+    link.transform.translation.x = 3.0
+    fixed.publish(peer.types.TFMessage(transforms=[link]))
+    options = ("--camera", "synthetic:0", "--pose-source", "tf", "--ros-camera-frame", "eye")
+    with running(tmp_path, *options, *PATIENT) as node:
+        node.wait(lambda: sum(bool(each.detections) for each in peer.received(ON_PLANE)) > 5)
+        node.stop()
+    for array in peer.received(ON_PLANE):
+        for each in array.detections:
+            position = vector(each.results[0].pose.pose.position)
+            assert 4.0 < position[0] < 6.5  # the ball rolls 1.3 to 2.7 m before the camera
+            assert abs(position[1]) < 2.0
 
 
 @pytest.mark.slow

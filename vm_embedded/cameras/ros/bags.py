@@ -24,6 +24,7 @@ from .bag_types import damage_errors, import_rosbags, typestore
 from .camera_poses import newest_pose, orientation_of
 from .images import image_of
 from .lens import lens_of
+from .message_fields import MESSAGES
 from .settings import RosSettings, camera_info_beside
 from .stamps import seconds_of
 from .transforms import Transform, TransformTree
@@ -69,10 +70,11 @@ def open_bag(name: str, reading: BagReading) -> Source:
         raise InputError(f"can't read bag {name}: {one_line(error)}") from error
     try:
         images = _image_topic(name, reader, reading.ros.image)
+        info = reading.ros.camera_info or camera_info_beside(images)
+        _check_topics(name, reader, reading, info)
     except InputError:
         reader.close()
         raise
-    info = reading.ros.camera_info or camera_info_beside(images)
     count = reader.topics[images].msgcount
     rate = (count - 1) / (1e-9 * reader.duration) if count > 1 and reader.duration > 0 else None
     settings = replace(reading, ros=replace(reading.ros, image=images, camera_info=info))
@@ -89,6 +91,19 @@ def _image_topic(name: str, reader: Any, chosen: str) -> str:
     if not chosen and len(topics) > 1:
         raise InputError(f"bag {name} has several topics of images; choose one: --ros-image {' or '.join(topics)}")
     return chosen or topics[0]
+
+
+def _check_topics(name: str, reader: Any, reading: BagReading, info: str) -> None:
+    """Raise InputError if a chosen topic is not in the bag, or if a topic has another type of messages."""
+    pose = reading.pose.source.removeprefix("topic:") if reading.pose.source.startswith("topic:") else ""
+    for topic in filter(None, (reading.ros.camera_info, pose)):
+        if topic not in reader.topics:
+            raise InputError(f"bag {name}: {unknown('topic', topic, sorted(reader.topics))}")
+    needed = [(info, "CameraInfo"), ("/tf", "TFMessage"), ("/tf_static", "TFMessage"), (pose, "PoseStamped")]
+    for topic, message in needed:
+        found = reader.topics[topic].msgtype if topic in reader.topics else MESSAGES[message]
+        if found != MESSAGES[message]:
+            raise InputError(f"bag {name}: topic {topic} must have messages of type {MESSAGES[message]}, not {found}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -160,6 +160,23 @@ def test_a_bag_can_not_be_played_as_a_live_camera(tmp_path):
     assert "a bag can't be played with --live" in json.loads(done.stderr.splitlines()[-1])["reason"]
 
 
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["--pose-source", "topic:/pse"], "unknown topic '/pse'"),
+        (["--ros-camera-info", "/camera/camera_inf"], "did you mean '/camera/camera_info'?"),
+        (
+            ["--pose-source", "topic:/tf"],
+            "topic /tf must have messages of type geometry_msgs/msg/PoseStamped, not tf2_",
+        ),
+        (["--ros-camera-info", "/tf"], "topic /tf must have messages of type"),
+    ],
+)
+def test_a_topic_that_is_missing_or_of_another_type_is_one_line(tmp_path, options, reason):
+    bag = Scene(count=1).write_bag(tmp_path / "bag")
+    one_complaint(run(bag, *options, code=1), reason)
+
+
 @pytest.mark.parametrize("name", ["missing.mcap", "missing.db3"])
 def test_a_bag_that_does_not_exist_is_one_line(tmp_path, name):
     one_complaint(run(tmp_path / name, code=1), f"no such bag: {tmp_path / name}")
