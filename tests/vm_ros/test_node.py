@@ -83,7 +83,7 @@ def test_the_numbers_are_those_of_the_lines_of_json(tmp_path, peer):
     peer.listen(ON_PLANE, "Detection3DArray")
     peer.listen(IN_IMAGE, "Detection2DArray")
     peer.middleware.start()
-    with running(tmp_path, "--camera", "synthetic") as node:
+    with running(tmp_path, "--camera", "synthetic", "--track") as node:
         node.wait(lambda: sum(bool(each.detections) for each in peer.received(ON_PLANE)) > 20)
         node.stop()
     lines = {round(each["wall"], 4): each["detections"] for each in node.frames}
@@ -94,6 +94,7 @@ def test_the_numbers_are_those_of_the_lines_of_json(tmp_path, peer):
             position = vector(place.results[0].pose.pose.position)
             assert np.abs(position - each["position"]).max() <= 0.00051
             assert abs(place.results[0].hypothesis.score - each["confidence"]) <= 0.00051
+            assert place.id == str(each["track"]["id"])
             compared += 1
     assert compared > 15
 

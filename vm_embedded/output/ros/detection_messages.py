@@ -60,7 +60,7 @@ def _detection_2d(types: Any, header: Any, detection: Detection, orientation: Or
             size_x=float(width),
             size_y=float(height),
         ),
-        id="",
+        id=_track_id(detection),
     )
 
 
@@ -70,8 +70,13 @@ def _detection_3d(types: Any, header: Any, detection: Detection, offset: Floats,
         header=header,
         results=[_hypothesis(types, detection, position)],
         bbox=types.BoundingBox3D(center=pose_at(types, position), size=types.Vector3(x=side, y=side, z=side)),
-        id="",
+        id=_track_id(detection),
     )
+
+
+def _track_id(detection: Detection) -> str:
+    """The number of its track, or an empty text."""
+    return "" if detection.track is None else str(detection.track.id)
 
 
 def _hypothesis(types: Any, detection: Detection, position: Floats) -> Any:
