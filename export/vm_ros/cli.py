@@ -13,7 +13,7 @@ import cv2
 
 from vm_embedded.cameras.open_camera import ROS
 from vm_embedded.cameras.ros.settings import NODE
-from vm_embedded.cli.options import ANGLES, add_live, add_model, add_pose, add_settings, read_options
+from vm_embedded.cli.options import ANGLES, add_live, add_model, add_pose, add_settings, add_track, read_options
 from vm_embedded.cli.program import Parser, program
 from vm_embedded.errors import VisualMeshError
 from vm_embedded.live.configuration import Configuration, with_overrides
@@ -45,6 +45,7 @@ def parser() -> argparse.ArgumentParser:
     add_model(parser)
     add_pose(parser, "instead of camera_info and tf")
     add_settings(parser)
+    add_track(parser)
     add_live(parser)
     return parser
 
