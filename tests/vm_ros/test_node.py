@@ -50,7 +50,7 @@ def test_another_process_decodes_the_same_numbers(tmp_path, peer, poses):
     detector = Detector.from_file("ball", Settings(max_distance=6.0))
     offset = np.append(OFFSET if poses == "tf" else np.zeros(2), 0.0)
     in_image = {seconds_of(each.header.stamp): each for each in peer.received(IN_IMAGE)}
-    compared = 0
+    errors = []
     for on_plane in peer.received(ON_PLANE):
         assert on_plane.header.frame_id == "base_footprint"
         time = min(robot.shown, key=lambda each: abs(each - seconds_of(on_plane.header.stamp)))
@@ -64,17 +64,22 @@ def test_another_process_decodes_the_same_numbers(tmp_path, peer, poses):
             continue  # at the edge of the picture, a pose that is interpolated can decide
         for each, place, box in zip(expected, on_plane.detections, array.detections, strict=True):
             assert place.results[0].hypothesis.class_id == box.results[0].hypothesis.class_id == each.class_name
-            assert abs(box.results[0].hypothesis.score - each.confidence) < 0.02
             position = vector(place.results[0].pose.pose.position)
-            assert np.abs(position - offset - each.position).max() < 0.005 * each.distance
             assert (vector(place.bbox.center.position) == position).all()
             assert (vector(place.bbox.size) == 2.0 * detector.manifest.object_radius).all()
             from_camera = orientation.rotation @ OPTICAL_TO_CAMERA @ vector(box.results[0].pose.pose.position)
-            assert np.abs(from_camera - each.distance * each.bearing).max() < 0.005 * each.distance
-            assert abs(box.bbox.center.position.x - each.center[0]) < 1.0
-            assert abs(box.bbox.size_x - np.ptp(each.outline[:, 0])) < 1.0
-            compared += 1
-    assert compared > 15
+            errors.append(
+                [
+                    np.abs(position - offset - each.position).max() / each.distance,
+                    np.abs(from_camera - each.distance * each.bearing).max() / each.distance,
+                    abs(box.bbox.center.position.x - each.center[0]) / SIZE[0],
+                    abs(box.bbox.size_x - np.ptp(each.outline[:, 0])) / SIZE[0],
+                    abs(box.results[0].hypothesis.score - each.confidence),
+                ]
+            )
+    assert len(errors) > 15
+    # A busy machine sends some poses late, and then the pose of a frame comes from poses that are far apart.
+    assert (np.median(errors, axis=0) < 0.002).all(), np.median(errors, axis=0)
 
 
 @pytest.mark.slow
