@@ -25,6 +25,7 @@ from vm_embedded.output.message_schema import message_schema
 from vm_export import cli as export
 from vm_label import cli as label
 from vm_mesh import cli as mesh
+from vm_ros import cli as ros
 from vm_synth import cli as synth
 from vm_synth.scene import configuration as scene
 from vm_train.cli import evaluate
@@ -54,7 +55,7 @@ def pages() -> dict[Path, str]:
 
 def parsers() -> dict[str, argparse.ArgumentParser]:
     """All programs, and commands of programs ("vm-train check"), with their parsers, in the order of the page."""
-    robot = (detect.parser(), doctor.parser(), bench.parser(), export.parser())
+    robot = (detect.parser(), doctor.parser(), bench.parser(), ros.parser(), export.parser())
     programs = (calibrate, synth, train, evaluate, mesh)
     workstation = (each for program in programs for each in program.parsers().values())
     return {each.prog: each for each in (*robot, *workstation, label.parser())}

@@ -24,7 +24,9 @@ def kind_of(message):
     """The kind of a message, as the schema names it."""
     if "type" in message:
         return "status" if "counts" in message else message["type"]
-    return "file_frame" if "source" in message else "ros"
+    if "source" in message:
+        return "file_frame"
+    return "ros" if "points" in message else "ros_state"
 
 
 def checked(message):

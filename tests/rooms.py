@@ -14,8 +14,8 @@ from pathlib import Path
 CHECKOUT = Path(__file__).resolve().parents[1]
 
 ROOMS = {
-    "vm_embedded": "cli > live > output > cameras > detection > field > network > mesh > poses > geometry > config"
-    " > sockets+files+errors+arrays",
+    "vm_embedded": "cli > live > output > cameras > detection > field > network > mesh > poses > geometry"
+    " > config > sockets+files+errors+arrays",
     "vm_workstation": "",
     "vm_export": "",
     "vm_synth": "__main__ > cli > dataset > render > scene > balls, bodies",
@@ -23,6 +23,7 @@ ROOMS = {
     "vm_label": "",
     "vm_train": "__main__ > cli > tuning > look > evaluation > learning > graphs > formats > boxes, data, scores",
     "vm_calibrate": "",
+    "vm_ros": "",
 }
 """The rooms of each package, from top to bottom: a room imports only from itself and from rooms further down. A comma
 separates rooms of the same level, which do not import each other; a plus joins modules that count as one room. A
@@ -36,6 +37,7 @@ PACKAGES = {
     "vm_mesh": {"vm_embedded", "vm_workstation"},
     "vm_label": {"vm_embedded", "vm_workstation"},
     "vm_calibrate": {"vm_embedded", "vm_workstation"},
+    "vm_ros": {"vm_embedded"},
     "vm_train": {"vm_embedded", "vm_workstation", "vm_export", "vm_synth"},
 }
 """Packages of the project that each package may import."""

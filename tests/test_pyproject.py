@@ -17,6 +17,7 @@ def test_package_data_and_scripts_are_declared():
         "vm-mesh",
         "vm-label",
         "vm-calibrate",
+        "vm-ros",
     }
     assert [each.split(">")[0] for each in project["dependencies"]] == [
         "numpy",

@@ -21,7 +21,13 @@ CALLS = [
     ("vm_export.cli", "torch", ["model.pt"]),
     ("vm_synth.cli", "mitsuba", ["out", "--count", "1", "--hdri", "."]),
     ("vm_mesh.cli", "matplotlib", ["quality", "-o", "quality.svg"]),
+    ("vm_embedded.cli.detect", "rosbags", ["recording.mcap"]),
+    ("vm_embedded.cli.detect", "rosbags", ["map.hdr", "--save-mcap", "out.mcap"]),
+    ("vm_ros.cli", "cyclonedds", []),
 ]
+
+STATUS = {"vm_ros.cli": 78}
+"""Exit status of a program that a service manager starts; that of the others is 1."""
 
 
 def without(package: str, module: str, arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
@@ -55,7 +61,7 @@ def test_a_program_without_its_packages_advises_a_command_that_installs_them(
 ):
     cv2.imwrite(str(tmp_path / "map.hdr"), np.ones((64, 128, 3), np.float32))  # for vm-synth
     done = without(package, module, arguments, tmp_path)
-    assert done.returncode == 1
+    assert done.returncode == STATUS.get(module, 1)
     assert "Traceback" not in done.stderr
     (advice,) = re.findall(r"run: (pip install '\.\[(\w+)\]') in the folder of vm-embedded", done.stderr)
     command, extra = advice

@@ -23,12 +23,13 @@ FEWEST = {
     "vm_mesh": 6,
     "vm_label": 8,
     "vm_calibrate": 12,
+    "vm_ros": 8,
     "vm_train": 55,
 }
 """Fewer modules than these mean that a check below looks in the wrong place."""
 
 OUTSIDE = {
-    "vm_embedded": {"numpy", "cv2", "onnxruntime"},
+    "vm_embedded": {"numpy", "cv2", "onnxruntime", "rosbags"},
     "vm_workstation": {"numpy", "cv2", "matplotlib"},
     "vm_export": {"numpy", "torch", "onnx", "yaml"},
     "vm_synth": {"numpy", "cv2", "mitsuba", "drjit", "matplotlib"},
@@ -36,13 +37,14 @@ OUTSIDE = {
     "vm_label": {"numpy", "cv2"},
     "vm_train": {"numpy", "cv2", "torch", "matplotlib", "yaml", "PIL"},
     "vm_calibrate": {"numpy", "cv2", "scipy"},
+    "vm_ros": {"numpy", "cv2", "rclpy", "cyclonedds"},
 }
 """Packages of others that each package may import."""
 
 RAY_TRACING = ["vm_synth.render.mitsuba", "vm_synth.render.tracer"]
 """The only modules that import mitsuba or drjit."""
 
-HEAVY = {"mitsuba", "drjit", "matplotlib", "scipy"}
+HEAVY = {"mitsuba", "drjit", "matplotlib", "scipy", "rosbags"}
 """Packages that are only imported inside functions, and for types."""
 
 
@@ -117,7 +119,7 @@ def test_heavy_packages_are_imported_where_they_are_used():
     [
         (
             "vm_embedded.cli.detect",
-            {"torch", "onnx", "matplotlib", "yaml", "mitsuba", "scipy", "vm_export", "vm_synth"},
+            {"torch", "onnx", "matplotlib", "yaml", "mitsuba", "scipy", "rosbags", "vm_export", "vm_synth", "vm_ros"},
         ),
         ("vm_export.cli", {"torch", "onnx", "matplotlib", "yaml", "mitsuba", "vm_synth", "vm_train"}),
         ("vm_synth.cli", {"mitsuba", "drjit", "torch", "matplotlib", "onnx", "scipy", "vm_export"}),
@@ -127,6 +129,7 @@ def test_heavy_packages_are_imported_where_they_are_used():
             {"torch", "onnx", "matplotlib", "mitsuba", "vm_export", "vm_synth", "vm_train"},
         ),
         ("vm_calibrate.cli", {"torch", "onnx", "matplotlib", "mitsuba", "scipy", "vm_export", "vm_synth", "vm_train"}),
+        ("vm_ros.cli", {"torch", "onnx", "matplotlib", "scipy", "cyclonedds", "rclpy", "rosbags", "vm_export"}),
         ("vm_train.cli.train", {"mitsuba", "drjit", "matplotlib", "tensorboard"}),
         ("vm_train.cli.evaluate", {"mitsuba", "drjit", "matplotlib", "tensorboard"}),
     ],

@@ -17,6 +17,8 @@ import numpy as np
 from ..arrays import Image
 from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
+from ..geometry.lens import Lens
+from ..geometry.orientation import Orientation
 from .decoding import decode
 from .image_header import MAX_MEGAPIXELS
 
@@ -47,7 +49,7 @@ class Frame:
 
     index: its number, from 0. source: its name in messages. read: returns the image, BGR, or in the file's own channels
     if the pixel format is another; raises InputError. path: its image file; None for a frame of a video. stamp: time
-    within its video or recording [s], or None.
+    within its video or recording [s], or None. lens, orientation: of the camera, if the source knows them.
     """
 
     index: int
@@ -55,6 +57,8 @@ class Frame:
     read: Callable[[], Image]
     path: Path | None = None
     stamp: float | None = None
+    lens: Lens | None = None
+    orientation: Orientation | None = None
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,11 @@ def open_sources(names: Sequence[str], raw: bool = False, max_megapixels: float 
     paths = [Path(each) for each in names]
     if len(names) > 1 and all(each.is_file() and each.suffix.lower() in IMAGE_SUFFIXES for each in paths):
         return _images(paths, partial(read_image, raw=raw, max_megapixels=max_megapixels))
-    opened = [open_source(each, raw, max_megapixels) for each in names]
+    return joined([open_source(each, raw, max_megapixels) for each in names])
+
+
+def joined(opened: Sequence[Source]) -> Source:
+    """Several sources as one, with frames numbered from 0."""
     if len(opened) == 1:
         return opened[0]
     frames = (frame for source in opened for frame in source.frames)

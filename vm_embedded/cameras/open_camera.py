@@ -14,6 +14,9 @@ from .mjpeg import MjpegCamera, NotMotionJpegError, parse_url
 from .opencv import OpenCvCamera, check_opencv_settings, device_path
 from .synthetic import SyntheticCamera, parse_motion
 
+ROS = "ros"
+"""Source of the images of a ROS topic, which vm-ros opens."""
+
 Opener = Callable[[], Camera]
 """Opens a camera. Raises CameraError if that fails now but may succeed later."""
 
@@ -22,7 +25,11 @@ def is_live(source: str) -> bool:
     """Whether a source is always a live camera: not a file, which vm-detect may also process frame by frame."""
     prefix = source.partition(":")[0]
     node = device_path(source)
-    return prefix in ("synthetic", "fault", "gstreamer") or "://" in source or (node is not None and not node.is_file())
+    return (
+        prefix in ("synthetic", "fault", "gstreamer", ROS)
+        or "://" in source
+        or (node is not None and not node.is_file())
+    )
 
 
 def brings_lens_and_pose(source: str) -> bool:
@@ -30,7 +37,7 @@ def brings_lens_and_pose(source: str) -> bool:
 
     A fault script also counts, whichever camera it adds faults to.
     """
-    return source.partition(":")[0] in ("synthetic", "fault")
+    return source.partition(":")[0] in ("synthetic", "fault", ROS)
 
 
 def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
@@ -39,6 +46,8 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
     raw: images keep their own channels. Raises InputError for a source or setting that can never work.
     """
     source = settings.source
+    if source == ROS:
+        raise InputError("camera ros, a topic of ROS, works only with vm-ros")
     if source.startswith("fault:"):
         script = FaultScript.read(Path(source.removeprefix("fault:")))
         faults, inner = Faults(script), camera_opener(replace(settings, source=script.source), raw)

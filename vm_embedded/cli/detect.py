@@ -14,6 +14,7 @@ from pathlib import Path
 import cv2
 
 from ..cameras.open_camera import is_live
+from ..cameras.ros.bags import is_bag
 from ..config.toml_writer import to_commented_toml
 from ..errors import InputError, VisualMeshError
 from ..live.configuration import HEADER, Configuration
@@ -27,7 +28,7 @@ from .program import Parser, program
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
-_FILES_ONLY = ("save_boxes", "save_overlay", "save_points", "emit_points", "explain")
+_FILES_ONLY = ("save_mcap", "save_boxes", "save_overlay", "save_points", "emit_points", "explain")
 """Options that a live camera rejects."""
 
 
@@ -47,13 +48,13 @@ def parser() -> argparse.ArgumentParser:
         "files",
         nargs="*",
         metavar="FILE",
-        help="the same as --camera: images, folders or videos; several are processed one after the other",
+        help="the same as --camera: images, folders, videos or bags; several are processed one after the other",
     )
     parser.add_argument(
         "--camera",
         metavar="SOURCE",
-        help="files, each frame once: an image, a folder or glob of images, or a video; or a live camera: its "
-        "number or device, an http, https or rtsp address, gstreamer:PIPELINE, synthetic, or fault:SCRIPT",
+        help="files, each frame once: an image, a folder or glob of images, a video, or a bag of ROS 2; or a live "
+        "camera: its number or device, an http, https or rtsp address, gstreamer:PIPELINE, synthetic, or fault:SCRIPT",
     )
     parser.add_argument(
         "--live", action="store_true", help="play files like a live camera: at their frame rate, skipping late frames"
@@ -90,6 +91,12 @@ def parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="write each image, its lens and pose, and the boxes of its objects as NAME.txt in YOLO format, for "
         "annotation tools and vm-label; near misses go to candidates.jsonl; DIR must be new or empty",
+    )
+    output.add_argument(
+        "--save-mcap",
+        type=Path,
+        metavar="FILE",
+        help="write images, lenses, poses, detections and states as FILE.mcap, for Foxglove and ROS 2",
     )
     output.add_argument("--emit-points", metavar="CLASS,...", help="add the points of these classes to the JSON")
     output.add_argument(
@@ -183,6 +190,8 @@ def _detect_live(options: argparse.Namespace) -> int:
                     f"--{name.replace('_', '-')} works only with files, not with a live camera; make a "
                     "recording, and give its folder"
                 )
+        if any(map(is_bag, options.files)):
+            raise InputError("a bag can't be played with --live; give it without --live, or play it for vm-ros")
         daemon = Daemon(lambda: read_options(options), EventLog("vm-detect"))
         return asyncio.run(daemon.run())
     except VisualMeshError as error:

@@ -6,10 +6,12 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
 from ..arrays import Image
-from ..cameras.image_files import Frame, check_file_format, lens_beside, open_sources
+from ..cameras.image_files import Frame, Source, check_file_format, joined, lens_beside, open_source, open_sources
+from ..cameras.ros.bags import BagReading, is_bag, open_bag
 from ..detection.detector import Detector
 from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError
@@ -20,6 +22,7 @@ from ..live.configuration import Configuration
 from ..output.box_files import BoxWriter
 from ..output.messages import file_message
 from ..output.result_files import make_folder, save_overlay, save_points
+from ..output.ros.mcap_file import McapFile
 from .progress import ProgressBar
 
 
@@ -36,8 +39,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     for name in emit_points:
         detector.manifest.column(name)
     check_file_format(format)
-    sources, largest = options.files or [given.camera.source], given.camera.max_megapixels
-    source = open_sources(sources, format != "bgr", largest)
+    source = _open(options.files or [given.camera.source], given)
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:
             make_folder(folder)
@@ -46,21 +48,40 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
 
     processed = 0
     bar = ProgressBar(source.count)
-    for frame in source.frames:
-        if follow is not None and frame.index == 0:
-            follow.time(frame)  # without times, no frame can be processed
-        try:
-            line = _process(frame, detector, pose, follow, options, emit_points, boxes)
-        except VisualMeshError as error:
+    with McapFile(options.save_mcap, given.ros.plane_frame) if options.save_mcap else nullcontext() as mcap:
+        for frame in source.frames:
+            if follow is not None and frame.index == 0:
+                follow.time(frame)  # without times, no frame can be processed
+            try:
+                line = _process(frame, detector, pose, follow, options, emit_points, boxes, mcap)
+            except VisualMeshError as error:
+                bar.clear()
+                complain(str(error))
+                if mcap is not None:
+                    mcap.write_state(frame, "degraded", str(error))
+                continue
             bar.clear()
-            complain(str(error))
-            continue
-        bar.clear()
-        print(line, flush=True)
-        processed += 1
-        bar.show(frame.index + 1)
+            print(line, flush=True)
+            processed += 1
+            bar.show(frame.index + 1)
     bar.clear()
     return processed
+
+
+def _open(names: Sequence[str], given: Configuration) -> Source:
+    """The frames of images, folders, videos and bags. Raises InputError."""
+    raw, largest = given.detector.format != "bgr", given.camera.max_megapixels
+    if not any(map(is_bag, names)):
+        return open_sources(names, raw, largest)
+    reading = BagReading(
+        ros=given.ros,
+        pose=given.pose,
+        lens=given.lens.lens if given.lens else None,
+        orientation=given.fixed_orientation(),
+        raw=raw,
+        max_megapixels=largest,
+    )
+    return joined([open_bag(each, reading) if is_bag(each) else open_source(each, raw, largest) for each in names])
 
 
 @dataclass(frozen=True)
@@ -72,6 +93,8 @@ class _DefaultPose:
 
     def of(self, frame: Frame) -> tuple[Lens, Orientation]:
         """Lens and orientation of a frame; the lens file beside it takes precedence. Raises InputError without one."""
+        if frame.lens is not None and frame.orientation is not None:
+            return frame.lens, frame.orientation
         lens, orientation = self.lens, self.orientation
         beside = lens_beside(frame.path)
         if beside is not None:
@@ -110,6 +133,7 @@ def _process(
     options: argparse.Namespace,
     emit_points: Sequence[str],
     boxes: BoxWriter | None,
+    mcap: McapFile | None,
 ) -> str:
     """Detect in a frame, save the files that the options ask for, and return its line of JSON.
 
@@ -117,7 +141,7 @@ def _process(
     """
     image = frame.read()  # its errors name the file
     try:
-        return _detect(image, frame, detector, pose, follow, options, emit_points, boxes)
+        return _detect(image, frame, detector, pose, follow, options, emit_points, boxes, mcap)
     except VisualMeshError as error:
         raise InputError(f"{frame.source}: {error}") from error
 
@@ -131,6 +155,7 @@ def _detect(
     options: argparse.Namespace,
     emit_points: Sequence[str],
     boxes: BoxWriter | None,
+    mcap: McapFile | None,
 ) -> str:
     lens, orientation = pose.of(frame)
     detections = detector.detect(image, orientation, lens, explain=options.explain or boxes is not None)
@@ -144,6 +169,8 @@ def _detect(
         save_points(options.save_points, frame, detections)
     if options.save_overlay is not None:
         save_overlay(options.save_overlay, frame, image, detections)
+    if mcap is not None:
+        mcap.write(frame, image, lens, orientation, detections)
     return json.dumps(file_message(frame, detections, emit_points, options.explain), allow_nan=False)
 
 

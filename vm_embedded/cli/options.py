@@ -10,6 +10,7 @@ from typing import Any
 
 from ..cameras.camera import CameraSettings
 from ..cameras.image_files import MESSAGES
+from ..cameras.ros.settings import RosSettings
 from ..detection.settings import Settings
 from ..geometry.lens_files import read_lens_file
 from ..live.configuration import (
@@ -31,6 +32,7 @@ LIVE = {
     "output": OutputSettings,
     "status": StatusSettings,
     "recorder": RecorderSettings,
+    "ros": RosSettings,
 }
 """Sections for live cameras."""
 
@@ -78,7 +80,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 def add_live(parser: argparse.ArgumentParser) -> None:
     """Add an option for each entry of the sections for live cameras."""
     for name, section in LIVE.items():
-        group = parser.add_argument_group(f"[{name}], for live cameras")
+        group = parser.add_argument_group(f"[{name}], for {'vm-ros and bags' if name == 'ros' else 'live cameras'}")
         add_section(group, section, f"{name}_", ("source",) if name == "camera" else ())
 
 

@@ -31,6 +31,39 @@ def rotation_z(angle: float) -> Floats:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def rotation_from_quaternion(quaternion: Sequence[float]) -> Floats:
+    """Rotation (3, 3) of a quaternion (w, x, y, z). Raises GeometryError if its length differs from 1 by over 1e-3."""
+    q = np.asarray(quaternion, dtype=np.float64)
+    if q.shape != (4,) or not np.isfinite(q).all() or abs(float(q @ q) - 1.0) > 2e-3:
+        raise GeometryError(f"quaternion must be (w, x, y, z) of length 1, not {list(quaternion)}")
+    w, x, y, z = q / np.linalg.norm(q)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_from_rotation(rotation: Floats) -> tuple[float, float, float, float]:
+    """The quaternion (w, x, y, z) of a rotation (3, 3), with w >= 0."""
+    # Each product of two components is a sum of entries of the rotation; the largest square gives the best precision.
+    r, trace = rotation, float(np.trace(rotation))
+    squares = [1.0 + trace, *(1.0 - trace + 2.0 * r[i, i] for i in range(3))]
+    products = np.array(
+        [
+            [squares[0], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
+            [r[2, 1] - r[1, 2], squares[1], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
+            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], squares[2], r[1, 2] + r[2, 1]],
+            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[3]],
+        ]
+    )
+    row = products[int(np.argmax(squares))]
+    w, x, y, z = row / math.copysign(float(np.linalg.norm(row)), row[0])
+    return float(w), float(x), float(y), float(z)
+
+
 @dataclass(frozen=True, eq=False)
 class Orientation:
     """Height and rotation of a camera over the observation plane.
@@ -86,17 +119,7 @@ class Orientation:
 
         Raises GeometryError if its length differs from 1 by more than 1e-3.
         """
-        q = np.asarray(quaternion, dtype=np.float64)
-        if q.shape != (4,) or not np.isfinite(q).all() or abs(float(q @ q) - 1.0) > 2e-3:
-            raise GeometryError(f"quaternion must be (w, x, y, z) of length 1, not {list(quaternion)}")
-        w, x, y, z = q / np.linalg.norm(q)
-        rotation = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        rotation = rotation_from_quaternion(quaternion)
         return cls(height, rotation @ OPTICAL_TO_CAMERA.T if optical else rotation)
 
     @cached_property

@@ -66,7 +66,8 @@ class Answerer:
                 detections = self._tracker.update(detections, shot.captured)
         except StalePoseError as error:
             self._counters.outcomes.stale += 1
-            self._health.pose_trouble = str(error)
+            rejection = self._poses.rejection
+            self._health.pose_trouble = f"{error}; {rejection}" if rejection else str(error)
             return None
         except (VisualMeshError, cv2.error, ValueError) as error:
             # NumPy raises ValueError for arrays that do not fit. No frame may end the daemon.

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..cameras.camera import CameraSettings
+from ..cameras.ros.settings import RosSettings
 from ..config.entries import EntryError, check_entries, entry, number, switch, text_line
 from ..config.sections import read_sections
 from ..config.toml_writer import to_commented_toml
@@ -146,6 +147,7 @@ class Configuration:
     output: OutputSettings = field(default_factory=OutputSettings)
     status: StatusSettings = field(default_factory=StatusSettings)
     recorder: RecorderSettings = field(default_factory=RecorderSettings)
+    ros: RosSettings = field(default_factory=RosSettings)
     deploy: DeploySettings = field(default_factory=DeploySettings)
 
     def fixed_orientation(self) -> Orientation | None:

@@ -27,8 +27,10 @@ from ..errors import InputError, VisualMeshError, one_line
 from ..output.channels import Channels
 from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
+from ..poses.settings import is_of_ros
 from ..poses.stream import PoseStream
 from .answering import Answer, Answerer
+from .bridge import Bridge
 from .configuration import Configuration, recording_toml
 from .control import REFUSED, ControlServer, default_socket_path
 from .counters import Counters
@@ -74,12 +76,16 @@ class Daemon:
     """Runs until a signal stops it, the camera ends, or too many reads of the camera hang.
 
     configure: reads the configuration; called at the start and for each reload. Raises VisualMeshError.
+    bridge: to other robot software.
     """
 
-    def __init__(self, configure: Callable[[], Configuration], log: EventLog) -> None:
+    def __init__(self, configure: Callable[[], Configuration], log: EventLog, bridge: Bridge | None = None) -> None:
         self._configure = configure
         self._log = log
+        self._bridge = bridge
         configuration = configure()
+        if bridge is None and is_of_ros(configuration.pose.source):
+            raise InputError(f"pose source {configuration.pose.source} works only with vm-ros and bags")
         detector = load_checked_detector(configuration)
         camera, status = configuration.camera, configuration.status
         self.recorder = Recorder(configuration.recorder, lambda event, level, folder: log(event, level, folder=folder))
@@ -94,7 +100,7 @@ class Daemon:
         self._notifier = SystemdNotifier()
         self._hung = False  # whether so many reads of the camera hang that only a new process helps
         self._wakeup = asyncio.Event()
-        opener = camera_opener(camera, raw=configuration.detector.format != "bgr")
+        opener = (bridge.opener if bridge else camera_opener)(camera, configuration.detector.format != "bgr")
         self.grabber = Grabber(opener, camera, self._wake)
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
         self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health)
@@ -124,6 +130,8 @@ class Daemon:
         try:
             for part in self._parts:
                 await part.open()
+            if self._bridge is not None:
+                await self._bridge.open(self.poses)
         except InputError:
             await self._close()
             raise
@@ -204,7 +212,7 @@ class Daemon:
         self._update_state()
         shot, detections = answer.shot, answer.detections
         self.last = live_message(self.counters.outcomes.frames, self.state, shot, detections, answer.time)
-        self._send(self.last)
+        self._send(self.last, answer)
         self.page.show(shot.image, detections)
         self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._recording_toml)
 
@@ -230,9 +238,11 @@ class Daemon:
             self._send(state_message(state, reason))
             self._notifier.send(STATUS=f"{state}{': ' if reason else ''}{reason}")
 
-    def _send(self, message: Message) -> None:
+    def _send(self, message: Message, answer: Answer | None = None) -> None:
         self._sent = time.monotonic()
         self.outputs.send(message)
+        if self._bridge is not None:
+            self._bridge.publish(message, answer)
 
     def _status(self) -> Message:
         """State, counts, and the last frame's message."""
@@ -290,6 +300,8 @@ class Daemon:
         self._wakeup.set()
 
     async def _close(self) -> None:
+        if self._bridge is not None:
+            await self._bridge.close()
         for part in self._parts:
             await part.close()
         # In a thread, so that a second signal still ends the process at once.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..cameras.camera import without_password
-from ..cameras.open_camera import brings_lens_and_pose, camera_opener, is_live
+from ..cameras.open_camera import ROS, brings_lens_and_pose, camera_opener, is_live
 from ..detection.detector import Detector
 from ..errors import InputError
 from .configuration import Configuration
@@ -17,7 +17,7 @@ def load_checked_detector(configuration: Configuration) -> Detector:
     detector = Detector.from_file(configuration.model, configuration.detector)
     camera = configuration.camera.source
     orientation = configuration.fixed_orientation()  # raises InputError for angles without a height
-    if is_live(camera):
+    if is_live(camera) and camera != ROS:
         camera_opener(configuration.camera, raw=configuration.detector.format != "bgr")  # only for its checks
     if configuration.recorder.trigger_class:
         detector.manifest.column(configuration.recorder.trigger_class)

@@ -9,7 +9,7 @@ from ..detection.detector import Detector
 from .configuration import Configuration, recording_toml
 from .load_detector import load_checked_detector
 
-_NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder")
+_NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder", "ros")
 """Sections that a reload does not change."""
 
 

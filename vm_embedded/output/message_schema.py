@@ -162,8 +162,16 @@ _MESSAGES: dict[str, Schema] = {
             "rejected": _parts("detection", "rejected proposals or clusters, each with its reason; with --explain"),
         },
     ),
+    "ros_state": _object(
+        'a state with [output] format = "ros", without detections',
+        {
+            "state": _STATE["state"],
+            "reason": _STATE["reason"],
+            "header": _part("ros_header") | {"description": "with the time of the message"},
+        },
+    ),
     "ros": _object(
-        'a message with [output] format = "ros": names and types of ROS 2, and the state',
+        'a frame with [output] format = "ros": names and types of ROS 2, and the state',
         {
             "state": _STATE["state"],
             "detections": _object(

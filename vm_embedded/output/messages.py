@@ -89,10 +89,13 @@ def to_json_line(message: Message) -> bytes:
 def to_ros(message: Message, frame_id: str) -> Message:
     """A message with the field names of ROS 2: a vision_msgs/Detection2DArray, and a geometry_msgs/PointStamped for
     each detection, in the plane's frame `frame_id`. The state, which those types lack, is added. The features of the
-    field are left out: those types have no place for them."""
+    field are left out: those types have no place for them. A message with a state only has no arrays: an empty one
+    would say that nothing is there."""
     seconds, rest = divmod(round(1e9 * message["wall"]), 10**9)
     header = {"stamp": {"sec": seconds, "nanosec": rest}, "frame_id": frame_id}
-    detections = message.get("detections", [])
+    if "detections" not in message:
+        return {"state": message["state"], "reason": message["reason"], "header": header}
+    detections = message["detections"]
     return {
         "state": message["state"],
         "detections": {"header": header, "detections": [_ros_detection(header, each) for each in detections]},

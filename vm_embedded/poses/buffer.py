@@ -107,6 +107,11 @@ def interpolate(one: Orientation, other: Orientation, share: float) -> Orientati
 
     The height changes linearly and stays positive; the rotation follows the shortest arc (slerp).
     """
-    turn = cv2.Rodrigues(one.rotation.T @ other.rotation)[0]
-    rotation: Floats = one.rotation @ cv2.Rodrigues(share * turn)[0]
+    rotation = interpolate_rotation(one.rotation, other.rotation, share)
     return Orientation(max(one.height + share * (other.height - one.height), 1e-3), rotation)
+
+
+def interpolate_rotation(one: Floats, other: Floats, share: float) -> Floats:
+    """The rotation (3, 3) at a share of the shortest way from one to the other; shares above 1 extrapolate."""
+    turn = cv2.Rodrigues(one.T @ other)[0]
+    return np.asarray(one @ cv2.Rodrigues(share * turn)[0], dtype=np.float64)

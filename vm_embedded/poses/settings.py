@@ -16,6 +16,11 @@ UDP_EXAMPLE = "0.0.0.0:5600"
 """Address to receive poses at, for error messages."""
 
 
+def is_of_ros(source: str) -> bool:
+    """Whether poses come from ROS: from tf, or from a topic."""
+    return source == "tf" or source.startswith("topic:")
+
+
 def _checked_source(field: Field[Any], value: object) -> str:
     kind, _, rest = value.partition(":") if isinstance(value, str) else ("", "", "")
     if kind == "udp":
@@ -25,8 +30,11 @@ def _checked_source(field: Field[Any], value: object) -> str:
             raise InputError(
                 f"{field.name} must be udp:ADDRESS:PORT, as in udp:{UDP_EXAMPLE}, not {value!r}"
             ) from error
-    elif not (value in ("fixed", "stdin") or (kind == "unix" and rest)):
-        raise InputError(f"{field.name} must be fixed, stdin, unix:PATH or udp:ADDRESS:PORT, not {value!r}")
+    elif not (value in ("fixed", "stdin", "tf") or (kind in ("unix", "topic") and rest)):
+        raise InputError(
+            f"{field.name} must be fixed, stdin, unix:PATH, udp:ADDRESS:PORT, or with ROS tf or topic:/NAME, "
+            f"not {value!r}"
+        )
     return str(value)
 
 
@@ -37,7 +45,8 @@ class PoseSettings:
     source: str = entry(
         _checked_source,
         "fixed",
-        "fixed: the pose in [orientation]; stdin, udp:ADDRESS:PORT or unix:PATH (creates the socket): lines of JSON",
+        "fixed: the pose in [orientation]; stdin, udp:ADDRESS:PORT or unix:PATH (creates the socket): lines of JSON; "
+        "tf or topic:/NAME (geometry_msgs/PoseStamped): only for vm-ros and bags",
     )
     clock: str = one_of(
         CLOCKS,

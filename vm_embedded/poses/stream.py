@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from ..errors import InputError, VisualMeshError
+from ..geometry.orientation import Orientation
 from ..sockets import BACKLOG, Connections, UnixListener, datagram_socket, parse_address
 from .buffer import PoseBuffer
 from .parsing import MAX_LINE_BYTES, parse_pose_line
@@ -30,6 +31,8 @@ class PoseStream:
         self.settings = settings
         self.poses = PoseBuffer(settings)
         self.received = 0
+        self.rejection = ""
+        """Why the last pose was rejected; empty if it was accepted."""
         self.bad = 0
         self.arrived = asyncio.Event()
         self._report = report
@@ -89,7 +92,7 @@ class PoseStream:
         try:
             return await reader.readline()
         except ValueError:
-            self._reject(f"pose line has more than {MAX_LINE_BYTES} bytes")
+            self.reject(f"pose line has more than {MAX_LINE_BYTES} bytes")
             return b"\n"
 
     def take(self, line: bytes) -> bool:
@@ -99,16 +102,27 @@ class PoseStream:
             return False
         try:
             read = parse_pose_line(line, self.settings.frame == "optical")
-            self.poses.add(self._time(read.time, now), read.orientation)
+            return self.add(self._time(read.time, now), read.orientation)
         except VisualMeshError as error:
-            self._reject(str(error))
+            self.reject(str(error))
+            return False
+
+    def add(self, time: float, orientation: Orientation) -> bool:
+        """Add a pose of a monotonic time [s], and return True; report and count it if it jumps or is not newer."""
+        try:
+            self.poses.add(time, orientation)
+        except VisualMeshError as error:
+            self.reject(str(error))
             return False
         self.received += 1
+        self.rejection = ""
         self.arrived.set()
         return True
 
-    def _reject(self, reason: str) -> None:
+    def reject(self, reason: str) -> None:
+        """Count a pose that can't be used, and report why."""
         self.bad += 1
+        self.rejection = reason
         self._report(reason)
 
     def _time(self, t: float | None, now: float) -> float:

@@ -40,6 +40,7 @@ def test_a_program_prints_its_version(program):
         ("vm-evaluate model.pt", "--outptu", "--output"),
         ("vm-mesh show", "--veiw", "--view"),
         ("vm-calibrate lens clip.avi", "--ouput", "--output"),
+        ("vm-ros", "--ros-imge", "--ros-image"),
     ],
 )
 def test_a_mistyped_option_is_one_line_with_the_nearest(command, mistyped, meant):

@@ -42,8 +42,8 @@ def test_lines_also_go_to_a_file_and_by_udp(tmp_path):
         port = listening.getsockname()[1]
         where = ("--output-udp", f"127.0.0.1:{port}", "--output-file", tmp_path / "lines.jsonl")
         with running(tmp_path, "--camera", "synthetic", *where, "--output-format", "ros") as found:
-            message = {"detections": {"detections": []}}
-            while not message["detections"]["detections"]:
+            message = {}
+            while not message.get("detections", {}).get("detections"):
                 message = read_message(listening.recv(65536))
             found.process.send_signal(signal.SIGTERM)
             assert found.process.wait(30) == 0

@@ -47,7 +47,7 @@ def test_the_schema_is_one():
 
 
 def test_each_message_is_of_one_kind(messages):
-    assert [kind_of(each) for each in messages] == ["frame", "state", "ros", "ros"]
+    assert [kind_of(each) for each in messages] == ["frame", "state", "ros", "ros_state"]
     for each in messages:
         validator("").validate(each)
     assert messages[2]["detections"]["detections"][0]["id"] == str(messages[0]["detections"][0]["track"]["id"])

@@ -1,0 +1,85 @@
+"""vm-ros: run the detector as a node of ROS 2."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import signal
+import sys
+from collections.abc import Sequence
+
+import cv2
+
+from vm_embedded.cameras.open_camera import ROS
+from vm_embedded.cameras.ros.settings import NODE
+from vm_embedded.cli.options import ANGLES, add_live, add_model, add_pose, add_settings, add_track, read_options
+from vm_embedded.cli.program import Parser, program
+from vm_embedded.errors import VisualMeshError
+from vm_embedded.live.configuration import Configuration, with_overrides
+from vm_embedded.live.daemon import EXIT_CONFIGURATION, Daemon
+from vm_embedded.live.log import EventLog
+
+from .connect import connect
+from .node import Node
+
+ROS_ARGUMENTS = "--ros-args"
+"""Everything behind this option is for ROS."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line of vm-ros; its settings are those of a live camera of vm-detect."""
+    parser = Parser(
+        prog="vm-ros",
+        description="Run the detector as a node of ROS 2: find objects in the images of a topic, and publish them as "
+        "vision_msgs, and the state as diagnostics. It uses rclpy where ROS is sourced, and the package cyclonedds "
+        "elsewhere.",
+        epilog="Exit status: as that of vm-detect for a live camera. Where ROS is sourced, the options behind "
+        f"{ROS_ARGUMENTS} are those of ROS, such as -r for remapping. " + ANGLES,
+    )
+    parser.add_argument(
+        "--camera",
+        metavar="SOURCE",
+        help=f"{ROS}: the images of the topic --ros-image; or another live camera, as for vm-detect; default {ROS}",
+    )
+    add_model(parser)
+    add_pose(parser, "instead of camera_info and tf")
+    add_settings(parser)
+    add_track(parser)
+    add_live(parser)
+    return parser
+
+
+@program
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run vm-ros and return its exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    cut = given.index(ROS_ARGUMENTS) if ROS_ARGUMENTS in given else len(given)
+    options = parser().parse_args(given[:cut])
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # vm-ros reports problems with cameras itself
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    cv2.setNumThreads(1)
+    for number in (signal.SIGHUP, signal.SIGUSR1):
+        signal.signal(number, signal.SIG_IGN)  # the daemon handles them once it runs
+    log = EventLog("vm-ros")
+    try:
+        node = Node(configuration(options), connect(NODE, given[cut + 1 :]))
+        return asyncio.run(Daemon(lambda: configuration(options), log, node).run())
+    except VisualMeshError as error:
+        log("can't start", "error", reason=str(error))
+        return EXIT_CONFIGURATION
+
+
+def configuration(options: argparse.Namespace) -> Configuration:
+    """The configuration of vm-detect, with images of ROS, and poses of tf unless a pose is given. Raises InputError."""
+    given = read_options(options)
+    ros: dict[str, dict[str, str]] = {}
+    if not given.camera.source:
+        ros["camera"] = {"source": ROS}
+    if (given.camera.source or ROS) == ROS and given.pose.source == "fixed" and given.fixed_orientation() is None:
+        ros["pose"] = {"source": "tf"}
+    return with_overrides(given, ros)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

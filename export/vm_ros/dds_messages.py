@@ -1,0 +1,68 @@
+"""The messages of ROS 2 as classes of the package cyclonedds, made from their fields."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+from cyclonedds.idl import make_idl_struct
+from cyclonedds.idl import types as idl
+
+from vm_embedded.cameras.ros.message_fields import FIELDS, fields_of
+
+_PRIMITIVES: dict[str, Any] = {
+    "bool": bool,
+    "byte": idl.uint8,
+    "uint8": idl.uint8,
+    "int32": idl.int32,
+    "uint32": idl.uint32,
+    "float64": idl.float64,
+    "string": str,
+}
+
+_LEVELS = {"OK": 0, "WARN": 1, "ERROR": 2}
+"""Constants of DiagnosticStatus."""
+
+
+def message_classes() -> SimpleNamespace:
+    """The classes of all messages by their short names, and functions that make their arrays."""
+    classes: dict[str, Any] = {}
+    for full in FIELDS:
+        package, _, name = full.split("/")
+        classes[name] = _message_class(full, f"{package}::msg::dds_::{name}_", classes)
+    for name, level in _LEVELS.items():
+        setattr(classes["DiagnosticStatus"], name, level)
+    return SimpleNamespace(**classes, octets=bytes, doubles=_doubles)
+
+
+def _doubles(numbers: Sequence[float]) -> list[float]:
+    return [float(each) for each in numbers]
+
+
+def _message_class(full: str, dds_name: str, classes: dict[str, Any]) -> Any:
+    """The class of a message. classes: those that it may contain."""
+    name = full.rpartition("/")[2]
+    types = {field: _type(kind, classes) for kind, field in fields_of(full)}
+    made: Any = make_idl_struct(name, dds_name, types)
+    octets = [field for kind, field in fields_of(full) if kind == "uint8[]"]
+    if octets:
+        # cyclonedds reads octets as a list of numbers, which takes a hundred times as long as bytes. But it can't
+        # describe bytes to other participants, so that only the coding is that of a class with bytes.
+        fast = make_idl_struct(name, dds_name, {**types, **dict.fromkeys(octets, bytes)})
+        made.serialize = lambda self, *given, **more: fast(**vars(self)).serialize(*given, **more)
+        made.deserialize = fast.deserialize
+    return made
+
+
+def _type(kind: str, classes: dict[str, Any]) -> Any:
+    """The type of a field: primitive, message, sequence or array."""
+    found = re.fullmatch(r"(\w+)(\[(\d*)\])?", kind)
+    assert found is not None, kind
+    single = _PRIMITIVES.get(found[1]) or classes[found[1]]
+    if found[2] is None:
+        return single
+    array: Any = idl.array
+    sequence: Any = idl.sequence
+    return array[single, int(found[3])] if found[3] else sequence[single]

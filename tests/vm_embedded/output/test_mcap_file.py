@@ -1,0 +1,119 @@
+"""vm-detect --save-mcap: what it writes is read back by rosbags, and by vm-detect itself."""
+
+import signal
+import subprocess
+
+import cv2
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+
+from tests.vm_embedded.cameras.ros.rolling_ball import Scene
+from tests.vm_embedded.cli.commands import COMMAND, lines, one_complaint, run
+
+
+def messages_of(path):
+    """All messages of a file by topic."""
+    found = {}
+    with AnyReader([path]) as reader:
+        for connection, _, data in reader.messages():
+            found.setdefault(connection.topic, []).append(reader.deserialize(data, connection.msgtype))
+    return found
+
+
+@pytest.fixture
+def scene_folder(tmp_path):
+    Scene(count=5).write_frames(tmp_path / "frames")
+    return tmp_path / "frames"
+
+
+@pytest.mark.slow
+def test_pictures_detections_and_states_are_in_the_file(tmp_path, scene_folder):
+    path = tmp_path / "out.mcap"
+    (scene_folder / "image002.png").write_bytes(b"no image")
+    done = run(scene_folder, "--save-mcap", path)
+    one_complaint(done, "image002.png")
+    printed = lines(done)
+    found = messages_of(path)
+    assert sorted(path.parent.iterdir()) == [scene_folder, path]
+    assert len(printed) == 4
+    arrays = found["/vm_ros/detections_3d"]
+    for line, array, boxes, drawn in zip(
+        printed, arrays, found["/vm_ros/detections_2d"], found["/vm_ros/annotations"], strict=True
+    ):
+        assert array.header.frame_id == "base_footprint"
+        expected = line["detections"]
+        assert len(array.detections) == len(boxes.detections) == len(drawn.points) == len(drawn.texts) == len(expected)
+        for each, place, box in zip(expected, array.detections, boxes.detections, strict=True):
+            position = place.results[0].pose.pose.position
+            assert np.abs(np.array([position.x, position.y, position.z]) - each["position"]).max() <= 0.00051
+            assert abs(box.bbox.center.position.x - each["center"][0]) < 1.0
+    pictures = [cv2.imdecode(each.data, cv2.IMREAD_COLOR) for each in found["/camera/image/compressed"]]
+    assert [each.shape for each in pictures] == [(512, 640, 3)] * 4
+    states = [{each.key: each.value for each in message.status[0].values} for message in found["/diagnostics"]]
+    assert [each["state"] for each in states] == ["ok", "ok", "degraded", "ok", "ok"]
+    assert "image002.png" in states[2]["reason"]
+    assert [message.status[0].level for message in found["/diagnostics"]] == [0, 0, 1, 0, 0]
+
+
+@pytest.mark.slow
+def test_the_file_is_a_bag_with_lens_and_poses(tmp_path, scene_folder):
+    path = tmp_path / "out.mcap"
+    first = lines(run(scene_folder, "--save-mcap", path))
+    again = lines(run(path))
+    assert [len(each["detections"]) for each in again] == [len(each["detections"]) for each in first]
+    for one, other in zip(first, again, strict=True):
+        for each, found in zip(one["detections"], other["detections"], strict=True):
+            assert np.abs(np.subtract(each["position"], found["position"])).max() < 0.02  # the pictures are JPEG
+
+
+@pytest.mark.slow
+def test_the_stamps_of_a_bag_stay(tmp_path):
+    bag = Scene(count=3).write_bag(tmp_path / "bag")
+    run(bag, "--save-mcap", tmp_path / "out.mcap")
+    with AnyReader([bag]) as one, AnyReader([tmp_path / "out.mcap"]) as other:
+        stamps = [
+            [
+                (stamp.sec, round(stamp.nanosec, -3))
+                for connection, _, data in reader.messages()
+                if connection.topic in ("/camera/image_raw", "/vm_ros/detections_2d")
+                for stamp in [reader.deserialize(data, connection.msgtype).header.stamp]
+            ]
+            for reader in (one, other)
+        ]
+    assert stamps[0] == stamps[1]
+    assert len(stamps[0]) == 3
+
+
+@pytest.mark.slow
+def test_frames_before_an_interrupt_are_in_the_file(tmp_path):
+    Scene(count=40).write_frames(tmp_path / "frames")
+    path = tmp_path / "out.mcap"
+    process = subprocess.Popen(
+        [COMMAND, tmp_path / "frames", "--save-mcap", path], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    try:
+        for _ in range(3):
+            assert process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        rest, errors = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 130, errors
+    count = 3 + len(rest.splitlines())
+    assert count < 40
+    assert count <= len(messages_of(path)["/vm_ros/detections_3d"]) <= count + 1
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [("out.bag", "must end in .mcap, not 'out.bag'"), ("missing/out.mcap", "there is no folder")],
+)
+def test_a_name_that_can_not_be_written_is_one_line(tmp_path, scene_folder, name, reason):
+    one_complaint(run(scene_folder, "--save-mcap", tmp_path / name, code=1), reason)
+
+
+def test_what_a_killed_run_has_left_is_not_overwritten(tmp_path, scene_folder):
+    (tmp_path / "out.mcap.part").mkdir()
+    done = run(scene_folder, "--save-mcap", tmp_path / "out.mcap", code=1)
+    one_complaint(done, "out.mcap.part is left from a run that was killed; remove it")

@@ -1,0 +1,39 @@
+"""What docs/ros.md says, done as a reader does it."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from .loopback import running
+
+PAGE = (Path(__file__).parents[2] / "docs" / "ros.md").read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("peer")  # a domain of its own
+def test_the_program_of_the_page_prints_where_the_ball_is(tmp_path, monkeypatch):
+    (uri,) = re.findall(r'^export CYCLONEDDS_URI="(.*)"$', PAGE, re.MULTILINE)
+    monkeypatch.setenv("CYCLONEDDS_URI", uri)
+    (program,) = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    with running(tmp_path, "--camera", "synthetic") as node:
+        node.wait(lambda: node.frames)
+        done = subprocess.run(
+            [sys.executable, "-c", program], capture_output=True, text=True, env=os.environ, timeout=120, check=False
+        )
+        node.stop()
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert len(lines) > 3
+    assert all(re.fullmatch(r"ball -?[0-9.]+ -?[0-9.]+", each) for each in lines), lines
+
+
+def test_the_page_names_all_topics_and_messages():
+    node = (Path(__file__).parents[2] / "export" / "vm_ros" / "node.py").read_text()
+    published = re.findall(r'middleware\.publisher\(f?"(?:\{prefix\})?(/[\w/]+)", "(\w+)"\)', node)
+    assert len(published) == 4
+    for topic, message in published:
+        assert re.search(rf"^\| `(/vm_ros)?{topic}` \| `\w+/{message}` \|", PAGE, re.MULTILINE), topic

@@ -1,0 +1,211 @@
+"""Read the frames of a bag of ROS 2 (.mcap or .db3), each with its lens and pose.
+
+The lens comes from camera_info. The pose comes from tf, interpolated at the stamp of the image, or from a topic of
+geometry_msgs/PoseStamped.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from ...arrays import Image
+from ...errors import InputError, VisualMeshError, one_line, unknown
+from ...geometry.lens import Lens
+from ...geometry.orientation import Orientation
+from ...poses.buffer import PoseBuffer, StalePoseError
+from ...poses.settings import PoseSettings
+from ..image_files import Frame, Source
+from ..image_header import MAX_MEGAPIXELS
+from .bag_types import damage_errors, import_rosbags, typestore
+from .camera_poses import newest_pose, orientation_of
+from .images import image_of
+from .lens import lens_of
+from .message_fields import MESSAGES
+from .settings import RosSettings, camera_info_beside
+from .stamps import seconds_of
+from .transforms import Transform, TransformTree
+
+SUFFIXES = (".mcap", ".db3")
+_IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+
+_AHEAD = 1.0
+"""How long after an image its pose may be in the bag [s]."""
+
+
+def is_bag(name: str) -> bool:
+    """Whether a source is a bag: a file, or the folder that `ros2 bag record` makes."""
+    path = Path(name)
+    return path.suffix.lower() in SUFFIXES or (path / "metadata.yaml").is_file()
+
+
+@dataclass(frozen=True, kw_only=True)
+class BagReading:
+    """How to read a bag.
+
+    ros: its topics and frames. pose: from where poses come, and how old they may be. lens, orientation: used for all
+    images instead of those in the bag. raw: images keep their own channels. max_megapixels: largest image [Mpx].
+    """
+
+    ros: RosSettings = field(default_factory=RosSettings)
+    pose: PoseSettings = field(default_factory=PoseSettings)
+    lens: Lens | None = None
+    orientation: Orientation | None = None
+    raw: bool = False
+    max_megapixels: float = MAX_MEGAPIXELS
+
+
+def open_bag(name: str, reading: BagReading) -> Source:
+    """The frames of a bag. Raises InputError if it can't be read, or if it is not clear which topic to take."""
+    rosbags = import_rosbags()
+    if not Path(name).exists():
+        raise InputError(f"no such bag: {name}")
+    try:
+        reader = rosbags.highlevel.AnyReader([Path(name)], default_typestore=typestore())
+        reader.open()
+    except damage_errors() as error:
+        raise InputError(f"can't read bag {name}: {one_line(error)}") from error
+    try:
+        images = _image_topic(name, reader, reading.ros.image)
+        info = reading.ros.camera_info or camera_info_beside(images)
+        _check_topics(name, reader, reading, info)
+    except InputError:
+        reader.close()
+        raise
+    count = reader.topics[images].msgcount
+    rate = (count - 1) / (1e-9 * reader.duration) if count > 1 and reader.duration > 0 else None
+    settings = replace(reading, ros=replace(reading.ros, image=images, camera_info=info))
+    return Source(_BagFrames(Path(name).name, reader, settings).frames(), count, rate)
+
+
+def _image_topic(name: str, reader: Any, chosen: str) -> str:
+    """The topic of the images. Raises InputError for one that the bag lacks, or if there are several."""
+    topics = sorted(topic for topic, info in reader.topics.items() if info.msgtype in _IMAGES and info.msgcount)
+    if not topics:
+        raise InputError(f"bag {name} has no images (its topics: {', '.join(sorted(reader.topics)) or 'none'})")
+    if chosen and chosen not in topics:
+        raise InputError(f"bag {name}: {unknown('topic of images', chosen, topics)}")
+    if not chosen and len(topics) > 1:
+        raise InputError(f"bag {name} has several topics of images; choose one: --ros-image {' or '.join(topics)}")
+    return chosen or topics[0]
+
+
+def _check_topics(name: str, reader: Any, reading: BagReading, info: str) -> None:
+    """Raise InputError if a chosen topic is not in the bag, or if a topic has another type of messages."""
+    pose = reading.pose.source.removeprefix("topic:") if reading.pose.source.startswith("topic:") else ""
+    for topic in filter(None, (reading.ros.camera_info, pose)):
+        if topic not in reader.topics:
+            raise InputError(f"bag {name}: {unknown('topic', topic, sorted(reader.topics))}")
+    needed = [(info, "CameraInfo"), ("/tf", "TFMessage"), ("/tf_static", "TFMessage"), (pose, "PoseStamped")]
+    for topic, message in needed:
+        found = reader.topics[topic].msgtype if topic in reader.topics else MESSAGES[message]
+        if found != MESSAGES[message]:
+            raise InputError(f"bag {name}: topic {topic} must have messages of type {MESSAGES[message]}, not {found}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Waiting:
+    """An image that waits for its pose. stamp [s]: of its header. logged [s]: when it was recorded."""
+
+    message: Any
+    stamp: float
+    logged: float
+
+
+class _BagFrames:
+    """Reads a bag once, and keeps images back until their pose is known."""
+
+    def __init__(self, name: str, reader: Any, reading: BagReading) -> None:
+        self._name, self._reader, self._reading = name, reader, reading
+        source = reading.pose.source
+        self._pose_topics = (source.removeprefix("topic:"),) if source.startswith("topic:") else ("/tf", "/tf_static")
+        self._tree, self._poses = TransformTree(), PoseBuffer(reading.pose)
+        self._lens = reading.lens
+        self._lens_trouble = f"no message on {reading.ros.camera_info}; give --lens"
+        self._pose_trouble = ""
+        self._count = 0
+
+    def frames(self) -> Iterator[Frame]:
+        """The frames in the order of the bag."""
+        ros, waiting = self._reading.ros, deque[_Waiting]()
+        topics = {ros.image, ros.camera_info, *self._pose_topics}
+        connections = [each for each in self._reader.connections if each.topic in topics]
+        try:
+            for connection, logged, data in self._reader.messages(connections):
+                now, message = 1e-9 * logged, self._reader.deserialize(data, connection.msgtype)
+                if connection.topic == ros.image:
+                    waiting.append(_Waiting(message, seconds_of(message.header.stamp), now))
+                elif connection.topic == ros.camera_info:
+                    self._take_lens(message)
+                else:
+                    self._take_pose(message, connection.topic)
+                while waiting and (now > waiting[0].logged + _AHEAD or self._has_pose(waiting[0])):
+                    yield self._frame(waiting.popleft())
+            while waiting:
+                self._has_pose(waiting[0])
+                yield self._frame(waiting.popleft())
+        except damage_errors() as error:
+            raise InputError(f"bag {self._name} is damaged: {one_line(error)}") from error
+        finally:
+            self._reader.close()
+
+    def _take_lens(self, message: Any) -> None:
+        if self._reading.lens is not None:
+            return
+        try:
+            self._lens, self._lens_trouble = lens_of(message), ""
+        except VisualMeshError as error:
+            self._lens, self._lens_trouble = None, str(error)
+
+    def _take_pose(self, message: Any, topic: str) -> None:
+        try:
+            if topic == "/tf_static":
+                for each in message.transforms:
+                    self._tree.add(each, None)
+            elif topic == "/tf":
+                for each in message.transforms:
+                    self._tree.add(each, seconds_of(each.header.stamp))
+            else:
+                pose = orientation_of(Transform.from_message(message.pose), self._reading.pose.frame == "optical")
+                self._poses.add(seconds_of(message.header.stamp), pose)
+        except VisualMeshError as error:
+            self._pose_trouble = str(error)
+
+    def _has_pose(self, image: _Waiting) -> bool:
+        """Whether there is a pose that is not older than an image; poses of tf are added here."""
+        if self._reading.orientation is not None:
+            return True
+        if len(self._pose_topics) > 1:
+            camera = self._reading.ros.camera_frame or image.message.header.frame_id
+            try:
+                pose = newest_pose(self._tree, self._reading.ros.plane_frame, camera, self._poses.newest, image.stamp)
+                if pose is not None:
+                    self._poses.add(*pose)
+                self._pose_trouble = ""
+            except VisualMeshError as error:
+                self._pose_trouble = str(error)
+        return self._poses.newest >= image.stamp
+
+    def _frame(self, image: _Waiting) -> Frame:
+        index, self._count = self._count, self._count + 1
+        source = f"{self._name} at {image.stamp:.3f} s"
+        orientation, trouble = self._reading.orientation, "" if self._lens is not None else self._lens_trouble
+        if orientation is None:
+            try:
+                orientation = self._poses.at(image.stamp)
+            except StalePoseError as error:
+                trouble = trouble or f"{self._pose_trouble or error}; give --height, or --pose-source topic:/NAME"
+        reading = self._reading
+
+        def read() -> Image:
+            try:
+                if trouble:
+                    raise InputError(trouble)
+                return image_of(image.message, reading.raw, reading.max_megapixels)
+            except InputError as error:
+                raise InputError(f"{source}: {error}") from error
+
+        return Frame(index, source, read, stamp=image.stamp, lens=self._lens, orientation=orientation)

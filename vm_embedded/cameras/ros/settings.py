@@ -1,0 +1,44 @@
+"""Section [ros]: which topics and frames of ROS 2 the detector uses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...config.entries import check_entries, one_of, text_line
+
+CLOCKS = ("wall", "arrival")
+
+NODE = "vm_ros"
+"""Name of the node, and first part of the topics that it publishes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RosSettings:
+    """Topics, frames and clock, for vm-ros and for bags."""
+
+    image: str = text_line("", "topic of the images; empty: /camera/image_raw, or the only topic of images in a bag")
+    camera_info: str = text_line("", "topic of the lens; empty: camera_info beside the topic of the images")
+    plane_frame: str = text_line(
+        "base_footprint", "tf frame of the observation plane: z points up, and z = 0 is the plane"
+    )
+    camera_frame: str = text_line("", "tf frame of the camera, with optical axes; empty: the frame_id of the images")
+    clock: str = one_of(
+        CLOCKS,
+        "wall",
+        "clock of the stamps; wall: the system's clock; arrival: another one, such as that of a bag that is played",
+    )
+    namespace: str = text_line(f"/{NODE}", "first part of the topics that vm-ros publishes")
+
+    def __post_init__(self) -> None:
+        check_entries(self)
+
+    @property
+    def camera_info_topic(self) -> str:
+        """The topic of the lens, as image_transport names it: beside the topic of the images."""
+        return self.camera_info or camera_info_beside(self.image)
+
+
+def camera_info_beside(image_topic: str) -> str:
+    """The usual topic of the lens for a topic of images, raw or compressed."""
+    parts = image_topic.removesuffix("/compressed").split("/")
+    return "/".join([*parts[:-1], "camera_info"])

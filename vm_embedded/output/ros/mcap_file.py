@@ -1,0 +1,119 @@
+"""Write images, lenses, poses, detections and states into an MCAP file, for Foxglove and as a bag of ROS 2."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Image
+from ...cameras.image_files import Frame
+from ...cameras.ros.bag_types import bag_types, import_rosbags, typestore
+from ...cameras.ros.images import jpeg_message
+from ...cameras.ros.lens import camera_info_message
+from ...cameras.ros.message_fields import MESSAGES
+from ...cameras.ros.settings import NODE
+from ...cameras.ros.stamps import stamp_of
+from ...cameras.ros.transforms import transform_message
+from ...detection.detections import Detections
+from ...errors import InputError
+from ...files import check_writable
+from ...geometry.lens import Lens
+from ...geometry.orientation import Orientation
+from .annotations import image_annotations
+from .detection_messages import detection_2d_array, detection_3d_array, diagnostic_array, header_of
+
+_CAMERA_FRAME = "camera_optical"
+_RATE = 30.0
+"""Frames per second of frames without a time [1/s]."""
+
+_ONE_DAY = 86400.0
+
+
+class McapFile:
+    """An MCAP file that frames are written into; a context manager.
+
+    The file appears when it is closed; until then, its content is in the folder PATH.part. plane_frame: name of the
+    frame of the observation plane. Raises InputError if rosbags is missing, or the file can't be written.
+    """
+
+    def __init__(self, path: Path, plane_frame: str) -> None:
+        if path.suffix.lower() != ".mcap":
+            raise InputError(f"an MCAP file must end in .mcap, not {path.name!r}")
+        check_writable(path)
+        self._path, self._plane_frame = path, plane_frame
+        self._part = path.with_name(path.name + ".part")
+        rosbags = import_rosbags()
+        if self._part.exists():
+            raise InputError(f"{self._part} is left from a run that was killed; remove it, or choose another name")
+        self._store, self._types = typestore(), bag_types()
+        mcap = rosbags.rosbag2.StoragePlugin.MCAP
+        self._writer = rosbags.rosbag2.Writer(self._part, version=9, storage_plugin=mcap)
+        try:
+            self._writer.open()
+        except OSError as error:
+            raise InputError(f"can't write {path}: {error.strerror or error}") from error
+        self._connections: dict[str, Any] = {}
+        self._start = time.time()
+
+    def write(self, frame: Frame, image: Image, lens: Lens, orientation: Orientation, detections: Detections) -> None:
+        """Write a frame with its detections, and the state ok. image: as BGR."""
+        types, now = self._types, self._time(frame)
+        stamp = stamp_of(types, now)
+        in_image, on_plane = header_of(types, stamp, _CAMERA_FRAME), header_of(types, stamp, self._plane_frame)
+        height, width = image.shape[:2]
+        pose = transform_message(types, on_plane, _CAMERA_FRAME, orientation)
+        self._add(now, "/tf", "TFMessage", types.TFMessage(transforms=[pose]))
+        info = camera_info_message(types, in_image, lens, (width, height))
+        if info is not None:
+            self._add(now, "/camera/camera_info", "CameraInfo", info)
+        self._add(now, "/camera/image/compressed", "CompressedImage", jpeg_message(types, in_image, image))
+        for name, kind, message in (
+            ("detections_2d", "Detection2DArray", detection_2d_array(types, in_image, detections, orientation)),
+            ("detections_3d", "Detection3DArray", detection_3d_array(types, on_plane, detections, np.zeros(2))),
+            ("annotations", "ImageAnnotations", image_annotations(types, stamp, detections)),
+        ):
+            self._add(now, f"/{NODE}/{name}", kind, message)
+        self.write_state(frame, "ok", "")
+
+    def write_state(self, frame: Frame, state: str, reason: str) -> None:
+        """Write the state at a frame: ok, or degraded with the reason why it was not processed."""
+        now = self._time(frame)
+        message = diagnostic_array(
+            self._types,
+            stamp_of(self._types, now),
+            f"{NODE}: detector",
+            state,
+            reason,
+            {"frame": frame.index},
+            frame.source,
+        )
+        self._add(now, "/diagnostics", "DiagnosticArray", message)
+
+    def _time(self, frame: Frame) -> float:
+        """Seconds since 1970: the stamp of a bag; else the start of this run and the time in the video."""
+        if frame.stamp is not None and frame.stamp > _ONE_DAY:
+            return frame.stamp
+        return self._start + (frame.stamp if frame.stamp is not None else frame.index / _RATE)
+
+    def _add(self, now: float, topic: str, kind: str, message: Any) -> None:
+        if topic not in self._connections:
+            self._connections[topic] = self._writer.add_connection(topic, MESSAGES[kind], typestore=self._store)
+        data = self._store.serialize_cdr(message, MESSAGES[kind])
+        self._writer.write(self._connections[topic], round(1e9 * now), data)
+
+    def __enter__(self) -> McapFile:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Complete the file, also after an error: it has the frames until then."""
+        self._writer.close()
+        written = next(self._part.glob("*.mcap"))
+        written.replace(self._path)
+        shutil.rmtree(self._part)
