@@ -17,7 +17,7 @@ from ..cameras.open_camera import is_live
 from ..config.toml_writer import to_commented_toml
 from ..errors import InputError, VisualMeshError
 from ..live.configuration import HEADER, Configuration
-from ..live.control import REFUSED, ask, default_socket_path
+from ..live.control import REFUSED, ask, control_path
 from ..live.daemon import EXIT_CONFIGURATION, Daemon
 from ..live.load_detector import load_checked_detector
 from ..live.log import EventLog
@@ -154,7 +154,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _ask(given: Configuration, command: str) -> int:
     """Send a command to the running detector and print its reply. Fails unless the detector is in state ok."""
-    reply = ask(Path(given.status.socket) if given.status.socket else default_socket_path(), command)
+    reply = ask(control_path(given.status.socket), command)
     if reply.startswith(REFUSED):
         raise InputError(reply.removeprefix(REFUSED))
     try:

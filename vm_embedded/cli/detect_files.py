@@ -143,7 +143,7 @@ def _detect(
     if options.save_points is not None:
         save_points(options.save_points, frame, detections)
     if options.save_overlay is not None:
-        save_overlay(options.save_overlay, frame, image, detections)
+        save_overlay(options.save_overlay, frame, detections)
     return json.dumps(file_message(frame, detections, emit_points, options.explain), allow_nan=False)
 
 

@@ -17,7 +17,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from pathlib import Path
 from typing import Any, Protocol
 
 from ..cameras.camera import without_password
@@ -30,7 +29,7 @@ from ..output.recorder import Moment, Recorder
 from ..poses.stream import PoseStream
 from .answering import Answer, Answerer
 from .configuration import Configuration, recording_toml
-from .control import REFUSED, ControlServer, default_socket_path
+from .control import REFUSED, ControlServer, control_path
 from .counters import Counters
 from .health import Health
 from .http_server import HttpServer, Page, Response
@@ -103,7 +102,7 @@ class Daemon:
         self.page = StatusPage(status.picture_fps, self._status)
         commands = {"status": lambda: json.dumps(self._status(), allow_nan=False)}
         commands |= {"record": self.record, "metrics": self.metrics}
-        control = ControlServer(Path(status.socket) if status.socket else default_socket_path(), commands)
+        control = ControlServer(control_path(status.socket), commands)
         self._parts: list[Part] = [self.outputs, self.poses, control, *self._http_servers()]
 
     @property

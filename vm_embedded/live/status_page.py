@@ -13,7 +13,6 @@ import cv2
 from ..arrays import Image
 from ..detection.detections import Detections
 from ..output.messages import Message
-from ..output.overlay import draw_overlay
 from .http_server import Response, Write
 from .overhead_map import overhead_map
 
@@ -90,7 +89,7 @@ class StatusPage:
 
 
 def _jpeg(image: Image, detections: Detections) -> bytes:
-    return cv2.imencode(".jpg", draw_overlay(image, detections), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+    return cv2.imencode(".jpg", detections.draw(), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
 
 
 def _map_json(detections: Detections) -> bytes:
