@@ -82,10 +82,13 @@ def test_of_several_sources_none_may_be_live():
     one_complaint(run("synthetic", IMAGES[0], code=1), "only one live camera")
 
 
-def test_the_other_pictures_of_a_set_of_vm_synth_are_no_frames(folder):
+@pytest.mark.parametrize("source", [".", "'*'", "*"])
+def test_the_other_files_of_a_set_of_vm_synth_are_no_frames(source, folder):
     for name in ("mask0000000.png", "coverage0000000.png"):
         cv2.imwrite(str(folder / name), np.zeros((512, 640), np.uint8))
-    done = detect(folder)
+    (folder / "scene0000000.json").write_text("{}")
+    shell = f"{COMMAND} --model {MODEL} {source}"
+    done = subprocess.run(shell, shell=True, cwd=folder, capture_output=True, text=True, check=False)
     assert [line["source"] for line in lines(done)] == [each.name for each in IMAGES[:2]]
     assert done.stderr == ""
 
