@@ -23,8 +23,9 @@ from ..geometry.lens_files import LensFile, lens_from_table, read_lens_file
 from ..geometry.orientation import Orientation
 from ..geometry.radial_lenses import RadialLens
 from ..network.bundled import DEFAULT, SHIPPED, model_path
+from ..network.model_file import ModelFile
 from ..output.channels import OutputSettings
-from ..output.recorder import RecorderSettings
+from ..output.recorder import CONFIGURATION, RecorderSettings
 from ..poses.settings import PoseSettings
 from ..sockets import checked_address
 from .deploy_settings import DeploySettings
@@ -33,6 +34,8 @@ HEADER = """Configuration of vm-detect. `vm-detect --print-config` prints this f
 Keep only the entries that you change: missing entries have their defaults.
 Each comment gives the meaning of the next entry, its unit in brackets, and its limits."""
 """First comment of a vm.toml that is printed."""
+
+_RECORDED_MODEL = "model.onnx"
 
 
 @dataclass(frozen=True)
@@ -184,11 +187,13 @@ def with_overrides(configuration: Configuration, sections: Mapping[str, Mapping[
     return replace(configuration, **changed)
 
 
-def recording_toml(configuration: Configuration) -> str:
-    """The vm.toml of a recording: the network, its settings and those of tracks. Raises InputError for an unknown name.
+def recording_files(configuration: Configuration, model: ModelFile) -> dict[str, bytes]:
+    """The files of a recording besides its frames, by name: vm.toml, and the network unless the package has it.
 
-    A network of the package has its name, so that the recording can be used on another machine; others a full path.
+    So a recording can be used on another machine. model: the network that runs.
     """
-    path = model_path(configuration.model).resolve()
-    model = next((name for name in SHIPPED if model_path(name).resolve() == path), str(path))
-    return to_commented_toml(Configuration(model=model, detector=configuration.detector, track=configuration.track))
+    shipped = next((name for name in SHIPPED if model_path(name).resolve() == model.path.resolve()), None)
+    recorded = Configuration(
+        model=shipped or _RECORDED_MODEL, detector=configuration.detector, track=configuration.track
+    )
+    return {CONFIGURATION: to_commented_toml(recorded).encode()} | ({} if shipped else {_RECORDED_MODEL: model.content})

@@ -28,7 +28,7 @@ from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
 from ..poses.stream import PoseStream
 from .answering import Answer, Answerer
-from .configuration import Configuration, recording_toml
+from .configuration import Configuration, recording_files
 from .control import REFUSED, ControlServer, control_path
 from .counters import Counters
 from .health import Health
@@ -97,7 +97,7 @@ class Daemon:
         self.grabber = Grabber(opener, camera, self._wake)
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
         self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health)
-        self._recording_toml = recording_toml(configuration)
+        self._recording_files = recording_files(configuration, detector.session.model)
         self.outputs = Channels(configuration.output)
         self.page = StatusPage(status.picture_fps, self._status)
         commands = {"status": lambda: json.dumps(self._status(), allow_nan=False)}
@@ -205,7 +205,7 @@ class Daemon:
         self.last = live_message(self.counters.outcomes.frames, self.state, shot, detections, answer.time)
         self._send(self.last)
         self.page.show(shot.image, detections)
-        self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._recording_toml)
+        self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._recording_files)
 
     def _report_bad_pose(self, reason: str) -> None:
         self.health.add_trouble(time.monotonic(), reason)
@@ -258,7 +258,7 @@ class Daemon:
     def record(self) -> str:
         """Start to write a recording of the last seconds; return where it goes, or REFUSED and the reason."""
         try:
-            result = self.recorder.record(self._recording_toml)
+            result = self.recorder.record(self._recording_files)
         except InputError as error:
             self._log("not recorded", "warning", reason=str(error))
             return f"{REFUSED}{error}"
@@ -279,7 +279,7 @@ class Daemon:
             return
         self.recorder.clear()
         self.answerer.reload(new.configuration, new.detector)
-        self._recording_toml = new.recording_toml
+        self._recording_files = new.recording_files
         self._log("reloaded", model=new.configuration.model, needs_restart=new.needs_restart)
 
     def _stop(self) -> None:
