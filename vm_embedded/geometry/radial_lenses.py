@@ -9,7 +9,7 @@ import math
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from ..arrays import Floats, Number
 from ..errors import InputError, unknown
 from .distortion import distort, monotone_radius, undistort
 from .lens import Lens, Size
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # typing has it from Python 3.11 on
 
 _STRONGEST = 1e6
 """Largest k0 [px^-2] and k1 [px^-4]; real lenses stay far below 1."""

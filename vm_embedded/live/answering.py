@@ -122,6 +122,6 @@ class Answerer:
             arrived.clear()
             try:
                 await asyncio.wait_for(arrived.wait(), left)
-            except TimeoutError:
+            except asyncio.TimeoutError:
                 break
         return poses.at(shot.captured)

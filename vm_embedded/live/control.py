@@ -52,7 +52,7 @@ class ControlServer:
         if not self._connections.admit(writer):
             return
         # asyncio logs a traceback for a canceled handler, so suppress that too.
-        with suppress(OSError, ValueError, TimeoutError, asyncio.CancelledError):
+        with suppress(OSError, ValueError, asyncio.TimeoutError, asyncio.CancelledError):
             word = (await asyncio.wait_for(reader.readline(), _TIMEOUT)).decode("ascii", "replace").strip()
             command = self._commands.get(word)
             self._connections.keep(writer)

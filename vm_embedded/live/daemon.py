@@ -174,7 +174,7 @@ class Daemon:
 
     async def _step(self) -> None:
         """Wait for a shot or for one tick, and do all that is due."""
-        with suppress(TimeoutError):
+        with suppress(asyncio.TimeoutError):
             await asyncio.wait_for(self._wakeup.wait(), _TICK)
         self._wakeup.clear()
         self._feed_watchdog()

@@ -17,6 +17,9 @@ _TIMEOUT = 5.0
 
 _MOST_STREAMS = 16
 
+_ENDINGS = (OSError, ValueError, EOFError, asyncio.LimitOverrunError, asyncio.TimeoutError, asyncio.CancelledError)
+"""How a connection may end early. Until Python 3.10, the time-out of asyncio is another error than TimeoutError."""
+
 
 @dataclass(frozen=True)
 class Response:
@@ -69,7 +72,7 @@ class HttpServer:
         self._tasks.add(task)
         try:
             # asyncio logs a traceback for a canceled handler, so suppress that too.
-            with suppress(OSError, ValueError, EOFError, asyncio.LimitOverrunError, asyncio.CancelledError):
+            with suppress(*_ENDINGS):
                 head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _TIMEOUT)
                 self._connections.keep(writer)
                 await self._respond(head.decode("latin-1").split("\r\n"), writer)

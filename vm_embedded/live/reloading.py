@@ -17,8 +17,8 @@ _NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder")
 class Reloaded:
     """The parts of a daemon that a reload replaces.
 
-    recording_files: the files of a recording besides its frames. needs_restart: names of the changed sections and entries that only a
-    restart applies; the configuration has their old values.
+    recording_files: the files of a recording besides its frames. needs_restart: names of the changed sections and
+    entries that only a restart applies; the configuration has their old values.
     """
 
     configuration: Configuration

@@ -75,7 +75,7 @@ class StatusPage:
                 await write(_BOUNDARY + head + picture + b"\r\n")
             await asyncio.sleep(self._period)
             self._changed.clear()
-            with suppress(TimeoutError):  # then send the same image: only a write notices a closed connection
+            with suppress(asyncio.TimeoutError):  # then send the same image: only a write notices a closed connection
                 await asyncio.wait_for(self._changed.wait(), _REPEAT)
 
     async def _picture(self) -> bytes | None:

@@ -3,16 +3,16 @@
 import re
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
 
 import vm_embedded
+from vm_embedded.config.toml_reader import parse_toml
 
 TOP = Path(__file__).parents[3]
 BIN = Path(sys.executable).parent
-PROGRAMS = sorted(tomllib.loads((TOP / "pyproject.toml").read_text())["project"]["scripts"])
+PROGRAMS = sorted(parse_toml((TOP / "pyproject.toml").read_text())["project"]["scripts"])
 
 
 def run(program, *arguments, **more):
