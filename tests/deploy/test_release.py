@@ -1,4 +1,4 @@
-"""A release as a maintainer makes it, in a clone: version, changelog, tag, and files as a user of an index gets them."""
+"""A release as a maintainer makes it, in a clone: version, changelog, tag, and the files for a package index."""
 
 import hashlib
 import os
@@ -50,7 +50,9 @@ def clone(tmp_path_factory):
 def released(clone):
     """The folder of the files of a release, by its clone."""
     changelog = clone / "CHANGELOG.md"
-    changelog.write_text(re.sub(r"^## \S+ \(.*\)$", "## 9.8.7 (unreleased)", changelog.read_text(), 1, re.MULTILINE))
+    changelog.write_text(
+        re.sub(r"^## \S+ \(.*\)$", "## 9.8.7 (unreleased)", changelog.read_text(), count=1, flags=re.MULTILINE)
+    )
     git(clone, "commit", "--quiet", "--all", "--message", "Changelog")
     done = release(clone, "9.8.7", "--url", URL)
     assert done.returncode == 0, done.stderr

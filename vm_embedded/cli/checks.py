@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import math
 import os
 import struct
 import time
@@ -194,6 +195,8 @@ def pixel_formats(node: Path) -> list[str]:
 def check_lens(configuration: Configuration) -> Finding:
     """Whether the lens fits the image size that the camera is configured for."""
     lens, camera = configuration.lens, configuration.camera
+    if configuration.fov is not None:
+        return Finding("lens", GOOD, f"{math.degrees(configuration.fov):g} degrees wide, without distortion")
     if lens is None:
         return Finding("lens", WARNING, "no lens is configured", "vm-detect --lens FILE, or set lens in vm.toml")
     if lens.lens.size is None:

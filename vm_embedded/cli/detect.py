@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import cv2
 
+from ..cameras.library_messages import silence_opencv
 from ..cameras.open_camera import is_live
 from ..config.toml_writer import to_commented_toml
 from ..errors import InputError, VisualMeshError
@@ -27,7 +27,7 @@ from .program import Parser, program
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
-_FILES_ONLY = ("save_boxes", "save_overlay", "save_points", "emit_points", "explain")
+_FILES_ONLY = ("save_boxes", "save_overlay", "save_video", "save_points", "emit_points", "explain")
 """Options that a live camera rejects."""
 
 
@@ -82,6 +82,13 @@ def parser() -> argparse.ArgumentParser:
         "--save-overlay", type=Path, metavar="DIR", help="write each image as NAME.jpg with its detections drawn in"
     )
     output.add_argument(
+        "--save-video",
+        type=Path,
+        metavar="FILE",
+        help="write all frames, with their detections drawn in, as one .mp4, .avi or .webm, at the rate of the video "
+        "that is read, or 10 a second for images",
+    )
+    output.add_argument(
         "--save-points", type=Path, metavar="DIR", help="write NAME.npz with pixels, rays and probabilities"
     )
     output.add_argument(
@@ -108,9 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # A shell turns `--camera *.jpg` into the first file and further ones.
     options.files = [*([options.camera] if options.camera is not None else []), *options.files]
     options.camera = options.files[0] if options.files else None
-    # vm-detect reports problems with files and cameras itself, so OpenCV and FFmpeg stay silent.
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    silence_opencv()
     cv2.setNumThreads(1)  # a frame has a few thousand points: too little work for more
     try:
         return _run(options)

@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 from ..arrays import Image
@@ -13,14 +14,18 @@ from ..cameras.image_files import Frame, check_file_format, lens_beside, open_so
 from ..detection.detector import Detector
 from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError
-from ..geometry.lens import Lens
+from ..geometry.lens import Lens, Size
 from ..geometry.lens_files import read_lens_file
 from ..geometry.orientation import Orientation
 from ..live.configuration import Configuration
 from ..output.box_files import BoxWriter
 from ..output.messages import file_message
 from ..output.result_files import make_folder, save_overlay, save_points
+from ..output.video_file import VideoFile
 from .progress import ProgressBar
+
+_IMAGES_RATE = 10.0
+"""Frame rate of a video of images [1/s]."""
 
 
 def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
@@ -30,7 +35,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     concern all frames.
     """
     format = given.detector.format
-    pose = _DefaultPose(given.lens.lens if given.lens else None, given.fixed_orientation())
+    pose = _DefaultPose(given, given.fixed_orientation())
     detector = Detector.from_file(given.model, given.detector)
     emit_points = [name.strip() for name in options.emit_points.split(",")] if options.emit_points else []
     for name in emit_points:
@@ -46,20 +51,24 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
 
     processed = 0
     bar = ProgressBar(source.count)
-    for frame in source.frames:
-        if follow is not None and frame.index == 0:
-            follow.time(frame)  # without times, no frame can be processed
-        try:
-            line = _process(frame, detector, pose, follow, options, emit_points, boxes)
-        except VisualMeshError as error:
+    with ExitStack() as stack:
+        video = None
+        if options.save_video is not None:
+            video = stack.enter_context(VideoFile(options.save_video, source.rate or _IMAGES_RATE))
+        for frame in source.frames:
+            if follow is not None and frame.index == 0:
+                follow.time(frame)  # without times, no frame can be processed
+            try:
+                line = _process(frame, detector, pose, follow, options, emit_points, boxes, video)
+            except VisualMeshError as error:
+                bar.clear()
+                complain(str(error))
+                continue
             bar.clear()
-            complain(str(error))
-            continue
+            print(line, flush=True)
+            processed += 1
+            bar.show(frame.index + 1)
         bar.clear()
-        print(line, flush=True)
-        processed += 1
-        bar.show(frame.index + 1)
-    bar.clear()
     return processed
 
 
@@ -67,18 +76,19 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
 class _DefaultPose:
     """Lens and orientation for frames without a lens file; None if the user gave none."""
 
-    lens: Lens | None
+    given: Configuration
     orientation: Orientation | None
 
-    def of(self, frame: Frame) -> tuple[Lens, Orientation]:
-        """Lens and orientation of a frame; the lens file beside it takes precedence. Raises InputError without one."""
-        lens, orientation = self.lens, self.orientation
+    def of(self, frame: Frame, size: Size) -> tuple[Lens, Orientation]:
+        """Lens and orientation of a frame of a size [px]; the lens file beside it takes precedence. Raises InputError
+        without one."""
+        lens, orientation = self.given.lens_for(size), self.orientation
         beside = lens_beside(frame.path)
         if beside is not None:
             file = read_lens_file(beside)
             lens, orientation = file.lens, file.orientation or orientation
         if lens is None:
-            raise InputError("no lens: give --lens, or put lensNAME.yaml beside imageNAME")
+            raise InputError("no lens: give --lens or --fov, or put lensNAME.yaml beside imageNAME")
         if orientation is None:
             raise InputError("no orientation: give --height (and --pitch, --roll), or Hoc in the lens file")
         return lens, orientation
@@ -110,6 +120,7 @@ def _process(
     options: argparse.Namespace,
     emit_points: Sequence[str],
     boxes: BoxWriter | None,
+    video: VideoFile | None,
 ) -> str:
     """Detect in a frame, save the files that the options ask for, and return its line of JSON.
 
@@ -117,7 +128,7 @@ def _process(
     """
     image = frame.read()  # its errors name the file
     try:
-        return _detect(image, frame, detector, pose, follow, options, emit_points, boxes)
+        return _detect(image, frame, detector, pose, follow, options, emit_points, boxes, video)
     except VisualMeshError as error:
         raise InputError(f"{frame.source}: {error}") from error
 
@@ -131,8 +142,9 @@ def _detect(
     options: argparse.Namespace,
     emit_points: Sequence[str],
     boxes: BoxWriter | None,
+    video: VideoFile | None,
 ) -> str:
-    lens, orientation = pose.of(frame)
+    lens, orientation = pose.of(frame, (image.shape[1], image.shape[0]))
     detections = detector.detect(image, orientation, lens, explain=options.explain or boxes is not None)
     if follow is not None:
         detections = follow.tracker.update(detections, follow.time(frame))
@@ -144,6 +156,8 @@ def _detect(
         save_points(options.save_points, frame, detections)
     if options.save_overlay is not None:
         save_overlay(options.save_overlay, frame, detections)
+    if video is not None:
+        video.write(detections.draw())
     return json.dumps(file_message(frame, detections, emit_points, options.explain), allow_nan=False)
 
 

@@ -111,6 +111,18 @@ class RadialLens(Lens):
 class Rectilinear(RadialLens):
     """r = f tan(theta): straight lines stay straight. Its fov must be below pi."""
 
+    @classmethod
+    def from_horizontal_fov(cls, fov: float, size: Size) -> Rectilinear:
+        """A lens without distortion for images of this size [px], whose width shows the angle fov [rad].
+
+        Raises InputError for an angle outside of (0, pi).
+        """
+        if not 0.0 < fov < math.pi:
+            raise InputError(f"a horizontal angle of view must be above 0 and below pi rad, not {fov}")
+        focal_length = 0.5 * size[0] / math.tan(0.5 * fov)
+        diagonal = 2.0 * math.atan(0.5 * math.hypot(*size) / focal_length)
+        return cls(focal_length=focal_length, fov=diagonal, size=size)
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.fov >= math.pi:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,13 +16,14 @@ from ..cameras.camera import CameraSettings
 from ..config.entries import EntryError, check_entries, entry, number, switch, text_line
 from ..config.sections import read_sections
 from ..config.toml_writer import to_commented_toml
-from ..config.units import angle, length
+from ..config.units import angle, length, parse_angle
 from ..detection.settings import Settings
 from ..detection.track_settings import TrackSettings
 from ..errors import InputError, VisualMeshError
+from ..geometry.lens import Lens, Size
 from ..geometry.lens_files import LensFile, lens_from_table, read_lens_file
 from ..geometry.orientation import Orientation
-from ..geometry.radial_lenses import RadialLens
+from ..geometry.radial_lenses import RadialLens, Rectilinear
 from ..network.bundled import DEFAULT, SHIPPED, model_path
 from ..network.model_file import ModelFile
 from ..output.channels import OutputSettings
@@ -120,6 +122,24 @@ def _read_lens(value: object) -> Path | LensFile:
     return LensFile(lens_from_table(value), None)
 
 
+def checked_fov(value: object) -> float:
+    """A horizontal angle of view [rad] from a number or text in radians, or from text in degrees. Raises InputError."""
+    fov = parse_angle(value, "fov")
+    if not math.radians(1.0) <= fov <= math.radians(150.0):
+        raise InputError(
+            f"fov must be from 1deg to 150deg, not {math.degrees(fov):g}deg: it describes a lens without distortion; "
+            "for a wider lens, give a lens file"
+        )
+    return fov
+
+
+def _commented_fov(value: float | None) -> str:
+    comment = (
+        '# instead of a lens: the horizontal angle of view, in radians or as in "70deg", of a lens without distortion'
+    )
+    return comment + ("\n# fov =" if value is None else f"\nfov = {value!r}")
+
+
 def _commented_lens(value: LensFile | None) -> str:
     comment = (
         "# the lens: a calibration file of the Visual Mesh reference, OpenCV or ROS, or a TOML file; or a table,\n"
@@ -137,10 +157,11 @@ def _commented_lens(value: LensFile | None) -> str:
 
 @dataclass(frozen=True)
 class Configuration:
-    """All sections. model and lens are not sections of entries, so they bring their own reader and writer."""
+    """All sections. model, lens and fov are not sections of entries, so they bring their own reader and writer."""
 
     model: str = field(default=DEFAULT, metadata={"read": _read_model, "to_commented_toml": _commented_model})
     lens: LensFile | None = field(default=None, metadata={"read": _read_lens, "to_commented_toml": _commented_lens})
+    fov: float | None = field(default=None, metadata={"read": checked_fov, "to_commented_toml": _commented_fov})
     orientation: FixedPose = field(default_factory=FixedPose)
     detector: Settings = field(default_factory=Settings)
     track: TrackSection = field(default_factory=TrackSection)
@@ -150,6 +171,12 @@ class Configuration:
     status: StatusSettings = field(default_factory=StatusSettings)
     recorder: RecorderSettings = field(default_factory=RecorderSettings)
     deploy: DeploySettings = field(default_factory=DeploySettings)
+
+    def lens_for(self, size: Size) -> Lens | None:
+        """The lens for images of this size [px]: that of the lens file, or the one of fov, or None."""
+        if self.lens is not None:
+            return self.lens.lens
+        return None if self.fov is None else Rectilinear.from_horizontal_fov(self.fov, size)
 
     def fixed_orientation(self) -> Orientation | None:
         """The orientation of section [orientation], or without a height there the one of the lens file, or None.
@@ -164,6 +191,8 @@ def read_configuration(path: str | Path) -> Configuration:
     known one."""
     path = Path(path)
     read = read_sections(Configuration, path)
+    if read.lens is not None and read.fov is not None:
+        raise InputError(f"configuration {path}: give lens or fov, not both")
     try:
         lens: object = read.lens  # the sections leave the path of a lens file here
         if isinstance(lens, Path):
