@@ -43,7 +43,7 @@ def install(tmp_path_factory):
 
     @cache
     def installed(command):
-        offline = command.replace("pip", f"{sys.executable} -m pip", 1) + " --dry-run --no-deps --no-build-isolation"
+        offline = command.replace("pip", f"{sys.executable} -m pip", 1)
         return subprocess.run(offline, shell=True, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
 
     return installed
@@ -60,9 +60,24 @@ def test_a_program_without_its_packages_advises_a_command_that_installs_them(
     (advice,) = re.findall(r"run: (pip install '\.\[(\w+)\]') in the folder of vm-embedded", done.stderr)
     command, extra = advice
     assert package in requirements(extra)
-    tried = install(command)
+    tried = install(f"{command} --dry-run --no-deps --no-build-isolation")
     assert tried.returncode == 0, tried.stderr
     assert "Would install vm-embedded" in tried.stdout
+
+
+def test_the_install_commands_of_the_pages_work(install):
+    """With their extras, from the checkout and from the wheel that a release makes."""
+    pages = [TOP / "README.md", TOP / "docs" / "use.md"]
+    found = re.findall(r"(pip install (?:\.|'[^']*'))", "".join(page.read_text() for page in pages))
+    assert {"pip install .", "pip install '.[train]'", "pip install '.[synth,train]'"} < set(found)
+    assert any("dist/" in each and "[train]" in each for each in found)
+    built = install("pip wheel . --wheel-dir dist --no-deps --no-build-isolation")
+    assert built.returncode == 0, built.stderr
+    for command in set(found):
+        tried = install(f"{command} --dry-run --no-deps --no-build-isolation --force-reinstall")
+        assert tried.returncode == 0, tried.stderr
+        assert "Would install vm-embedded" in tried.stdout
+        assert "does not provide the extra" not in tried.stderr
 
 
 def requirements(extra: str) -> str:

@@ -58,6 +58,7 @@ Shards can write to one folder, or to several folders; then copy all files into 
 def parser() -> argparse.ArgumentParser:
     """The options of vm-synth OUT."""
     made = Parser(
+        commands=("preview", "check", "config"),
         prog="vm-synth",
         description="Render pictures of a ball, or of another object on a table or floor, lit by 360 degree "
         "photographs. Each has masks, lens, camera pose and the true positions of the objects.",

@@ -28,7 +28,7 @@ class VideoFile:
             raise InputError(f"can't write the video {path}: {unknown('suffix', suffix, _CODECS)}")
         check_writable(path)
         self._path, self._part = path, path.with_name(f"{path.stem}.part{suffix}")
-        self._rate, self._codec = rate, cv2.VideoWriter_fourcc(*_CODECS[suffix])
+        self._rate, self._codec = rate, cv2.VideoWriter.fourcc(*_CODECS[suffix])
         self._writer: cv2.VideoWriter | None = None
         self._size = (0, 0)
 
@@ -42,7 +42,7 @@ class VideoFile:
             raise InputError(f"can't write the video {self._path}: OpenCV can't encode it or create the file")
         if size != self._size:
             raise InputError(
-                f"it has {size[0]} x {size[1]} px, but all pictures of the video {self._path} must have the size of the "
+                f"it has {size[0]} x {size[1]} px, but all pictures of the video {self._path} must be as large as the "
                 f"first, {self._size[0]} x {self._size[1]} px"
             )
         self._writer.write(picture)
