@@ -12,6 +12,9 @@ from ..detection.settings import Settings
 from ..detection.stopwatch import Stopwatch
 from ..errors import InputError
 
+_WORTH_SHOWING = 0.05
+"""Least confidence of a rejected candidate that is shown: most candidates are far from any threshold."""
+
 
 def threshold_name(detector: Detector) -> str:
     """The setting that decides: min_confidence with a close look, threshold without."""
@@ -32,10 +35,11 @@ def with_threshold(detector: Detector, text: str) -> Settings:
 
 
 def with_settings(detector: Detector, detections: Detections, settings: Settings) -> Detections:
-    """What the frame of `detections` shows with other thresholds, the rejected candidates included.
+    """What the frame of `detections` shows with other thresholds, with the rejected candidates that are not hopeless.
 
     Its network does not run again. Use it in the thread of the detector. Raises ModelError if the close look does not
     run.
     """
     found, rejected = locate(detections.observation, detector.look, settings, Stopwatch(), explain=True)
-    return replace(detections, objects=found, rejected=rejected, threshold=settings.threshold)
+    near = tuple(each for each in rejected if each.confidence >= _WORTH_SHOWING)
+    return replace(detections, objects=found, rejected=near, threshold=settings.threshold)
