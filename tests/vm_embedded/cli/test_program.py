@@ -77,7 +77,7 @@ def completed(line, folder):
     [
         ("vm-detect --save-v", ["--save-video"]),
         ("vm-detect photo.jpg --form", ["--format"]),
-        ("vm-detect --sampling ", ["exact", "fast"]),
+        ("vm-detect --output-unix-format ", ["lines", "binary"]),
         ("vm-detect pho", []),
         ("vm-doctor --js", ["--json"]),
         ("vm-mesh sh", ["show"]),
