@@ -31,7 +31,9 @@ def checked_image(image: AnyImage | None, format: str) -> Image:
     if format not in FORMATS:
         raise InputError(unknown("pixel format", format, FORMATS))
     if image is None:
-        raise InputError("image must be an array of uint8, not NoneType, which cv2.imread returns for a file that it can't read")
+        raise InputError(
+            "image must be an array of uint8, not NoneType, which cv2.imread returns for a file that it can't read"
+        )
     if not isinstance(image, np.ndarray) or image.dtype != np.uint8:
         kind = image.dtype if isinstance(image, np.ndarray) else type(image).__name__
         raise InputError(f"image must be an array of uint8, not {kind}")
