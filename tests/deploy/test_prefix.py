@@ -134,7 +134,7 @@ def test_without_systemd_it_says_how_to_start_it_and_when_to_restart_it(bundle, 
             assert time.monotonic() < deadline
         with socket.socket(socket.AF_UNIX) as reader:
             reader.connect(str(here.path / "run" / "lines.sock"))
-            assert json.loads(reader.makefile().readline())["state"] == "ok"
+            assert read_message(reader.makefile().readline())["state"] == "ok"
         restart = f"stop it, and start it again with {command}"
         assert restart in here.deploy("model", model).stdout
         assert restart in here.install(changed(bundle, tmp_path / "b", "2-b")).stdout
