@@ -12,7 +12,7 @@ BUILD ?= build/networks
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
 
-.PHONY: help setup demo test lint bundle deb deploy logs lock bench bench-external bench-synth bench-train data networks test-data score choices look-choices fixtures docs site clean
+.PHONY: help setup demo test lint matrix release bundle deb deploy logs lock bench bench-external bench-synth bench-train data networks test-data score choices look-choices fixtures docs site clean
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -33,6 +33,13 @@ lint: .venv/dev ## style, spelling and types
 	$(BIN)/ruff format --check .
 	$(BIN)/codespell
 	$(BIN)/mypy
+
+matrix: .venv/dev ## test the runtime with each Python from 3.10 to 3.14 that is here, the oldest and the newest numpy
+	$(BIN)/python -m tests.matrix
+
+release: .venv/dev ## make a release in dist/: make release VERSION=0.2.0 [URL=https://HOST/OWNER/NAME]
+	@test -n "$(VERSION)" || { echo 'make release needs VERSION, as in make release VERSION=0.2.0'; exit 1; }
+	$(BIN)/python deploy/release.py $(VERSION) $(if $(URL),--url '$(URL)')
 
 bundle: .venv/bundle ## pack all that a robot needs in one file: make bundle [MODEL=model.onnx] [CONFIG=vm.toml] [TARGET=linux_x86_64-cp311]
 	$(BIN)/python deploy/bundle.py --target $(TARGET) $(if $(MODEL),--model '$(MODEL)') $(if $(CONFIG),--config '$(CONFIG)')
@@ -130,7 +137,7 @@ clean: ## remove everything that make made
 	rm -rf .venv demo-out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 .venv/made:
-	@$(PYTHON) -c 'import sys; sys.exit("vm-embedded needs Python 3.11 or newer, $(PYTHON) is " + sys.version.split()[0] + "; run make PYTHON=python3.11" if sys.version_info < (3, 11) else 0)'
+	@$(PYTHON) -c 'import sys; sys.exit("vm-embedded needs Python 3.10 or newer, $(PYTHON) is " + sys.version.split()[0] + "; run make PYTHON=python3.11" if sys.version_info < (3, 10) else 0)'
 	$(PYTHON) -m venv .venv
 	@touch $@
 

@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Image
-from vm_embedded.detection.detections import Detection
+from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.lens_files import read_lens_file

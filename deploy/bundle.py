@@ -156,7 +156,7 @@ def configuration_files(configuration: Path | None, model: str | None) -> dict[s
         shown = Configuration(
             model=MODEL,
             camera=CameraSettings(source="synthetic"),
-            output=OutputSettings(stdout=False, unix="/run/vm-detect/lines.sock"),
+            output=OutputSettings(stdout=False, unix="lines.sock"),
         )
         return {CONFIGURATION: to_commented_toml(shown).encode(), MODEL: _model(model or DEFAULT)}
     given = read_configuration(configuration)

@@ -32,7 +32,7 @@ OTHERS: dict[str, type] = {
 """Types that public names return or share as their base."""
 
 GROUPS = {
-    "Detect": ("Detector", "Settings", "Detections", "Detection", "ClassPoints", "Observation", "draw_overlay"),
+    "Detect": ("Detector", "Settings", "Detections", "Detection", "ClassPoints", "Observation"),
     "Tracks": ("Tracker", "TrackSettings", "Track"),
     "Features of the field": (
         "FieldFeatures",

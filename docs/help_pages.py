@@ -19,6 +19,7 @@ import api_page
 
 from vm_calibrate import cli as calibrate
 from vm_embedded.cli import bench, detect, doctor
+from vm_embedded.cli.program import PrintCompletion
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.live import configuration as detection
 from vm_embedded.output.message_schema import message_schema
@@ -33,7 +34,7 @@ from vm_train.cli import options as train
 from vm_train.learning import configuration as training
 from vm_train.look import configuration as look
 
-_ABOUT = (argparse._HelpAction, argparse._VersionAction)
+_ABOUT = (argparse._HelpAction, argparse._VersionAction, PrintCompletion)
 """Options that all programs have."""
 
 DOCS = Path(__file__).parent
@@ -63,7 +64,10 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
 
 def command_line() -> str:
     """The page of the command line."""
-    made = "Made from the help texts of the programs by `make docs`. `--help` prints the same, `--version` the version."
+    made = (
+        "Made from the help texts of the programs by `make docs`. `--help` prints the same, `--version` the version, "
+        "and `--completion` the script that completes options in bash."
+    )
     parts = [f"# Command line\n\n{made}\n"]
     for parser in parsers().values():
         parts.append(f"## {parser.prog}\n\n{parser.description}\n")

@@ -3,6 +3,7 @@
 import ast
 import importlib
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -74,11 +75,35 @@ def test_the_readme_is_short():
     assert len(README.read_text().splitlines()) <= 150
 
 
-def test_the_python_of_the_readme_works(monkeypatch, capsys):
-    program = README.read_text().split("```python\n")[1].split("```")[0]
-    monkeypatch.chdir(TOP)
-    exec(program, {})
-    assert capsys.readouterr().out.startswith("ball 0.")
+def programs(page: Path) -> list[str]:
+    """The Python of a page."""
+    return re.findall(r"^```python\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize(
+    ("page", "printed"),
+    [(README, "ball 0."), (DOCS / "use.md", "detections, "), (DOCS / "meshes.md", "ball head ground [")],
+    ids=["README", "use", "meshes"],
+)
+def test_the_python_of_a_page_works_as_pasted(page, printed, tmp_path, monkeypatch, capsys):
+    """In the folder of the checkout, one program after the other, as in one interpreter."""
+    (tmp_path / "tests").symlink_to(TOP / "tests")  # so that files that a program writes land elsewhere
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for program in programs(page):
+        exec(program, names)
+    assert printed in capsys.readouterr().out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [README, DOCS / "use.md", DOCS / "meshes.md"], ids=name_of)
+def test_the_python_of_a_page_has_right_types(page, tmp_path):
+    """A user's strict type checker accepts it: images as OpenCV's stubs declare them, py.typed, all annotations."""
+    (tmp_path / "program.py").write_text("".join(programs(page)))
+    command = [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", "--config-file", "", "program.py"]
+    environment = {**os.environ, "MYPYPATH": str(TOP)}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
 
 
 def test_the_training_of_the_readme_uses_the_radii_of_its_pictures():
@@ -89,15 +114,6 @@ def test_the_training_of_the_readme_uses_the_radii_of_its_pictures():
     assert len(commands) == 2
     assert "--set mesh.radius_of=scene" in commands[0]
     assert "--radius-of scene" in commands[1]
-
-
-def test_the_python_of_the_page_of_meshes_works(monkeypatch, capsys):
-    programs = re.findall(r"^```python\n(.*?)^```", (DOCS / "meshes.md").read_text(), re.MULTILINE | re.DOTALL)
-    assert len(programs) == 2
-    monkeypatch.chdir(TOP)
-    for program in programs:
-        exec(program, {})
-    assert "ball head ground [" in capsys.readouterr().out
 
 
 def test_the_design_has_a_line_for_each_room():

@@ -23,4 +23,6 @@ def test_package_data_and_scripts_are_declared():
         "numpy",
         "onnxruntime",
         "opencv-python-headless",
+        "tomli",
     ]
+    assert project["dependencies"][-1].endswith("; python_version < '3.11'")

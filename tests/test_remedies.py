@@ -15,6 +15,9 @@ import pytest
 TOP = Path(__file__).parents[1]
 EXTRAS = tomllib.loads((TOP / "pyproject.toml").read_text())["project"]["optional-dependencies"]
 
+OTHERS = ("torch", "onnx", "PIL", "yaml", "matplotlib", "tensorboard", "scipy", "mitsuba", "drjit")
+"""Modules that pip install . does not bring."""
+
 CALLS = [
     ("vm_train.cli.train", "torch", ["data", "-o", "run"]),
     ("vm_train.cli.evaluate", "matplotlib", ["points", "-o", "points.svg"]),
@@ -30,9 +33,10 @@ STATUS = {"vm_ros.cli": 78}
 """Exit status of a program that a service manager starts; that of the others is 1."""
 
 
-def without(package: str, module: str, arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run a program as on a machine that lacks a package."""
-    program = f"import sys; sys.modules[{package!r}] = None; from {module} import main; sys.exit(main({arguments}))"
+def without_extras(module: str, arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a program as on a machine that has only the runtime."""
+    nothing = f"import sys; sys.modules.update(dict.fromkeys({OTHERS}))"
+    program = f"{nothing}; from {module} import main; sys.exit(main({arguments}))"
     path = os.pathsep.join([str(TOP), str(TOP / "export")])
     environment = {**os.environ, "PYTHONPATH": path}
     command = [sys.executable, "-c", program]
@@ -49,7 +53,7 @@ def install(tmp_path_factory):
 
     @cache
     def installed(command):
-        offline = command.replace("pip", f"{sys.executable} -m pip", 1) + " --dry-run --no-deps --no-build-isolation"
+        offline = command.replace("pip", f"{sys.executable} -m pip", 1)
         return subprocess.run(offline, shell=True, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
 
     return installed
@@ -60,15 +64,30 @@ def test_a_program_without_its_packages_advises_a_command_that_installs_them(
     module, package, arguments, tmp_path, install
 ):
     cv2.imwrite(str(tmp_path / "map.hdr"), np.ones((64, 128, 3), np.float32))  # for vm-synth
-    done = without(package, module, arguments, tmp_path)
+    done = without_extras(module, arguments, tmp_path)
     assert done.returncode == STATUS.get(module, 1)
     assert "Traceback" not in done.stderr
     (advice,) = re.findall(r"run: (pip install '\.\[(\w+)\]') in the folder of vm-embedded", done.stderr)
     command, extra = advice
     assert package in requirements(extra)
-    tried = install(command)
+    tried = install(f"{command} --dry-run --no-deps --no-build-isolation")
     assert tried.returncode == 0, tried.stderr
     assert "Would install vm-embedded" in tried.stdout
+
+
+def test_the_install_commands_of_the_pages_work(install):
+    """With their extras, from the checkout and from the wheel that a release makes."""
+    pages = [TOP / "README.md", TOP / "docs" / "use.md"]
+    found = re.findall(r"(pip install (?:\.|'[^']*'))", "".join(page.read_text() for page in pages))
+    assert {"pip install .", "pip install '.[train]'", "pip install '.[synth,train]'"} < set(found)
+    assert any("dist/" in each and "[train]" in each for each in found)
+    built = install("pip wheel . --wheel-dir dist --no-deps --no-build-isolation")
+    assert built.returncode == 0, built.stderr
+    for command in set(found):
+        tried = install(f"{command} --dry-run --no-deps --no-build-isolation --force-reinstall")
+        assert tried.returncode == 0, tried.stderr
+        assert "Would install vm-embedded" in tried.stdout
+        assert "does not provide the extra" not in tried.stderr
 
 
 def requirements(extra: str) -> str:

@@ -1,6 +1,7 @@
 """The Visual Mesh detector for robots: numpy, ONNX Runtime and OpenCV, nothing else."""
 
-from .detection.detections import ClassPoints, Detection, Detections
+from .detection.detection import Detection
+from .detection.detections import ClassPoints, Detections
 from .detection.detector import Detector
 from .detection.multi_view import CameraView, Sighting, detect_views
 from .detection.settings import Settings
@@ -19,7 +20,6 @@ from .geometry.planes import GROUND, Plane, Pose
 from .geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from .geometry.sphere import Sphere
 from .mesh.models import build_mesh
-from .output.overlay import draw_overlay
 
 __all__ = [
     "GROUND",
@@ -57,7 +57,6 @@ __all__ = [
     "VisualMeshError",
     "build_mesh",
     "detect_views",
-    "draw_overlay",
     "read_lens_file",
 ]
 

@@ -24,6 +24,9 @@ Mask = npt.NDArray[np.bool_]
 Image = npt.NDArray[np.uint8]
 """A picture, (height, width, channels) or (height, width)."""
 
+AnyImage = npt.NDArray[Any]
+"""What OpenCV returns as an image; functions that take one check its type and shape."""
+
 Number = Any
 """A float or an array of floats; formulas of this type work on both."""
 

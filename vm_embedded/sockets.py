@@ -25,17 +25,26 @@ _UMASK = 0o117
 """Gives the socket's file mode 0660."""
 
 
+def runtime_folder() -> Path:
+    """Folder of the sockets whose path is relative: that of systemd or of the user's session, otherwise /tmp."""
+    for variable in ("RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"):
+        folder = os.environ.get(variable, "").split(":")[0]
+        if folder:
+            return Path(folder)
+    return Path("/tmp")
+
+
 class UnixListener:
-    """A Unix stream socket that listens at a path.
+    """A Unix stream socket that listens at a path; a relative one is in the runtime folder.
 
     option: of vm-detect that gives another path, for the error message. It replaces a socket file on which no process
     listens anymore. Raises InputError if another process listens there, or if the socket can't be created.
     """
 
     def __init__(self, path: str | Path, option: str) -> None:
-        self.path, self._option = Path(path), option
+        self.path, self._option = runtime_folder() / path, option
         if len(os.fsencode(self.path)) > _MAX_PATH_BYTES:
-            raise InputError(f"the path of a socket must have at most {_MAX_PATH_BYTES} bytes: {path}")
+            raise InputError(f"the path of a socket must have at most {_MAX_PATH_BYTES} bytes: {self.path}")
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
         try:
             self._remove_stale_file()
@@ -49,7 +58,10 @@ class UnixListener:
             self._inode = self.path.stat().st_ino
         except OSError as error:
             self.socket.close()
-            raise InputError(f"can't listen at {path}: {error.strerror or error}") from error
+            raise InputError(
+                f"can't listen at {self.path}: {error.strerror or error}; give a path in a folder that you can write "
+                f"to with {option}"
+            ) from error
         except InputError:
             self.socket.close()
             raise

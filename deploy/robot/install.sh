@@ -20,7 +20,7 @@ usage: install.sh [--prefix DIR] [--systemd | --no-systemd] [--dry-run]
 
   --prefix DIR   folder of the releases; default $PREFIX
   --systemd      install it as a service; the default, unless the last installation used --no-systemd
-  --no-systemd   install only the program; you must start and restart it
+  --no-systemd   install only the program; start it with vm-deploy run, and again after each change
   --dry-run      check everything, change nothing
 
 Exit status: 0 the release is in use; 1 it failed, and the previous release stays in use; 2 wrong usage.
@@ -233,6 +233,4 @@ fi
 rm -rf "$PREFIX/left"
 prune
 say "$release is in use"
-if ! uses_systemd; then
-    say "start it: $PREFIX/current/venv/bin/vm-detect --config $PREFIX/current/etc/vm.toml"
-fi
+say_restart

@@ -8,6 +8,7 @@
 #   PREFIX/current, previous    links to releases; the unit starts `current`
 #   PREFIX/trial                the two links before the switch; exists until `current` has proved healthy
 #   PREFIX/supervisor           systemd or none; marks the folder as ours
+#   PREFIX/run                  sockets of the detector, without systemd
 # shellcheck shell=sh
 
 UNITS=/etc/systemd/system
@@ -67,8 +68,19 @@ lock() { # SECONDS: wait for other commands of this program for so long, then fa
 
 uptime_seconds() { cut -d . -f 1 /proc/uptime; } # a clock that nobody can set
 
+sockets() { if uses_systemd; then say /run/vm-detect; else say "$PREFIX/run"; fi; } # print their folder
+
 detect() { # ARGUMENT...: run vm-detect of the current release with its configuration
-    RUNTIME_DIRECTORY=/run/vm-detect "$PREFIX/current/venv/bin/vm-detect" --config "$PREFIX/current/etc/vm.toml" "$@"
+    RUNTIME_DIRECTORY=$(sockets) "$PREFIX/current/venv/bin/vm-detect" --config "$PREFIX/current/etc/vm.toml" "$@"
+}
+
+say_restart() { # say how a change comes into use without systemd: nothing else starts the detector
+    if uses_systemd; then return; fi
+    if [ -n "$(state)" ]; then
+        say "the detector that runs does not use it yet: stop it, and start it again with $PREFIX/vm-deploy run"
+    else
+        say "start the detector with $PREFIX/vm-deploy run"
+    fi
 }
 
 setting() { # NAME: print an entry of [deploy]

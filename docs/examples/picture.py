@@ -7,7 +7,7 @@ import sys
 
 import cv2
 
-from vm_embedded import Detector, draw_overlay, read_lens_file
+from vm_embedded import Detector, read_lens_file
 
 
 def main(picture: str, lens_file: str, copy: str) -> None:
@@ -19,7 +19,7 @@ def main(picture: str, lens_file: str, copy: str) -> None:
     for ball in detections:
         x, y, _ = ball.position
         print(f"{ball.class_name} {ball.confidence:.2f}: {x:.2f} m ahead, {y:.2f} m to the left")
-    cv2.imwrite(copy, draw_overlay(image, detections))
+    detections.save(copy)
 
 
 if __name__ == "__main__":

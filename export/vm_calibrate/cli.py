@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from vm_embedded.cli.program import Parser, program, version
+from vm_embedded.cli.program import Parser, is_completing, program
 from vm_embedded.errors import VisualMeshError, install_extra, unknown
 from vm_workstation.option_types import at_least
 
@@ -118,9 +118,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("usage: vm-calibrate COMMAND ...\n\ncommands (vm-calibrate COMMAND --help lists their options):")
         print("\n".join(f"  {name:9s}{each.description}" for name, each in known.items()))
         return EXIT_OK if given else EXIT_USAGE
-    if given[0] == "--version":
-        print(version("vm-calibrate"))
-        return EXIT_OK
+    if given[0] not in known and (given[0].startswith("-") or is_completing()):
+        Parser(prog="vm-calibrate", commands=tuple(known)).parse_args(given)
     if given[0] not in known:
         print(f"vm-calibrate: {unknown('command', given[0], known)}", file=sys.stderr)
         return EXIT_USAGE

@@ -35,7 +35,10 @@ class PoseFit:
 def orientation_of(numbers: Floats) -> Orientation:
     """The orientation of the numbers (3,) of a fit."""
     height, pitch, roll = (float(each) for each in numbers)
-    return Orientation.from_roll_pitch(math.exp(min(height, 10.0)), roll=roll, pitch=pitch)
+    turn = math.tau  # a step of the fit may go beyond it
+    return Orientation.from_roll_pitch(
+        math.exp(min(height, 10.0)), roll=math.remainder(roll, turn), pitch=math.remainder(pitch, turn)
+    )
 
 
 def numbers_of(normal: Floats, height: float) -> Floats:

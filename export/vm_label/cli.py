@@ -12,6 +12,7 @@ from contextlib import suppress
 from ipaddress import IPv4Address
 from pathlib import Path
 
+from vm_embedded.cli.program import Parser, program
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_workstation.stopping import stoppable
 
@@ -26,7 +27,7 @@ EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
 def parser() -> argparse.ArgumentParser:
     """The command line of vm-label."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="vm-label",
         description="Judge boxes on a page in the browser: is this the object? yes, no or skip. Each answer is saved "
         "at once in DIR/answers.jsonl. Ctrl-C ends the program; the next start continues.",
@@ -87,6 +88,7 @@ def _address(text: str) -> str:
         raise argparse.ArgumentTypeError(f"{text!r} is not an IPv4 address, such as 127.0.0.1 or 0.0.0.0") from error
 
 
+@program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-label and return its exit status."""
     options = parser().parse_args(arguments)
@@ -107,9 +109,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return EXIT_FAILED
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader, such as head, has closed the pipe
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_OK
 
 
 def _complain(problems: Sequence[str]) -> None:

@@ -29,7 +29,6 @@ from vm_embedded.geometry.lens import Lens
 from vm_embedded.live.answering import Answer
 from vm_embedded.live.configuration import Configuration
 from vm_embedded.output.messages import Message
-from vm_embedded.output.overlay import draw_overlay
 from vm_embedded.output.ros.detection_messages import (
     detection_2d_array,
     detection_3d_array,
@@ -145,7 +144,7 @@ class Node:
             self._drawing = asyncio.ensure_future(drawing)
 
     def _publish_debug_image(self, header: Any, image: Image, detections: Detections) -> None:
-        self._debug_image.publish(jpeg_message(self._types, header, draw_overlay(image, detections)))
+        self._debug_image.publish(jpeg_message(self._types, header, detections.draw(image)))
 
     def _camera_offset(self, captured: float) -> Floats:
         """Where the camera is in the plane's frame (2,) [m]; zeros if its origin is below the camera.

@@ -12,10 +12,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from vm_embedded.cli.program import Parser, program
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
-from vm_embedded.errors import InputError, VisualMeshError
+from vm_embedded.errors import InputError, VisualMeshError, unknown
 from vm_embedded.files import atomic_write, check_writable
 from vm_workstation.contact_sheet import check_sheet_path, choose_indices, write_sheet
 from vm_workstation.option_types import at_least
@@ -56,7 +57,8 @@ Shards can write to one folder, or to several folders; then copy all files into 
 
 def parser() -> argparse.ArgumentParser:
     """The options of vm-synth OUT."""
-    made = argparse.ArgumentParser(
+    made = Parser(
+        commands=("preview", "check", "config"),
         prog="vm-synth",
         description="Render pictures of a ball, or of another object on a table or floor, lit by 360 degree "
         "photographs. Each has masks, lens, camera pose and the true positions of the objects.",
@@ -74,7 +76,13 @@ def parser() -> argparse.ArgumentParser:
         help="folder of environment maps: .hdr, .exr, .pfm; default: built-in rooms, which look less real",
     )
     made.add_argument("--seed", type=at_least(0), default=0, metavar="S", help="random seed; default 0")
-    made.add_argument("--config", type=Path, metavar="FILE", help="scene.toml; missing entries keep their defaults")
+    made.add_argument(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help=f"scene.toml; missing entries keep their defaults; {', '.join(_EXAMPLES[:-1])} and {_EXAMPLES[-1]} come "
+        "with the package",
+    )
     made.add_argument(
         "--set",
         action="append",
@@ -94,7 +102,7 @@ def parser() -> argparse.ArgumentParser:
 
 def preview_parser() -> argparse.ArgumentParser:
     """The options of vm-synth preview OUT."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-synth preview",
         description="Draw a contact sheet of a set. Below each picture is a copy with tinted classes and outlines of "
         "the objects to detect. They are computed from position, lens and pose, not from the rendered mask. A single "
@@ -118,7 +126,7 @@ def preview_parser() -> argparse.ArgumentParser:
 
 def check_parser() -> argparse.ArgumentParser:
     """The options of vm-synth check OUT."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-synth check",
         description="Read a whole set: report missing and damaged files, and what the pictures show. "
         "Exit status 0 if the set is complete and valid, else 1.",
@@ -139,7 +147,7 @@ def check_parser() -> argparse.ArgumentParser:
 
 def config_parser() -> argparse.ArgumentParser:
     """The options of vm-synth config."""
-    made = argparse.ArgumentParser(
+    made = Parser(
         prog="vm-synth config",
         description="Print a scene.toml with all entries, their meanings, units, limits and defaults.",
     )
@@ -161,6 +169,7 @@ def _shard(text: str) -> tuple[int, int]:
     return int(number), int(count)
 
 
+@program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-synth and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
@@ -179,11 +188,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return EXIT_INTERRUPTED
 
 
+def _scene_file(given: Path | None) -> Path | None:
+    """The file of --config: the user's, or else the one of the package, with or without .toml.
+
+    Raises InputError for a name that is neither.
+    """
+    if given is None or given.exists() or given.parent != Path():
+        return given
+    if given.name.removesuffix(".toml") not in _EXAMPLES:
+        raise InputError(
+            f"can't read {given}: there is no such file, and {unknown('configuration', str(given), _EXAMPLES)}"
+        )
+    return Path(__file__).with_name(given.name.removesuffix(".toml") + ".toml")
+
+
 def _render(options: argparse.Namespace) -> int:
     workers = len(os.sched_getaffinity(0)) if options.workers is None else options.workers
     if workers < 1 or options.count < 1:
         raise InputError(f"--workers ({workers}) and --count ({options.count}) must be at least 1")
-    configuration = read_sections(SceneConfiguration, options.config, parse_overrides(options.set, _EXAMPLE))
+    configuration = read_sections(
+        SceneConfiguration, _scene_file(options.config), parse_overrides(options.set, _EXAMPLE)
+    )
     find_llvm()
     maps = _maps(options, configuration)
     rooms = () if maps else tuple(HELD_OUT_ROOMS if options.held_out else ROOMS)

@@ -1,10 +1,12 @@
 """The real bundle under a prefix, without network and systemd: installed, run, upgraded, and upgraded badly."""
 
 import os
+import re
 import signal
 import socket
 import subprocess
 import time
+from contextlib import contextmanager
 
 import pytest
 
@@ -105,6 +107,43 @@ def test_it_runs_as_systemd_runs_it(prefix, tmp_path):
         finally:
             process.kill()
             told.close()
+
+
+@contextmanager
+def started(command):
+    """A detector that a printed command starts; stopped at the end."""
+    with subprocess.Popen(command, shell=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield process
+        finally:
+            process.send_signal(signal.SIGTERM)
+            process.stderr.read()
+            assert process.wait(10.0) == 0
+
+
+def test_without_systemd_it_says_how_to_start_it_and_when_to_restart_it(bundle, tmp_path):
+    """As a user types it: no command before it cuts it off from this machine, where the detector runs."""
+    here = Prefix(tmp_path / "prefix", [])
+    said = here.install(changed(bundle, tmp_path / "a", "1-a")).stdout
+    (command,) = re.findall(r"start the detector with (.* run)$", said, re.MULTILINE)
+    assert f"start the detector with {command}" in here.deploy("status").stdout
+    model = here.path / "current" / "etc" / "model.onnx"
+    with started(f"exec {command}"):
+        deadline = time.monotonic() + 60.0
+        while "detector  ok" not in here.deploy("status").stdout:
+            assert time.monotonic() < deadline
+        with socket.socket(socket.AF_UNIX) as reader:
+            reader.connect(str(here.path / "run" / "lines.sock"))
+            assert read_message(reader.makefile().readline())["state"] == "ok"
+        restart = f"stop it, and start it again with {command}"
+        assert restart in here.deploy("model", model).stdout
+        assert restart in here.install(changed(bundle, tmp_path / "b", "2-b")).stdout
+        assert restart in here.deploy("rollback").stdout
+    assert "detector  no reply" in here.deploy("status").stdout
+    taken = subprocess.run(f"{command} --output-unix /nowhere/lines.sock", shell=True, capture_output=True, text=True)
+    assert taken.returncode == 78
+    assert "/nowhere/lines.sock" in taken.stderr
+    assert "--output-unix" in taken.stderr
 
 
 def test_an_upgrade_keeps_what_the_robot_has_changed_and_goes_back(prefix, bundle, tmp_path):

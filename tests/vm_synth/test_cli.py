@@ -29,6 +29,22 @@ def test_config_prints_a_configuration_that_vm_synth_reads(tmp_path, capsys):
     assert "no maps" in line
 
 
+@pytest.mark.parametrize("name", ["polyhaven.toml", "soccer"])
+def test_configurations_of_the_package_have_names_in_any_folder(name, tmp_path, monkeypatch, capsys):
+    (tmp_path / "maps").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert "no maps" in fails(capsys, "out", "--count", 1, "--hdri", "maps", "--config", name)
+    (tmp_path / name).write_text("[cmaera]")  # the user's own file comes first
+    assert "cmaera" in fails(capsys, "out", "--count", 1, "--hdri", "maps", "--config", name)
+
+
+def test_an_unknown_configuration_is_named_with_the_nearest(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    line = fails(capsys, "out", "--count", 1, "--config", "polyhavn.toml")
+    assert "polyhavn.toml" in line
+    assert "did you mean 'polyhaven'" in line
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -25,8 +25,8 @@ from .image_header import MAX_MEGAPIXELS
 MESSAGES = "recording.jsonl"
 """The file with the messages of a recording, one line for each image."""
 
-_BESIDE = ("mask", "coverage")
-"""Pictures of vm-synth that are not frames."""
+_BESIDE = ("mask", "coverage", "lens", "scene")
+"""First parts of the names of files that belong to a frame imageX of vm-synth, and are none."""
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".pgm", ".ppm", ".tif", ".tiff", ".webp")
 
@@ -76,7 +76,8 @@ def open_sources(names: Sequence[str], raw: bool = False, max_megapixels: float 
     With `raw`, images keep the channels of their files. Larger images are not decoded [Mpx]. Raises InputError as
     `open_source` does.
     """
-    paths = [Path(each) for each in names]
+    paths = _without_companions([Path(each) for each in names])
+    names = [each for each in names if Path(each) in paths]
     if len(names) > 1 and all(each.is_file() and each.suffix.lower() in IMAGE_SUFFIXES for each in paths):
         return _images(paths, partial(read_image, raw=raw, max_megapixels=max_megapixels))
     return joined([open_source(each, raw, max_megapixels) for each in names])
@@ -106,11 +107,9 @@ def open_source(name: str, raw: bool = False, max_megapixels: float = MAX_MEGAPI
 def _open(name: str, path: Path, read: Callable[[Path], Image]) -> Source:
     if path.is_dir():
         found = [each for each in path.iterdir() if each.suffix.lower() in IMAGE_SUFFIXES]
-        images = {each.stem for each in found}
-        found = [each for each in found if not _belongs_to_an_image(each, images)]
         if not found:
             raise InputError(f"no images in directory {name} (looked for {', '.join(IMAGE_SUFFIXES)})")
-        return _images(found, read, _recorded_times(path / MESSAGES))
+        return _images(_without_companions(found), read, _recorded_times(path / MESSAGES))
     if path.is_file() and path.suffix.lower() in IMAGE_SUFFIXES:
         return _images([path], read)
     if path.exists() or name.isdigit():
@@ -120,13 +119,19 @@ def _open(name: str, path: Path, read: Callable[[Path], Image]) -> Source:
         found = [Path(each) for each in matches if Path(each).suffix.lower() in IMAGE_SUFFIXES]
         if not found:
             raise InputError(f"no images match {name}")
-        return _images(found, read)
+        return _images(_without_companions(found), read)
     raise InputError(f"no such image, directory, video or camera: {name}")
 
 
-def _belongs_to_an_image(path: Path, stems: set[str]) -> bool:
-    """Whether a file is the maskX or coverageX that vm-synth writes beside imageX; stems: of all images."""
-    return any(f"image{path.stem.removeprefix(each)}" in stems for each in _BESIDE if path.stem.startswith(each))
+def _without_companions(paths: Sequence[Path]) -> list[Path]:
+    """The files without those, such as maskX and lensX, that vm-synth writes beside an imageX among them."""
+    images = {each.parent / each.stem for each in paths}
+
+    def belongs_to_an_image(path: Path) -> bool:
+        stems = (f"image{path.stem.removeprefix(each)}" for each in _BESIDE if path.stem.startswith(each))
+        return any(path.with_name(stem) in images for stem in stems)
+
+    return [each for each in paths if not belongs_to_an_image(each)]
 
 
 def _images(paths: list[Path], read: Callable[[Path], Image], times: Mapping[str, float] | None = None) -> Source:

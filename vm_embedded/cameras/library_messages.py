@@ -1,6 +1,6 @@
-"""The lines that libjpeg prints to standard error while it decodes.
+"""What other libraries print: the lines of libjpeg are collected while it decodes, and OpenCV is silenced.
 
-It reports damage only there: it fills the rest of the picture with gray, and OpenCV reports success.
+libjpeg reports damage only there: it fills the rest of the picture with gray, and OpenCV reports success.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ import re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+import cv2
 
 _STDERR = 2
 
@@ -60,3 +62,12 @@ def _duplicate() -> int | None:
         return os.dup(_STDERR)
     except OSError:
         return None
+
+
+def silence_opencv() -> None:
+    """Make OpenCV and its FFmpeg print nothing: this program reports problems with files and cameras itself."""
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    if hasattr(cv2, "setLogLevel"):  # until OpenCV 4
+        cv2.setLogLevel(0)
+    else:
+        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import math
 import os
 import struct
 import time
@@ -16,7 +17,7 @@ from ..cameras.open_camera import camera_opener
 from ..cameras.opencv import device_path
 from ..errors import VisualMeshError, one_line
 from ..live.configuration import Configuration
-from ..live.control import default_socket_path
+from ..live.control import control_path
 from ..live.load_detector import load_checked_detector
 
 GOOD, WARNING, BAD = "ok", "warning", "failure"
@@ -194,6 +195,8 @@ def pixel_formats(node: Path) -> list[str]:
 def check_lens(configuration: Configuration) -> Finding:
     """Whether the lens fits the image size that the camera is configured for."""
     lens, camera = configuration.lens, configuration.camera
+    if configuration.fov is not None:
+        return Finding("lens", GOOD, f"{math.degrees(configuration.fov):g} degrees wide, without distortion")
     if lens is None:
         return Finding("lens", WARNING, "no lens is configured", "vm-detect --lens FILE, or set lens in vm.toml")
     if lens.lens.size is None:
@@ -240,7 +243,7 @@ def check_clock(source: Path, now: float) -> Finding:
 
 def check_status_socket(configuration: Configuration) -> Finding:
     """Whether the status socket can be created."""
-    path = Path(configuration.status.socket) if configuration.status.socket else default_socket_path()
+    path = control_path(configuration.status.socket)
     if not os.access(path.parent, os.W_OK):
         return Finding("status socket", BAD, f"can't write to {path.parent}", f"sudo install -d -o $USER {path.parent}")
     return Finding("status socket", GOOD, str(path))

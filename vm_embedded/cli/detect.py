@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -13,12 +12,13 @@ from pathlib import Path
 
 import cv2
 
+from ..cameras.library_messages import silence_opencv
 from ..cameras.open_camera import is_live
 from ..cameras.ros.bags import is_bag
 from ..config.toml_writer import to_commented_toml
 from ..errors import InputError, VisualMeshError
 from ..live.configuration import HEADER, Configuration
-from ..live.control import REFUSED, ask, default_socket_path
+from ..live.control import REFUSED, ask, control_path
 from ..live.daemon import EXIT_CONFIGURATION, Daemon
 from ..live.load_detector import load_checked_detector
 from ..live.log import EventLog
@@ -28,7 +28,15 @@ from .program import Parser, program
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
-_FILES_ONLY = ("save_mcap", "save_boxes", "save_overlay", "save_points", "emit_points", "explain")
+_FILES_ONLY = (
+    "save_mcap",
+    "save_boxes",
+    "save_overlay",
+    "save_video",
+    "save_points",
+    "emit_points",
+    "explain",
+)
 """Options that a live camera rejects."""
 
 
@@ -83,6 +91,13 @@ def parser() -> argparse.ArgumentParser:
         "--save-overlay", type=Path, metavar="DIR", help="write each image as NAME.jpg with its detections drawn in"
     )
     output.add_argument(
+        "--save-video",
+        type=Path,
+        metavar="FILE",
+        help="write all frames, with their detections drawn in, as one .mp4, .avi or .webm, at the rate of the video "
+        "that is read, or 10 a second for images",
+    )
+    output.add_argument(
         "--save-points", type=Path, metavar="DIR", help="write NAME.npz with pixels, rays and probabilities"
     )
     output.add_argument(
@@ -115,9 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # A shell turns `--camera *.jpg` into the first file and further ones.
     options.files = [*([options.camera] if options.camera is not None else []), *options.files]
     options.camera = options.files[0] if options.files else None
-    # vm-detect reports problems with files and cameras itself, so OpenCV and FFmpeg stay silent.
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    silence_opencv()
     cv2.setNumThreads(1)  # a frame has a few thousand points: too little work for more
     try:
         return _run(options)
@@ -161,7 +174,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _ask(given: Configuration, command: str) -> int:
     """Send a command to the running detector and print its reply. Fails unless the detector is in state ok."""
-    reply = ask(Path(given.status.socket) if given.status.socket else default_socket_path(), command)
+    reply = ask(control_path(given.status.socket), command)
     if reply.startswith(REFUSED):
         raise InputError(reply.removeprefix(REFUSED))
     try:

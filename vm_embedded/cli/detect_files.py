@@ -6,7 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 from ..arrays import Image
@@ -15,7 +15,7 @@ from ..cameras.ros.bags import BagReading, is_bag, open_bag
 from ..detection.detector import Detector
 from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError
-from ..geometry.lens import Lens
+from ..geometry.lens import Lens, Size
 from ..geometry.lens_files import read_lens_file
 from ..geometry.orientation import Orientation
 from ..live.configuration import Configuration
@@ -23,7 +23,11 @@ from ..output.box_files import BoxWriter
 from ..output.messages import file_message
 from ..output.result_files import make_folder, save_overlay, save_points
 from ..output.ros.mcap_file import McapFile
+from ..output.video_file import VideoFile
 from .progress import ProgressBar
+
+_IMAGES_RATE = 10.0
+"""Frame rate of a video of images [1/s]."""
 
 
 def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
@@ -33,7 +37,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     concern all frames.
     """
     format = given.detector.format
-    pose = _DefaultPose(given.lens.lens if given.lens else None, given.fixed_orientation())
+    pose = _DefaultPose(given, given.fixed_orientation())
     detector = Detector.from_file(given.model, given.detector)
     emit_points = [name.strip() for name in options.emit_points.split(",")] if options.emit_points else []
     for name in emit_points:
@@ -48,12 +52,18 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
 
     processed = 0
     bar = ProgressBar(source.count)
-    with McapFile(options.save_mcap, given.ros.plane_frame) if options.save_mcap else nullcontext() as mcap:
+    with ExitStack() as stack:
+        mcap = None
+        if options.save_mcap is not None:
+            mcap = stack.enter_context(McapFile(options.save_mcap, given.ros.plane_frame))
+        video = None
+        if options.save_video is not None:
+            video = stack.enter_context(VideoFile(options.save_video, source.rate or _IMAGES_RATE))
         for frame in source.frames:
             if follow is not None and frame.index == 0:
                 follow.time(frame)  # without times, no frame can be processed
             try:
-                line = _process(frame, detector, pose, follow, options, emit_points, boxes, mcap)
+                line = _process(frame, detector, pose, follow, options, emit_points, boxes, mcap, video)
             except VisualMeshError as error:
                 bar.clear()
                 complain(str(error))
@@ -64,7 +74,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
             print(line, flush=True)
             processed += 1
             bar.show(frame.index + 1)
-    bar.clear()
+        bar.clear()
     return processed
 
 
@@ -88,20 +98,21 @@ def _open(names: Sequence[str], given: Configuration) -> Source:
 class _DefaultPose:
     """Lens and orientation for frames without a lens file; None if the user gave none."""
 
-    lens: Lens | None
+    given: Configuration
     orientation: Orientation | None
 
-    def of(self, frame: Frame) -> tuple[Lens, Orientation]:
-        """Lens and orientation of a frame; the lens file beside it takes precedence. Raises InputError without one."""
+    def of(self, frame: Frame, size: Size) -> tuple[Lens, Orientation]:
+        """Lens and orientation of a frame of a size [px]; the lens file beside it takes precedence. Raises InputError
+        without one."""
         if frame.lens is not None and frame.orientation is not None:
             return frame.lens, frame.orientation
-        lens, orientation = self.lens, self.orientation
+        lens, orientation = self.given.lens_for(size), self.orientation
         beside = lens_beside(frame.path)
         if beside is not None:
             file = read_lens_file(beside)
             lens, orientation = file.lens, file.orientation or orientation
         if lens is None:
-            raise InputError("no lens: give --lens, or put lensNAME.yaml beside imageNAME")
+            raise InputError("no lens: give --lens or --fov, or put lensNAME.yaml beside imageNAME")
         if orientation is None:
             raise InputError("no orientation: give --height (and --pitch, --roll), or Hoc in the lens file")
         return lens, orientation
@@ -134,6 +145,7 @@ def _process(
     emit_points: Sequence[str],
     boxes: BoxWriter | None,
     mcap: McapFile | None,
+    video: VideoFile | None,
 ) -> str:
     """Detect in a frame, save the files that the options ask for, and return its line of JSON.
 
@@ -141,7 +153,7 @@ def _process(
     """
     image = frame.read()  # its errors name the file
     try:
-        return _detect(image, frame, detector, pose, follow, options, emit_points, boxes, mcap)
+        return _detect(image, frame, detector, pose, follow, options, emit_points, boxes, mcap, video)
     except VisualMeshError as error:
         raise InputError(f"{frame.source}: {error}") from error
 
@@ -156,8 +168,9 @@ def _detect(
     emit_points: Sequence[str],
     boxes: BoxWriter | None,
     mcap: McapFile | None,
+    video: VideoFile | None,
 ) -> str:
-    lens, orientation = pose.of(frame)
+    lens, orientation = pose.of(frame, (image.shape[1], image.shape[0]))
     detections = detector.detect(image, orientation, lens, explain=options.explain or boxes is not None)
     if follow is not None:
         detections = follow.tracker.update(detections, follow.time(frame))
@@ -168,9 +181,11 @@ def _detect(
     if options.save_points is not None:
         save_points(options.save_points, frame, detections)
     if options.save_overlay is not None:
-        save_overlay(options.save_overlay, frame, image, detections)
+        save_overlay(options.save_overlay, frame, detections)
     if mcap is not None:
         mcap.write(frame, image, lens, orientation, detections)
+    if video is not None:
+        video.write(detections.draw())
     return json.dumps(file_message(frame, detections, emit_points, options.explain), allow_nan=False)
 
 

@@ -8,8 +8,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 
-import cv2
-
+from ..cameras.library_messages import silence_opencv
 from ..errors import VisualMeshError
 from .checks import BAD, Finding, run_checks
 from .options import add_live, add_model, add_pose, add_settings, read_options
@@ -38,7 +37,7 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-doctor and return its exit status."""
     options = parser().parse_args(arguments)
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    silence_opencv()
     try:
         configuration = read_options(options)
         worst = EXIT_OK

@@ -12,12 +12,14 @@ from ..cameras.camera import CameraSettings
 from ..cameras.image_files import MESSAGES
 from ..cameras.ros.settings import RosSettings
 from ..detection.settings import Settings
+from ..errors import InputError
 from ..geometry.lens_files import read_lens_file
 from ..live.configuration import (
     Configuration,
     FixedPose,
     StatusSettings,
     TrackSection,
+    checked_fov,
     read_configuration,
     with_overrides,
 )
@@ -62,6 +64,11 @@ def add_pose(parser: argparse.ArgumentParser, description: str) -> None:
         metavar="FILE",
         help="lens file: YAML of the reference or of a calibration, or TOML; its Hoc gives the orientation unless "
         "--height does",
+    )
+    pose.add_argument(
+        "--fov",
+        metavar="ANGLE",
+        help="instead of a lens file: the horizontal angle of view, such as 70deg, of a lens without distortion",
     )
     pose.add_argument(
         "--height",
@@ -133,8 +140,12 @@ def read_options(options: argparse.Namespace) -> Configuration:
     configured = with_overrides(configured, given)
     if options.model is not None:
         configured = replace(configured, model=options.model)
+    if options.lens is not None and options.fov is not None:
+        raise InputError("give --lens or --fov, not both")
     if options.lens is not None:
-        configured = replace(configured, lens=read_lens_file(options.lens))
+        configured = replace(configured, lens=read_lens_file(options.lens), fov=None)
+    if options.fov is not None:
+        configured = replace(configured, fov=checked_fov(options.fov), lens=None)
     return configured
 
 

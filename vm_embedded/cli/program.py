@@ -1,4 +1,4 @@
-"""What all programs share: --version, errors of usage as one line, and a quiet end when their reader leaves."""
+"""What all programs share: --version, completion, errors of usage as one line, and a quiet end when a reader leaves."""
 
 from __future__ import annotations
 
@@ -9,9 +9,20 @@ import sys
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from functools import wraps
+from importlib import metadata
 from typing import Any, NoReturn, ParamSpec
 
 EXIT_OK, EXIT_FAILED = 0, 1
+
+_COMPLETING = "_VM_COMPLETE"
+"""Environment variable with which the shell asks a program for completions of the words so far."""
+
+_BASH = """\
+_vm_complete() {{
+    mapfile -t COMPREPLY < <({variable}=1 "$1" "${{COMP_WORDS[@]:1:COMP_CWORD}}" 2>/dev/null)
+}}
+complete -o default -F _vm_complete {programs}
+"""
 
 P = ParamSpec("P")
 
@@ -19,23 +30,47 @@ P = ParamSpec("P")
 class Parser(argparse.ArgumentParser):
     """A parser of a program's options, or of one of its commands ("vm-train check").
 
-    An error of usage is one line, which names the nearest option, and not the whole usage. Exit status 2.
+    commands: names of the program's commands, for completion. An error of usage is one line, which names the nearest
+    option, and not the whole usage. Exit status 2.
     """
 
-    def __init__(self, **more: Any) -> None:
+    def __init__(self, commands: Sequence[str] = (), **more: Any) -> None:
         super().__init__(**more)
         self._given: Sequence[str] = ()
+        self._commands = commands
         self.add_argument("--version", action="version", version=version(self.prog), help="show the version and exit")
+        if " " not in self.prog:
+            self.add_argument(
+                "--completion",
+                action=PrintCompletion,
+                nargs=0,
+                help='show the script that completes options in bash, for ~/.bashrc: eval "$(vm-detect --completion)"',
+            )
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """As argparse does; it remembers the arguments for an error message."""
         self._given = sys.argv[1:] if args is None else args
+        if is_completing():
+            print("\n".join(self.completions([word for word in self._given if word != "="])))
+            self.exit()
         return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Print what is wrong as one line, and exit with status 2."""
         message = self._unknown_option() or message
         self.exit(2, f"{self.prog}: {' '.join(message.split())}; {self.prog} --help lists the options\n")
+
+    def completions(self, words: Sequence[str]) -> list[str]:
+        """What the last of the words may become: values of an option, options, or commands."""
+        last = words[-1] if words else ""
+        before = self._option_string_actions.get(words[-2]) if len(words) > 1 else None
+        if before is not None and before.nargs != 0:
+            candidates = [str(each) for each in before.choices or ()]
+        elif last.startswith("-"):
+            candidates = [name for name in self._option_string_actions if name.startswith("--")]
+        else:
+            candidates = list(self._commands) if len(words) < 2 else []
+        return [each for each in candidates if each.startswith(last)]
 
     def _unknown_option(self) -> str | None:
         """What is wrong with the first argument that looks like an option but is none; None if all are options."""
@@ -48,6 +83,25 @@ class Parser(argparse.ArgumentParser):
                 near = get_close_matches(name, options, n=1)
                 return f"unknown option {name}" + (f": did you mean {near[0]}?" if near else "")
         return None
+
+
+def is_completing() -> bool:
+    """Whether the shell asks for completions, instead of a user for a result."""
+    return _COMPLETING in os.environ
+
+
+class PrintCompletion(argparse.Action):
+    """The option --completion: prints a script for bash, which asks the programs themselves for completions."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any, **__: Any) -> None:
+        """Print it for all programs that are installed, and exit."""
+        try:
+            scripts = metadata.distribution("vm-embedded").entry_points
+            programs = sorted(each.name for each in scripts if each.group == "console_scripts")
+        except metadata.PackageNotFoundError:
+            programs = [parser.prog]
+        print(_BASH.format(variable=_COMPLETING, programs=" ".join(programs)), end="")
+        parser.exit()
 
 
 def version(program: str) -> str:

@@ -15,10 +15,13 @@ class ProgressBar:
     total: number of steps; None if unknown, and then nothing is shown.
     program: name at the start of each line; None writes no lines where there is no terminal.
     done: number of steps that an earlier run has completed; the time left does not count them.
+
+    Set `note` to what else to show, such as the loss of a training.
     """
 
     def __init__(self, total: int | None, program: str | None = None, done: int = 0) -> None:
         self.done = self._done_before = done
+        self.note = ""
         self._total = total if total and total > 1 else None
         self._program = program
         self._terminal = sys.stderr.isatty()
@@ -59,4 +62,5 @@ class ProgressBar:
 
     def _text(self, total: int) -> str:
         seconds = int((total - self.done) * self.elapsed / max(self.done - self._done_before, 1))
-        return f"{self.done}/{total}, {seconds // 3600}:{seconds // 60 % 60:02d}:{seconds % 60:02d} left"
+        left = f"{seconds // 3600}:{seconds // 60 % 60:02d}:{seconds % 60:02d} left"
+        return ", ".join(filter(None, [f"{self.done}/{total}", left, self.note]))

@@ -54,7 +54,7 @@ def make_workload(options: argparse.Namespace, given: Configuration) -> Workload
     middle = given.fixed_orientation() or Orientation.from_roll_pitch(_HEIGHT, 0.0, _PITCH)
     if abs(sway) >= middle.height:
         raise InputError(f"--sway {sway:g} m moves a camera at {middle.height:g} m below the plane; give a smaller one")
-    image, lens = _image_and_lens(options, given.lens.lens if given.lens else None, given.detector.format)
+    image, lens = _image_and_lens(options, given)
     return Workload(image, lens, middle, swing, sway, walk(middle, swing, sway, options.frames))
 
 
@@ -85,16 +85,23 @@ def draw_empty_field(size: Size, format: str) -> Image:
     return field if format in ("bgr", "rgb") else np.ascontiguousarray(field[:, :, 1])
 
 
-def _image_and_lens(options: argparse.Namespace, lens: Lens | None, format: str) -> tuple[Image, Lens]:
+def _image_and_lens(options: argparse.Namespace, given: Configuration) -> tuple[Image, Lens]:
     """The image to detect in, and its lens: the given one, or a rectilinear one with a wide view."""
+    format = given.detector.format
     if options.image is None:
-        size = _parse_size(options.size) if options.size else (lens.size if lens and lens.size else _SIZE)
-        return draw_empty_field(size, format), lens or Rectilinear(focal_length=0.5 * size[0], fov=2.0)
+        own = given.lens.lens.size if given.lens is not None else None
+        size = _parse_size(options.size) if options.size else (own or _SIZE)
+        return draw_empty_field(size, format), given.lens_for(size) or _wide_lens(size)
     if options.size is not None:
         raise InputError("--size is only for the drawn field; leave it out with --image")
     check_file_format(format)
     image = checked_image(read_image(options.image, raw=format != "bgr"), format)
-    return image, lens or Rectilinear(focal_length=0.5 * image.shape[1], fov=2.0)
+    size = image.shape[1], image.shape[0]
+    return image, given.lens_for(size) or _wide_lens(size)
+
+
+def _wide_lens(size: Size) -> Lens:
+    return Rectilinear(focal_length=0.5 * size[0], fov=2.0)
 
 
 def _parse_size(text: str) -> Size:

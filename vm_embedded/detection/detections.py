@@ -2,81 +2,26 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
-from ..arrays import Floats, Singles
+from ..arrays import AnyImage, Floats, Image, Singles
+from ..errors import InputError, unknown
 from ..field.features import FieldFeatures
+from ..files import atomic_write
 from ..network.manifest import Manifest
+from .detection import Detection
 from .observation import Observation
-from .track import Track
+from .overlay import draw_overlay
 
-
-@dataclass(frozen=True, eq=False)
-class Detection:
-    """One object on the observation plane, or, with a `reason`, a rejected candidate.
-
-    The coordinates are in the plane's frame. Its origin is on the plane below the camera, and z points up. This is the
-    frame that the orientation maps to: the x axis is the direction of yaw 0. Without a yaw, x points where the camera
-    looks.
-
-    class_name: name of its class. confidence: 0 to 1; with a close look its calibrated probability, otherwise the mean
-    probability of the points inside its outline. center (2,) [px]: centroid of its outline. radius [px]: of a disk with
-    the same area as its outline. outline (m, 2) [px]: the part that the lens sees. bearing (3,): unit vector from the
-    camera to its center. position (3,) [m]: its center: where the bearing meets the plane that is parallel to the
-    observation plane, at the height of the object's center. distance [m]: from the camera to this center.
-    angular_radius [rad]: angle from its center to its outline. With a close look, it follows from the size that the
-    close look saw; without one, from the size that fits the points best. distance_by_angle [m]: distance that follows
-    from `angular_radius` and the real radius. distances_agree: whether the apparent size is near the size expected at
-    `distance`, within 20 % with a close look, otherwise within one ring spacing of the mesh. points: number of mesh
-    points inside its outline. reason: why it was rejected, or None. track: of the object over several frames, if a
-    Tracker follows it.
-    """
-
-    class_name: str
-    confidence: float
-    center: Floats
-    radius: float
-    outline: Floats
-    bearing: Floats
-    position: Floats
-    distance: float
-    angular_radius: float
-    distance_by_angle: float
-    distances_agree: bool
-    points: int
-    reason: str | None = None
-    track: Track | None = None
-
-    def __repr__(self) -> str:
-        x, y, z = self.position
-        reason = "" if self.reason is None else f" rejected: {self.reason}"
-        place = f"{self.distance:.2f} m at ({x:.2f}, {y:.2f}, {z:.2f})"
-        return f"<{self.class_name} {self.confidence:.2f} {place}{reason}>"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain numbers for JSON: pixels to 0.1, meters to 0.001."""
-        data: dict[str, Any] = {
-            "class": self.class_name,
-            "confidence": round(self.confidence, 3),
-            "center": [round(float(value), 1) for value in self.center],
-            "radius": round(self.radius, 1),
-            "bearing": [round(float(value), 5) for value in self.bearing],
-            "position": [round(float(value), 3) for value in self.position],
-            "distance": round(self.distance, 3),
-            "angular_radius": round(self.angular_radius, 5),
-            "distance_by_angle": round(self.distance_by_angle, 3),
-            "distances_agree": self.distances_agree,
-            "points": self.points,
-        }
-        if self.reason is not None:
-            data["reason"] = self.reason
-        if self.track is not None:
-            data["track"] = self.track.as_dict()
-        return data
+_PICTURES = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff")
+_JPEG_QUALITY = 92
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +84,36 @@ class Detections:
         data["timing_ms"] = {stage: round(value, 3) for stage, value in self.timing_ms.items()}
         return data
 
+    def to_json(self) -> str:
+        """The same as one line of JSON."""
+        return json.dumps(self.as_dict(), allow_nan=False)
+
+    def draw(self, image: AnyImage | None = None) -> Image:
+        """A BGR copy of an image with the mesh points, objects and features of the field drawn in.
+
+        image: uint8 (height, width[, channels]), BGR, BGRA or gray, of the frame's size; default: the frame itself.
+        Objects have their outline, confidence and distance. Raises InputError for another size or type.
+        """
+        canvas = self.observation.pyramid.bgr() if image is None else _checked_canvas(image, self.observation.view.size)
+        return draw_overlay(canvas, self.observation, self.objects, self.rejected, self.threshold, self.field)
+
+    def save(self, path: str | Path) -> None:
+        """Write the frame with all that was found drawn in (.jpg, .png and others), or the results as JSON (.json).
+
+        Raises InputError for another suffix, or if the file can't be written.
+        """
+        path = Path(path)
+        suffix = path.suffix.lower()
+        if suffix == ".json":
+            content = self.to_json().encode() + b"\n"
+        elif suffix in _PICTURES:
+            encoded = cv2.imencode(suffix, self.draw(), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1]
+            content = encoded.tobytes()
+        else:
+            raise InputError(f"can't write {path}: {unknown('suffix', suffix, (*_PICTURES, '.json'))}")
+        with atomic_write(path) as part:
+            part.write_bytes(content)
+
     @property
     def manifest(self) -> Manifest:
         """What the model file says about the network."""
@@ -164,3 +139,15 @@ class Detections:
         column = self.probabilities[:, self.manifest.column(class_name)]
         chosen = np.flatnonzero(column > self.threshold)
         return ClassPoints(class_name, self.rays[chosen], self.pixels[chosen], column[chosen])
+
+
+def _checked_canvas(image: AnyImage, size: tuple[int, int]) -> Image:
+    """An image to draw into, width and height as given [px]. Raises InputError."""
+    if not isinstance(image, np.ndarray) or image.dtype != np.uint8 or image.ndim not in (2, 3):
+        raise InputError("image must be an array of uint8, (height, width[, channels])")
+    if image.shape[1::-1] != size or (image.ndim == 3 and image.shape[2] not in (1, 3, 4)):
+        raise InputError(
+            f"image must have the size of the frame, {size[0]} x {size[1]} px, and 1, 3 or 4 channels, "
+            f"not the shape {image.shape}"
+        )
+    return image

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..arrays import Image
+from ..arrays import AnyImage
+from ..errors import InputError
 from ..geometry.lens import Lens, Size
 from ..geometry.orientation import Orientation
 from ..network.bundled import model_path
@@ -48,13 +49,16 @@ class Detector:
         """
         return cls(read_model(model_path(path)), settings)
 
-    def detect(self, image: Image, orientation: Orientation, lens: Lens, explain: bool = False) -> Detections:
+    def detect(
+        self, image: AnyImage | None, orientation: Orientation | None, lens: Lens, explain: bool = False
+    ) -> Detections:
         """Find objects in an image. A camera that sees no part of the plane gives no points and no detections.
 
         image: uint8 (height, width[, channels]) in the pixel format of the settings. orientation: of the camera at the
         time of the image. explain: also return the rejected candidates.
 
-        Raises InputError for an image or lens that doesn't fit, GeometryError for a camera too low for the object.
+        Raises InputError without an image or orientation (None is what cv2.imread and a lens file return that have
+        none), and for an image or lens that doesn't fit; GeometryError for a camera too low for the object.
         """
         return self.locate(self.observe(image, orientation, lens), explain)
 
@@ -68,15 +72,17 @@ class Detector:
         """
         return self.cache.prepare_nearby(orientation, lens.for_image(size), size)
 
-    def observe(self, image: Image, orientation: Orientation, lens: Lens) -> Observation:
+    def observe(self, image: AnyImage | None, orientation: Orientation | None, lens: Lens) -> Observation:
         """Classify the mesh points in an image: the first step of `detect`, with the same arguments and errors."""
-        image = checked_image(image, self.settings.format)
-        size = image.shape[1], image.shape[0]
+        frame = checked_image(image, self.settings.format)
+        if orientation is None:
+            raise InputError("there is no orientation but None, which a lens file without Hoc has; see Orientation")
+        size = frame.shape[1], frame.shape[0]
         lens = lens.for_image(size)
         watch = Stopwatch()
         view = self.cache.view(orientation, lens, size)
         watch.lap("mesh")
-        return observe(Pyramid(image, self.settings.format), view, self.manifest, self.session, self.settings, watch)
+        return observe(Pyramid(frame, self.settings.format), view, self.manifest, self.session, self.settings, watch)
 
     def locate(self, observation: Observation, explain: bool = False) -> Detections:
         """Find objects and field features among classified points: the second step of `detect`.

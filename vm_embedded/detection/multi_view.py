@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Floats, Image
+from ..arrays import AnyImage, Floats
 from ..errors import GeometryError, InputError
 from ..geometry.lens import Lens
 from ..geometry.planes import GROUND, Plane, Pose
-from .detections import Detection
+from .detection import Detection
 from .detector import Detector
 from .objects import locate
 from .stopwatch import Stopwatch
@@ -22,10 +22,11 @@ from .stopwatch import Stopwatch
 class CameraView:
     """A camera's picture, its lens and its pose.
 
-    image: uint8, in the detector's pixel format. lens: of the camera. pose: of the camera in the world frame.
+    image: uint8, in the detector's pixel format, as for `Detector.detect`. lens: of the camera. pose: of the camera in
+    the world frame.
     """
 
-    image: Image
+    image: AnyImage | None
     lens: Lens
     pose: Pose
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Floats, Singles
 from .candidates import Candidate, propose
-from .detections import Detection
+from .detection import Detection
 from .fitting import best_scale, fit
 from .judging import judge
 from .looking import Judgment, Look, look_closely

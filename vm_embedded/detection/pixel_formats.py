@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from ..arrays import Image
+from ..arrays import AnyImage, Image
 from ..errors import InputError, unknown
 
 # For each format: its number of channels, and the positions of red, green and blue.
@@ -23,13 +23,17 @@ FORMATS = (*_CHANNELS, "gray", *_BAYER)
 """Pixel formats of a frame."""
 
 
-def checked_image(image: Image, format: str) -> Image:
+def checked_image(image: AnyImage | None, format: str) -> Image:
     """The image, if it has that format: uint8, (height, width, channels), at least 2 x 2 px.
 
     A gray or Bayer image may come without its last axis, and loses it. Raises InputError.
     """
     if format not in FORMATS:
         raise InputError(unknown("pixel format", format, FORMATS))
+    if image is None:
+        raise InputError(
+            "image must be an array of uint8, not NoneType, which cv2.imread returns for a file that it can't read"
+        )
     if not isinstance(image, np.ndarray) or image.dtype != np.uint8:
         kind = image.dtype if isinstance(image, np.ndarray) else type(image).__name__
         raise InputError(f"image must be an array of uint8, not {kind}")

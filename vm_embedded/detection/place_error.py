@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Floats
-from .detections import Detection
+from .detection import Detection
 from .track_settings import TrackSettings
 
 _LEVEL = 1e-3

@@ -25,6 +25,11 @@ class Pyramid:
             self._levels.append(_halved(self._levels[-1]))
         return self._levels[number]
 
+    def bgr(self) -> Image:
+        """The frame as BGR (height, width, 3), or gray (height, width)."""
+        frame = self._levels[0]
+        return frame if frame.ndim == 2 else frame[:, :, self.channels[::-1]]
+
 
 def _halved(image: Image) -> Image:
     """A picture of half the width and height, without the last row or column of an odd number."""

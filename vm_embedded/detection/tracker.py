@@ -14,7 +14,8 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import InputError
 from ..geometry.orientation import rotation_z
-from .detections import Detection, Detections
+from .detection import Detection
+from .detections import Detections
 from .kalman import correct, predict, squared_distances
 from .place_error import place_errors
 from .stopwatch import Stopwatch

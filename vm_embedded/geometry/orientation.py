@@ -106,7 +106,19 @@ class Orientation:
 
     @classmethod
     def from_roll_pitch(cls, height: float, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Orientation:
-        """From angles [rad], R = Rz(yaw) Ry(pitch) Rx(roll). pitch > 0 looks down, roll > 0 tilts to the right."""
+        """From angles [rad], R = Rz(yaw) Ry(pitch) Rx(roll). pitch > 0 looks down, roll > 0 tilts to the right.
+
+        Raises GeometryError for a roll or pitch beyond a full turn, which is probably in degrees, and for angles that
+        are not finite.
+        """
+        for name, angle in (("roll", roll), ("pitch", pitch)):
+            if math.isfinite(angle) and abs(angle) > math.tau:
+                raise GeometryError(
+                    f"{name} of {angle:g} rad is more than a full turn; did you mean {angle:g} degrees, "
+                    f"{name}=math.radians({angle:g})?"
+                )
+        if not (math.isfinite(roll) and math.isfinite(pitch) and math.isfinite(yaw)):
+            raise GeometryError(f"roll, pitch and yaw must be finite numbers, not {roll}, {pitch} and {yaw}")
         cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
         tilt = np.array([[cp, sp * sr, sp * cr], [0.0, cr, -sr], [-sp, cp * sr, cp * cr]])
         return cls(height, rotation_z(yaw) @ tilt)

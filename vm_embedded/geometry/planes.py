@@ -7,7 +7,6 @@ positions of detections, is the camera's foot point: the point of the plane clos
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -79,18 +78,18 @@ class Plane:
         object.__setattr__(self, "offset", offset / length)
 
     @classmethod
-    def through(cls, name: str, point: Sequence[float], normal: Sequence[float]) -> Plane:
+    def through(cls, name: str, point: npt.ArrayLike, normal: npt.ArrayLike) -> Plane:
         """The plane through a point [m] of the world, with this normal. Raises GeometryError."""
         place, direction = _numbers(point), _numbers(normal)
         if place.shape != (3,) or direction.shape != (3,):
             raise GeometryError(
-                f"plane {name!r} needs three numbers for its point and its normal, not {point}, {normal}"
+                f"plane {name!r} needs three numbers for its point and its normal, not {point!r}, {normal!r}"
             )
         x, y, z = direction.tolist()
         return cls(name, (x, y, z), float(place @ direction))
 
     @classmethod
-    def spotlight(cls, name: str, target: Sequence[float], camera: Sequence[float]) -> Plane:
+    def spotlight(cls, name: str, target: npt.ArrayLike, camera: npt.ArrayLike) -> Plane:
         """The plane through the point `target` that faces a camera at the point `camera` [m].
 
         The target is the point of this plane that is closest to the camera, so it is in the middle of the mesh.
@@ -99,7 +98,9 @@ class Plane:
         """
         here, there = _numbers(camera), _numbers(target)
         if here.shape != (3,) or there.shape != (3,):
-            raise GeometryError(f"spotlight {name!r} needs three numbers for target and camera, not {target}, {camera}")
+            raise GeometryError(
+                f"spotlight {name!r} needs three numbers for target and camera, not {target!r}, {camera!r}"
+            )
         toward = here - there
         return cls.through(name, target, toward.tolist())
 

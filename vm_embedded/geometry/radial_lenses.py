@@ -9,7 +9,7 @@ import math
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from ..arrays import Floats, Number
 from ..errors import InputError, unknown
 from .distortion import distort, monotone_radius, undistort
 from .lens import Lens, Size
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # typing has it from Python 3.11 on
 
 _STRONGEST = 1e6
 """Largest k0 [px^-2] and k1 [px^-4]; real lenses stay far below 1."""
@@ -107,6 +110,18 @@ class RadialLens(Lens):
 
 class Rectilinear(RadialLens):
     """r = f tan(theta): straight lines stay straight. Its fov must be below pi."""
+
+    @classmethod
+    def from_horizontal_fov(cls, fov: float, size: Size) -> Rectilinear:
+        """A lens without distortion for images of this size [px], whose width shows the angle fov [rad].
+
+        Raises InputError for an angle outside of (0, pi).
+        """
+        if not 0.0 < fov < math.pi:
+            raise InputError(f"a horizontal angle of view must be above 0 and below pi rad, not {fov}")
+        focal_length = 0.5 * size[0] / math.tan(0.5 * fov)
+        diagonal = 2.0 * math.atan(0.5 * math.hypot(*size) / focal_length)
+        return cls(focal_length=focal_length, fov=diagonal, size=size)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -97,10 +97,9 @@ class Answerer:
 
     def _lens(self, shot: Shot) -> Lens:
         """The shot's own lens, or the configured one. Raises InputError."""
-        configured = self.configuration.lens
-        lens = shot.lens or (configured.lens if configured is not None else None)
+        lens = shot.lens or self.configuration.lens_for((shot.image.shape[1], shot.image.shape[0]))
         if lens is None:
-            raise InputError("no lens: give --lens")
+            raise InputError("no lens: give --lens or --fov")
         return lens
 
     async def _orientation(self, shot: Shot) -> Orientation:
@@ -123,6 +122,6 @@ class Answerer:
             arrived.clear()
             try:
                 await asyncio.wait_for(arrived.wait(), left)
-            except TimeoutError:
+            except asyncio.TimeoutError:
                 break
         return poses.at(shot.captured)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,16 +17,18 @@ from ..cameras.ros.settings import RosSettings
 from ..config.entries import EntryError, check_entries, entry, number, switch, text_line
 from ..config.sections import read_sections
 from ..config.toml_writer import to_commented_toml
-from ..config.units import angle, length
+from ..config.units import angle, length, parse_angle
 from ..detection.settings import Settings
 from ..detection.track_settings import TrackSettings
 from ..errors import InputError, VisualMeshError
+from ..geometry.lens import Lens, Size
 from ..geometry.lens_files import LensFile, lens_from_table, read_lens_file
 from ..geometry.orientation import Orientation
-from ..geometry.radial_lenses import RadialLens
+from ..geometry.radial_lenses import RadialLens, Rectilinear
 from ..network.bundled import DEFAULT, SHIPPED, model_path
+from ..network.model_file import ModelFile
 from ..output.channels import OutputSettings
-from ..output.recorder import RecorderSettings
+from ..output.recorder import CONFIGURATION, RecorderSettings
 from ..poses.settings import PoseSettings
 from ..sockets import checked_address
 from .deploy_settings import DeploySettings
@@ -34,6 +37,8 @@ HEADER = """Configuration of vm-detect. `vm-detect --print-config` prints this f
 Keep only the entries that you change: missing entries have their defaults.
 Each comment gives the meaning of the next entry, its unit in brackets, and its limits."""
 """First comment of a vm.toml that is printed."""
+
+_RECORDED_MODEL = "model.onnx"
 
 
 @dataclass(frozen=True)
@@ -118,6 +123,24 @@ def _read_lens(value: object) -> Path | LensFile:
     return LensFile(lens_from_table(value), None)
 
 
+def checked_fov(value: object) -> float:
+    """A horizontal angle of view [rad] from a number or text in radians, or from text in degrees. Raises InputError."""
+    fov = parse_angle(value, "fov")
+    if not math.radians(1.0) <= fov <= math.radians(150.0):
+        raise InputError(
+            f"fov must be from 1deg to 150deg, not {math.degrees(fov):g}deg: it describes a lens without distortion; "
+            "for a wider lens, give a lens file"
+        )
+    return fov
+
+
+def _commented_fov(value: float | None) -> str:
+    comment = (
+        '# instead of a lens: the horizontal angle of view, in radians or as in "70deg", of a lens without distortion'
+    )
+    return comment + ("\n# fov =" if value is None else f"\nfov = {value!r}")
+
+
 def _commented_lens(value: LensFile | None) -> str:
     comment = (
         "# the lens: a calibration file of the Visual Mesh reference, OpenCV or ROS, or a TOML file; or a table,\n"
@@ -135,10 +158,11 @@ def _commented_lens(value: LensFile | None) -> str:
 
 @dataclass(frozen=True)
 class Configuration:
-    """All sections. model and lens are not sections of entries, so they bring their own reader and writer."""
+    """All sections. model, lens and fov are not sections of entries, so they bring their own reader and writer."""
 
     model: str = field(default=DEFAULT, metadata={"read": _read_model, "to_commented_toml": _commented_model})
     lens: LensFile | None = field(default=None, metadata={"read": _read_lens, "to_commented_toml": _commented_lens})
+    fov: float | None = field(default=None, metadata={"read": checked_fov, "to_commented_toml": _commented_fov})
     orientation: FixedPose = field(default_factory=FixedPose)
     detector: Settings = field(default_factory=Settings)
     track: TrackSection = field(default_factory=TrackSection)
@@ -149,6 +173,12 @@ class Configuration:
     recorder: RecorderSettings = field(default_factory=RecorderSettings)
     ros: RosSettings = field(default_factory=RosSettings)
     deploy: DeploySettings = field(default_factory=DeploySettings)
+
+    def lens_for(self, size: Size) -> Lens | None:
+        """The lens for images of this size [px]: that of the lens file, or the one of fov, or None."""
+        if self.lens is not None:
+            return self.lens.lens
+        return None if self.fov is None else Rectilinear.from_horizontal_fov(self.fov, size)
 
     def fixed_orientation(self) -> Orientation | None:
         """The orientation of section [orientation], or without a height there the one of the lens file, or None.
@@ -163,6 +193,8 @@ def read_configuration(path: str | Path) -> Configuration:
     known one."""
     path = Path(path)
     read = read_sections(Configuration, path)
+    if read.lens is not None and read.fov is not None:
+        raise InputError(f"configuration {path}: give lens or fov, not both")
     try:
         lens: object = read.lens  # the sections leave the path of a lens file here
         if isinstance(lens, Path):
@@ -186,11 +218,13 @@ def with_overrides(configuration: Configuration, sections: Mapping[str, Mapping[
     return replace(configuration, **changed)
 
 
-def recording_toml(configuration: Configuration) -> str:
-    """The vm.toml of a recording: the network, its settings and those of tracks. Raises InputError for an unknown name.
+def recording_files(configuration: Configuration, model: ModelFile) -> dict[str, bytes]:
+    """The files of a recording besides its frames, by name: vm.toml, and the network unless the package has it.
 
-    A network of the package has its name, so that the recording can be used on another machine; others a full path.
+    So a recording can be used on another machine. model: the network that runs.
     """
-    path = model_path(configuration.model).resolve()
-    model = next((name for name in SHIPPED if model_path(name).resolve() == path), str(path))
-    return to_commented_toml(Configuration(model=model, detector=configuration.detector, track=configuration.track))
+    shipped = next((name for name in SHIPPED if model_path(name).resolve() == model.path.resolve()), None)
+    recorded = Configuration(
+        model=shipped or _RECORDED_MODEL, detector=configuration.detector, track=configuration.track
+    )
+    return {CONFIGURATION: to_commented_toml(recorded).encode()} | ({} if shipped else {_RECORDED_MODEL: model.content})

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..errors import InputError
-from ..sockets import BACKLOG, Connections, UnixListener
+from ..sockets import BACKLOG, Connections, UnixListener, runtime_folder
 
 NAME = "vm-detect.sock"
 
@@ -28,13 +28,10 @@ Command = Callable[[], str]
 """Carries out a command and returns the reply."""
 
 
-def default_socket_path() -> Path:
-    """Path of the socket if none is configured: in the runtime folder of systemd or of the user session."""
-    for variable in ("RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"):
-        folder = os.environ.get(variable, "").split(":")[0]
-        if folder:
-            return Path(folder) / NAME
-    return Path(f"/tmp/vm-detect-{os.getuid()}.sock")
+def control_path(configured: str) -> Path:
+    """Path of the socket; configured: [status] socket, or empty."""
+    folder = runtime_folder()
+    return folder / (configured or (NAME if folder != Path("/tmp") else f"vm-detect-{os.getuid()}.sock"))
 
 
 class ControlServer:
@@ -55,7 +52,7 @@ class ControlServer:
         if not self._connections.admit(writer):
             return
         # asyncio logs a traceback for a canceled handler, so suppress that too.
-        with suppress(OSError, ValueError, TimeoutError, asyncio.CancelledError):
+        with suppress(OSError, ValueError, asyncio.TimeoutError, asyncio.CancelledError):
             word = (await asyncio.wait_for(reader.readline(), _TIMEOUT)).decode("ascii", "replace").strip()
             command = self._commands.get(word)
             self._connections.keep(writer)

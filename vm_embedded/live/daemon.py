@@ -15,9 +15,8 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 from typing import Any, Protocol
 
 from ..cameras.camera import without_password
@@ -31,16 +30,15 @@ from ..poses.settings import is_of_ros
 from ..poses.stream import PoseStream
 from .answering import Answer, Answerer
 from .bridge import Bridge
-from .configuration import Configuration, recording_toml
-from .control import REFUSED, ControlServer, default_socket_path
+from .configuration import Configuration, recording_files
+from .control import REFUSED, ControlServer, control_path
 from .counters import Counters
 from .health import Health
-from .http_server import HttpServer, Page, Response
+from .live_page import LivePage
 from .load_detector import load_checked_detector
 from .log import EventLog
 from .prometheus import resident_bytes
 from .reloading import read_again
-from .status_page import StatusPage
 from .systemd import SystemdNotifier
 
 EXIT_OK, EXIT_FAILED, EXIT_HUNG, EXIT_CONFIGURATION = 0, 1, 75, 78
@@ -104,13 +102,13 @@ class Daemon:
         self.grabber = Grabber(opener, camera, self._wake)
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
         self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health)
-        self._recording_toml = recording_toml(configuration)
+        self._recording_files = recording_files(configuration, detector.session.model)
         self.outputs = Channels(configuration.output)
-        self.page = StatusPage(status.picture_fps, self._status)
+        self.page = LivePage(self.answerer, self._status, self.record, self.metrics, self._use_threshold)
         commands = {"status": lambda: json.dumps(self._status(), allow_nan=False)}
         commands |= {"record": self.record, "metrics": self.metrics}
-        control = ControlServer(Path(status.socket) if status.socket else default_socket_path(), commands)
-        self._parts: list[Part] = [self.outputs, self.poses, control, *self._http_servers()]
+        control = ControlServer(control_path(status.socket), commands)
+        self._parts: list[Part] = [self.outputs, self.poses, control, *self.page.servers()]
 
     @property
     def configuration(self) -> Configuration:
@@ -140,6 +138,8 @@ class Daemon:
         self._notifier.send(READY=1)
         camera = without_password(self.configuration.camera.source)
         self._log("ready", model=self.configuration.model, camera=camera)
+        if self.configuration.status.page:
+            self._log("status page", address=self.configuration.status.page, token=self.page.token)
         clock_offset = time.time() - time.monotonic()
         while not (self._stops or self._hung or self._camera_ended()):
             await self._step()
@@ -168,22 +168,13 @@ class Daemon:
             return EXIT_OK, "signal"
         return EXIT_OK if self.counters.outcomes.frames else EXIT_FAILED, "the camera has ended"
 
-    def _http_servers(self) -> Iterator[HttpServer]:
-        status = self.configuration.status
-        metrics: dict[str, Page] = {"/metrics": lambda: Response("text/plain; version=0.0.4", self.metrics().encode())}
-        if status.page:
-            pages: dict[str, Page] = {"/": self.page.page, "/state": self.page.state, "/map": self.page.map, **metrics}
-            yield HttpServer(status.page, pages, {"/stream": self.page.stream})
-        if status.metrics:
-            yield HttpServer(status.metrics, metrics)
-
     def _camera_ended(self) -> bool:
         """Whether the camera has ended and its last shot was taken."""
         return self.grabber.ended and not self.grabber.has_shot
 
     async def _step(self) -> None:
         """Wait for a shot or for one tick, and do all that is due."""
-        with suppress(TimeoutError):
+        with suppress(asyncio.TimeoutError):
             await asyncio.wait_for(self._wakeup.wait(), _TICK)
         self._wakeup.clear()
         self._feed_watchdog()
@@ -213,8 +204,8 @@ class Daemon:
         shot, detections = answer.shot, answer.detections
         self.last = live_message(self.counters.outcomes.frames, self.state, shot, detections, answer.time)
         self._send(self.last, answer)
-        self.page.show(shot.image, detections)
-        self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._recording_toml)
+        self.page.show(answer)
+        self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._recording_files)
 
     def _report_bad_pose(self, reason: str) -> None:
         self.health.add_trouble(time.monotonic(), reason)
@@ -254,6 +245,12 @@ class Daemon:
             "last": self.last,
         }
 
+    def _use_threshold(self, name: str, value: float) -> None:
+        """Let recordings have a threshold that the status page has changed."""
+        self.recorder.clear()  # a recording has one vm.toml
+        self._recording_files = recording_files(self.configuration, self.answerer.detector.session.model)
+        self._log("threshold changed", "warning", **{name: value})
+
     def metrics(self) -> str:
         """All metrics in Prometheus's text format."""
         self._collect_counts()
@@ -269,7 +266,7 @@ class Daemon:
     def record(self) -> str:
         """Start to write a recording of the last seconds; return where it goes, or REFUSED and the reason."""
         try:
-            result = self.recorder.record(self._recording_toml)
+            result = self.recorder.record(self._recording_files)
         except InputError as error:
             self._log("not recorded", "warning", reason=str(error))
             return f"{REFUSED}{error}"
@@ -290,7 +287,7 @@ class Daemon:
             return
         self.recorder.clear()
         self.answerer.reload(new.configuration, new.detector)
-        self._recording_toml = new.recording_toml
+        self._recording_files = new.recording_files
         self._log("reloaded", model=new.configuration.model, needs_restart=new.needs_restart)
 
     def _stop(self) -> None:

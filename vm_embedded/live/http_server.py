@@ -1,21 +1,29 @@
-"""A small HTTP server for the status page, its video stream and the metrics. It supports GET only."""
+"""A small HTTP server for the status page, its video stream and the metrics.
+
+GET reads. POST changes something, and needs a token: in a header, so that no form of another web site can send it.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import hmac
 import os
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from ipaddress import ip_address
+from urllib.parse import parse_qsl
 
-from ..errors import InputError
+from ..errors import InputError, VisualMeshError
 from ..sockets import BACKLOG, Connections, UnixListener, parse_address
 
 _TIMEOUT = 5.0
 """How long a browser may take to send its request, and to receive each part of the response [s]."""
 
 _MOST_STREAMS = 16
+
+_ENDINGS = (OSError, ValueError, EOFError, asyncio.LimitOverrunError, asyncio.TimeoutError, asyncio.CancelledError)
+"""How a connection may end early. Until Python 3.10, the time-out of asyncio is another error than TimeoutError."""
 
 
 @dataclass(frozen=True)
@@ -27,18 +35,31 @@ class Response:
 
 
 Write = Callable[[bytes], Awaitable[None]]
-Page = Callable[[], Awaitable[Response] | Response]
+Query = Mapping[str, str]
+"""What follows the question mark of an address."""
+
+Page = Callable[[Query], Awaitable[Response] | Response]
+"""Returns a page, or carries out an action. Raises VisualMeshError for a wrong query."""
+
 Stream = Callable[[Write], Awaitable[None]]
 
 
 class HttpServer:
     """Serves pages, and streams that last as long as the browser is connected.
 
-    where: ADDRESS:PORT or unix:PATH.
+    where: ADDRESS:PORT or unix:PATH. actions: what POST carries out, by path, if the header X-Token holds the token.
     """
 
-    def __init__(self, where: str, pages: Mapping[str, Page], streams: Mapping[str, Stream] | None = None) -> None:
-        self._where, self._pages, self._streams = where, pages, streams or {}
+    def __init__(
+        self,
+        where: str,
+        pages: Mapping[str, Page],
+        streams: Mapping[str, Stream] | None = None,
+        actions: Mapping[str, Page] | None = None,
+        token: str = "",
+    ) -> None:
+        self._where, self._pages, self._streams, self._actions = where, pages, streams or {}, actions or {}
+        self._token = token
         self._file: UnixListener | None = None
         self._server: asyncio.Server | None = None
         self._tasks: set[asyncio.Task[None]] = set()
@@ -69,7 +90,7 @@ class HttpServer:
         self._tasks.add(task)
         try:
             # asyncio logs a traceback for a canceled handler, so suppress that too.
-            with suppress(OSError, ValueError, EOFError, asyncio.LimitOverrunError, asyncio.CancelledError):
+            with suppress(*_ENDINGS):
                 head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _TIMEOUT)
                 self._connections.keep(writer)
                 await self._respond(head.decode("latin-1").split("\r\n"), writer)
@@ -84,14 +105,20 @@ class HttpServer:
             await asyncio.wait_for(writer.drain(), _TIMEOUT)
 
         method, path, *_ = [*head[0].split(" "), "", ""]
-        path = path.partition("?")[0]
-        if method != "GET":
+        path, _, text = path.partition("?")
+        query = dict(parse_qsl(text))
+        if method != "GET" and not (method == "POST" and path in self._actions):
             await write(_encode("405 Method Not Allowed", Response("text/plain", b"only GET is supported\n")))
         elif self._file is None and not _has_numeric_host(head):
             await write(_encode("403 Forbidden", Response("text/plain", b"use the IP address, not a host name\n")))
+        elif method == "POST":
+            given = _header(head, "x-token") or ""
+            if self._token and hmac.compare_digest(given.encode(), self._token.encode()):
+                await write(await _answer(self._actions[path], query))
+            else:
+                await write(_encode("403 Forbidden", Response("text/plain", b"wrong token; see the log\n")))
         elif path in self._pages:
-            response = self._pages[path]()
-            await write(_encode("200 OK", response if isinstance(response, Response) else await response))
+            await write(await _answer(self._pages[path], query))
         elif path in self._streams and self._streaming < _MOST_STREAMS:
             self._streaming += 1
             try:
@@ -112,10 +139,25 @@ class HttpServer:
             self._file.close()
 
 
+async def _answer(page: Page, query: Query) -> bytes:
+    """The response of a page or action; a wrong query gives status 400 with the reason."""
+    try:
+        response = page(query)
+        return _encode("200 OK", response if isinstance(response, Response) else await response)
+    except VisualMeshError as error:
+        return _encode("400 Bad Request", Response("text/plain; charset=utf-8", f"{error}\n".encode()))
+
+
+def _header(head: list[str], name: str) -> str | None:
+    """The value of the first header of a name in lower case."""
+    values = [line.partition(":")[2].strip() for line in head[1:] if line.lower().startswith(f"{name}:")]
+    return values[0] if values else None
+
+
 def _has_numeric_host(head: list[str]) -> bool:
     """Whether a request without or with a header Host is allowed, see is_numeric_host."""
-    hosts = [line.partition(":")[2].strip() for line in head[1:] if line.lower().startswith("host:")]
-    return not hosts or is_numeric_host(hosts[0])
+    host = _header(head, "host")
+    return host is None or is_numeric_host(host)
 
 
 def is_numeric_host(host: str) -> bool:

@@ -22,8 +22,8 @@ def load_checked_detector(configuration: Configuration) -> Detector:
     if configuration.recorder.trigger_class:
         detector.manifest.column(configuration.recorder.trigger_class)
     if is_live(camera) and not brings_lens_and_pose(camera):
-        if configuration.lens is None:
-            raise InputError(f"camera {without_password(camera)} needs a lens: give --lens")
+        if configuration.lens is None and configuration.fov is None:
+            raise InputError(f"camera {without_password(camera)} needs a lens: give --lens or --fov")
         if configuration.pose.source == "fixed" and orientation is None:
             raise InputError(
                 f"camera {without_password(camera)} needs poses: give --height, --pose-source, or Hoc in the lens file"

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from ..detection.detector import Detector
-from .configuration import Configuration, recording_toml
+from .configuration import Configuration, recording_files
 from .load_detector import load_checked_detector
 
 _NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder", "ros")
@@ -17,13 +17,13 @@ _NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder", "ros")
 class Reloaded:
     """The parts of a daemon that a reload replaces.
 
-    recording_toml: the vm.toml of recordings. needs_restart: names of the changed sections and entries that only a
-    restart applies; the configuration has their old values.
+    recording_files: the files of a recording besides its frames. needs_restart: names of the changed sections and
+    entries that only a restart applies; the configuration has their old values.
     """
 
     configuration: Configuration
     detector: Detector
-    recording_toml: str
+    recording_files: dict[str, bytes]
     needs_restart: list[str]
 
 
@@ -38,4 +38,5 @@ def read_again(configure: Callable[[], Configuration], running: Configuration) -
     needs_restart = [name for name, section in kept.items() if section != getattr(wanted, name)]
     if wanted.detector.format != running.detector.format:
         needs_restart.append("detector.format")
-    return Reloaded(replace(configuration, **kept), detector, recording_toml(configuration), needs_restart)
+    files = recording_files(configuration, detector.session.model)
+    return Reloaded(replace(configuration, **kept), detector, files, needs_restart)

@@ -40,7 +40,11 @@ class OutputSettings:
         "UDP receivers, one datagram per line: ADDRESS:PORT, separated by commas",
         example=_UDP_EXAMPLE,
     )
-    unix: str = text_line("", "Unix socket to create; each reader gets every line")
+    unix: str = text_line(
+        "",
+        "Unix socket to create; each reader gets every line; a relative path is in $RUNTIME_DIRECTORY, "
+        "$XDG_RUNTIME_DIR or /tmp",
+    )
     format: str = one_of(FORMATS, "json", "json, or ros for the field names of vision_msgs and geometry_msgs in ROS 2")
     unix_format: str = one_of(
         UNIX_FORMATS, "lines", "messages of the Unix socket: lines in the format above, or the compact binary form"

@@ -1,8 +1,8 @@
 """The recorder: it keeps the last seconds in memory and writes them to disk on request.
 
 A recording is a folder that vm-detect --camera reads like any folder of images. It holds lossless images, each with a
-lens file for lens and pose; vm.toml with the network and the settings; and recording.jsonl with the messages. Running
-the detector on a recording gives the same detections to the last bit.
+lens file for lens and pose; vm.toml with the settings; the network, unless it comes with the package; and
+recording.jsonl with the messages. Running the detector on a recording gives the same detections to the last bit.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import shutil
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -84,10 +84,10 @@ class Recorder:
         self._writer: threading.Thread | None = None
         self._last_trigger = -float("inf")  # when a class last triggered a recording [s]
 
-    def keep(self, moment: Moment, configuration: str) -> None:
+    def keep(self, moment: Moment, files: Mapping[str, bytes]) -> None:
         """Keep a moment and drop those that are too old. Record if the trigger class was detected.
 
-        configuration: text of the vm.toml of a recording.
+        files: those of a recording besides its frames, by name: vm.toml and a model.
         """
         if not self.settings.folder:
             return
@@ -104,12 +104,12 @@ class Recorder:
             if now - self._last_trigger >= self.settings.pause:
                 self._last_trigger = now
                 with suppress(InputError):
-                    self.record(configuration)
+                    self.record(files)
 
-    def record(self, configuration: str) -> str:
+    def record(self, files: Mapping[str, bytes]) -> str:
         """Start to write the kept moments, and return a line that says so. Raises InputError if it can't start.
 
-        configuration: text of the recording's vm.toml.
+        files: as for `keep`.
         """
         if not self.settings.folder:
             raise InputError("recording is off: set [recorder] folder")
@@ -121,12 +121,12 @@ class Recorder:
         name = f"{time.strftime('%Y-%m-%dT%H-%M-%S', time.localtime(now))}.{int(1e3 * now) % 1000:03d}"
         folder = Path(self.settings.folder) / name
         moments = list(self._moments)
-        arguments = (folder, moments, configuration)
+        arguments = (folder, moments, files)
         self._writer = threading.Thread(target=self._write, args=arguments, name="recorder", daemon=True)
         self._writer.start()
         return f"recording {len(moments)} frames to {folder}"
 
-    def _write(self, folder: Path, moments: Sequence[Moment], configuration: str) -> None:
+    def _write(self, folder: Path, moments: Sequence[Moment], files: Mapping[str, bytes]) -> None:
         """Write a recording. If it can't be completed, keep the frames that were written.
 
         Each frame's message follows its files at once, so vm-detect reads even the folder of a process that was killed.
@@ -135,7 +135,8 @@ class Recorder:
         written, trouble = 0, ""
         try:
             part.mkdir(parents=True)
-            (part / CONFIGURATION).write_text(configuration, encoding="utf-8")
+            for name, content in files.items():
+                (part / name).write_bytes(content)
             with (part / MESSAGES).open("wb") as messages:
                 for written, nbytes in enumerate(self._write_moments(part, moments), start=1):
                     messages.write(to_json_line(moments[written - 1].message))

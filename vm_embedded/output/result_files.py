@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 
-from ..arrays import Image
 from ..cameras.image_files import Frame
 from ..detection.detections import Detections
 from ..errors import InputError
 from ..files import atomic_write
-from .overlay import draw_overlay
 
 
 def save_points(folder: Path, frame: Frame, detections: Detections) -> Path:
@@ -23,12 +20,10 @@ def save_points(folder: Path, frame: Frame, detections: Detections) -> Path:
     return path
 
 
-def save_overlay(folder: Path, frame: Frame, image: Image, detections: Detections) -> Path:
+def save_overlay(folder: Path, frame: Frame, detections: Detections) -> Path:
     """Write NAME.jpg: the image with mesh points and detections drawn in."""
     path = folder / f"{frame_name(frame)}.jpg"
-    _, content = cv2.imencode(".jpg", draw_overlay(image, detections), [cv2.IMWRITE_JPEG_QUALITY, 92])
-    with atomic_write(path) as part:
-        part.write_bytes(content.tobytes())
+    detections.save(path)
     return path
 
 

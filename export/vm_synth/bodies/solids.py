@@ -7,13 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vm_embedded.arrays import Floats, Indices, Mask, Singles
 
 from .paints import Paint
+
+if TYPE_CHECKING:
+    from typing_extensions import Self  # typing has it from Python 3.11 on
 
 LABELS = ("goal", "environment", "robot", "ball")
 """The classes of bodies; ball is that of the object to detect, also if it is not a ball."""

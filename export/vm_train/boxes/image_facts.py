@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import ExifTags
-from PIL import Image as Pillow
 
 from vm_embedded.arrays import Image
 from vm_embedded.cameras.decoding import decode
@@ -72,6 +70,9 @@ def _content(path: Path) -> bytes:
 
 def _orientation(path: Path) -> int:
     """The EXIF orientation of an image that OpenCV can read; 1 if Pillow finds none."""
+    from PIL import ExifTags
+    from PIL import Image as Pillow
+
     try:
         with Pillow.open(path) as image:
             found = image.getexif().get(ExifTags.Base.Orientation, UPRIGHT)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from vm_embedded.errors import InputError, one_line
 
 from .folder_files import FolderFiles, read_text
@@ -40,6 +38,8 @@ def read_names(files: FolderFiles) -> tuple[str, ...] | None:
 
 
 def _read(path: Path) -> tuple[str, ...]:
+    import yaml  # only training has it
+
     try:
         text = read_text(path)
         if path.suffix.lower() in (".yaml", ".yml"):

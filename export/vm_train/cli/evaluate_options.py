@@ -21,6 +21,7 @@ Exit status: 0 files written, 1 error (see standard error), 2 wrong usage, 130 i
 def parser() -> argparse.ArgumentParser:
     """The options of vm-evaluate MODEL DATA."""
     made = Parser(
+        commands=("points",),
         prog="vm-evaluate",
         description="Evaluate a network on pictures with masks. Write scores of points and of objects, by distance, as "
         "JSON, CSV, plots and one HTML page.",

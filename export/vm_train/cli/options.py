@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 
 from vm_embedded.cli.program import Parser
@@ -42,6 +43,7 @@ Exit status: 0 success, 1 failure (standard error tells why), 2 wrong usage, 130
 def parser() -> argparse.ArgumentParser:
     """The options of vm-train DATA."""
     made = Parser(
+        commands=tuple(re.findall(r"^  vm-train (\S+)", _EPILOG, re.MULTILINE)),
         prog="vm-train",
         description="Train a network on a folder of pictures with masks, lenses and poses. It first checks all "
         "pictures. You can stop or kill it at any time: vm-train resume continues. With one thread on a CPU, the final "

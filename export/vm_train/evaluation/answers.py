@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from vm_embedded.arrays import Floats, Mask, Singles
-from vm_embedded.detection.detections import Detection
+from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.field_points import locate_features
 from vm_embedded.detection.objects import locate

@@ -53,8 +53,7 @@ def write_evaluation(
     if points_on_object is not None:
         figures["points_on_object"] = points_on_object
     for name, each in figures.items():
-        for suffix in (".png", ".svg"):
-            save_figure(each, out / "plots" / f"{name}{suffix}")
+        save_figure(each, out / "plots" / f"{name}.svg")
     images = {name: (out / "plots" / f"{name}.svg").read_bytes() for name in figures}
     texts["report.html"] = page(scores, images, _strips(evaluation))
     for file_name, text in texts.items():
@@ -63,8 +62,7 @@ def write_evaluation(
     for stale in {f"{name}.csv" for name in _TABLES}.difference(texts):
         (out / stale).unlink(missing_ok=True)
     for stale in set(_PLOTS).difference(figures):
-        for suffix in (".png", ".svg"):
-            (out / "plots" / f"{stale}{suffix}").unlink(missing_ok=True)
+        (out / "plots" / f"{stale}.svg").unlink(missing_ok=True)
     return scores
 
 

@@ -15,8 +15,9 @@ from ..data.picture_files import PictureFiles
 from .answers import Subject, load_subject
 from .evaluation import Evaluation, Rules, evaluate_pictures
 
-_CHUNK = 32
-"""Pictures that a worker evaluates at a time. Adding up two results costs about as much as one picture."""
+_FEWEST, _CHUNK = 16, 32
+"""Pictures that a worker evaluates at a time. Adding up two results costs about as much as one picture, and starting a
+worker as much as about ten: it loads the network and its libraries."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ def evaluate(
     report: is called after each picture. Raises the errors of `evaluate_pictures`, and VisualMeshError if a worker was
     killed.
     """
-    size = min(_CHUNK, max(-(-len(pictures) // workers), 1))
+    size = min(_CHUNK, max(-(-len(pictures) // workers), _FEWEST))
     chunks = [pictures[start : start + size] for start in range(0, len(pictures), size)]
     result = Evaluation.empty(subject, job.rules)
     for part, chunk in zip(_parts(job, subject, chunks, workers), chunks, strict=True):

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Mask, Singles
-from vm_embedded.detection.detections import Detection
+from vm_embedded.detection.detection import Detection
 
 from ..data.picture_files import PictureFiles
 from ..scores.object_scores import Mistakes

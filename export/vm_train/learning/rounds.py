@@ -132,6 +132,8 @@ class _Round:
         self._scores = PointScores(self._classes)
         self._bar = ProgressBar(trainer.total, "vm-train", trainer.done)
         self._saved = perf_counter()
+        self._losses: list[float] = []  # of the steps of this epoch
+        self._score = ""  # of the last validation, for the bar
 
     def process(self, batch: Batch, graphs: Sequence[LabeledGraph]) -> None:
         """Learn from this process's part of a batch, or score it for the validation."""
@@ -143,6 +145,8 @@ class _Round:
         else:
             step = self._trainer.step(batch.items, graphs)
             self._log.write(step.number, {"loss": step.loss, "points": step.points, "rate": step.rate})
+            self._losses.append(step.loss)
+            self._bar.note = f"epoch {batch.epoch + 1}, loss {np.mean(self._losses):.3f}{self._score}"
             self._bar.advance()
 
     def is_out_of_patience(self, batch: Batch) -> bool:
@@ -188,8 +192,22 @@ class _Round:
         self._warn_if_unseen(known, objects)
         record = {"epoch": self._progress.validated, "score": score, "average_precision": known}
         self._log.write(self._trainer.done, record)
-        if score > self._progress.best:
+        is_best = score > self._progress.best
+        self._report(score, is_best)
+        if is_best:
             self._keep(score)
+
+    def _report(self, score: float, is_best: bool) -> None:
+        """Print the loss and the score of an epoch: a long training shows at once whether it learns."""
+        self._bar.clear()
+        self._score = f", score {score:.3f}"
+        loss = f"loss {np.mean(self._losses):.3f}, " if self._losses else ""  # none after a stop before a validation
+        self._losses.clear()
+        if self._hardware.is_leader:
+            recipe, best = self._run.configuration.training, ", the best so far" if is_best else ""
+            prefix = f"round {self._progress.round}, " if recipe.trainings > 1 else ""
+            epoch = f"epoch {self._progress.validated} of {recipe.epochs}"
+            print(f"{prefix}{epoch}: {loss}score {score:.3f}{best}", flush=True)
 
     def _warn_if_unseen(self, known: dict[str, float], objects: Sequence[str]) -> None:
         """After the first validation, warn if its pictures show none of the classes that are objects."""

@@ -148,6 +148,7 @@ class _Stage:
             step = self._trainer.step()
             losses = {"loss": step.presence + step.place, "presence": step.presence, "place": step.place}
             log.write(step.number, losses | {"rate": step.rate})
+            self._bar.note = f"epoch {epoch + 1}, loss {losses['loss']:.3f}"
             self._bar.advance()
             if stop_requested():
                 self._bar.clear()

@@ -1,9 +1,11 @@
 """vm-detect on images and videos, and what goes wrong with them."""
 
 import json
+import math
 import os
 import shutil
 import subprocess
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -13,6 +15,7 @@ from tests.drawn_scenes import FOLDER, IMAGES, MODEL, TRUTH
 
 from .commands import COMMAND, detect, lines, one_complaint, run
 
+DEMO = Path(__file__).parents[2] / "fixtures" / "demo" / "image0000002.jpg"
 STAGES = ["mesh", "project", "sample", "infer", "cluster", "field", "total"]
 
 
@@ -82,10 +85,13 @@ def test_of_several_sources_none_may_be_live():
     one_complaint(run("synthetic", IMAGES[0], code=1), "only one live camera")
 
 
-def test_the_other_pictures_of_a_set_of_vm_synth_are_no_frames(folder):
+@pytest.mark.parametrize("source", [".", "'*'", "*"])
+def test_the_other_files_of_a_set_of_vm_synth_are_no_frames(source, folder):
     for name in ("mask0000000.png", "coverage0000000.png"):
         cv2.imwrite(str(folder / name), np.zeros((512, 640), np.uint8))
-    done = detect(folder)
+    (folder / "scene0000000.json").write_text("{}")
+    shell = f"{COMMAND} --model {MODEL} {source}"
+    done = subprocess.run(shell, shell=True, cwd=folder, capture_output=True, text=True, check=False)
     assert [line["source"] for line in lines(done)] == [each.name for each in IMAGES[:2]]
     assert done.stderr == ""
 
@@ -153,6 +159,77 @@ def test_overlays_are_pictures_of_the_frame_s_size(tmp_path):
     drawn, frame = cv2.imread(str(tmp_path / IMAGES[0].name)), cv2.imread(str(IMAGES[0]))
     assert drawn.shape == frame.shape
     assert (np.abs(drawn.astype(int) - frame).max(axis=2) > 60).sum() > 500
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".avi", ".webm"])
+def test_a_video_has_every_frame_with_what_was_found(suffix, folder, tmp_path):
+    path = tmp_path / f"found{suffix}"
+    path.write_text("an older file")
+    detect(folder, "--save-video", path, "--save-overlay", tmp_path)
+    capture = cv2.VideoCapture(str(path))
+    assert capture.get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
+    for each in IMAGES[:2]:
+        seen, drawn = capture.read()[1], cv2.imread(str(tmp_path / each.name))
+        plain = cv2.imread(str(each))
+        difference = np.abs(seen.astype(int) - drawn).mean()
+        assert difference < min(12.0, np.abs(plain.astype(int) - drawn).mean() + 8.0)
+        assert seen.shape == plain.shape
+    assert not capture.read()[0]
+    assert sorted(each.name for each in tmp_path.iterdir() if each.suffix == suffix) == [path.name]
+
+
+def test_a_video_of_a_video_has_its_rate(tmp_path, lens):
+    path = tmp_path / "clip.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 25.0, (640, 512))
+    for _ in range(3):
+        writer.write(cv2.imread(str(IMAGES[0])))
+    writer.release()
+    detect(path, "--lens", lens, "--height", 0.8, "--pitch", "30deg", "--save-video", tmp_path / "found.mp4")
+    assert cv2.VideoCapture(str(tmp_path / "found.mp4")).get(cv2.CAP_PROP_FPS) == pytest.approx(25.0)
+
+
+def test_a_video_that_can_not_be_written_is_named(folder, tmp_path):
+    one_complaint(detect(folder, "--save-video", tmp_path / "a.mp", code=1), "a.mp", "did you mean '.mp4'")
+    one_complaint(detect(folder, "--save-video", tmp_path / "nowhere" / "a.mp4", code=1), "no folder")
+    small = cv2.resize(cv2.imread(str(IMAGES[1])), (320, 256))
+    cv2.imwrite(str(folder / IMAGES[1].name), small)
+    done = detect(folder, "--save-video", tmp_path / "a.mp4")
+    one_complaint(done, IMAGES[1].name, "320 x 256 px", "640 x 512 px")
+    assert len(lines(done)) == 1
+
+
+def test_a_photo_needs_no_lens_file(tmp_path):
+    """The same as with the lens file of such a lens."""
+    shutil.copy(DEMO, tmp_path / "photo.jpg")
+    pose = ("--height", 0.6, "--pitch", "20deg")
+    found = lines(run(tmp_path / "photo.jpg", "--fov", "70deg", *pose))
+    height, width = cv2.imread(str(DEMO)).shape[:2]
+    focal_length = 0.5 * width / math.tan(math.radians(35.0))
+    fov = 2.0 * math.atan(0.5 * math.hypot(width, height) / focal_length)
+    lens = tmp_path / "lens.toml"
+    lens.write_text(f'projection = "rectilinear"\nfocal_length = {focal_length!r}\nfov = {fov!r}\n')
+    again = lines(run(tmp_path / "photo.jpg", "--lens", lens, *pose))
+    configured = tmp_path / "vm.toml"
+    configured.write_text('fov = "70deg"\n[orientation]\nheight = 0.6\npitch = "20deg"\n')
+    third = lines(run(tmp_path / "photo.jpg", "--config", configured))
+    assert found[0]["points"] > 100
+    assert [found[0][name] for name in ("points", "detections")] == [
+        again[0][name] for name in ("points", "detections")
+    ]
+    assert [found[0][name] for name in ("points", "detections")] == [
+        third[0][name] for name in ("points", "detections")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("fov", "said"), [("70", "70deg"), ("170deg", "150deg"), ("0", "1deg"), ("wide", "angle"), ("nan", "angle")]
+)
+def test_impossible_angles_of_view_are_refused(fov, said, tmp_path):
+    one_complaint(run(IMAGES[0], "--fov", fov, "--height", 0.6, code=1), said)
+
+
+def test_a_lens_and_an_angle_of_view_are_one_too_many(lens):
+    one_complaint(run(IMAGES[0], "--fov", "70deg", "--lens", lens, code=1), "not both")
 
 
 def test_class_points_come_on_request():

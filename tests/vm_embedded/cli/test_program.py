@@ -1,20 +1,20 @@
 """What all programs share, as a user meets it: --version, mistyped options, and a reader that leaves."""
 
+import os
 import re
+import shlex
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
 
 import vm_embedded
+from vm_embedded.config.toml_reader import parse_toml
 
 TOP = Path(__file__).parents[3]
 BIN = Path(sys.executable).parent
-PROGRAMS = sorted(
-    set(tomllib.loads((TOP / "pyproject.toml").read_text())["project"]["scripts"]) - {"vm-label", "vm-synth"}
-)
+PROGRAMS = sorted(parse_toml((TOP / "pyproject.toml").read_text())["project"]["scripts"])
 
 
 def run(program, *arguments, **more):
@@ -39,6 +39,9 @@ def test_a_program_prints_its_version(program):
         ("vm-train check data", "--jsom", "--json"),
         ("vm-evaluate model.pt", "--outptu", "--output"),
         ("vm-mesh show", "--veiw", "--view"),
+        ("vm-label boxes", "--wirte", "--write"),
+        ("vm-synth out", "--cuont", "--count"),
+        ("vm-synth check out", "--jsom", "--json"),
         ("vm-calibrate lens clip.avi", "--ouput", "--output"),
         ("vm-ros", "--ros-imge", "--ros-image"),
     ],
@@ -51,6 +54,42 @@ def test_a_mistyped_option_is_one_line_with_the_nearest(command, mistyped, meant
     assert f"unknown option {mistyped.partition('=')[0]}: did you mean {meant}?" in line
     suggested = re.search(r"; (vm-.*) --help lists the options", line)[1]
     assert run(*suggested.split(), "--help").returncode == 0
+
+
+def completed(line, folder):
+    """What bash offers at the end of a line, after what a user has in ~/.bashrc. Empty: it completes names of files."""
+    words = shlex.split(line) + ([""] if line.endswith(" ") else [])
+    script = f"""
+    eval "$(vm-detect --completion)"
+    COMP_WORDS=({shlex.join(words)}) COMP_CWORD={len(words) - 1}
+    handler=$(complete -p {words[0]} | sed 's/.*-F \\([^ ]*\\) .*/\\1/')
+    $handler {words[0]}
+    printf '%s\\n' "${{COMPREPLY[@]}}"
+    """
+    environment = {**os.environ, "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
+    command = ["bash", "--norc", "-c", script]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True, timeout=60)
+    assert done.stderr == ""
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("vm-detect --save-v", ["--save-video"]),
+        ("vm-detect photo.jpg --form", ["--format"]),
+        ("vm-detect --output-unix-format ", ["lines", "binary"]),
+        ("vm-detect pho", []),
+        ("vm-doctor --js", ["--json"]),
+        ("vm-mesh sh", ["show"]),
+        ("vm-mesh show --vi", ["--view"]),
+        ("vm-synth pre", ["preview"]),
+        ("vm-train look-", ["look-config"]),
+        ("vm-calibrate l", ["lens"]),
+    ],
+)
+def test_bash_completes_options_values_and_commands(line, offered, tmp_path):
+    assert completed(line, tmp_path) == offered
 
 
 def test_an_option_like_no_other_is_named():

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.vm_embedded.detection.views import observation_of, view_at
-from vm_embedded.detection.detections import Detection, Detections
+from vm_embedded.detection.detection import Detection
+from vm_embedded.detection.detections import Detections
 
 HEIGHT, RADIUS = 0.8, 0.1
 """Height of the camera and radius of the ball [m]."""

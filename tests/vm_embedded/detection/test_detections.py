@@ -6,7 +6,9 @@ import cv2
 import pytest
 
 from tests.drawn_scenes import IMAGES, MODEL
-from vm_embedded import Detector, draw_overlay, read_lens_file
+from vm_embedded import Detector, InputError, Settings, read_lens_file
+
+LENS = IMAGES[0].with_name(IMAGES[0].name.replace("image", "lens")).with_suffix(".yaml")
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +18,7 @@ def image():
 
 @pytest.fixture(scope="module")
 def detections(image):
-    camera = read_lens_file(IMAGES[0].with_name(IMAGES[0].name.replace("image", "lens")).with_suffix(".yaml"))
+    camera = read_lens_file(LENS)
     return Detector.from_file(MODEL).detect(image, camera.orientation, camera.lens, explain=True)
 
 
@@ -37,7 +39,43 @@ def test_detections_as_json_are_those_of_vm_detect(detections):
 
 
 def test_detections_are_drawn_and_saved(image, detections, tmp_path):
-    drawn = draw_overlay(image, detections)
+    before = image.copy()
+    drawn = detections.draw(image)
     assert drawn.shape == image.shape
     assert (drawn != image).any()
-    assert cv2.imwrite(str(tmp_path / "found.jpg"), drawn)
+    assert (image == before).all()
+    assert (detections.draw() == drawn).all()
+    detections.save(tmp_path / "found.png")
+    assert (cv2.imread(str(tmp_path / "found.png")) == drawn).all()
+    detections.save(str(tmp_path / "found.json"))
+    assert json.loads((tmp_path / "found.json").read_text()) == json.loads(detections.to_json()) == detections.as_dict()
+
+
+def test_what_can_not_be_drawn_or_saved_is_refused(image, detections, tmp_path):
+    for wrong in (image[1:], image.astype("float32"), image[:, :, :2]):
+        with pytest.raises(InputError, match="image must"):
+            detections.draw(wrong)
+    with pytest.raises(InputError, match=r"suffix '.jpgg'; did you mean '.jpg'"):
+        detections.save(tmp_path / "found.jpgg")
+    with pytest.raises(InputError, match="can't write"):
+        detections.save(tmp_path / "nowhere" / "found.jpg")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("format", "code"), [("rgb", cv2.COLOR_BGR2RGB), ("rgba", cv2.COLOR_BGR2RGBA)])
+def test_other_pixel_formats_are_drawn_in_their_colors(image, detections, format, code):
+    camera = read_lens_file(LENS)
+    detector = Detector.from_file(MODEL, Settings(format=format))
+    found = detector.detect(cv2.cvtColor(image, code), camera.orientation, camera.lens, explain=True)
+    assert (found.draw() == detections.draw()).all()
+
+
+def test_a_missing_image_is_an_error_of_the_user(tmp_path):
+    camera, detector = read_lens_file(LENS), Detector.from_file(MODEL)
+    with pytest.raises(InputError, match="can't read"):
+        detector.detect(cv2.imread(str(tmp_path / "none.jpg")), camera.orientation, camera.lens)
+
+
+def test_a_lens_file_without_orientation_is_an_error_of_the_user(image):
+    with pytest.raises(InputError, match="no orientation"):
+        Detector.from_file(MODEL).detect(image, None, read_lens_file(LENS).lens)

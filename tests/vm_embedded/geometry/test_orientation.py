@@ -225,3 +225,11 @@ def test_a_quaternion_that_is_not_of_length_1_is_refused(quaternion):
 def test_a_quaternion_of_few_digits_is_made_one_of_length_1():
     matrix = Orientation.from_quaternion(1.0, (1.0004, 0.0, 0.0, 0.0)).rotation
     np.testing.assert_allclose(matrix, np.eye(3), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["roll", "pitch"])
+def test_degrees_are_refused_with_a_hint(name):
+    with pytest.raises(GeometryError, match=rf"{name} of 20 rad is more than a full turn.*math.radians\(20\)"):
+        Orientation.from_roll_pitch(0.8, **{name: 20})
+    with pytest.raises(GeometryError, match="finite"):
+        Orientation.from_roll_pitch(0.8, **{name: math.inf})

@@ -120,7 +120,7 @@ UNKNOWN = {
     "orientation": ("[orientation]\npich = 0.1\n", r"line 2.*\[orientation\] 'pich'.*'pitch'"),
     "detector": ("[detector]\ntreshold = 0.5\n", r"line 2.*\[detector\] 'treshold'.*'threshold'"),
     "lens": (FULL.replace("focal_length", "focal_lenght"), "'focal_lenght'.*'focal_length'"),
-    "nothing like it": ("zzz = 1\n", "'zzz'.*allowed: model, lens, orientation, detector"),
+    "nothing like it": ("zzz = 1\n", "'zzz'.*allowed: model, lens, fov, orientation, detector"),
 }
 
 

@@ -68,6 +68,21 @@ def test_figures_are_given_by_address_only_and_nothing_else_is(tmp_path):
         assert asked(b"POST / HTTP/1.1\r\nHost: localhost\r\n\r\n").startswith("HTTP/1.1 405")
         assert asked(b"GET /etc/passwd HTTP/1.1\r\nHost: [::1]:1\r\n\r\n").startswith("HTTP/1.1 404")
         assert asked(b"\r\n\r\n").startswith("HTTP/1.1 405")
+        (token,) = [each["token"].encode() for each in found.events if each["event"] == "status page"]
+        assert "null" not in asked(b"GET /preview?value=0.3 HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        for value in (b"", b"?value=nan", b"?value=2", b"?value=x"):
+            answer = asked(b"GET /preview" + value + b" HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            assert answer.startswith("HTTP/1.1 400")
+            assert "from 0 to 1" in answer
+        change, right = b" /threshold?value=0.9 HTTP/1.1\r\nHost: ", b"\r\nX-Token: " + token
+        for refused in (b"localhost", b"localhost\r\nX-Token: ", b"localhost\r\nX-Token: x", b"a.example" + right):
+            assert asked(b"POST" + change + refused + b"\r\n\r\n").startswith("HTTP/1.1 403")
+        assert asked(b"GET" + change + b"localhost" + right + b"\r\n\r\n").startswith("HTTP/1.1 404")
+        assert asked(b"OPTIONS" + change + b"localhost\r\n\r\n").startswith("HTTP/1.1 405")
+        assert not [each for each in found.events if each["event"] == "threshold changed"]
+        assert "refused" in asked(b"POST /record HTTP/1.1\r\nHost: [::1]" + right + b"\r\n\r\n")
+        assert asked(b"POST" + change + b"localhost" + right + b"\r\n\r\n").startswith("HTTP/1.1 200")
+        found.wait(lambda: [each for each in found.events if each["event"] == "threshold changed"])
         with socket.socket(socket.AF_UNIX) as connection:
             connection.connect(str(tmp_path / "figures"))
             connection.sendall(b"GET /metrics HTTP/1.1\r\n\r\n")

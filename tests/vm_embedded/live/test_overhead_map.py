@@ -76,16 +76,16 @@ def test_the_map_has_what_the_messages_have():
 def test_maps_are_computed_when_asked_for_and_once_for_all(monkeypatch):
     computed = []
     monkeypatch.setattr(status_page, "overhead_map", lambda each: computed.append(each) or {"n": len(computed)})
-    page = StatusPage(10.0, dict)
+    page = StatusPage(10.0, dict, lambda detections, query: detections)
 
     async def ask():
-        assert (await page.map()).content == b"null"
-        image, detections = demo_frame(0)
-        page.show(image, detections)
+        assert (await page.map({})).content == b"null"
+        detections = demo_frame(0)[1]
+        page.show(detections)
         assert computed == []
-        answers = await asyncio.gather(page.map(), page.map())
+        answers = await asyncio.gather(page.map({}), page.map({}))
         assert {each.content for each in answers} == {b'{"n":1}'}
-        page.show(image, replace(detections))
-        assert (await page.map()).content == b'{"n":2}'
+        page.show(replace(detections))
+        assert (await page.map({})).content == b'{"n":2}'
 
     asyncio.run(ask())

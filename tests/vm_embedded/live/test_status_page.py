@@ -26,11 +26,69 @@ def wait(what, seconds=60.0):
         time.sleep(0.1)
 
 
-@pytest.mark.slow
-def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_camera(tmp_path, browser):
+def free_address():
     with socket.socket() as made:
         made.bind(("127.0.0.1", 0))
-        where = f"127.0.0.1:{made.getsockname()[1]}"
+        return f"127.0.0.1:{made.getsockname()[1]}"
+
+
+@pytest.mark.slow
+def test_the_page_previews_a_threshold_uses_it_and_records_with_the_token_of_the_log(tmp_path, browser):
+    where, kept = free_address(), tmp_path / "recordings"
+    options = ("--camera", "synthetic", "--status-page", where, "--recorder-folder", kept, "--recorder-seconds", 0.5)
+    with running(tmp_path, *options) as found:
+        found.wait_for_state("ok")
+        (token,) = [each["token"] for each in found.events if each["event"] == "status page"]
+        browser.set_window_size(1700, 1000)
+        browser.get(f"http://{where}/")
+
+        def text(name):
+            return browser.find_element("id", name).text
+
+        def slide(value):
+            move = "const slider = document.getElementById('threshold'); slider.value = arguments[0]; slider.oninput();"
+            browser.execute_script(move, value)
+
+        def shown(name):
+            return browser.find_element("id", name).is_displayed()
+
+        wait(lambda: "pose from fixed" in text("runs"))
+        for each in ("model ball", "camera synthetic", "camera height 0.", "pitch, roll ", "temperature"):
+            assert each in text("runs")
+        wait(lambda: text("threshold-value") == "0.40")
+        slide(1.0)
+        wait(lambda: shown("preview") and "0 found" in text("effect"))
+        assert not shown("picture")
+        browser.save_screenshot(str(tmp_path / "preview.png"))
+        assert any(each["detections"] for each in found.frames[-20:])  # a preview changes nothing
+        browser.find_element("id", "use").click()
+        wait(lambda: "token" in text("answer"))
+        browser.find_element("id", "token").send_keys("wrong")
+        browser.find_element("id", "use").click()
+        wait(lambda: "wrong token" in text("answer"))
+        browser.find_element("id", "token").clear()
+        browser.find_element("id", "token").send_keys(token)
+        browser.find_element("id", "use").click()
+        wait(lambda: "min_confidence = 1" in text("answer"))
+        wait(lambda: shown("picture"))
+        seen = len(found.frames)
+        found.wait(lambda: len(found.frames) > seen + 20)
+        assert not any(each["detections"] for each in found.frames[seen + 1 :])
+        slide(0.4)
+        wait(lambda: shown("preview"))
+        browser.find_element("id", "back").click()
+        wait(lambda: shown("picture") and text("threshold-value") == "1.00")
+        browser.find_element("id", "record").click()
+        wait(lambda: "recording" in text("answer"))
+        found.wait(lambda: [each for each in found.events if each["event"] == "recorded"])
+        found.stop()
+    (folder,) = kept.iterdir()
+    assert "\nmin_confidence = 1\n" in (folder / "vm.toml").read_text()
+
+
+@pytest.mark.slow
+def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_camera(tmp_path, browser):
+    where = free_address()
     source = script(tmp_path / "script.toml", 'faults = [{ kind = "unplug", at = 20.0, seconds = 3.0 }]\n')
     with running(tmp_path, *source, *QUICK, "--status-page", where) as found:
         found.wait_for_state("ok")

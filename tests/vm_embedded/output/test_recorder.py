@@ -1,9 +1,11 @@
 """Recordings of a real vm-detect."""
 
+import shutil
 import signal
 import subprocess
 import time
 
+from tests.drawn_scenes import MODEL
 from tests.messages import read_message
 from tests.vm_embedded.live.running import COMMAND, arguments, running
 
@@ -25,6 +27,20 @@ def test_a_recording_is_detected_in_again_bit_by_bit(tmp_path):
     again = [read_message(line) for line in done.stdout.splitlines()]
     assert [each["detections"] for each in again] == [each["detections"] for each in recorded]
     assert any(each["detections"] for each in again)
+
+
+def test_a_recording_with_an_own_network_is_read_on_another_machine(tmp_path):
+    model, kept = tmp_path / "mine.onnx", tmp_path / "recordings"
+    shutil.copy(MODEL, model)
+    options = ("--camera", "synthetic", "--model", model, "--recorder-folder", kept, "--recorder-seconds", 0.3)
+    with running(tmp_path, *options) as found:
+        found.wait(lambda: len(found.frames) > 5)
+        count_promised(ask_to_record(tmp_path))
+        found.wait(lambda: [each for each in found.events if each["event"] == "recorded"])
+        found.stop()
+    model.unlink()
+    (folder,) = kept.iterdir()
+    assert count_found(folder.rename(tmp_path / "elsewhere")) > 1
 
 
 def test_the_sight_of_a_class_and_a_signal_make_recordings(tmp_path):

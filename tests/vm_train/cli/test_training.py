@@ -2,12 +2,15 @@
 
 import fcntl
 import json
+import os
+import pty
 import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -50,11 +53,34 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, data):
         (each, step) for each in (1, 2) for step in range(1, 3 * -(-count // 4) + 1)
     ]
     assert [each["epoch"] for each in records if "score" in each] == [1, 2, 3, 1, 2, 3]
+    shown = re.findall(r"^round (\d), epoch (\d) of 3: loss (\d\.\d{3}), score (\d\.\d{3})", done.stdout, re.MULTILINE)
+    scores = [each for each in records if "score" in each]
+    assert [tuple(map(int, each[:2])) for each in shown] == [(each["round"], each["epoch"]) for each in scores]
+    assert [each[3] for each in shown] == [f"{each['score']:.3f}" for each in scores]
+    first = [each["loss"] for each in steps[: len(steps) // 6]]
+    assert shown[0][2] == f"{sum(first) / len(first):.3f}"
     assert len(list((folder / "tensorboard" / "round2").glob("events*"))) == 1
     checkpoint = Checkpoint.load(folder / "model.pt")
     assert checkpoint.manifest.provenance["training_pictures"] == str(count)
     assert checkpoint.manifest.provenance["data"] == data.name
     assert [each.name for each in checkpoint.manifest.classes] == ["ball", "line", "field", "environment"]
+
+
+def test_at_a_terminal_the_bar_shows_epoch_loss_and_score(data, configuration, tmp_path):
+    main, terminal = pty.openpty()
+    command = [*COMMAND, data, "-o", tmp_path / "run", "--config", configuration]
+    with subprocess.Popen(
+        list(map(str, command)), stdout=subprocess.DEVNULL, stderr=terminal, env=environment()
+    ) as process:
+        os.close(terminal)
+        shown = b""
+        with suppress(OSError):  # the end of a terminal whose program has ended
+            while part := os.read(main, 4096):
+                shown += part
+    os.close(main)
+    assert process.returncode == 0
+    assert re.search(rb"left, epoch 1, loss \d\.\d{3}\x1b", shown)
+    assert re.search(rb"left, epoch 3, loss \d\.\d{3}, score \d\.\d{3}\x1b", shown)
 
 
 def test_its_network_is_exported_with_its_provenance(whole, tmp_path):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...detection.detections import Detection, Detections
+from ...detection.detection import Detection
+from ...detection.detections import Detections
 
 _LINE_LOOP = 2  # of PointsAnnotation
 _YELLOW, _BLACK, _CLEAR = (1.0, 0.86, 0.24, 1.0), (0.0, 0.0, 0.0, 0.7), (0.0, 0.0, 0.0, 0.0)

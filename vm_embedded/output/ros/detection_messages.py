@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Floats
-from ...detection.detections import Detection, Detections
+from ...detection.detection import Detection
+from ...detection.detections import Detections
 from ...geometry.orientation import OPTICAL_TO_CAMERA, Orientation
 
 LEVELS = {"ok": "OK", "starting": "WARN", "degraded": "WARN", "stopping": "WARN"}

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
 from ..arrays import Image
-from ..detection.detections import Detection, Detections
+from ..field.features import FieldFeatures
+from .detection import Detection
 from .field_overlay import draw_field, label_field
 from .labels import INK, Color, Labels
+from .observation import Observation
+from .prepared_view import PreparedView
 
 # Colors are BGR. Objects stand out; classes that cover areas are pale.
 _OBJECT, _REJECTED = (60, 220, 255), (90, 90, 255)
@@ -22,42 +27,49 @@ _FARTHEST = 1e4
 """Largest pixel of an outline that is drawn: OpenCV cannot draw far outside of an image."""
 
 
-def draw_overlay(image: Image, detections: Detections) -> Image:
+def draw_overlay(
+    image: Image,
+    observation: Observation,
+    objects: Sequence[Detection],
+    rejected: Sequence[Detection],
+    threshold: float,
+    field: FieldFeatures | None,
+) -> Image:
     """A copy of a BGR, BGRA or gray image with mesh points in the color of their class, objects with outline,
-    confidence and distance, and the features of the field.
+    confidence and distance, and the features of the field. threshold: a point above it belongs to a class.
 
     A tracked object also has its number and speed, and, if it moves, an arrow to where it will be after half a second.
 
     The paper's fig:ball_detection_images has such pictures; there, the colors are confidences.
     """
-    colors = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image[:, :, :3]
+    colors = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 or image.shape[2] == 1 else image[:, :, :3]
     canvas = np.array(colors, dtype=np.uint8, order="C")
     scale = max(max(canvas.shape[:2]) / 1280.0, 0.8)
-    _draw_points(canvas, detections)
-    if detections.field is not None:
-        draw_field(canvas, detections.field, detections.observation.view, scale)
-    drawn = [(each, _OBJECT) for each in detections.objects] + [(each, _REJECTED) for each in detections.rejected]
+    _draw_points(canvas, observation, threshold)
+    if field is not None:
+        draw_field(canvas, field, observation.view, scale)
+    drawn = [(each, _OBJECT) for each in objects] + [(each, _REJECTED) for each in rejected]
     drawn = [(each, color) for each, color in drawn if np.abs(each.outline).max(initial=0.0) < _FARTHEST]
     for each, color in reversed(drawn):
         _draw_outline(canvas, each, color, scale)
-        _draw_arrow(canvas, each, detections, scale)
+        _draw_arrow(canvas, each, observation.view, scale)
     labels = Labels(canvas, scale)
     for each, _ in drawn:
         labels.avoid(each.center, each.radius)
     for each, color in drawn:
         _label(labels, each, color)
-    if detections.field is not None:
-        label_field(labels, detections.field, detections.observation.view)
+    if field is not None:
+        label_field(labels, field, observation.view)
     return canvas
 
 
-def _draw_points(canvas: Image, detections: Detections) -> None:
+def _draw_points(canvas: Image, observation: Observation, threshold: float) -> None:
     """Draw mesh points: crosses of five pixels for objects and uprights, single pixels for the rest."""
-    pixels = np.rint(detections.pixels).astype(np.intp)
+    pixels = np.rint(observation.pixels).astype(np.intp)
     _draw_pixels(canvas, pixels, _OTHER)
     areas = 0
-    for column, each in enumerate(detections.manifest.classes):
-        chosen = pixels[detections.probabilities[:, column] > detections.threshold]
+    for column, each in enumerate(observation.manifest.classes):
+        chosen = pixels[observation.probabilities[:, column] > threshold]
         if each.kind == "area":
             _draw_pixels(canvas, chosen, _AREAS[areas % len(_AREAS)])
             areas += 1
@@ -79,13 +91,13 @@ def _draw_outline(canvas: Image, detection: Detection, color: Color, scale: floa
     cv2.polylines(canvas, [points], True, color, thickness, cv2.LINE_AA, shift=4)
 
 
-def _draw_arrow(canvas: Image, detection: Detection, detections: Detections, scale: float) -> None:
+def _draw_arrow(canvas: Image, detection: Detection, view: PreparedView, scale: float) -> None:
     """Draw the motion of a tracked object, unless it may stand still."""
     track = detection.track
     if track is None or np.hypot(*track.velocity) < 2.0 * track.velocity_error:
         return
     places = np.array([track.position[:2], track.position_at(track.time + _AHEAD)[:2]])
-    pixels = detections.observation.view.plane_pixels(places)
+    pixels = view.plane_pixels(places)
     if (np.abs(pixels) < _FARTHEST).all():
         start, end = np.rint(pixels).astype(int).tolist()
         thickness = max(1, round(2 * scale))

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tests.vm_embedded.output.features import demo_frame, full, scene
-from vm_embedded.output.labels import INK, Labels
-from vm_embedded.output.overlay import draw_overlay
+from vm_embedded.detection.labels import INK, Labels
 
 
 def colors_near(image, pixel):
@@ -19,8 +18,8 @@ def test_every_feature_is_drawn_where_it_is():
     image, detections = demo_frame(6)
     view = detections.observation.view
     field = scene(view)
-    plain = draw_overlay(image, detections)
-    drawn = draw_overlay(image, replace(detections, field=field))
+    plain = detections.draw(image)
+    drawn = replace(detections, field=field).draw(image)
     middles = [each.ends.mean(axis=0) for each in field.lines] + [field.border.points[1:3].mean(axis=0)]
     places = [*middles, *(each.position for each in (*field.robots, *field.posts, *field.crossings))]
     places += [field.circle.center - (field.circle.radius, 0.0), field.circle.center - (0.0, field.circle.radius)]
@@ -43,11 +42,11 @@ def test_plane_pixels_are_those_of_the_mesh_points():
 def test_features_outside_of_the_view_do_no_harm(number):
     image, detections = demo_frame(number)
     for make in (scene, full):
-        drawn = draw_overlay(image, replace(detections, field=make(detections.observation.view)))
+        drawn = replace(detections, field=make(detections.observation.view)).draw(image)
         assert drawn.shape == image.shape
     behind = scene(detections.observation.view)
     behind = replace(behind, crossings=tuple(replace(each, position=-each.position) for each in behind.crossings))
-    draw_overlay(image, replace(detections, field=behind))
+    replace(detections, field=behind).draw(image)
 
 
 def area(canvas):

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 
 from ..arrays import Floats, Image
-from ..detection.prepared_view import PreparedView
 from ..field.features import CenterCircle, FieldFeatures, Upright
 from .labels import INK, Color, Labels
+from .prepared_view import PreparedView
 
 # Colors are BGR. Magenta shows on white lines and on grass.
 _LINE, _BORDER, _POST, _ROBOT = (255, 0, 255), (255, 210, 0), (255, 190, 90), (60, 150, 255)

@@ -1,0 +1,105 @@
+"""The status page of a running detector: what it shows, what it may change, and the servers of page and metrics."""
+
+from __future__ import annotations
+
+import math
+import secrets
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from ..cameras.camera import without_password
+from ..detection.detections import Detections
+from ..geometry.orientation import Orientation
+from ..output.messages import Message
+from .answering import Answer, Answerer
+from .http_server import HttpServer, Page, Query, Response
+from .status_page import StatusPage
+from .temperatures import read_temperatures
+from .threshold import threshold_name, with_settings, with_threshold
+
+
+class LivePage:
+    """The page and its two changes: a recording, and another threshold. Changes need `token`, which the log prints.
+
+    answerer: has detector and configuration. status, record, metrics: texts of the daemon. use_threshold: is called
+    with name and value of a threshold that was changed.
+    """
+
+    def __init__(
+        self,
+        answerer: Answerer,
+        status: Callable[[], Message],
+        record: Callable[[], str],
+        metrics: Callable[[], str],
+        use_threshold: Callable[[str, float], None],
+    ) -> None:
+        self.token = secrets.token_urlsafe(9)
+        self._answerer, self._status, self._record, self._metrics = answerer, status, record, metrics
+        self._use_threshold = use_threshold
+        self._page = StatusPage(answerer.configuration.status.picture_fps, self._state, self._preview)
+        self._pose: Message | None = None  # of the last frame
+
+    def servers(self) -> Iterator[HttpServer]:
+        """The servers that the configuration asks for."""
+        status, page = self._answerer.configuration.status, self._page
+        metrics: dict[str, Page] = {"/metrics": self._metrics_page}
+        if status.page:
+            pages: dict[str, Page] = {"/": page.page, "/state": page.state, "/map": page.map, "/preview": page.preview}
+            actions: dict[str, Page] = {"/record": self._start_recording, "/threshold": self._change_threshold}
+            yield HttpServer(status.page, pages | metrics, {"/stream": page.stream}, actions, self.token)
+        if status.metrics:
+            yield HttpServer(status.metrics, metrics)
+
+    def show(self, answer: Answer) -> None:
+        """Show an answer."""
+        self._page.show(answer.detections)
+        self._pose = _describe_pose(answer.orientation, self._answerer.configuration.pose.source)
+
+    def _state(self) -> Message:
+        """The status of the daemon, and what runs."""
+        detector, configuration = self._answerer.detector, self._answerer.configuration
+        name = threshold_name(detector)
+        return self._status() | {
+            "model": Path(configuration.model).name,
+            "camera": without_password(configuration.camera.source),
+            "pose": self._pose,
+            "temperatures": read_temperatures(),
+            "threshold": {"name": name, "value": getattr(detector.settings, name)},
+            "records": bool(configuration.recorder.folder),
+        }
+
+    def _preview(self, detections: Detections, query: Query) -> Detections:
+        """What a frame shows with the threshold of a query. Raises VisualMeshError."""
+        detector = self._answerer.detector
+        return with_settings(detector, detections, with_threshold(detector, query.get("value", "")))
+
+    def _metrics_page(self, _: Query) -> Response:
+        return Response("text/plain; version=0.0.4", self._metrics().encode())
+
+    def _start_recording(self, _: Query) -> Response:
+        return _text(self._record())
+
+    def _change_threshold(self, query: Query) -> Response:
+        """Use another threshold until the configuration is read again. Raises InputError."""
+        detector = self._answerer.detector
+        settings, name = with_threshold(detector, query.get("value", "")), threshold_name(detector)
+        detector.settings = settings
+        self._answerer.configuration = replace(self._answerer.configuration, detector=settings)
+        value = getattr(settings, name)
+        self._use_threshold(name, value)
+        return _text(f"{name} = {value:g} until a restart or reload; to keep it, write it to [detector] in vm.toml")
+
+
+def _text(text: str) -> Response:
+    return Response("text/plain; charset=utf-8", text.encode())
+
+
+def _describe_pose(orientation: Orientation, source: str) -> Message:
+    """A pose: height [m], pitch and roll [degrees], and where it comes from."""
+    return {
+        "height": round(orientation.height, 3),
+        "pitch": round(math.degrees(orientation.pitch), 1),
+        "roll": round(math.degrees(orientation.roll), 1),
+        "source": source,
+    }
