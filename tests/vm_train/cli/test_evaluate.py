@@ -115,7 +115,7 @@ def test_a_close_look_s_proposals_have_scores_of_their_own(capsys, looking, data
     options = ("--radius-of", "scene", "--max-proposals", 7, "--min-confidence", 0)
     done = run(looking, data, "-o", out, "--workers", 2, *options)
     assert "proposals for class ball: " in done.stdout
-    assert {f"proposals.{kind}" for kind in ("png", "svg")} < {path.name for path in (out / "plots").iterdir()}
+    assert "proposals.svg" in {path.name for path in (out / "plots").iterdir()}
     page = (out / "report.html").read_text()
     assert "<h2>Proposals for class ball</h2>" in page
     assert 'alt="proposals"' in page
