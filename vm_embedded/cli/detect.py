@@ -166,8 +166,8 @@ def _ask(given: Configuration, command: str) -> int:
 
 def _check_configuration(given: Configuration) -> int:
     """Load the model and check that the configuration fits together. Raises VisualMeshError."""
-    detector = load_checked_detector(given)
-    print(f"{given.model}: {len(detector.manifest.classes)} classes, self-test passed; the configuration is good")
+    detector, proved = load_checked_detector(given)
+    print(f"{given.model}: {len(detector.manifest.classes)} classes, {proved}; the configuration is good")
     return EXIT_OK
 
 

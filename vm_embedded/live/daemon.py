@@ -80,7 +80,7 @@ class Daemon:
         self._configure = configure
         self._log = log
         configuration = configure()
-        detector = load_checked_detector(configuration)
+        detector, self._proved = load_checked_detector(configuration)
         camera, status = configuration.camera, configuration.status
         self.recorder = Recorder(configuration.recorder, lambda event, level, folder: log(event, level, folder=folder))
         self.last: Message | None = None
@@ -131,7 +131,7 @@ class Daemon:
         self._update_state()
         self._notifier.send(READY=1)
         camera = without_password(self.configuration.camera.source)
-        self._log("ready", model=self.configuration.model, camera=camera)
+        self._log("ready", model=self.configuration.model, proved=self._proved, camera=camera)
         clock_offset = time.time() - time.monotonic()
         while not (self._stops or self._hung or self._camera_ended()):
             await self._step()
@@ -279,7 +279,7 @@ class Daemon:
         self.recorder.clear()
         self.answerer.configuration, self.answerer.detector = new.configuration, new.detector
         self._recording_toml = new.recording_toml
-        self._log("reloaded", model=new.configuration.model, needs_restart=new.needs_restart)
+        self._log("reloaded", model=new.configuration.model, proved=new.proved, needs_restart=new.needs_restart)
 
     def _stop(self) -> None:
         self._stops += 1

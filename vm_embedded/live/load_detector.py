@@ -6,15 +6,21 @@ from ..cameras.camera import without_password
 from ..cameras.open_camera import brings_lens_and_pose, camera_opener, is_live
 from ..detection.detector import Detector
 from ..errors import InputError
+from ..network.bundled import model_path
+from ..network.model_file import read_model
 from .configuration import Configuration
+from .proof import prove
 
 
-def load_checked_detector(configuration: Configuration) -> Detector:
-    """Load the configured network, run its self-test, and check camera, lens, poses and trigger class.
+def load_checked_detector(configuration: Configuration) -> tuple[Detector, str]:
+    """Load the configured network, prove that it works, and check camera, lens, poses and trigger class.
 
-    Raises VisualMeshError for the first thing that is missing or invalid.
+    Return the detector, and in words what was proved. Raises VisualMeshError for the first thing that is missing or
+    invalid.
     """
-    detector = Detector.from_file(configuration.model, configuration.detector)
+    model = read_model(model_path(configuration.model))
+    proved = prove(model)
+    detector = Detector(model, configuration.detector)
     camera = configuration.camera.source
     orientation = configuration.fixed_orientation()  # raises InputError for angles without a height
     if is_live(camera):
@@ -28,4 +34,4 @@ def load_checked_detector(configuration: Configuration) -> Detector:
             raise InputError(
                 f"camera {without_password(camera)} needs poses: give --height, --pose-source, or Hoc in the lens file"
             )
-    return detector
+    return detector, proved

@@ -17,12 +17,13 @@ _NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder")
 class Reloaded:
     """The parts of a daemon that a reload replaces.
 
-    recording_toml: the vm.toml of recordings. needs_restart: names of the changed sections and entries that only a
+    proved: in words, what shows that the network works. recording_toml: the vm.toml of recordings. needs_restart: names of the changed sections and entries that only a
     restart applies; the configuration has their old values.
     """
 
     configuration: Configuration
     detector: Detector
+    proved: str
     recording_toml: str
     needs_restart: list[str]
 
@@ -33,9 +34,9 @@ def read_again(configure: Callable[[], Configuration], running: Configuration) -
     # The open camera delivers its frames in the format of the start.
     detector_settings = replace(wanted.detector, format=running.detector.format)
     configuration = replace(wanted, detector=detector_settings)
-    detector = load_checked_detector(configuration)
+    detector, proved = load_checked_detector(configuration)
     kept = {name: getattr(running, name) for name in _NEEDS_RESTART}
     needs_restart = [name for name, section in kept.items() if section != getattr(wanted, name)]
     if wanted.detector.format != running.detector.format:
         needs_restart.append("detector.format")
-    return Reloaded(replace(configuration, **kept), detector, recording_toml(configuration), needs_restart)
+    return Reloaded(replace(configuration, **kept), detector, proved, recording_toml(configuration), needs_restart)
