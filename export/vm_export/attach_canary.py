@@ -57,7 +57,7 @@ def with_canary(content: bytes, picture: CanaryPicture) -> bytes:
         raise InputError(f"{picture.name} can't be a canary: {error}") from error
     seen = {each.class_name for each in found.objects}
     for each in model.manifest.classes:
-        if each.name not in (seen if each.kind == "object" else [name for name, count in found.points.items() if count]):
+        if not (each.name in seen if each.kind == "object" else found.points[each.name]):
             raise InputError(
                 f"{picture.name} can't be a canary: the networks find no {each.name} in it; choose a picture in which "
                 "they find every class"

@@ -40,8 +40,9 @@ def attached(content: bytes, manifest: Manifest, look: LookCheckpoint) -> tuple[
     if look.glance is not None:
         glance, files[GLANCE_KEY], glance_difference = _exported(look.glance)
         contract, difference = replace(contract, glance=glance), float(np.maximum(difference, glance_difference))
+    described = {METADATA_KEY: replace(manifest, look=contract).as_json()}
     entries = {key: base64.b64encode(file).decode() for key, file in files.items()}
-    return with_metadata(content, _WITHOUT | {METADATA_KEY: replace(manifest, look=contract).as_json()} | entries), difference
+    return with_metadata(content, _WITHOUT | described | entries), difference
 
 
 def _exported(look: LookCheckpoint) -> tuple[LookContract, bytes, float]:

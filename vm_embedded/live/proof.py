@@ -66,8 +66,9 @@ def find_canary(detector: Detector, picture: bytes, camera: LensFile) -> Canary:
 def in_words(canary: Canary) -> str:
     """What a canary shows: the number of objects of each class, and of points of the other classes."""
     names = [each.class_name for each in canary.objects]
-    counts = [f"{names.count(name)} {name}" for name in dict.fromkeys(names)]
-    return ", ".join(counts + [f"{count} points of {name}" for name, count in canary.points.items() if name not in names])
+    objects = [f"{names.count(name)} {name}" for name in dict.fromkeys(names)]
+    points = [f"{count} points of {name}" for name, count in canary.points.items() if name not in names]
+    return ", ".join(objects + points)
 
 
 def _difference(found: Canary, expected: Canary) -> str:

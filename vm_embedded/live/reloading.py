@@ -17,8 +17,8 @@ _NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder")
 class Reloaded:
     """The parts of a daemon that a reload replaces.
 
-    proved: in words, what shows that the network works. recording_toml: the vm.toml of recordings. needs_restart: names of the changed sections and entries that only a
-    restart applies; the configuration has their old values.
+    proved: in words, what shows that the network works. recording_toml: the vm.toml of recordings. needs_restart: names
+    of the changed sections and entries that only a restart applies; the configuration has their old values.
     """
 
     configuration: Configuration

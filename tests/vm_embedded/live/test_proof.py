@@ -32,9 +32,7 @@ def test_a_model_without_a_self_test_is_refused(ball, part):
     without = {
         "mesh network": replace(manifest, self_test=None),
         "close look": replace(manifest, look=replace(manifest.look, self_test=None)),
-        "glance": replace(
-            manifest, look=replace(manifest.look, glance=replace(manifest.look.glance, self_test=None))
-        ),
+        "glance": replace(manifest, look=replace(manifest.look, glance=replace(manifest.look.glance, self_test=None))),
     }
     with pytest.raises(ModelError, match=f"its {part} has no self-test"):
         prove(replace(ball, manifest=without[part]))
