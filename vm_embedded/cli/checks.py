@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import fcntl
 import os
@@ -122,7 +123,7 @@ def check_opencv(installed: set[str]) -> Finding:
 def check_model(configuration: Configuration) -> Finding:
     """Whether the model loads, passes its self-tests and finds its canary."""
     try:
-        detector, proved = load_checked_detector(configuration)
+        detector, proved = asyncio.run(load_checked_detector(configuration))
     except VisualMeshError as error:
         return Finding("model", BAD, str(error), "vm-detect --check-config tells whether it works after a change")
     model = detector.session.model

@@ -18,6 +18,7 @@ from ..poses.buffer import StalePoseError
 from ..poses.stream import PoseStream
 from .configuration import Configuration
 from .counters import Counters
+from .frame_watchdog import FrameWatchdog
 from .health import Health
 
 
@@ -42,9 +43,10 @@ class Answerer:
         poses: PoseStream,
         counters: Counters,
         health: Health,
+        watchdog: FrameWatchdog,
     ) -> None:
         self.configuration, self.detector = configuration, detector
-        self._poses, self._counters, self._health = poses, counters, health
+        self._poses, self._counters, self._health, self._watchdog = poses, counters, health, watchdog
 
     async def answer(self, shot: Shot) -> Answer | None:
         """Detect the objects in a shot; None if it is too old, has no pose, or the detection fails."""
@@ -54,7 +56,8 @@ class Answerer:
             lens, orientation = self._lens(shot), await self._orientation(shot)
             self._health.pose_trouble = ""
             started = time.perf_counter()
-            detections = self.detector.detect(shot.image, orientation, lens)
+            with self._watchdog.frame():
+                detections = self.detector.detect(shot.image, orientation, lens)
         except StalePoseError as error:
             self._counters.outcomes.stale += 1
             self._health.pose_trouble = str(error)

@@ -23,6 +23,7 @@ from typing import Any, Protocol
 from ..cameras.camera import without_password
 from ..cameras.grabber import MOST_HANGING, Grabber
 from ..cameras.open_camera import camera_opener
+from ..detection.detector import Detector
 from ..errors import InputError, VisualMeshError, one_line
 from ..output.channels import Channels
 from ..output.messages import Message, live_message, state_message
@@ -32,6 +33,7 @@ from .answering import Answer, Answerer
 from .configuration import Configuration, recording_toml
 from .control import REFUSED, ControlServer, default_socket_path
 from .counters import Counters
+from .frame_watchdog import FrameWatchdog
 from .health import Health
 from .http_server import HttpServer, Page, Response
 from .load_detector import load_checked_detector
@@ -56,6 +58,9 @@ _HEARTBEAT = 1.0
 _RECORDING_S = 3.5
 """Longest wait for a recording when the daemon stops [s]; the unit's TimeoutStopSec is 5 s."""
 
+_LAST_WORDS_S = 0.3
+"""Time for the threads of the outputs to write the last message of a process that hangs [s]."""
+
 _CLOCK_JUMP = 0.5
 """Change of the wall clock relative to the monotonic clock that is logged [s]."""
 
@@ -73,14 +78,20 @@ class Part(Protocol):
 class Daemon:
     """Runs until a signal stops it, the camera ends, or too many reads of the camera hang.
 
-    configure: reads the configuration; called at the start and for each reload. Raises VisualMeshError.
+    configure: reads the configuration for each reload. proved: in words, what shows that the detector works.
     """
 
-    def __init__(self, configure: Callable[[], Configuration], log: EventLog) -> None:
+    def __init__(
+        self,
+        configure: Callable[[], Configuration],
+        configuration: Configuration,
+        detector: Detector,
+        proved: str,
+        log: EventLog,
+    ) -> None:
         self._configure = configure
+        self._proved = proved
         self._log = log
-        configuration = configure()
-        detector, self._proved = load_checked_detector(configuration)
         camera, status = configuration.camera, configuration.status
         self.recorder = Recorder(configuration.recorder, lambda event, level, folder: log(event, level, folder=folder))
         self.last: Message | None = None
@@ -94,10 +105,12 @@ class Daemon:
         self._notifier = SystemdNotifier()
         self._hung = False  # whether so many reads of the camera hang that only a new process helps
         self._wakeup = asyncio.Event()
+        self._reloading: asyncio.Task[None] | None = None
         opener = camera_opener(camera, raw=configuration.detector.format != "bgr")
         self.grabber = Grabber(opener, camera, self._wake)
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
-        self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health)
+        self._watchdog = FrameWatchdog(self._end_hanging)
+        self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health, self._watchdog)
         self._recording_toml = recording_toml(configuration)
         self.outputs = Channels(configuration.output)
         self.page = StatusPage(status.picture_fps, self._status)
@@ -105,6 +118,13 @@ class Daemon:
         commands |= {"record": self.record, "metrics": self.metrics}
         control = ControlServer(Path(status.socket) if status.socket else default_socket_path(), commands)
         self._parts: list[Part] = [self.outputs, self.poses, control, *self._http_servers()]
+
+    @classmethod
+    async def prepare(cls, configure: Callable[[], Configuration], log: EventLog) -> Daemon:
+        """A daemon whose configuration was read and whose detector was proved. Raises VisualMeshError."""
+        configuration = configure()
+        detector, proved = await load_checked_detector(configuration)
+        return cls(configure, configuration, detector, proved, log)
 
     @property
     def configuration(self) -> Configuration:
@@ -117,7 +137,7 @@ class Daemon:
         sys.setswitchinterval(_SWITCH_INTERVAL)
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self._stop)
-        loop.add_signal_handler(signal.SIGHUP, self.reload)
+        loop.add_signal_handler(signal.SIGHUP, self._start_reload)
         loop.add_signal_handler(signal.SIGUSR1, self.record)
         loop.set_exception_handler(self._log_loop_error)
         self._loop = loop
@@ -128,6 +148,7 @@ class Daemon:
             await self._close()
             raise
         self.grabber.start()
+        self._watchdog.start()
         self._update_state()
         self._notifier.send(READY=1)
         camera = without_password(self.configuration.camera.source)
@@ -269,10 +290,16 @@ class Daemon:
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self._wakeup.set)
 
-    def reload(self) -> None:
+    def _start_reload(self) -> None:
+        """Begin a reload, instead of one that has not ended."""
+        if self._reloading is not None:
+            self._reloading.cancel()
+        self._reloading = self._loop.create_task(self._reload())
+
+    async def _reload(self) -> None:
         """Read the configuration and the model again. If anything is wrong, nothing changes."""
         try:
-            new = read_again(self._configure, self.configuration)
+            new = await read_again(self._configure, self.configuration)
         except VisualMeshError as error:
             self._log("reload refused", "error", reason=str(error))
             return
@@ -287,7 +314,19 @@ class Daemon:
             os._exit(EXIT_FAILED)  # the second signal ends the process at once
         self._wakeup.set()
 
+    def _end_hanging(self) -> None:
+        """End the process, whose event loop hangs in a frame. Called in another thread."""
+        reason = f"a frame takes more than {FrameWatchdog.limit:g} s"
+        self._log("stopped", "error", frames=self.counters.outcomes.frames, reason=reason)
+        self.outputs.send(state_message("stopping", reason))
+        self._notifier.send(STATUS=f"stopping: {reason}")
+        time.sleep(_LAST_WORDS_S)
+        os._exit(EXIT_HUNG)
+
     async def _close(self) -> None:
+        self._watchdog.close()
+        if self._reloading is not None:
+            self._reloading.cancel()
         for part in self._parts:
             await part.close()
         # In a thread, so that a second signal still ends the process at once.

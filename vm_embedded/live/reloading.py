@@ -28,13 +28,16 @@ class Reloaded:
     needs_restart: list[str]
 
 
-def read_again(configure: Callable[[], Configuration], running: Configuration) -> Reloaded:
-    """Read the configuration and load its network. running: the current configuration. Raises VisualMeshError."""
+async def read_again(configure: Callable[[], Configuration], running: Configuration) -> Reloaded:
+    """Read the configuration and load its network. running: the current configuration. Raises VisualMeshError.
+
+    The running detector waits only while the network is loaded, after another process has proved it.
+    """
     wanted = configure()
     # The open camera delivers its frames in the format of the start.
     detector_settings = replace(wanted.detector, format=running.detector.format)
     configuration = replace(wanted, detector=detector_settings)
-    detector, proved = load_checked_detector(configuration)
+    detector, proved = await load_checked_detector(configuration)
     kept = {name: getattr(running, name) for name in _NEEDS_RESTART}
     needs_restart = [name for name, section in kept.items() if section != getattr(wanted, name)]
     if wanted.detector.format != running.detector.format:

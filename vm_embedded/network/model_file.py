@@ -65,25 +65,29 @@ class ModelFile:
 
 
 def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
-    """Read and check a model file.
+    """Read and check a model file of at most `max_mib` [MiB]. Raises ModelError as the two steps do."""
+    return parse_model(path, read_content(path, max_mib))
 
-    Raises ModelError if it is missing, larger than `max_mib` [MiB], not an ONNX file, refers to external data, contains
-    inner graphs (control flow) or functions, lacks a manifest of this format, or is not what its seal says: a damaged
-    network could still pass its self-test, and find nothing.
-    """
+
+def read_content(path: str | Path, max_mib: float = 64.0) -> bytes:
+    """The bytes of a model file. Raises ModelError if it is missing, or larger than `max_mib` [MiB]."""
     path = Path(path)
     try:
         size = path.stat().st_size
         if size > max_mib * 2**20:
             raise ModelError(f"{path}: {size / 2**20:.1f} MiB is too large for a model (allowed: {max_mib:g} MiB)")
-        content = path.read_bytes()
+        return path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
         raise ModelError(f"can't read the model {path}: {getattr(error, 'strerror', None) or error}") from error
-    return parse_model(path, content)
 
 
 def parse_model(path: str | Path, content: bytes) -> ModelFile:
-    """Check the content of a model file. path: for messages. Raises ModelError as `read_model` does."""
+    """Check the content of a model file. path: for messages.
+
+    Raises ModelError if it is not an ONNX file, refers to external data, contains inner graphs (control flow) or
+    functions, lacks a manifest of this format, or is not what its seal says: a damaged network could still pass its
+    self-test, and find nothing.
+    """
     try:
         metadata, digest = _read_fields(content)
         if METADATA_KEY not in metadata:
