@@ -9,6 +9,7 @@ SEED ?= 1
 SCENES ?= export/vm_synth/polyhaven.toml
 NETWORKS := ball ball-small soccer
 BUILD ?= build/networks
+CANARY := --canary vm_embedded/models/canary.jpg export/networks/canary.yaml
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
 
@@ -95,10 +96,10 @@ vm_embedded/models/%.onnx: export/networks/%-look.toml $(BUILD)/glance/look.pt
 	if test -e $(BUILD)/$*-look/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-look; \
 		else $(BIN)/vm-train look data/soccer --from $(BUILD)/mesh/model.pt --glance $(BUILD)/glance/look.pt \
 			-o $(BUILD)/$*-look --config $<; fi
-	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $(BUILD)/$*-look/look.pt --layout runs -o $@
+	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $(BUILD)/$*-look/look.pt --layout runs $(CANARY) -o $@
 
 vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx
-	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --look-above 0.005 --layout runs -o $@
+	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $@
 
 test-data: .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
 	$(BIN)/python -m benchmarks.test_data $(HDRI) $(TEST)

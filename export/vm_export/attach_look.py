@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-import onnx
 import torch
-from onnx import helper
 
 import vm_embedded
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.network.close_look import CloseLook
-from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY, LookContract, LookTest
+from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY, LookContract
+from vm_embedded.network.look_test import LookTest, made_patches
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
-from vm_embedded.network.model_file import SEAL_KEY, sealed
 
 from .look_checkpoint import LookCheckpoint
 from .look_graph import look_model
 from .look_network import LookNetwork
+from .metadata import with_metadata
 
 _CHECKED_PATCHES = (0, 1, 2, 7, 40)
+
+_WITHOUT: dict[str, str | None] = {LOOK_KEY: None, GLANCE_KEY: None}
+"""Removes a look network and its glance from the metadata."""
+
+_MADE = 64
+"""Patches that are made for a self-test."""
 
 
 def attached(content: bytes, manifest: Manifest, look: LookCheckpoint) -> tuple[bytes, float]:
@@ -36,7 +40,9 @@ def attached(content: bytes, manifest: Manifest, look: LookCheckpoint) -> tuple[
     if look.glance is not None:
         glance, files[GLANCE_KEY], glance_difference = _exported(look.glance)
         contract, difference = replace(contract, glance=glance), float(np.maximum(difference, glance_difference))
-    return _with_metadata(content, replace(manifest, look=contract), files), difference
+    described = {METADATA_KEY: replace(manifest, look=contract).as_json()}
+    entries = {key: base64.b64encode(file).decode() for key, file in files.items()}
+    return with_metadata(content, _WITHOUT | described | entries), difference
 
 
 def _exported(look: LookCheckpoint) -> tuple[LookContract, bytes, float]:
@@ -45,15 +51,23 @@ def _exported(look: LookCheckpoint) -> tuple[LookContract, bytes, float]:
     content = look_model(network)
     contract = replace(
         look.contract,
-        self_test=LookTest(look.examples, _answers(network, look.examples)),
+        self_test=look_self_test(look),
         provenance={**look.contract.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"},
     )
     return contract, content, largest_look_difference(content, look)
 
 
+def look_self_test(look: LookCheckpoint) -> LookTest:
+    """The most and the least likely example of a look network, with its answers to them and to patches made of them."""
+    probabilities = _answers(look.network.eval(), look.examples)[:, 0]
+    chosen = look.examples[np.unique([probabilities.argmax(), probabilities.argmin()])]
+    patches = np.concatenate([chosen, made_patches(chosen, _MADE)])
+    return LookTest(chosen, _answers(look.network, patches))
+
+
 def detached(content: bytes, manifest: Manifest) -> bytes:
     """A model file's bytes without its look network. content, manifest: of the model file."""
-    return _with_metadata(content, replace(manifest, look=None), {})
+    return with_metadata(content, _WITHOUT | {METADATA_KEY: replace(manifest, look=None).as_json()})
 
 
 def largest_look_difference(content: bytes, look: LookCheckpoint) -> float:
@@ -75,17 +89,3 @@ def _answers(network: LookNetwork, patches: Image) -> Singles:
     with torch.inference_mode():
         answers: Singles = network(torch.from_numpy(np.ascontiguousarray(patches))).numpy()
     return answers
-
-
-def _with_metadata(content: bytes, manifest: Manifest, files: Mapping[str, bytes]) -> bytes:
-    """A model file's bytes with another manifest, these inner files, and a new seal. All else stays as it is.
-
-    files: of the look network and its glance, by key.
-    """
-    model = onnx.load_from_string(content)
-    replaced = (LOOK_KEY, GLANCE_KEY, SEAL_KEY)
-    metadata = {each.key: each.value for each in model.metadata_props if each.key not in replaced}
-    metadata[METADATA_KEY] = manifest.as_json()
-    metadata |= {key: base64.b64encode(file).decode() for key, file in files.items()}
-    helper.set_model_props(model, metadata)
-    return sealed(bytes(model.SerializeToString(deterministic=True)))

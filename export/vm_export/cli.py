@@ -32,7 +32,7 @@ def parser() -> argparse.ArgumentParser:
         "model",
         type=Path,
         help="checkpoint (.pt), network of the reference implementation (.yaml), or a model file (.onnx, or the name "
-        "of a network of the package) whose close look you want to change",
+        "of a network of the package) whose close look or canary you want to change",
     )
     parser.add_argument(
         "-o", "--output", type=Path, help="file to write; default: the name of the model with .onnx or .yaml"
@@ -57,6 +57,14 @@ def parser() -> argparse.ArgumentParser:
         help="probability of a mesh point from which it counts for a proposal, if this network needs another one than "
         "the network that the look was trained with; a network of many classes is less sure of each; lower: more "
         "proposals",
+    )
+    parser.add_argument(
+        "--canary",
+        type=Path,
+        nargs=2,
+        metavar=("IMAGE", "LENS"),
+        help="small picture that shows an object of every class, and its lens file with Hoc; the detector must find "
+        "them again at each start. For a model file (.onnx), also renew the self-tests",
     )
     facts = parser.add_argument_group("entries that the file lacks, or that you want to replace")
     facts.add_argument(
@@ -97,7 +105,9 @@ def _run(options: argparse.Namespace) -> int:
         options.model = model_path(options.model)
     _check_options(options)
     # Imported here: without torch, --help still works and the error is one clear line.
-    from .export import change_look, export, fastest_layout
+    from .attach_canary import CanaryPicture
+    from .change_model import change_canary, change_look
+    from .export import export, fastest_layout
     from .look_checkpoint import LookCheckpoint
     from .reference import write_reference
 
@@ -105,12 +115,17 @@ def _run(options: argparse.Namespace) -> int:
     portable = output.with_suffix(".plain" + output.suffix)
     one_file = options.to_yaml or options.layout or _is_model_file(options.model)
     for path in (output,) if one_file else (output, portable):
-        for given in filter(None, (options.model, options.look)):
+        for given in filter(None, (options.model, options.look, *(options.canary or ()))):
             if path.resolve() == given.resolve():
                 raise InputError(f"{path} is the input and would be overwritten; give another file with --output")
     look = LookCheckpoint.load(options.look) if options.look else None
     if look is not None and options.look_above is not None:
         look = look.for_points_above(options.look_above)
+    canary = CanaryPicture.read(*options.canary) if options.canary else None
+    if _is_model_file(options.model) and canary is not None:
+        change_canary(options.model, output, canary)
+        _print_written(output, f"networks of {options.model} with a new canary", None, None)
+        return EXIT_OK
     if _is_model_file(options.model):
         difference = change_look(options.model, output, look)
         _print_written(output, f"mesh network of {options.model}", look, difference)
@@ -125,7 +140,7 @@ def _run(options: argparse.Namespace) -> int:
     files = {portable: "plain"} if options.layout is None and layout != "plain" else {}
     files[output] = layout
     for path, layout in files.items():
-        _print_written(path, f"layout {layout}", look, export(checkpoint, path, layout, look))
+        _print_written(path, f"layout {layout}", look, export(checkpoint, path, layout, look, canary))
     return EXIT_OK
 
 
@@ -139,8 +154,8 @@ def _check_options(options: argparse.Namespace) -> None:
         raise InputError("--look-above is for the look that --look attaches; add --look, or leave it out")
     if options.look_above is not None and not 0.0 <= options.look_above <= 0.99:
         raise InputError(f"--look-above must be from 0 to 0.99, not {options.look_above:g}")
-    if options.to_yaml and (options.layout or options.look):
-        option = "--layout" if options.layout else "--look"
+    if options.to_yaml and (options.layout or options.look or options.canary):
+        option = "--layout" if options.layout else "--look" if options.look else "--canary"
         raise InputError(f"{option} is for ONNX files; leave it out with --to-yaml")
     if not _is_model_file(options.model):
         if options.no_look:
@@ -153,8 +168,14 @@ def _check_options(options: argparse.Namespace) -> None:
         raise InputError(
             f"{', '.join(given)} can't change a model file; give the checkpoint (.pt) instead of {options.model}"
         )
-    if not options.look and not options.no_look:
-        raise InputError(f"{options.model} is a model file already; change its close look with --look or --no-look")
+    changes = [option for option in ("look", "no_look", "canary") if getattr(options, option)]
+    if not changes:
+        raise InputError(
+            f"{options.model} is a model file already; change its close look with --look or --no-look, or its canary "
+            "with --canary"
+        )
+    if options.canary and len(changes) > 1:
+        raise InputError("a model file gets another close look or another canary; give one of the two options")
 
 
 def _print_written(path: Path, content: str, look: LookCheckpoint | None, difference: float | None) -> None:

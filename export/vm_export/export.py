@@ -16,17 +16,19 @@ from vm_embedded.files import atomic_write
 from vm_embedded.mesh.grids import lattice_neighbors
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
-from vm_embedded.network.model_file import ModelFile, read_model
+from vm_embedded.network.model_file import ModelFile
 from vm_embedded.network.self_test import SelfTest
 from vm_embedded.network.session import Session
 
-from .attach_look import attached, detached
+from .attach_canary import CanaryPicture, with_canary
+from .attach_look import attached
 from .checkpoint import Checkpoint
 from .lattice_graph import lattice_model
 from .look_checkpoint import LookCheckpoint
 from .network import Network
 from .plain_graph import plain_model
 from .runs_graph import runs_model
+from .strong_self_test import strong_self_test
 
 LARGEST_DIFFERENCE = 1e-4
 """Largest difference of an answer that is allowed between ONNX Runtime and torch."""
@@ -59,13 +61,18 @@ def onnx_model(network: Network, manifest: Manifest) -> bytes:
 
 
 def export(
-    checkpoint: Checkpoint, path: str | Path, layout: str | None = None, look: LookCheckpoint | None = None
+    checkpoint: Checkpoint,
+    path: str | Path,
+    layout: str | None = None,
+    look: LookCheckpoint | None = None,
+    canary: CanaryPicture | None = None,
 ) -> float:
     """Write the model file of a checkpoint and return the largest difference to torch of an answer.
 
-    layout: one of LAYOUTS; default the fastest one. look: a look network to write into the same file. ONNX Runtime runs
-    the networks before the file is written. Raises ModelError if an answer differs by more than LARGEST_DIFFERENCE, the
-    layout does not fit the manifest, or the look does not fit its classes, and InputError if the file can't be written.
+    layout: one of LAYOUTS; default the fastest one. look: a look network to write into the same file. canary: a
+    picture that becomes its canary. ONNX Runtime runs the networks before the file is written. Raises ModelError if an
+    answer differs by more than LARGEST_DIFFERENCE, the layout does not fit the manifest, or the look does not fit its
+    classes, and InputError if the picture does not show every class, or the file can't be written.
     """
     layout = layout or fastest_layout(checkpoint)
     network = checkpoint.network.eval()
@@ -76,39 +83,20 @@ def export(
         layout=layout,
         operations=network.shape.operations,
         provenance=provenance,
-        self_test=random_example(network, 12, 0, checkpoint.manifest.model.steps if layout == "lattice" else None),
     )
+    manifest = replace(manifest, self_test=strong_self_test(network, manifest))
     content = onnx_model(network, manifest)
     difference = largest_difference(content, network, manifest)
-    _check_difference(path, "probabilities", difference)
+    check_difference(path, "probabilities", difference)
     if look is not None:
         content, look_difference = attached(content, manifest, look)
-        _check_difference(path, "answers of the close look", look_difference)
+        check_difference(path, "answers of the close look", look_difference)
         difference = max(difference, look_difference)
-    _write(path, content)
+    write_model(path, content if canary is None else with_canary(content, canary))
     return difference
 
 
-def change_look(model: str | Path, path: str | Path, look: LookCheckpoint | None) -> float | None:
-    """Write a copy of a model file with this look network, or without any; its mesh network stays as it is.
-
-    Return the largest difference to torch of the look's answers, None without a look. Raises ModelError if an answer
-    differs by more than LARGEST_DIFFERENCE, the look does not fit the file's classes, or there is none to remove, and
-    InputError if the file can't be written.
-    """
-    read = read_model(model)
-    if look is not None:
-        content, difference = attached(read.content, read.manifest, look)
-        _check_difference(path, "answers of the close look", difference)
-        _write(path, content)
-        return difference
-    if read.look is None:
-        raise ModelError(f"{model} has no close look to remove")
-    _write(path, detached(read.content, read.manifest))
-    return None
-
-
-def _check_difference(path: str | Path, what: str, difference: float) -> None:
+def check_difference(path: str | Path, what: str, difference: float) -> None:
     """Raises ModelError if ONNX Runtime and torch differ too much, or if an answer is NaN."""
     if not difference <= LARGEST_DIFFERENCE:
         raise ModelError(
@@ -117,7 +105,8 @@ def _check_difference(path: str | Path, what: str, difference: float) -> None:
         )
 
 
-def _write(path: str | Path, content: bytes) -> None:
+def write_model(path: str | Path, content: bytes) -> None:
+    """Write a file as a whole. Raises InputError."""
     with atomic_write(Path(path)) as part:
         part.write_bytes(content)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from vm_embedded.arrays import Floats
-from vm_embedded.network.look_contract import ANSWERS
+from vm_embedded.network.look_test import ANSWERS
 
 from .look_network import NOISE_FLOOR, LookNetwork
 from .onnx_graph import FLOAT, UINT8, OnnxGraph

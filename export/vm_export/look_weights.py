@@ -60,7 +60,7 @@ def _state(constants: Mapping[str, Singles], convolutions: int) -> dict[str, tor
 
 
 def _examples(contract: LookContract) -> Image:
-    """The patches of the self-test; a gray one if there is none."""
+    """The first patches of the self-test; a gray one if there is none."""
     if contract.self_test is not None:
         return contract.self_test.patches.copy()  # its own array can't be written, which torch does not support
     return np.full((1, contract.size, contract.size, 3), 128, dtype=np.uint8)

@@ -63,11 +63,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal.signal(number, signal.SIG_IGN)  # the daemon handles them once it runs
     log = EventLog("vm-ros")
     try:
-        node = Node(configuration(options), connect(NODE, given[cut + 1 :]))
-        return asyncio.run(Daemon(lambda: configuration(options), log, node).run())
+        return asyncio.run(_prove_and_run(options, given[cut + 1 :], log))
     except VisualMeshError as error:
         log("can't start", "error", reason=str(error))
         return EXIT_CONFIGURATION
+
+
+async def _prove_and_run(options: argparse.Namespace, ros_arguments: Sequence[str], log: EventLog) -> int:
+    """Connect to ROS, and run the daemon after its network was proved. Raises VisualMeshError."""
+    node = Node(configuration(options), connect(NODE, ros_arguments))
+    daemon = await Daemon.prepare(lambda: configuration(options), log, node)
+    return await daemon.run()
 
 
 def configuration(options: argparse.Namespace) -> Configuration:

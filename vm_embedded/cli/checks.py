@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import fcntl
 import math
@@ -121,13 +122,16 @@ def check_opencv(installed: set[str]) -> Finding:
 
 
 def check_model(configuration: Configuration) -> Finding:
-    """Whether the model loads and passes its self-test."""
+    """Whether the model loads, passes its self-tests and finds its canary."""
     try:
-        detector = load_checked_detector(configuration)
+        detector, proved = asyncio.run(load_checked_detector(configuration))
     except VisualMeshError as error:
         return Finding("model", BAD, str(error), "vm-detect --check-config tells whether it works after a change")
-    digest = detector.session.model.sha256
-    return Finding("model", GOOD, f"{configuration.model}: self-test passed, sha256 {digest[:16]}...")
+    model = detector.session.model
+    seen = f"{configuration.model}: {proved}, sha256 {model.sha256[:16]}..."
+    if model.canary is None:
+        return Finding("model", WARNING, seen, "vm-export --canary IMAGE LENS writes a picture that it must find")
+    return Finding("model", GOOD, seen)
 
 
 def check_cameras(configuration: Configuration, root: Path) -> Iterator[Finding]:

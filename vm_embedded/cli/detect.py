@@ -47,10 +47,10 @@ def parser() -> argparse.ArgumentParser:
         description="Find objects in images, videos or live cameras, and print one line of JSON for each frame.",
         epilog="Exit status for files: 0, at least one frame was processed; 1, no frame was processed. For a live "
         "camera: 0, a signal such as Ctrl-C stopped it, or the played file has ended; 1, a second signal ended it at "
-        "once, or the played file has ended and no frame could be processed; 75, reads of the camera hang, and a "
-        "restart may help; 78, the configuration can't be used, and a restart would fail again. For --status: 0, the "
-        "state is ok; 1, the state is not ok, or nothing answers. Always: 2, the options can't be parsed; "
-        "130, Ctrl-C while files are processed, or before the live camera runs. " + ANGLES,
+        "once, or the played file has ended and no frame could be processed; 75, reads of the camera or a frame "
+        "hang, and a restart may help; 78, the configuration can't be used, and a restart would fail again. "
+        "For --status: 0, the state is ok; 1, the state is not ok, or nothing answers. Always: 2, the options can't be "
+        "parsed; 130, Ctrl-C while files are processed, or before the live camera runs. " + ANGLES,
     )
     parser.add_argument(
         "files",
@@ -187,8 +187,8 @@ def _ask(given: Configuration, command: str) -> int:
 
 def _check_configuration(given: Configuration) -> int:
     """Load the model and check that the configuration fits together. Raises VisualMeshError."""
-    detector = load_checked_detector(given)
-    print(f"{given.model}: {len(detector.manifest.classes)} classes, self-test passed; the configuration is good")
+    detector, proved = asyncio.run(load_checked_detector(given))
+    print(f"{given.model}: {len(detector.manifest.classes)} classes, {proved}; the configuration is good")
     return EXIT_OK
 
 
@@ -205,10 +205,15 @@ def _detect_live(options: argparse.Namespace) -> int:
                 )
         if any(map(is_bag, options.files)):
             raise InputError("a bag can't be played with --live; give it without --live, or play it for vm-ros")
-        daemon = Daemon(lambda: read_options(options), EventLog("vm-detect"))
-        return asyncio.run(daemon.run())
+        return asyncio.run(_prove_and_run(options))
     except VisualMeshError as error:
         return _report_bad_configuration(error)
+
+
+async def _prove_and_run(options: argparse.Namespace) -> int:
+    """Run the daemon after its network was proved. Raises VisualMeshError."""
+    daemon = await Daemon.prepare(lambda: read_options(options), EventLog("vm-detect"))
+    return await daemon.run()
 
 
 def _report_bad_configuration(error: VisualMeshError) -> int:

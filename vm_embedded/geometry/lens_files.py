@@ -66,17 +66,22 @@ def read_lens_file(path: str | Path) -> LensFile:
         if path.suffix.lower() == ".toml":
             table = parse_toml(text)
             return LensFile(lens_from_table(table.get("lens", table)), None)
-        table = read_yaml(text)
-        if not isinstance(table, dict):
-            raise InputError("expected a table of keys and values")
-        if "projection" in table:
-            table = {_REFERENCE_NAMES.get(key, key): value for key, value in table.items()}
-            hoc = table.pop("Hoc", None)
-            return LensFile(lens_from_table(table), None if hoc is None else Orientation.from_hoc(hoc))
-        hoc = table.pop("Hoc", None)
-        return LensFile(lens_from_calibration(table), None if hoc is None else Orientation.from_hoc(hoc))
+        return parse_lens_yaml(text)
     except VisualMeshError as error:
         raise InputError(f"lens file {path}: {error}") from error
+
+
+def parse_lens_yaml(text: str) -> LensFile:
+    """Reads the text of a lens file in YAML. Raises InputError, also for a bad orientation GeometryError."""
+    table = read_yaml(text)
+    if not isinstance(table, dict):
+        raise InputError("expected a table of keys and values")
+    if "projection" in table:
+        table = {_REFERENCE_NAMES.get(key, key): value for key, value in table.items()}
+        hoc = table.pop("Hoc", None)
+        return LensFile(lens_from_table(table), None if hoc is None else Orientation.from_hoc(hoc))
+    hoc = table.pop("Hoc", None)
+    return LensFile(lens_from_calibration(table), None if hoc is None else Orientation.from_hoc(hoc))
 
 
 def format_lens_file(lens: Lens, orientation: Orientation | None) -> str:

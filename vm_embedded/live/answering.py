@@ -19,6 +19,7 @@ from ..poses.buffer import StalePoseError
 from ..poses.stream import PoseStream
 from .configuration import Configuration
 from .counters import Counters
+from .frame_watchdog import FrameWatchdog
 from .health import Health
 
 
@@ -43,9 +44,10 @@ class Answerer:
         poses: PoseStream,
         counters: Counters,
         health: Health,
+        watchdog: FrameWatchdog,
     ) -> None:
         self.configuration, self.detector = configuration, detector
-        self._poses, self._counters, self._health = poses, counters, health
+        self._poses, self._counters, self._health, self._watchdog = poses, counters, health, watchdog
         self._tracker = Tracker(configuration.track)
 
     def reload(self, configuration: Configuration, detector: Detector) -> None:
@@ -61,7 +63,8 @@ class Answerer:
             lens, orientation = self._lens(shot), await self._orientation(shot)
             self._health.pose_trouble = ""
             started = time.perf_counter()
-            detections = self.detector.detect(shot.image, orientation, lens)
+            with self._watchdog.frame():
+                detections = self.detector.detect(shot.image, orientation, lens)
             if self.configuration.track.on:
                 detections = self._tracker.update(detections, shot.captured)
         except StalePoseError as error:

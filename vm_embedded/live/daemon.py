@@ -22,6 +22,7 @@ from typing import Any, Protocol
 from ..cameras.camera import without_password
 from ..cameras.grabber import MOST_HANGING, Grabber
 from ..cameras.open_camera import camera_opener
+from ..detection.detector import Detector
 from ..errors import InputError, VisualMeshError, one_line
 from ..output.channels import Channels
 from ..output.messages import Message, live_message, state_message
@@ -33,6 +34,7 @@ from .bridge import Bridge
 from .configuration import Configuration, recording_files
 from .control import REFUSED, ControlServer, control_path
 from .counters import Counters
+from .frame_watchdog import FrameWatchdog
 from .health import Health
 from .live_page import LivePage
 from .load_detector import load_checked_detector
@@ -56,6 +58,9 @@ _HEARTBEAT = 1.0
 _RECORDING_S = 3.5
 """Longest wait for a recording when the daemon stops [s]; the unit's TimeoutStopSec is 5 s."""
 
+_LAST_WORDS_S = 0.3
+"""Time for the threads of the outputs to write the last message of a process that hangs [s]."""
+
 _CLOCK_JUMP = 0.5
 """Change of the wall clock relative to the monotonic clock that is logged [s]."""
 
@@ -73,18 +78,23 @@ class Part(Protocol):
 class Daemon:
     """Runs until a signal stops it, the camera ends, or too many reads of the camera hang.
 
-    configure: reads the configuration; called at the start and for each reload. Raises VisualMeshError.
-    bridge: to other robot software.
+    configure: reads the configuration for each reload. proved: in words, what shows that the detector works. bridge: to
+    other robot software.
     """
 
-    def __init__(self, configure: Callable[[], Configuration], log: EventLog, bridge: Bridge | None = None) -> None:
+    def __init__(
+        self,
+        configure: Callable[[], Configuration],
+        configuration: Configuration,
+        detector: Detector,
+        proved: str,
+        log: EventLog,
+        bridge: Bridge | None = None,
+    ) -> None:
         self._configure = configure
+        self._proved = proved
         self._log = log
         self._bridge = bridge
-        configuration = configure()
-        if bridge is None and is_of_ros(configuration.pose.source):
-            raise InputError(f"pose source {configuration.pose.source} works only with vm-ros and bags")
-        detector = load_checked_detector(configuration)
         camera, status = configuration.camera, configuration.status
         self.recorder = Recorder(configuration.recorder, lambda event, level, folder: log(event, level, folder=folder))
         self.last: Message | None = None
@@ -98,10 +108,12 @@ class Daemon:
         self._notifier = SystemdNotifier()
         self._hung = False  # whether so many reads of the camera hang that only a new process helps
         self._wakeup = asyncio.Event()
+        self._reloading: asyncio.Task[None] | None = None
         opener = (bridge.opener if bridge else camera_opener)(camera, configuration.detector.format != "bgr")
         self.grabber = Grabber(opener, camera, self._wake)
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
-        self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health)
+        self._watchdog = FrameWatchdog(self._end_hanging)
+        self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health, self._watchdog)
         self._recording_files = recording_files(configuration, detector.session.model)
         self.outputs = Channels(configuration.output)
         self.page = LivePage(self.answerer, self._status, self.record, self.metrics, self._use_threshold)
@@ -109,6 +121,17 @@ class Daemon:
         commands |= {"record": self.record, "metrics": self.metrics}
         control = ControlServer(control_path(status.socket), commands)
         self._parts: list[Part] = [self.outputs, self.poses, control, *self.page.servers()]
+
+    @classmethod
+    async def prepare(
+        cls, configure: Callable[[], Configuration], log: EventLog, bridge: Bridge | None = None
+    ) -> Daemon:
+        """A daemon whose configuration was read and whose detector was proved. Raises VisualMeshError."""
+        configuration = configure()
+        if bridge is None and is_of_ros(configuration.pose.source):
+            raise InputError(f"pose source {configuration.pose.source} works only with vm-ros and bags")
+        detector, proved = await load_checked_detector(configuration)
+        return cls(configure, configuration, detector, proved, log, bridge)
 
     @property
     def configuration(self) -> Configuration:
@@ -121,7 +144,7 @@ class Daemon:
         sys.setswitchinterval(_SWITCH_INTERVAL)
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self._stop)
-        loop.add_signal_handler(signal.SIGHUP, self.reload)
+        loop.add_signal_handler(signal.SIGHUP, self._start_reload)
         loop.add_signal_handler(signal.SIGUSR1, self.record)
         loop.set_exception_handler(self._log_loop_error)
         self._loop = loop
@@ -134,10 +157,11 @@ class Daemon:
             await self._close()
             raise
         self.grabber.start()
+        self._watchdog.start()
         self._update_state()
         self._notifier.send(READY=1)
         camera = without_password(self.configuration.camera.source)
-        self._log("ready", model=self.configuration.model, camera=camera)
+        self._log("ready", model=self.configuration.model, proved=self._proved, camera=camera)
         if self.configuration.status.page:
             self._log("status page", address=self.configuration.status.page, token=self.page.token)
         clock_offset = time.time() - time.monotonic()
@@ -278,17 +302,23 @@ class Daemon:
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self._wakeup.set)
 
-    def reload(self) -> None:
+    def _start_reload(self) -> None:
+        """Begin a reload, instead of one that has not ended."""
+        if self._reloading is not None:
+            self._reloading.cancel()
+        self._reloading = self._loop.create_task(self._reload())
+
+    async def _reload(self) -> None:
         """Read the configuration and the model again. If anything is wrong, nothing changes."""
         try:
-            new = read_again(self._configure, self.configuration)
+            new = await read_again(self._configure, self.configuration)
         except VisualMeshError as error:
             self._log("reload refused", "error", reason=str(error))
             return
         self.recorder.clear()
         self.answerer.reload(new.configuration, new.detector)
         self._recording_files = new.recording_files
-        self._log("reloaded", model=new.configuration.model, needs_restart=new.needs_restart)
+        self._log("reloaded", model=new.configuration.model, proved=new.proved, needs_restart=new.needs_restart)
 
     def _stop(self) -> None:
         self._stops += 1
@@ -296,7 +326,19 @@ class Daemon:
             os._exit(EXIT_FAILED)  # the second signal ends the process at once
         self._wakeup.set()
 
+    def _end_hanging(self) -> None:
+        """End the process, whose event loop hangs in a frame. Called in another thread."""
+        reason = f"a frame takes more than {FrameWatchdog.limit:g} s"
+        self._log("stopped", "error", frames=self.counters.outcomes.frames, reason=reason)
+        self.outputs.send(state_message("stopping", reason))
+        self._notifier.send(STATUS=f"stopping: {reason}")
+        time.sleep(_LAST_WORDS_S)
+        os._exit(EXIT_HUNG)
+
     async def _close(self) -> None:
+        self._watchdog.close()
+        if self._reloading is not None:
+            self._reloading.cancel()
         if self._bridge is not None:
             await self._bridge.close()
         for part in self._parts:

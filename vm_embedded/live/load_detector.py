@@ -6,26 +6,41 @@ from ..cameras.camera import without_password
 from ..cameras.open_camera import ROS, brings_lens_and_pose, camera_opener, is_live
 from ..detection.detector import Detector
 from ..errors import InputError
+from ..network.bundled import model_path
+from ..network.model_file import parse_model, read_content
 from .configuration import Configuration
+from .proving_process import prove_in_process
 
 
-def load_checked_detector(configuration: Configuration) -> Detector:
-    """Load the configured network, run its self-test, and check camera, lens, poses and trigger class.
+async def load_checked_detector(configuration: Configuration) -> tuple[Detector, str]:
+    """Load the configured network, prove that it works, and check camera, lens, poses and trigger class.
 
-    Raises VisualMeshError for the first thing that is missing or invalid.
+    Return the detector, and in words what was proved. Another process proves it first. Raises VisualMeshError for the
+    first thing that is missing or invalid.
     """
-    detector = Detector.from_file(configuration.model, configuration.detector)
-    camera = configuration.camera.source
-    orientation = configuration.fixed_orientation()  # raises InputError for angles without a height
-    if is_live(camera) and camera != ROS:
-        camera_opener(configuration.camera, raw=configuration.detector.format != "bgr")  # only for its checks
+    _check_camera(configuration)
+    path = model_path(configuration.model)
+    content = read_content(path)
+    proved = await prove_in_process(path, content)
+    detector = Detector(parse_model(path, content), configuration.detector)
     if configuration.recorder.trigger_class:
         detector.manifest.column(configuration.recorder.trigger_class)
-    if is_live(camera) and not brings_lens_and_pose(camera):
-        if configuration.lens is None and configuration.fov is None:
-            raise InputError(f"camera {without_password(camera)} needs a lens: give --lens or --fov")
-        if configuration.pose.source == "fixed" and orientation is None:
-            raise InputError(
-                f"camera {without_password(camera)} needs poses: give --height, --pose-source, or Hoc in the lens file"
-            )
-    return detector
+    return detector, proved
+
+
+def _check_camera(configuration: Configuration) -> None:
+    """Raise InputError for a camera, lens or pose that is missing or invalid."""
+    camera = configuration.camera.source
+    orientation = configuration.fixed_orientation()  # raises InputError for angles without a height
+    if not is_live(camera):
+        return
+    if camera != ROS:
+        camera_opener(configuration.camera, raw=configuration.detector.format != "bgr")  # only for its checks
+    if brings_lens_and_pose(camera):
+        return
+    if configuration.lens is None and configuration.fov is None:
+        raise InputError(f"camera {without_password(camera)} needs a lens: give --lens or --fov")
+    if configuration.pose.source == "fixed" and orientation is None:
+        raise InputError(
+            f"camera {without_password(camera)} needs poses: give --height, --pose-source, or Hoc in the lens file"
+        )

@@ -17,26 +17,31 @@ _NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder", "ros")
 class Reloaded:
     """The parts of a daemon that a reload replaces.
 
-    recording_files: the files of a recording besides its frames. needs_restart: names of the changed sections and
-    entries that only a restart applies; the configuration has their old values.
+    proved: in words, what shows that the network works. recording_files: the files of a recording besides its frames.
+    needs_restart: names of the changed sections and entries that only a restart applies; the configuration has their
+    old values.
     """
 
     configuration: Configuration
     detector: Detector
+    proved: str
     recording_files: dict[str, bytes]
     needs_restart: list[str]
 
 
-def read_again(configure: Callable[[], Configuration], running: Configuration) -> Reloaded:
-    """Read the configuration and load its network. running: the current configuration. Raises VisualMeshError."""
+async def read_again(configure: Callable[[], Configuration], running: Configuration) -> Reloaded:
+    """Read the configuration and load its network. running: the current configuration. Raises VisualMeshError.
+
+    The running detector waits only while the network is loaded, after another process has proved it.
+    """
     wanted = configure()
     # The open camera delivers its frames in the format of the start.
     detector_settings = replace(wanted.detector, format=running.detector.format)
     configuration = replace(wanted, detector=detector_settings)
-    detector = load_checked_detector(configuration)
+    detector, proved = await load_checked_detector(configuration)
     kept = {name: getattr(running, name) for name in _NEEDS_RESTART}
     needs_restart = [name for name, section in kept.items() if section != getattr(wanted, name)]
     if wanted.detector.format != running.detector.format:
         needs_restart.append("detector.format")
     files = recording_files(configuration, detector.session.model)
-    return Reloaded(replace(configuration, **kept), detector, files, needs_restart)
+    return Reloaded(replace(configuration, **kept), detector, proved, files, needs_restart)

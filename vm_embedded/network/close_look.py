@@ -10,7 +10,8 @@ import numpy as np
 
 from ..arrays import Image, Singles
 from ..errors import ModelError
-from .look_contract import ANSWERS, LookContract
+from .look_contract import LookContract
+from .look_test import ANSWERS
 from .model_file import ModelFile
 from .onnx_model import OnnxModel
 
@@ -37,7 +38,7 @@ class CloseLook:
         self.onnx = OnnxModel(name, content, interface, "answers", threads, spinning)
         test = contract.self_test
         if test is not None:
-            self.onnx.check_answer(self.run(test.patches), test.answers)
+            self.onnx.check_answer(self.run(test.all_patches), test.answers)
 
     @classmethod
     def of(cls, model: ModelFile, threads: int = 1, spinning: bool = False) -> CloseLook | None:

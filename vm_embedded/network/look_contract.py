@@ -2,50 +2,18 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
-import numpy as np
-
-from ..arrays import Image, Singles
 from ..errors import ModelError
+from .look_test import LookTest
 
 LOOK_KEY = "visual_mesh_look"
 """Key of the look network, an ONNX file as base64, in the metadata of a model file."""
 
 GLANCE_KEY = "visual_mesh_glance"
 """Key of its glance, in the same form."""
-
-ANSWERS = ("probability", "right", "down", "size")
-"""Outputs of a look network for a patch; see CloseLook.run."""
-
-
-@dataclass(frozen=True, eq=False)
-class LookTest:
-    """Patches (n, size, size, 3), RGB, and the network's answers (n, 4) to them."""
-
-    patches: Image
-    answers: Singles
-
-    def as_dict(self) -> dict[str, Any]:
-        """Text and nested lists for JSON."""
-        return {
-            "patches": base64.b64encode(np.ascontiguousarray(self.patches).tobytes()).decode(),
-            "answers": np.round(self.answers.astype(float), 6).tolist(),
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any], size: int) -> LookTest:
-        """Inverse of `as_dict`, for patches of size x size samples. Raises ModelError."""
-        try:
-            answers = np.array(data["answers"], dtype=np.float32).reshape(-1, len(ANSWERS))
-            content = np.frombuffer(base64.b64decode(data["patches"], validate=True), dtype=np.uint8)
-            return cls(content.reshape(len(answers), size, size, 3), answers)
-        except (KeyError, TypeError, ValueError, OverflowError, binascii.Error) as error:
-            raise ModelError(f"self-test of the close look can't be read: {error}") from error
 
 
 @dataclass(frozen=True, kw_only=True)

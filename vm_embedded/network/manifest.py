@@ -227,7 +227,7 @@ class Manifest:
         data = asdict(replace(self, look=None)) | {"format_version": FORMAT_VERSION}
         data["look"] = self.look.as_dict() if self.look else None
         data["self_test"] = self.self_test.as_dict() if self.self_test else None
-        return json.dumps(data, sort_keys=True)
+        return json.dumps(data, sort_keys=True, separators=(",", ":"))
 
     @classmethod
     def from_json(cls, text: str) -> Manifest:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import ModelError
+from .canary import CANARY_KEY, Canary
 from .look_contract import GLANCE_KEY, LOOK_KEY, LookContract
 from .manifest import METADATA_KEY, Manifest
 
@@ -51,8 +52,8 @@ _Budget = Iterator[int]
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A model file's bytes, its manifest, the SHA-256 of the bytes, and the ONNX files of its look network and of the
-    glance before it, if any."""
+    """A model file's bytes, its manifest, the SHA-256 of the bytes, and, if it has them, the ONNX files of its look
+    network and of the glance before it, and its canary."""
 
     path: Path
     content: bytes
@@ -60,23 +61,33 @@ class ModelFile:
     sha256: str
     look: bytes | None = None
     glance: bytes | None = None
+    canary: Canary | None = None
 
 
 def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
-    """Read and check a model file.
+    """Read and check a model file of at most `max_mib` [MiB]. Raises ModelError as the two steps do."""
+    return parse_model(path, read_content(path, max_mib))
 
-    Raises ModelError if it is missing, larger than `max_mib` [MiB], not an ONNX file, refers to external data, contains
-    inner graphs (control flow) or functions, lacks a manifest of this format, or is not what its seal says: a damaged
-    network could still pass its self-test, and find nothing.
-    """
+
+def read_content(path: str | Path, max_mib: float = 64.0) -> bytes:
+    """The bytes of a model file. Raises ModelError if it is missing, or larger than `max_mib` [MiB]."""
     path = Path(path)
     try:
         size = path.stat().st_size
         if size > max_mib * 2**20:
             raise ModelError(f"{path}: {size / 2**20:.1f} MiB is too large for a model (allowed: {max_mib:g} MiB)")
-        content = path.read_bytes()
+        return path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
         raise ModelError(f"can't read the model {path}: {getattr(error, 'strerror', None) or error}") from error
+
+
+def parse_model(path: str | Path, content: bytes) -> ModelFile:
+    """Check the content of a model file. path: for messages.
+
+    Raises ModelError if it is not an ONNX file, refers to external data, contains inner graphs (control flow) or
+    functions, lacks a manifest of this format, or is not what its seal says: a damaged network could still pass its
+    self-test, and find nothing.
+    """
     try:
         metadata, digest = _read_fields(content)
         if METADATA_KEY not in metadata:
@@ -85,13 +96,14 @@ def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
         contract = manifest.look
         look = _inner_file(metadata, LOOK_KEY, "close look", contract)
         glance = _inner_file(metadata, GLANCE_KEY, "glance", contract and contract.glance)
+        canary = Canary.from_json(metadata[CANARY_KEY]) if CANARY_KEY in metadata else None
         if SEAL_KEY not in metadata:
             raise ModelError("has no checksum: it was written by an older release; export it again with this release")
         if metadata[SEAL_KEY] != digest:
             raise ModelError("its checksum is wrong: it was damaged or changed; copy or export it again")
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from error
-    return ModelFile(path, content, manifest, hashlib.sha256(content).hexdigest(), look, glance)
+    return ModelFile(Path(path), content, manifest, hashlib.sha256(content).hexdigest(), look, glance, canary)
 
 
 def _inner_file(metadata: dict[str, str], key: str, name: str, contract: LookContract | None) -> bytes | None:

@@ -1,0 +1,57 @@
+"""A model file with another look network or another canary; its mesh network stays as it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from vm_embedded.errors import ModelError
+from vm_embedded.network.manifest import METADATA_KEY
+from vm_embedded.network.model_file import read_model
+
+from .attach_canary import CanaryPicture, with_canary
+from .attach_look import attached, detached, look_self_test
+from .export import check_difference, write_model
+from .look_checkpoint import LookCheckpoint
+from .look_weights import look_of
+from .metadata import with_metadata
+from .network_weights import network_of
+from .strong_self_test import strong_self_test
+
+
+def change_look(model: str | Path, path: str | Path, look: LookCheckpoint | None) -> float | None:
+    """Write a copy of a model file with this look network, or without any; its mesh network stays as it is, and its
+    canary gets the new answers.
+
+    Return the largest difference to torch of the look's answers, None without a look. Raises ModelError if an answer
+    differs by more than LARGEST_DIFFERENCE, the look does not fit the file's classes, or there is none to remove, and
+    InputError if the file can't be written.
+    """
+    read = read_model(model)
+    difference = None
+    if look is not None:
+        content, difference = attached(read.content, read.manifest, look)
+        check_difference(path, "answers of the close look", difference)
+    elif read.look is None:
+        raise ModelError(f"{model} has no close look to remove")
+    else:
+        content = detached(read.content, read.manifest)
+    write_model(path, content if read.canary is None else with_canary(content, CanaryPicture.of(read.canary)))
+    return difference
+
+
+def change_canary(model: str | Path, path: str | Path, canary: CanaryPicture) -> None:
+    """Write a copy of a model file with new self-tests and this canary; its networks stay as they are.
+
+    Raises ModelError for a file of another program, and InputError if the picture does not show every class, or the
+    file can't be written.
+    """
+    read = read_model(model)
+    manifest = replace(read.manifest, self_test=strong_self_test(network_of(read).network, read.manifest))
+    if manifest.look is not None:
+        checkpoint = look_of(read)
+        contract = replace(manifest.look, self_test=look_self_test(checkpoint))
+        if contract.glance is not None and checkpoint.glance is not None:
+            contract = replace(contract, glance=replace(contract.glance, self_test=look_self_test(checkpoint.glance)))
+        manifest = replace(manifest, look=contract)
+    write_model(path, with_canary(with_metadata(read.content, {METADATA_KEY: manifest.as_json()}), canary))

@@ -1,0 +1,113 @@
+"""Prove that a model file works in a child process with limits, so that a file of an enemy can't hurt the detector.
+
+The parent reads the file once, and the child gets its bytes: nobody can change the file between the two.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import resource
+import signal
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import cv2
+
+from ..errors import ModelError, VisualMeshError, one_line
+from ..network.model_file import parse_model
+from .proof import prove
+
+_LONGEST_S, _PROCESSOR_S = 25.0, 15
+"""Limits of the whole proof, and of its processor time after the imports [s]. The unit's TimeoutStartSec is 30 s."""
+
+_MEMORY_MIB = 1024
+"""Limit of the memory that the proof may add [MiB]; the networks of the package add 120."""
+
+_NOBODY = 65534
+"""User and group without rights, if the parent is root."""
+
+
+async def prove_in_process(path: str | Path, content: bytes) -> str:
+    """Like `prove`, for the content of a model file, in another process. path: for messages. Raises ModelError."""
+    package = str(Path(__file__).parents[2])
+    environment = os.environ | {"PYTHONPATH": package, "OPENBLAS_NUM_THREADS": "1"}
+    try:
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-P", "-m", "vm_embedded.live.proving_process", str(path)),
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.DEVNULL,
+            env=environment,
+        )
+    except OSError as error:
+        raise ModelError(f"{path}: can't start the process that proves it: {error.strerror}") from error
+    try:
+        async with asyncio.timeout(_LONGEST_S):
+            output, _ = await process.communicate(content)
+    except TimeoutError as error:
+        raise ModelError(f"{path}: its proof takes longer than {_LONGEST_S:g} s") from error
+    finally:
+        if process.returncode is None:
+            process.kill()
+            await process.wait()
+    try:
+        answer = json.loads(output)
+        proved, refusal = str(answer["proved"]), str(answer["refusal"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise ModelError(f"{path}: {_end(process.returncode)}") from error
+    if refusal:
+        raise ModelError(refusal)
+    return proved
+
+
+def _end(status: int | None) -> str:
+    """How a child that did not answer has ended."""
+    if status in (-signal.SIGXCPU, -signal.SIGKILL):
+        return f"its proof takes more than {_PROCESSOR_S} s of processor time, or too much memory"
+    if status is not None and status < 0:
+        return f"ONNX Runtime was ended by {signal.Signals(-status).name} during its proof"
+    return f"its proof ended with status {status} and without an answer"
+
+
+def main(path: str) -> None:
+    """The child: prove the model file on standard input, and print the answer as a line of JSON."""
+    cv2.setNumThreads(1)
+    _limit_this_process()
+    proved = refusal = ""
+    try:
+        proved = prove(parse_model(path, sys.stdin.buffer.read()))
+    except VisualMeshError as error:
+        refusal = str(error)
+    except (MemoryError, cv2.error) as error:
+        refusal = f"{path}: its proof failed: {one_line(error) or 'not enough memory'}"
+    print(json.dumps({"proved": proved, "refusal": refusal}))
+
+
+def _limit_this_process() -> None:
+    """Set the limits, and become a user without rights."""
+    with open("/proc/self/statm", encoding="ascii") as file:  # noqa: PTH123
+        in_use = int(file.read().split()[0]) * resource.getpagesize()
+    used = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+    _limit(resource.RLIMIT_AS, in_use + _MEMORY_MIB * 2**20)
+    _limit(resource.RLIMIT_CPU, int(used) + 1 + _PROCESSOR_S)
+    _limit(resource.RLIMIT_FSIZE, 0)
+    _limit(resource.RLIMIT_CORE, 0)
+    _limit(resource.RLIMIT_NOFILE, 64)
+    if os.geteuid() == 0:
+        with suppress(OSError):  # a container may not allow it; the limits stay
+            os.setgroups([])
+            os.setgid(_NOBODY)
+            os.setuid(_NOBODY)
+
+
+def _limit(kind: int, most: int) -> None:
+    _, hard = resource.getrlimit(kind)
+    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(kind, (most, most))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
