@@ -32,22 +32,20 @@ _NOBODY = 65534
 
 async def prove_in_process(path: str | Path, content: bytes) -> str:
     """Like `prove`, for the content of a model file, in another process. path: for messages. Raises ModelError."""
-    package = str(Path(__file__).parents[2])
-    environment = os.environ | {"PYTHONPATH": package, "OPENBLAS_NUM_THREADS": "1"}
     try:
         process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-P", "-m", "vm_embedded.live.proving_process", str(path)),
+            *(sys.executable, "-m", "vm_embedded.live.proving_process", str(path)),
+            cwd=Path(__file__).parents[2],  # the only folder that -m adds to the path of modules
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.DEVNULL,
-            env=environment,
+            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
         )
     except OSError as error:
         raise ModelError(f"{path}: can't start the process that proves it: {error.strerror}") from error
     try:
-        async with asyncio.timeout(_LONGEST_S):
-            output, _ = await process.communicate(content)
-    except TimeoutError as error:
+        output, _ = await asyncio.wait_for(process.communicate(content), _LONGEST_S)
+    except asyncio.TimeoutError as error:
         raise ModelError(f"{path}: its proof takes longer than {_LONGEST_S:g} s") from error
     finally:
         if process.returncode is None:
