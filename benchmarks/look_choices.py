@@ -27,7 +27,7 @@ from vm_embedded.config.sections import read_sections
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
 from vm_embedded.network.bundled import model_path
-from vm_export.export import change_look
+from vm_export.change_model import change_look
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_train.data.pictures import find_pictures
 from vm_train.data.split import Split

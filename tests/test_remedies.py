@@ -15,7 +15,19 @@ import pytest
 TOP = Path(__file__).parents[1]
 EXTRAS = tomllib.loads((TOP / "pyproject.toml").read_text())["project"]["optional-dependencies"]
 
-OTHERS = ("torch", "onnx", "PIL", "yaml", "matplotlib", "tensorboard", "scipy", "mitsuba", "drjit")
+OTHERS = (
+    "torch",
+    "onnx",
+    "PIL",
+    "yaml",
+    "matplotlib",
+    "tensorboard",
+    "scipy",
+    "mitsuba",
+    "drjit",
+    "rosbags",
+    "cyclonedds",
+)
 """Modules that pip install . does not bring."""
 
 CALLS = [

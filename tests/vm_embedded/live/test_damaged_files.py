@@ -14,7 +14,7 @@ from vm_embedded.detection.detector import Detector
 from vm_embedded.errors import VisualMeshError
 from vm_embedded.live.configuration import Configuration, read_configuration
 from vm_embedded.network.bundled import model_path
-from vm_export.export import change_look
+from vm_export.change_model import change_look
 
 WORDS = ["nan", "inf", "-1", "1e400", "true", '"x"', "[]", "{}", "[1, 2]", "'''", "\\u0000", "9" * 400, "1979-05-27"]
 

@@ -14,8 +14,8 @@ import cv2
 import pytest
 
 from tests.vm_export.looks import look_checkpoint
+from vm_export.change_model import change_look
 from vm_export.checkpoint import Checkpoint
-from vm_export.export import change_look
 from vm_export.grid import Grid
 from vm_train.cli.evaluate import main
 
