@@ -51,6 +51,12 @@ class TuningRecipe:
     steps: int = number(60, "steps of an epoch", "", (1, 1e6))
     patience: int = number(3, "epochs without a better validation after which the training ends", "", (1, 1e4))
     own: float = number(0.5, "share of each batch that shows your own frames; the others are rendered", "", (0.01, 1.0))
+    distillation: float = number(
+        1.0,
+        "share of a rendered patch's target that is the answer of the network before; higher: it forgets less",
+        "",
+        (0.0, 1.0),
+    )
     batch: int = number(256, "patches in a step", "", (2, 1e5))
     positives: float = number(0.33, "share of each batch that shows an object", "", (0.01, 0.99))
     rate: float = number(1e-3, "highest learning rate; it rises once, then falls (one cycle)", "", (1e-9, 1e3))

@@ -5,6 +5,7 @@ Patches without an object are drawn by the network's errors, which it learns at 
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -24,6 +25,7 @@ from ..learning.trainer import read_state
 from ..look.labels import OBJECT
 from ..look.patch_set import PatchSet
 from ..look.scores import Calibration, logits_of
+from ..look.teacher import LookTeacher
 from ..look.trainer import LookTrainer
 from .run_folder import TuningRun
 
@@ -103,9 +105,11 @@ class _Stage:
         training, weights = patches.for_training(self._recipe.own)
         self._calibration = _calibration(before.network, patches.rendered_validation)
         network = before.network
+        shares = torch.arange(len(training)) >= len(patches.own)
+        teacher = LookTeacher(copy.deepcopy(network), self._recipe.distillation * shares)
         recipe = self._recipe.for_stage(stage)
         self._trainer = LookTrainer(
-            network, training, before.contract.extent, recipe, settings.augmentation, self._total, weights
+            network, training, before.contract.extent, recipe, settings.augmentation, self._total, weights, teacher
         )
         self._progress, self._best = StageProgress(stage), _copy(network)
         if state is not None:
