@@ -67,6 +67,15 @@ def average_precision(confidence: Floats, right: Mask, truths: int | None = None
     return PrecisionRecall(ranked[last], hits[last] / (last + 1.0), hits[last] / max(count, 1), count).average_precision
 
 
+def balanced_loss(logits: Floats, shown: Mask) -> float:
+    """Mean cross-entropy of logits (n,), where patches with and those without an object weigh the same; NaN if one kind
+    is missing. shown (n,): whether a patch shows an object."""
+    if not 0 < shown.sum() < len(shown):
+        return np.nan
+    losses = np.logaddexp(0.0, np.where(shown, -logits, logits))
+    return float(0.5 * losses[shown].mean() + 0.5 * losses[~shown].mean())
+
+
 @dataclass(frozen=True)
 class Calibration:
     """Scale and offset that turn a logit into that of a calibrated probability."""

@@ -29,6 +29,7 @@ from .configuration import LookRecipe, PatchAugmentation
 from .labels import OBJECT
 from .patch_set import PatchSet
 from .scores import logits_of
+from .teacher import LookTeacher
 
 _PRECISE = 0.1
 """Errors of center and size above this have an absolute instead of a squared loss."""
@@ -48,7 +49,8 @@ class LookTrainer:
     """A network that is trained for `total` steps on patches.
 
     extent: half the side of a patch [expected radii]. weights (n,): how often each patch is drawn, compared to others
-    of its kind; None: equally often. Raises InputError if none shows an object, or all do."""
+    of its kind; None: equally often. teacher: gives the target of some patches' presence. Raises InputError if no patch
+    shows an object, or all do."""
 
     def __init__(
         self,
@@ -59,6 +61,7 @@ class LookTrainer:
         augmentation: PatchAugmentation,
         total: int,
         weights: Floats | None = None,
+        teacher: LookTeacher | None = None,
     ) -> None:
         self.network = network.train()
         self.recipe, self.total, self.done = recipe, total, 0
@@ -69,7 +72,7 @@ class LookTrainer:
             if not len(chosen):
                 raise InputError(f"none of the {len(patches)} training patches {what}")
         self._errors: npt.NDArray[np.float32] | None = None
-        self._weights = weights
+        self._weights, self._teacher = weights, teacher
         self._shown_chances, self._chances = (
             None if weights is None else np.cumsum(weights[rows]) for rows in (self._with, self._without)
         )
@@ -97,7 +100,8 @@ class LookTrainer:
             self._images[chosen], self._targets[chosen], self._extent, self._augmentation, random
         )
         answers = self.network.logits(patches)
-        presence = functional.binary_cross_entropy_with_logits(answers[:, 0], shown)
+        wanted = shown if self._teacher is None else self._teacher.presence(chosen, patches, shown)
+        presence = functional.binary_cross_entropy_with_logits(answers[:, 0], wanted)
         errors = functional.smooth_l1_loss(answers[:, 1:], targets, reduction="none", beta=_PRECISE).sum(dim=1)
         place = (errors * shown).sum() / shown.sum()
         loss = presence + place

@@ -5,6 +5,7 @@ Patches without an object are drawn by the network's errors, which it learns at 
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
@@ -23,8 +24,10 @@ from ..learning.log import TrainingLog
 from ..learning.trainer import read_state
 from ..look.labels import OBJECT
 from ..look.patch_set import PatchSet
-from ..look.scores import Calibration, logits_of
+from ..look.scores import balanced_loss, logits_of
+from ..look.teacher import LookTeacher
 from ..look.trainer import LookTrainer
+from .mixing import Remembered, most_of_the_new
 from .run_folder import TuningRun
 
 _SAVE_INTERVAL = 30.0
@@ -101,11 +104,14 @@ class _Stage:
         self._recipe = settings.training
         self._total = self._recipe.epochs * self._recipe.steps
         training, weights = patches.for_training(self._recipe.own)
-        self._calibration = _calibration(before.network, patches.rendered_validation)
+        self._before = copy.deepcopy(before.network)
+        self._remembered = Remembered.of(self._before, patches.rendered_validation)
         network = before.network
+        shares = torch.arange(len(training)) >= len(patches.own)
+        teacher = LookTeacher(self._before, self._recipe.distillation * shares)
         recipe = self._recipe.for_stage(stage)
         self._trainer = LookTrainer(
-            network, training, before.contract.extent, recipe, settings.augmentation, self._total, weights
+            network, training, before.contract.extent, recipe, settings.augmentation, self._total, weights, teacher
         )
         self._progress, self._best = StageProgress(stage), _copy(network)
         if state is not None:
@@ -126,12 +132,23 @@ class _Stage:
                 if not self._train_epoch(log, stop_requested):
                     return None
         self._bar.clear()
-        network = self._trainer.network.eval()
+        return self._finished()
+
+    def _finished(self) -> LookNetwork:
+        """The network of the best epoch, mixed with the network before, and calibrated."""
+        network = self._trainer.network
         network.load_state_dict(self._best)
-        after = _calibration(network, self._patches.rendered_validation)
+        rendered, old = self._patches.rendered_validation, self._remembered
+        mixture = most_of_the_new(self._before, network, rendered, self._recipe.forgetting)
+        network, new = mixture.network, mixture.remembered
+        print(
+            f"{self._stage}: {mixture.share:.0%} of the weights of epoch {self._progress.best_epoch}, the others as "
+            f"before; loss {new.loss:.3f} for rendered patches, {old.loss:.3f} before",
+            flush=True,
+        )
         # The probability of a rendered patch keeps its meaning: it was calibrated on what is found in whole pictures.
-        scale = after.scale / self._calibration.scale
-        offset = (after.offset - self._calibration.offset) / self._calibration.scale
+        scale = new.calibration.scale / old.calibration.scale
+        offset = (new.calibration.offset - old.calibration.offset) / old.calibration.scale
         network.calibration.copy_(torch.tensor([scale, offset]))
         return network
 
@@ -173,25 +190,14 @@ class _Stage:
         return True
 
     def _loss(self, patches: PatchSet) -> float:
-        """Mean cross-entropy of patches with, and of those without an object; NaN if one of them is missing."""
-        self._trainer.network.eval()
-        logits = logits_of(self._trainer.network, patches.patches)[:, 0].astype(np.float64)
+        """The balanced loss of the network's logits; NaN if one kind of patches is missing."""
+        logits = logits_of(self._trainer.network.eval(), patches.patches)[:, 0].astype(np.float64)
         self._trainer.network.train()
-        shown = patches.labels == OBJECT
-        if not 0 < shown.sum() < len(shown):
-            return math.nan
-        losses = np.logaddexp(0.0, np.where(shown, -logits, logits))
-        return float(0.5 * losses[shown].mean() + 0.5 * losses[~shown].mean())
+        return balanced_loss(logits, patches.labels == OBJECT)
 
     def _save(self) -> None:
         self._trainer.save(self._run.state_path, {"progress": asdict(self._progress), "best": self._best})
         self._saved = perf_counter()
-
-
-def _calibration(network: LookNetwork, patches: PatchSet) -> Calibration:
-    """The calibration of a network's logits on labeled patches."""
-    logits = logits_of(network.eval(), patches.patches)[:, 0].astype(np.float64)
-    return Calibration.fit(logits, patches.labels == OBJECT)
 
 
 def _copy(network: LookNetwork) -> dict[str, torch.Tensor]:
