@@ -39,9 +39,9 @@ def parser() -> argparse.ArgumentParser:
         epilog="Exit status for files: 0, at least one frame was processed; 1, no frame was processed. For a live "
         "camera: 0, a signal such as Ctrl-C stopped it, or the played file has ended; 1, a second signal ended it at "
         "once, or the played file has ended and no frame could be processed; 75, reads of the camera or a frame "
-        "hang, and a restart may help; 78, the configuration can't be used, and a restart would fail again. For --status: 0, the "
-        "state is ok; 1, the state is not ok, or nothing answers. Always: 2, the options can't be parsed; "
-        "130, Ctrl-C while files are processed, or before the live camera runs. " + ANGLES,
+        "hang, and a restart may help; 78, the configuration can't be used, and a restart would fail again. "
+        "For --status: 0, the state is ok; 1, the state is not ok, or nothing answers. Always: 2, the options can't be "
+        "parsed; 130, Ctrl-C while files are processed, or before the live camera runs. " + ANGLES,
     )
     parser.add_argument(
         "files",

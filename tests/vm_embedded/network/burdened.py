@@ -1,5 +1,7 @@
 """Model files that pass every check of their content, but take much time or memory to run."""
 
+from itertools import pairwise
+
 import onnx
 from onnx import helper
 
@@ -25,9 +27,7 @@ def burdened(nodes, initializers=()):
 def _product(square, count):
     """Nodes that multiply a matrix with itself again and again, and turn the result to 0."""
     names = [square, *(f"power{number}" for number in range(count))]
-    nodes = [
-        helper.make_node("MatMul", [name, square], [after]) for name, after in zip(names[:-1], names[1:], strict=True)
-    ]
+    nodes = [helper.make_node("MatMul", [name, square], [after]) for name, after in pairwise(names)]
     zero = helper.make_tensor("zero", onnx.TensorProto.FLOAT, [], [0.0])
     nodes += [
         helper.make_node("ReduceMax", [names[-1]], ["largest"], keepdims=0),
