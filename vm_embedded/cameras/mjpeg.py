@@ -5,11 +5,13 @@ from __future__ import annotations
 import base64
 import http.client
 import time
+from contextlib import suppress
 from urllib.parse import SplitResult, unquote, urlsplit
 
 from ..errors import InputError, one_line
 from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, without_password
 from .decoding import decode_frame
+from .frame_clock import FrameClock
 
 _LARGEST_PART = 64 * 2**20
 """Largest size of a part, which holds one image [bytes]."""
@@ -33,6 +35,7 @@ class MjpegCamera:
         self._raw = raw
         self._response: http.client.HTTPResponse | None = None
         self._begun = False  # whether a part was requested
+        self._clock = FrameClock()
         self._past_boundary = False  # whether the boundary before the next part was read already
         url = parse_url(settings.source)
         kind = http.client.HTTPSConnection if url.scheme == "https" else http.client.HTTPConnection
@@ -70,22 +73,32 @@ class MjpegCamera:
         return without_password(self.settings.source)
 
     def read(self) -> Shot:
-        """Return the next shot. Raises CameraError at the end of the stream, BrokenFrameError for a bad image."""
+        """Return the next shot.
+
+        Raises CameraError at the end of the stream, and BrokenFrameError for a bad image, or for one that is too old:
+        decoding it would only delay the next.
+        """
         limit = self.settings.lost_ms if self._begun else max(self.settings.open_ms, self.settings.lost_ms)
-        deadline, self._begun = time.monotonic() + 1e-3 * limit, True
+        asked = time.monotonic()
+        deadline, self._begun = asked + 1e-3 * limit, True
         try:
-            content = self._read_part(deadline)
+            content, stamp = self._read_part(deadline)
         except (OSError, ValueError, OverflowError, http.client.HTTPException) as error:  # overflow: a chunk's length
             raise CameraError(f"{self._name}: {one_line(error)}") from error
-        captured = time.monotonic() - 1e-3 * self.settings.latency_ms
+        now = time.monotonic()
+        captured = self._clock.taken(now, stamp, now - asked) - 1e-3 * self.settings.latency_ms
+        if 1e3 * (now - captured) > self.settings.max_age_ms:
+            raise BrokenFrameError(
+                f"frame is {1e3 * (now - captured):.0f} ms old, allowed are {self.settings.max_age_ms:g} ms"
+            )
         return Shot(decode_frame(content, self._raw, self.settings.max_megapixels), captured, content)
 
-    def _read_part(self, deadline: float) -> bytes:
-        """The content of the next part."""
+    def _read_part(self, deadline: float) -> tuple[bytes, float | None]:
+        """The content of the next part, and the server's time of it [s], if it sends one."""
         while not self._past_boundary and not self._read_line().startswith(self._boundary):
             self._check_time(deadline)
         self._past_boundary = False
-        length = None
+        length = stamp = None
         for _ in range(_MOST_HEADERS):
             line = self._read_line()
             if not line.strip():
@@ -93,9 +106,13 @@ class MjpegCamera:
             name, _, value = line.partition(b":")
             if name.strip().lower() == b"content-length":
                 length = int(value)
+            elif name.strip().lower() == b"x-timestamp":
+                with suppress(ValueError):
+                    stamp = float(value)
         if length is not None and not 0 <= length <= _LARGEST_PART:
             raise BrokenFrameError(f"image has {length} bytes, allowed are 0 to {_LARGEST_PART}")
-        return self._read_to_boundary(deadline) if length is None else self._read_bytes(length, deadline)
+        content = self._read_to_boundary(deadline) if length is None else self._read_bytes(length, deadline)
+        return content, stamp
 
     def _read_line(self) -> bytes:
         assert self._response is not None

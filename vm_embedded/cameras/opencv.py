@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import InputError
 from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, without_password
 from .decoding import decode_frame
+from .frame_clock import FrameClock
 
 _OLDEST = 1.0
 """Largest age of a device's own timestamp that is trusted [s]."""
@@ -30,6 +31,7 @@ class OpenCvCamera:
         self.settings = settings
         self._raw = raw
         self._device = device_path(settings.source)
+        self._clock = FrameClock()
         self._last = -np.inf  # the last timestamp that was trusted
         source = settings.source
         if self._device is not None:
@@ -85,12 +87,13 @@ class OpenCvCamera:
         return Shot(np.asarray(image), captured)
 
     def _captured(self, arrived: float) -> float:
-        """When the frame was taken, in monotonic time [s]: V4L2's timestamp if it is plausible, else the arrival less
-        the configured latency."""
+        """When the frame was taken, in monotonic time [s]: V4L2's timestamp if it is plausible, else what the
+        arrivals tell, less the configured latency."""
         stamp = 1e-3 * self._capture.get(cv2.CAP_PROP_POS_MSEC) if self._device is not None else -np.inf
         trusted = arrived - _OLDEST < stamp < arrived + _EARLY and stamp > self._last
         self._last = max(self._last, stamp) if trusted else self._last
-        return float(min(stamp, arrived)) if trusted else arrived - 1e-3 * self.settings.latency_ms
+        taken = self._clock.taken(arrived)
+        return float(min(stamp, arrived)) if trusted else taken - 1e-3 * self.settings.latency_ms
 
     def close(self) -> None:
         """Release the device or stream."""

@@ -1,6 +1,8 @@
 """A server of Motion JPEG over HTTP, for tests."""
 
 import http.server
+import queue
+import socket
 import socketserver
 import threading
 import time
@@ -50,3 +52,60 @@ class Server:
         self.alive = False
         self._server.shutdown()
         self._server.server_close()
+
+
+class LiveServer:
+    """Serves pictures that it takes at a fixed rate, all of them in order, also those that had to wait.
+
+    Behind each picture, the time when it was taken follows (monotonic [s]), which `time_of` reads. stamps: also send it
+    as X-Timestamp, by a clock that is this far ahead [s]. While `stalled` is set, nothing is sent.
+    """
+
+    RATE = 15.0
+
+    def __init__(self, pictures, stamps=None):
+        self.stalled = threading.Event()
+        self._taken = queue.SimpleQueue()
+        self._alive = True
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.address = f"http://127.0.0.1:{self._listening.getsockname()[1]}/stream"
+        self._stamps = stamps
+        for work in (lambda: self._take(pictures), self._serve):
+            threading.Thread(target=work, daemon=True).start()
+
+    def _take(self, pictures):
+        begun, count = time.monotonic(), 0
+        while self._alive:
+            time.sleep(max(begun + count / self.RATE - time.monotonic(), 0.0))
+            now = time.monotonic()
+            self._taken.put((now, pictures[count % len(pictures)] + f"{now:020.6f}".encode()))
+            count += 1
+
+    def _serve(self):
+        try:
+            connection, _ = self._listening.accept()
+            with connection:
+                connection.recv(4096)
+                connection.sendall(
+                    b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\n\r\n"
+                )
+                while not self._taken.empty():
+                    self._taken.get()
+                while self._alive:
+                    now, picture = self._taken.get()
+                    while self.stalled.is_set():
+                        time.sleep(0.005)
+                    stamp = "" if self._stamps is None else f"X-Timestamp: {now + self._stamps:.6f}\r\n"
+                    head = f"--frame\r\nContent-Length: {len(picture)}\r\n{stamp}\r\n"
+                    connection.sendall(head.encode() + picture + b"\r\n")
+        except OSError:
+            return
+
+    def kill(self):
+        self._alive = False
+        self._listening.close()
+
+
+def time_of(picture):
+    """When a picture of LiveServer was taken, monotonic [s]."""
+    return float(picture[-20:])

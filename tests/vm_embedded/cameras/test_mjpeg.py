@@ -1,17 +1,20 @@
 """Motion JPEG from a real HTTP server that dies and comes back."""
 
 import json
+import signal
 import socket
 import threading
 import time
 
+import numpy as np
 import pytest
 
-from tests.vm_embedded.cameras.mjpeg_server import Server
+from tests.vm_embedded.cameras.mjpeg_server import LiveServer, Server, time_of
 from tests.vm_embedded.live.running import DEMO, LENS, running
 from vm_embedded.cameras.camera import BrokenFrameError, CameraError, CameraSettings
 from vm_embedded.cameras.mjpeg import MjpegCamera, NotMotionJpegError, parse_url
 from vm_embedded.cameras.synthetic import SIZE
+from vm_embedded.output.recorder import MESSAGES
 
 
 @pytest.mark.parametrize("length", [True, False], ids=["with lengths", "without"])
@@ -143,3 +146,64 @@ def test_attack_8_a_chunk_of_any_length_is_a_camera_error(length):
         with pytest.raises(CameraError, match=r"http://127\.0\.0\.1"):
             camera.read()
         camera.close()
+
+
+STAMPS = pytest.mark.parametrize("stamps", [None, 5000.0], ids=["without stamps", "X-Timestamp"])
+
+
+@STAMPS
+def test_attack_5_after_a_stall_of_the_network_a_frame_is_as_old_as_it_is(pictures, stamps):
+    server = LiveServer(pictures, stamps)
+    camera = MjpegCamera(CameraSettings(source=server.address, lost_ms=10000))
+    shots, old = [], 0
+    try:
+        for at in range(150):
+            if at in (40, 100):
+                server.stalled.set()
+                threading.Timer(1.0, server.stalled.clear).start()
+            try:
+                shots.append(camera.read())
+            except BrokenFrameError:  # it is too old
+                old += 1
+        said = np.array([each.captured - time_of(each.encoded) for each in shots])
+        assert said.max() < 0.25  # a frame that waited is up to 1 s old
+        assert old > 5
+        assert len(shots) > 50
+    finally:
+        camera.close()
+        server.kill()
+
+
+@STAMPS
+@pytest.mark.parametrize("what", ["the network", "the detector"])
+def test_attack_5_after_a_stall_no_old_frame_is_reported(tmp_path, pictures, stamps, what):
+    (tmp_path / "vm.toml").write_text(LENS)
+    server = LiveServer(pictures, stamps)
+    kept = tmp_path / "recordings"
+    options = ("--config", tmp_path / "vm.toml", "--camera", server.address, "--camera-lost-ms", "10000")
+    try:
+        with running(tmp_path, *options, "--recorder-folder", kept, "--recorder-seconds", "60") as found:
+            found.wait_for_state("ok")
+            for _ in range(3):
+                if what == "the network":
+                    server.stalled.set()
+                    time.sleep(1.0)
+                    server.stalled.clear()
+                else:
+                    found.process.send_signal(signal.SIGSTOP)
+                    time.sleep(1.0)
+                    found.process.send_signal(signal.SIGCONT)
+                before = len(found.frames)
+                found.wait(lambda before=before: len(found.frames) > before + 20)
+            found.process.send_signal(signal.SIGUSR1)
+            found.wait(lambda: any(each["event"] == "recorded" for each in found.events))
+            assert found.stop()[0] == 0
+    finally:
+        server.kill()
+    (folder,) = kept.iterdir()
+    messages = [json.loads(line) for line in (folder / MESSAGES).read_text().splitlines()]
+    pictures = [path.read_bytes() for path in sorted(folder.glob("*.jpg"))]
+    assert len(messages) == len(pictures) > 60
+    # A message was sent age_ms after the time of its frame, as the detector says. This is when it was really taken:
+    ages = [each["t"] + 1e-3 * each["age_ms"] - time_of(one) for each, one in zip(messages, pictures, strict=True)]
+    assert max(ages) < 0.5, sorted(ages)[-5:]
