@@ -50,7 +50,9 @@ class TuningRecipe:
     epochs: int = number(8, "largest number of epochs; the network is validated after each epoch", "", (1, 1e4))
     steps: int = number(60, "steps of an epoch", "", (1, 1e6))
     patience: int = number(3, "epochs without a better validation after which the training ends", "", (1, 1e4))
-    own: float = number(0.25, "share of each batch that shows your own frames; the others are rendered", "", (0.01, 1.0))
+    own: float = number(
+        0.25, "share of each batch that shows your own frames; the others are rendered", "", (0.01, 1.0)
+    )
     distillation: float = number(
         1.0,
         "share of a rendered patch's target that is the answer of the network before; higher: it forgets less",
