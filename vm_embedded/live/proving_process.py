@@ -17,6 +17,7 @@ from pathlib import Path
 import cv2
 
 from ..errors import ModelError, VisualMeshError, one_line
+from ..network.canary import package_picture
 from ..network.model_file import parse_model
 from .proof import prove
 
@@ -73,6 +74,7 @@ def _end(status: int | None) -> str:
 def main(path: str) -> None:
     """The child: prove the model file on standard input, and print the answer as a line of JSON."""
     cv2.setNumThreads(1)
+    package_picture()  # a user without rights may not reach the folder of the package
     _limit_this_process()
     proved = refusal = ""
     try:

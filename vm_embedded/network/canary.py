@@ -9,6 +9,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -77,11 +78,17 @@ class Canary:
             raise ModelError(f"its canary can't be read: {error}") from error
 
 
+@cache
+def package_picture() -> bytes:
+    """The content of PACKAGE_PICTURE, which is read once. Raises OSError."""
+    return PACKAGE_PICTURE.read_bytes()
+
+
 def _picture(text: str) -> bytes:
     """The picture from the JSON. Raises ValueError."""
     if not text.startswith(_HASH):
         return base64.b64decode(text, validate=True)
-    picture = PACKAGE_PICTURE.read_bytes()
+    picture = package_picture()
     if hashlib.sha256(picture).hexdigest() != text.removeprefix(_HASH):
         raise ValueError("its picture is not the one of this release; export the model again")
     return picture
