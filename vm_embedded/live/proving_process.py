@@ -15,9 +15,9 @@ from contextlib import suppress
 from pathlib import Path
 
 import cv2
+import numpy as np
 
 from ..errors import ModelError, VisualMeshError, one_line
-from ..network.canary import package_picture
 from ..network.model_file import parse_model
 from .proof import prove
 
@@ -74,7 +74,6 @@ def _end(status: int | None) -> str:
 def main(path: str) -> None:
     """The child: prove the model file on standard input, and print the answer as a line of JSON."""
     cv2.setNumThreads(1)
-    package_picture()  # a user without rights may not reach the folder of the package
     _limit_this_process()
     proved = refusal = ""
     try:
@@ -96,11 +95,17 @@ def _limit_this_process() -> None:
     _limit(resource.RLIMIT_FSIZE, 0)
     _limit(resource.RLIMIT_CORE, 0)
     _limit(resource.RLIMIT_NOFILE, 64)
-    if os.geteuid() == 0:
+    # Modules are also imported later. Where only root can read them, the limits must do.
+    if os.geteuid() == 0 and all(map(_can_be_read_by_all, (__file__, np.__file__, os.__file__))):
         with suppress(OSError):  # a container may not allow it; the limits stay
             os.setgroups([])
             os.setgid(_NOBODY)
             os.setuid(_NOBODY)
+
+
+def _can_be_read_by_all(file: str) -> bool:
+    path = Path(file).resolve()
+    return bool(path.stat().st_mode & 0o004) and all(each.stat().st_mode & 0o001 for each in path.parents)
 
 
 def _limit(kind: int, most: int) -> None:

@@ -9,7 +9,6 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -78,17 +77,11 @@ class Canary:
             raise ModelError(f"its canary can't be read: {error}") from error
 
 
-@cache
-def package_picture() -> bytes:
-    """The content of PACKAGE_PICTURE, which is read once. Raises OSError."""
-    return PACKAGE_PICTURE.read_bytes()
-
-
 def _picture(text: str) -> bytes:
     """The picture from the JSON. Raises ValueError."""
     if not text.startswith(_HASH):
         return base64.b64decode(text, validate=True)
-    picture = package_picture()
+    picture = PACKAGE_PICTURE.read_bytes()
     if hashlib.sha256(picture).hexdigest() != text.removeprefix(_HASH):
         raise ValueError("its picture is not the one of this release; export the model again")
     return picture
