@@ -95,12 +95,19 @@ def _limit_this_process() -> None:
     _limit(resource.RLIMIT_FSIZE, 0)
     _limit(resource.RLIMIT_CORE, 0)
     _limit(resource.RLIMIT_NOFILE, 64)
-    # Modules are also imported later. Where only root can read them, the limits must do.
-    if os.geteuid() == 0 and all(map(_can_be_read_by_all, (__file__, np.__file__, os.__file__))):
+    if os.geteuid() == 0 and modules_are_public():
         with suppress(OSError):  # a container may not allow it; the limits stay
             os.setgroups([])
             os.setgid(_NOBODY)
             os.setuid(_NOBODY)
+
+
+def modules_are_public() -> bool:
+    """Whether any user can read the modules of Python and of the package.
+
+    If not, root's process keeps its rights, because it imports modules later, too; it still has the limits.
+    """
+    return all(map(_can_be_read_by_all, (__file__, np.__file__, os.__file__)))
 
 
 def _can_be_read_by_all(file: str) -> bool:
