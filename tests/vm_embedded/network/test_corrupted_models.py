@@ -122,7 +122,7 @@ def test_attack_1_wrong_weights_under_a_right_checksum_are_refused(name, count):
 def test_the_self_tests_have_clear_positives_and_negatives_of_every_class(name):
     manifest = parse_model("model.onnx", model_path(name).read_bytes()).manifest
     probabilities = manifest.self_test.probabilities[:-1]
-    assert (probabilities.max(axis=0) > 0.75).all()
+    assert (probabilities.max(axis=0) > 0.7).all()
     assert (probabilities.min(axis=0) < 0.05).all()
     for look in (manifest.look, manifest.look.glance):
         found = look.self_test.answers[:, 0]
