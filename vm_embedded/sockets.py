@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import ipaddress
 import os
 import socket
 import stat
@@ -154,6 +155,17 @@ def parse_address(text: str, name: str, example: str) -> tuple[str, int]:
     if not (colon and host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):
         raise InputError(f"{name} must be ADDRESS:PORT, as in {example}, not {text!r}")
     return host, int(port)
+
+
+def is_open_to_network(address: str) -> bool:
+    """Whether other machines can reach a server at ADDRESS:PORT or unix:PATH."""
+    if address.startswith("unix:"):
+        return False
+    host = address.strip().rpartition(":")[0].removeprefix("[").removesuffix("]")
+    try:
+        return not ipaddress.ip_address(host).is_loopback
+    except ValueError:  # a name
+        return host != "localhost"
 
 
 def datagram_socket(

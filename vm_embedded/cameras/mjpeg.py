@@ -12,6 +12,7 @@ from ..errors import InputError, one_line
 from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, without_password
 from .decoding import decode_frame
 from .frame_clock import FrameClock
+from .timed_stream import TimedStream
 
 _LARGEST_PART = 64 * 2**20
 """Largest size of a part, which holds one image [bytes]."""
@@ -37,12 +38,14 @@ class MjpegCamera:
         self._begun = False  # whether a part was requested
         self._clock = FrameClock()
         self._past_boundary = False  # whether the boundary before the next part was read already
+        self._stream: TimedStream | None = None
         url = parse_url(settings.source)
         kind = http.client.HTTPSConnection if url.scheme == "https" else http.client.HTTPConnection
         self._connection = kind(url.hostname or "", url.port, timeout=1e-3 * settings.open_ms)
         try:
             self._connection.connect()
-            connected = self._connection.sock  # http.client forgets the socket if the server will end the connection
+            self._stream = TimedStream(self._connection.sock, time.monotonic() + 1e-3 * settings.open_ms)
+            self._connection.sock = self._stream
             self._response = self._request(url.path or "/", url.query, url.username, url.password)
         except (OSError, http.client.HTTPException) as error:
             self.close()
@@ -50,7 +53,7 @@ class MjpegCamera:
         except CameraError:
             self.close()
             raise
-        connected.settimeout(1e-3 * settings.lost_ms)
+        self._stream.pause = 1e-3 * settings.lost_ms
 
     def _request(self, path: str, query: str, user: str | None, password: str | None) -> http.client.HTTPResponse:
         headers = {"Accept": "multipart/x-mixed-replace, */*"}
@@ -78,11 +81,12 @@ class MjpegCamera:
         Raises CameraError at the end of the stream, and BrokenFrameError for a bad image, or for one that is too old:
         decoding it would only delay the next.
         """
+        assert self._stream is not None
         limit = self.settings.lost_ms if self._begun else max(self.settings.open_ms, self.settings.lost_ms)
         asked = time.monotonic()
-        deadline, self._begun = asked + 1e-3 * limit, True
+        self._stream.deadline, self._begun = asked + 1e-3 * limit, True
         try:
-            content, stamp = self._read_part(deadline)
+            content, stamp = self._read_part()
         except (OSError, ValueError, OverflowError, http.client.HTTPException) as error:  # overflow: a chunk's length
             raise CameraError(f"{self._name}: {one_line(error)}") from error
         now = time.monotonic()
@@ -93,10 +97,10 @@ class MjpegCamera:
             )
         return Shot(decode_frame(content, self._raw, self.settings.max_megapixels), captured, content)
 
-    def _read_part(self, deadline: float) -> tuple[bytes, float | None]:
+    def _read_part(self) -> tuple[bytes, float | None]:
         """The content of the next part, and the server's time of it [s], if it sends one."""
         while not self._past_boundary and not self._read_line().startswith(self._boundary):
-            self._check_time(deadline)
+            pass
         self._past_boundary = False
         length = stamp = None
         for _ in range(_MOST_HEADERS):
@@ -111,7 +115,7 @@ class MjpegCamera:
                     stamp = float(value)
         if length is not None and not 0 <= length <= _LARGEST_PART:
             raise BrokenFrameError(f"image has {length} bytes, allowed are 0 to {_LARGEST_PART}")
-        content = self._read_to_boundary(deadline) if length is None else self._read_bytes(length, deadline)
+        content = self._read_to_boundary() if length is None else self._read_bytes(length)
         return content, stamp
 
     def _read_line(self) -> bytes:
@@ -121,34 +125,30 @@ class MjpegCamera:
             raise CameraError(f"{self._name} ended the stream")
         return line
 
-    def _read_bytes(self, length: int, deadline: float) -> bytes:
+    def _read_bytes(self, length: int) -> bytes:
         response, content = self._response, bytearray()
         assert response is not None
         while len(content) < length:
-            self._check_time(deadline)
             received = response.read1(length - len(content))
             if not received:
                 raise CameraError(f"{self._name} ended the stream within an image")
             content += received
         return bytes(content)
 
-    def _read_to_boundary(self, deadline: float) -> bytes:
+    def _read_to_boundary(self) -> bytes:
         """A part of unknown length. The boundary after it also starts the next part."""
         content = bytearray()
         while not (line := self._read_line()).startswith(self._boundary):
-            self._check_time(deadline)
             content += line
             if len(content) > _LARGEST_PART:
                 raise BrokenFrameError(f"image has more than {_LARGEST_PART} bytes")
         self._past_boundary = True
         return bytes(content).removesuffix(b"\r\n")
 
-    def _check_time(self, deadline: float) -> None:
-        if time.monotonic() > deadline:
-            raise CameraError(f"{self._name} sends too slowly")
-
     def close(self) -> None:
         """End the connection."""
+        if self._stream is not None:
+            self._stream.disconnect()
         self._connection.close()
         if self._response is not None:
             self._response.close()

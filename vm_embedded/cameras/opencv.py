@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 # OpenCV's default waits ten seconds for a frame; a lost camera should show earlier. Set before cv2 is imported.
@@ -22,6 +24,28 @@ _OLDEST = 1.0
 
 _EARLY = 0.005
 """How far in the future a timestamp may be [s]: the two clocks are read one after the other."""
+
+
+_FFMPEG_OPTIONS = "OPENCV_FFMPEG_CAPTURE_OPTIONS"
+
+_STREAMS = (
+    "rtsp,rtp,mpegts,mpjpeg,mjpeg,jpeg_pipe,flv,live_flv,matroska,webm,mov,mp4,avi,asf,ogg,nut,mpeg,"
+    "h264,hevc,m4v,mpegvideo,av1,obu,ivf"
+)
+"""Formats of FFmpeg that contain the stream itself. Others, such as HLS, DASH and SDP, name further addresses."""
+
+
+@contextmanager
+def _ffmpeg_options() -> Iterator[None]:
+    """FFmpeg opens no other address than the camera's, unless the environment has options for it already."""
+    given = os.environ.get(_FFMPEG_OPTIONS)
+    if given is None:
+        os.environ[_FFMPEG_OPTIONS] = f"rtsp_transport;tcp|max_redirects;0|format_whitelist;{_STREAMS}"
+    try:
+        yield
+    finally:
+        if given is None:
+            os.environ.pop(_FFMPEG_OPTIONS, None)
 
 
 class OpenCvCamera:
@@ -43,7 +67,8 @@ class OpenCvCamera:
         else:
             limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, int(settings.open_ms)]
             limits += [cv2.CAP_PROP_READ_TIMEOUT_MSEC, int(settings.lost_ms)]
-            self._capture = cv2.VideoCapture(source, cv2.CAP_FFMPEG, limits)
+            with _ffmpeg_options():
+                self._capture = cv2.VideoCapture(source, cv2.CAP_FFMPEG, limits)
         if not self._capture.isOpened():
             self._capture.release()
             raise CameraError(f"can't open camera {without_password(source)}")

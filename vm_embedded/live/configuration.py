@@ -78,7 +78,7 @@ class StatusSettings:
     socket: str = text_line(
         "",
         "Unix socket for vm-detect --status and --record; empty: vm-detect.sock in $RUNTIME_DIRECTORY or "
-        "$XDG_RUNTIME_DIR, otherwise /tmp/vm-detect-UID.sock",
+        "$XDG_RUNTIME_DIR, otherwise in the private folder /tmp/vm-detect-UID",
     )
     page: str = entry(
         checked_address,

@@ -29,6 +29,7 @@ from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
 from ..poses.settings import is_of_ros
 from ..poses.stream import PoseStream
+from ..sockets import is_open_to_network
 from .answering import Answer, Answerer
 from .bridge import Bridge
 from .configuration import Configuration, recording_files
@@ -156,6 +157,10 @@ class Daemon:
         except InputError:
             await self._close()
             raise
+        for name in ("page", "metrics"):
+            for address in getattr(self.configuration.status, name).split(","):
+                if address and is_open_to_network(address):
+                    self._log("open to the network", "warning", entry=f"[status] {name}", address=address)
         self.grabber.start()
         self._watchdog.start()
         self._update_state()

@@ -17,6 +17,9 @@ from .buffer import PoseBuffer
 from .parsing import MAX_LINE_BYTES, parse_pose_line
 from .settings import UDP_EXAMPLE, PoseSettings
 
+_OLDEST, _EARLY = 10.0, 0.05
+"""Largest age of a pose, and how far in the future it may be [s]: until then, it would keep out all good poses."""
+
 Report = Callable[[str], None]
 """Gets the reason why a pose was rejected."""
 
@@ -133,9 +136,9 @@ class PoseStream:
             return now - 1e-3 * self.settings.latency_ms
         if self.settings.clock == "wall":
             t += now - time.time()
-        if not now - 10.0 < t < now + 1.0:
+        if not now - _OLDEST < t < now + _EARLY:
             raise InputError(
-                f"t of the pose is {t - now:+.1f} s from now on the {self.settings.clock} clock; "
+                f"t of the pose is {t - now:+.3g} s from now on the {self.settings.clock} clock; "
                 "send t of that clock, or change [pose] clock"
             )
         return t - 1e-3 * self.settings.latency_ms

@@ -11,6 +11,7 @@ set.json              seed, count, configuration and maps of the set
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -38,10 +39,23 @@ def file_of(folder: Path, part: str, index: int) -> Path:
     return folder / f"{part}{index:07d}{PARTS[part]}"
 
 
+_ENDS = {".jpg": b"\xff\xd9", ".png": b"IEND\xaeB`\x82", ".json": b"}\n", ".yaml": b"\n"}
+"""The last bytes of a whole file, by its suffix."""
+
+
 def is_done(folder: Path, index: int) -> bool:
-    """Whether all files of a picture exist and none is empty."""
-    paths = (file_of(folder, part, index) for part in PARTS)
-    return all(path.is_file() and path.stat().st_size > 0 for path in paths)
+    """Whether all files of a picture exist and none is cut short."""
+    return all(_is_whole(file_of(folder, part, index)) for part in PARTS)
+
+
+def _is_whole(path: Path) -> bool:
+    end = _ENDS[path.suffix]
+    try:
+        with path.open("rb") as file:
+            file.seek(-len(end), os.SEEK_END)
+            return file.read() == end
+    except OSError:  # it is missing, or shorter than its end
+        return False
 
 
 def indices_in(folder: Path) -> list[int]:

@@ -5,14 +5,18 @@ import signal
 import socket
 import threading
 import time
+from contextlib import suppress
 
+import cv2
 import numpy as np
 import pytest
 
 from tests.vm_embedded.cameras.mjpeg_server import LiveServer, Server, time_of
 from tests.vm_embedded.live.running import DEMO, LENS, running
 from vm_embedded.cameras.camera import BrokenFrameError, CameraError, CameraSettings
+from vm_embedded.cameras.grabber import MOST_HANGING
 from vm_embedded.cameras.mjpeg import MjpegCamera, NotMotionJpegError, parse_url
+from vm_embedded.cameras.open_camera import camera_opener
 from vm_embedded.cameras.synthetic import SIZE
 from vm_embedded.output.recorder import MESSAGES
 
@@ -207,3 +211,121 @@ def test_attack_5_after_a_stall_no_old_frame_is_reported(tmp_path, pictures, sta
     # A message was sent age_ms after the time of its frame, as the detector says. This is when it was really taken:
     ages = [each["t"] + 1e-3 * each["age_ms"] - time_of(one) for each, one in zip(messages, pictures, strict=True)]
     assert max(ages) < 0.5, sorted(ages)[-5:]
+
+
+class Script:
+    """A server that answers each connection with the next reply: bytes, or a function that gets the connection."""
+
+    def __init__(self, *replies):
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.port = self._listening.getsockname()[1]
+        self.address = f"http://127.0.0.1:{self.port}/"
+        self.requests = []
+        self._replies = replies
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def _serve(self):
+        try:
+            while True:
+                connection, _ = self._listening.accept()
+                self.requests.append(connection.recv(65536))
+                number = len(self.requests) - 1
+                threading.Thread(target=self._reply, args=(connection, number), daemon=True).start()
+        except OSError:
+            return
+
+    def _reply(self, connection, number):
+        reply = self._replies[min(number, len(self._replies) - 1)]
+        with connection, suppress(OSError):
+            if callable(reply):
+                reply(connection)
+            else:
+                connection.sendall(reply)
+
+    def kill(self):
+        self._listening.close()
+
+
+HEAD = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\n\r\n"
+
+
+@pytest.mark.parametrize("after", ["nothing", "in a line", "in a picture"])
+def test_attack_12_a_trickle_ends_a_read_in_time(pictures, after):
+    """A byte now and then, at once or after the beginning of a part."""
+    begin = {
+        "nothing": b"",
+        "in a line": HEAD + b"--fr",
+        "in a picture": HEAD + b"--frame\r\nContent-Length: 999\r\n\r\n",
+    }
+    stop = threading.Event()
+
+    def trickle(connection):
+        connection.sendall(begin[after])
+        while not stop.wait(0.02):
+            connection.sendall(b"x")
+
+    server = Script(trickle)
+    try:
+        with pytest.raises(CameraError, match="timed out"):
+            MjpegCamera(CameraSettings(source=server.address, open_ms=300, lost_ms=300)).read()
+    finally:
+        stop.set()
+        server.kill()
+
+
+def test_attack_12_a_stream_of_one_frame_and_a_trickle_is_opened_again_and_again(tmp_path, pictures):
+    (tmp_path / "vm.toml").write_text(LENS)
+    stop = threading.Event()
+
+    def one_frame(connection):
+        content = pictures[len(server.requests) % len(pictures)]
+        connection.sendall(HEAD + b"--frame\r\nContent-Length: %d\r\n\r\n" % len(content) + content)
+        while not stop.wait(0.05):
+            connection.sendall(b"x")
+
+    server = Script(one_frame)
+    options = ("--config", tmp_path / "vm.toml", "--camera", server.address, "--camera-open-ms", "500")
+    try:
+        with running(tmp_path, *options, "--camera-lost-ms", 300, "--camera-longest-retry-ms", 20) as found:
+            found.wait(lambda: len(server.requests) > MOST_HANGING + 4)
+            assert found.frames
+            assert found.stop()[0] == 0
+    finally:
+        stop.set()
+        server.kill()
+
+
+def test_attack_12_a_camera_can_not_lead_to_another_address(tmp_path):
+    """By a redirect, by a playlist (HLS), or by a session description (SDP)."""
+    (tmp_path / "vm.toml").write_text(LENS)
+    other = Script(b"HTTP/1.0 404 Not Found\r\n\r\n")
+    away = other.address.encode()
+    playlist = b"#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n" + away + b"a.ts\n"
+    kind = b"HTTP/1.0 200 OK\r\nContent-Type: application/vnd.apple.mpegurl\r\n\r\n"
+    first, moved = b"HTTP/1.0 200 OK\r\nContent-Type: video/mp2t\r\n\r\n", b"HTTP/1.0 302 Found\r\nLocation: " + away
+    for replies in ((kind + playlist,), (first, moved + b"\r\n\r\n"), (moved + b"\r\n\r\n",)):
+        server = Script(*replies)
+        options = ("--config", tmp_path / "vm.toml", "--camera", server.address + "x.m3u8", "--camera-open-ms", 2000)
+        with running(tmp_path, *options, "--camera-retry-ms", 50) as found:
+            found.wait(lambda server=server: len(server.requests) > 4)
+            found.wait_for_state("camera_lost")
+            found.stop()
+        server.kill()
+    assert other.requests == []
+    other.kill()
+
+
+def test_a_stream_in_another_format_is_still_read(tmp_path, pictures):
+    path = tmp_path / "film.avi"
+    film = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30.0, SIZE)
+    for each in pictures[:20]:
+        film.write(cv2.imdecode(np.frombuffer(each, np.uint8), cv2.IMREAD_COLOR))
+    film.release()
+    content = path.read_bytes()
+    server = Script(b"HTTP/1.0 200 OK\r\nContent-Type: video/x-msvideo\r\n\r\n" + content)
+    try:
+        camera = camera_opener(CameraSettings(source=server.address))()
+        assert camera.read().image.shape == (SIZE[1], SIZE[0], 3)
+        camera.close()
+    finally:
+        server.kill()

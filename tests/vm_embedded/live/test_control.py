@@ -1,12 +1,17 @@
 """The control socket of a real vm-detect."""
 
+import os
 import re
 import socket
+import stat
 import subprocess
+
+import pytest
 
 from tests.messages import read_message
 from tests.vm_embedded.live.running import COMMAND, arguments, running
-from vm_embedded.live.control import ask
+from vm_embedded.errors import InputError
+from vm_embedded.live.control import ask, default_socket_path, private_folder
 
 
 def test_a_socket_that_was_left_behind_is_replaced_and_one_in_use_is_not(tmp_path):
@@ -45,3 +50,46 @@ def test_asking_what_is_no_detector_ends(tmp_path):
         done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
     assert done.returncode == 1
     assert "no detector replies" in done.stderr
+
+
+def test_attack_12_the_default_socket_is_in_a_folder_that_only_its_user_may_open(tmp_path):
+    folder = private_folder(tmp_path / "mine")
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    assert private_folder(folder) == folder
+
+
+@pytest.mark.parametrize("occupy", ["open", "link", "file", "socket"])
+def test_attack_12_a_default_folder_that_somebody_else_made_is_refused(tmp_path, occupy):
+    path = tmp_path / "theirs"
+    if occupy == "open":
+        path.mkdir()
+        path.chmod(0o777)
+    elif occupy == "link":
+        (tmp_path / "other").mkdir(mode=0o700)
+        path.symlink_to(tmp_path / "other")
+    elif occupy == "file":
+        path.write_text("")
+    else:
+        socket.socket(socket.AF_UNIX).bind(str(path))
+    with pytest.raises(InputError, match="only this user may open"):
+        private_folder(path)
+
+
+def test_attack_12_the_folder_of_another_user_is_refused(tmp_path):
+    if os.geteuid() != 0:
+        pytest.skip("only root can give a folder to another user")
+    path = tmp_path / "theirs"
+    path.mkdir(mode=0o700)
+    os.chown(path, 65534, 65534)
+    with pytest.raises(InputError, match="only this user may open"):
+        private_folder(path)
+
+
+def test_without_a_runtime_folder_the_default_is_private(monkeypatch):
+    for name in ("RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    path = default_socket_path()
+    assert path.parent.stat().st_uid == os.getuid()
+    assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
+    monkeypatch.setenv("XDG_RUNTIME_DIR", "/run/user/7")
+    assert str(default_socket_path()) == "/run/user/7/vm-detect.sock"

@@ -9,6 +9,7 @@ import pytest
 from tests.vm_embedded.live.running import running
 from vm_embedded.errors import InputError
 from vm_embedded.live.http_server import HttpServer
+from vm_embedded.sockets import is_open_to_network
 
 
 def test_a_busy_port_and_an_unknown_host_are_named_once():
@@ -88,3 +89,33 @@ def test_figures_are_given_by_address_only_and_nothing_else_is(tmp_path):
             connection.sendall(b"GET /metrics HTTP/1.1\r\n\r\n")
             assert "vm_frames_total" in b"".join(iter(lambda: connection.recv(65536), b"")).decode()
         found.stop()
+
+
+def test_attack_12_a_page_that_the_network_can_reach_is_warned_about(tmp_path):
+    with socket.socket() as one, socket.socket() as other:
+        for each in (one, other):
+            each.bind(("127.0.0.1", 0))
+        page, metrics = f"0.0.0.0:{one.getsockname()[1]}", f"127.0.0.1:{other.getsockname()[1]}"
+    with running(tmp_path, "--camera", "synthetic", "--status-page", page, "--status-metrics", metrics) as found:
+        found.wait_for_state("ok")
+        found.stop()
+    (warning,) = [each for each in found.events if each["event"] == "open to the network"]
+    assert (warning["level"], warning["entry"], warning["address"]) == ("warning", "[status] page", page)
+
+
+@pytest.mark.parametrize(
+    ("address", "is_open"),
+    [
+        ("127.0.0.1:80", False),
+        ("127.1.2.3:80", False),
+        ("[::1]:80", False),
+        ("localhost:80", False),
+        ("unix:/tmp/page", False),
+        ("0.0.0.0:80", True),
+        ("[::]:80", True),
+        ("192.168.0.20:80", True),
+        ("robot:80", True),
+    ],
+)
+def test_which_addresses_the_network_can_reach(address, is_open):
+    assert is_open_to_network(address) == is_open

@@ -183,3 +183,22 @@ def test_a_long_line_on_standard_input_is_left_out_and_the_next_one_is_read(tmp_
             time.sleep(0.01)
         found.wait_for_state("ok")
         found.stop()
+
+
+def test_attack_12_a_pose_in_the_future_is_refused_and_blocks_no_good_one(tmp_path):
+    port = free_port()
+    source = ("--camera", f"synthetic:{TURN}", "--pose-source", f"udp:127.0.0.1:{port}")
+    with running(tmp_path, *source) as found, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
+        sender = Sender(lambda line: sending.sendto(line, ("127.0.0.1", port)))
+        sender.start()
+        found.wait_for_state("ok")
+        for ahead in (0.1, 0.5, 0.9):
+            sending.sendto(pose_line(MOTION, time.monotonic() + ahead), ("127.0.0.1", port))
+        found.wait(lambda: json.loads(ask(tmp_path / "control", "status"))["counts"]["poses_bad"] >= 3)
+        before, accepted = len(found.frames), json.loads(ask(tmp_path / "control", "status"))["counts"]["poses"]
+        found.wait(lambda: len(found.frames) > before + 5)
+        assert json.loads(ask(tmp_path / "control", "status"))["counts"]["poses"] > accepted
+        assert any("from now on the monotonic clock" in each.get("reason", "") for each in found.messages)
+        sender.on = False
+        sender.join()
+        found.stop()
