@@ -16,7 +16,7 @@ class TimedStream(io.RawIOBase):
     """The bytes of a connected socket, in the form in which http.client uses a socket.
 
     A socket's own timeout begins again with each byte, so a server that sends a byte now and then holds its reader
-    forever. deadline: monotonic time after which reading raises TimeoutError [s]. pause: longest silence until then [s].
+    forever. deadline: monotonic time when reading raises TimeoutError [s]. pause: longest silence until then [s].
     Only `disconnect` closes the socket: http.client closes what it got while its response is still being read.
     """
 
