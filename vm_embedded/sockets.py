@@ -7,6 +7,7 @@ import ipaddress
 import os
 import socket
 import stat
+from contextlib import suppress
 from dataclasses import Field
 from pathlib import Path
 from typing import Any
@@ -26,13 +27,35 @@ _UMASK = 0o117
 """Gives the socket's file mode 0660."""
 
 
+def socket_path(path: str | Path) -> Path:
+    """The path of a socket; a relative one is in the runtime folder. Raises InputError as `runtime_folder` does."""
+    return Path(path) if Path(path).is_absolute() else runtime_folder() / path
+
+
 def runtime_folder() -> Path:
-    """Folder of the sockets whose path is relative: that of systemd or of the user's session, otherwise /tmp."""
+    """Folder of the sockets whose path is relative: that of systemd or of the user's session, else one in /tmp that
+    only this user may open. Raises InputError if somebody else has made that one."""
     for variable in ("RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"):
         folder = os.environ.get(variable, "").split(":")[0]
         if folder:
             return Path(folder)
-    return Path("/tmp")
+    return private_folder(Path(f"/tmp/vm-detect-{os.getuid()}"))
+
+
+def private_folder(folder: Path) -> Path:
+    """The folder, created if it is missing. Anybody may create one in /tmp, so it is checked. Raises InputError."""
+    try:
+        with suppress(FileExistsError):
+            folder.mkdir(mode=0o700)
+        found = folder.lstat()
+    except OSError as error:
+        raise InputError(f"can't create {folder}: {error.strerror or error}") from error
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
+        raise InputError(
+            f"{folder} must be a folder that only this user may open; remove it, or give sockets absolute paths, for "
+            "example with --status-socket"
+        )
+    return folder
 
 
 class UnixListener:
@@ -43,7 +66,7 @@ class UnixListener:
     """
 
     def __init__(self, path: str | Path, option: str) -> None:
-        self.path, self._option = runtime_folder() / path, option
+        self.path, self._option = socket_path(path), option
         if len(os.fsencode(self.path)) > _MAX_PATH_BYTES:
             raise InputError(f"the path of a socket must have at most {_MAX_PATH_BYTES} bytes: {self.path}")
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)

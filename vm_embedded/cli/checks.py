@@ -247,14 +247,10 @@ def check_clock(source: Path, now: float) -> Finding:
 
 def check_status_socket(configuration: Configuration) -> Finding:
     """Whether the status socket can be created."""
-<<<<<<< HEAD
-    path = control_path(configuration.status.socket)
-=======
     try:
-        path = Path(configuration.status.socket) if configuration.status.socket else default_socket_path()
+        path = control_path(configuration.status.socket)
     except InputError as error:
         return Finding("status socket", BAD, str(error), "ls -ld /tmp/vm-detect-$(id -u)")
->>>>>>> 8a35bf2 (Trickling cameras, redirects, future poses, open pages, private sockets, cut pictures: the smaller attacks)
     if not os.access(path.parent, os.W_OK):
         return Finding("status socket", BAD, f"can't write to {path.parent}", f"sudo install -d -o $USER {path.parent}")
     return Finding("status socket", GOOD, str(path))

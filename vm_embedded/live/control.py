@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import socket
-import stat
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
 from ..errors import InputError
-from ..sockets import BACKLOG, Connections, UnixListener, runtime_folder
+from ..sockets import BACKLOG, Connections, UnixListener, socket_path
 
 NAME = "vm-detect.sock"
 
@@ -29,37 +27,9 @@ Command = Callable[[], str]
 """Carries out a command and returns the reply."""
 
 
-<<<<<<< HEAD
 def control_path(configured: str) -> Path:
-    """Path of the socket; configured: [status] socket, or empty."""
-    folder = runtime_folder()
-    return folder / (configured or (NAME if folder != Path("/tmp") else f"vm-detect-{os.getuid()}.sock"))
-=======
-def default_socket_path() -> Path:
-    """Path of the socket if none is configured: in the runtime folder of systemd or of the user session, else in a
-    folder that only this user may open. Raises InputError if the last belongs to somebody else."""
-    for variable in ("RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"):
-        folder = os.environ.get(variable, "").split(":")[0]
-        if folder:
-            return Path(folder) / NAME
-    return private_folder(Path(f"/tmp/vm-detect-{os.getuid()}")) / NAME
-
-
-def private_folder(folder: Path) -> Path:
-    """The folder, created if it is missing. Anybody may create one in /tmp, so it is checked. Raises InputError."""
-    try:
-        with suppress(FileExistsError):
-            folder.mkdir(mode=0o700)
-        found = folder.lstat()
-    except OSError as error:
-        raise InputError(f"can't create {folder}: {error.strerror or error}") from error
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
-        raise InputError(
-            f"{folder} must be a folder that only this user may open; remove it, or choose another path with "
-            "--status-socket"
-        )
-    return folder
->>>>>>> 8a35bf2 (Trickling cameras, redirects, future poses, open pages, private sockets, cut pictures: the smaller attacks)
+    """Path of the socket; configured: [status] socket, or empty. Raises InputError without a safe folder for it."""
+    return socket_path(configured or NAME)
 
 
 class ControlServer:

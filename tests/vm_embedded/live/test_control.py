@@ -11,7 +11,8 @@ import pytest
 from tests.messages import read_message
 from tests.vm_embedded.live.running import COMMAND, arguments, running
 from vm_embedded.errors import InputError
-from vm_embedded.live.control import ask, default_socket_path, private_folder
+from vm_embedded.live.control import ask, control_path
+from vm_embedded.sockets import private_folder
 
 
 def test_a_socket_that_was_left_behind_is_replaced_and_one_in_use_is_not(tmp_path):
@@ -88,8 +89,8 @@ def test_attack_12_the_folder_of_another_user_is_refused(tmp_path):
 def test_without_a_runtime_folder_the_default_is_private(monkeypatch):
     for name in ("RUNTIME_DIRECTORY", "XDG_RUNTIME_DIR"):
         monkeypatch.delenv(name, raising=False)
-    path = default_socket_path()
+    path = control_path("")
     assert path.parent.stat().st_uid == os.getuid()
     assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
     monkeypatch.setenv("XDG_RUNTIME_DIR", "/run/user/7")
-    assert str(default_socket_path()) == "/run/user/7/vm-detect.sock"
+    assert str(control_path("")) == "/run/user/7/vm-detect.sock"
