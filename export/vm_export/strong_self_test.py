@@ -20,7 +20,7 @@ from .network import Network
 _HOPS = 3
 """Links from the middle of a patch to its edge: ring6 gets patches of about 37 points."""
 
-_STEPS, _RATE = 60, 0.1
+_STEPS, _RATE = 150, 0.2
 _RANGES = {"absolute": (0.0, 1.0), "relative": (-3.0, 3.0)}
 """Colors that points of each kind of POINT_COLORS can have; relative ones are rarely farther from 0."""
 

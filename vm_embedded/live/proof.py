@@ -31,7 +31,7 @@ def prove(model: ModelFile) -> str:
     look = manifest.look
     parts = {"mesh network": manifest, "close look": look, "glance": look and look.glance}
     for name, part in parts.items():
-        if part is not None and part.self_test is None:
+        if part is not None and not part.self_test:
             raise ModelError(f"{model.path}: its {name} has no self-test; export it again")
     detector = Detector(model, Settings())  # which runs the self-tests
     if model.canary is None:

@@ -28,6 +28,9 @@ class LookTest:
     patches: Image
     answers: Singles
 
+    def __len__(self) -> int:
+        return len(self.answers)
+
     @property
     def all_patches(self) -> Image:
         """The patches (n, size, size, 3) of all answers."""
@@ -50,7 +53,7 @@ class LookTest:
         except (KeyError, TypeError, ValueError, OverflowError, binascii.Error) as error:
             raise ModelError(f"self-test of the close look can't be read: {error}") from error
         made = len(answers) - len(patches)
-        if not 0 <= made <= _MOST_MADE or not len(patches):
+        if not 0 <= made <= (_MOST_MADE if len(patches) else 0):
             raise ModelError(
                 f"self-test of the close look has {len(patches)} patches and {len(answers)} answers; it must have a "
                 f"patch, and at most {_MOST_MADE} more answers than patches"

@@ -226,7 +226,7 @@ class Manifest:
         """The manifest as the model file holds it."""
         data = asdict(replace(self, look=None)) | {"format_version": FORMAT_VERSION}
         data["look"] = self.look.as_dict() if self.look else None
-        data["self_test"] = self.self_test.as_dict() if self.self_test else None
+        data["self_test"] = None if self.self_test is None else self.self_test.as_dict()
         return json.dumps(data, sort_keys=True, separators=(",", ":"))
 
     @classmethod

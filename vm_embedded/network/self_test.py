@@ -24,6 +24,9 @@ class SelfTest:
     probabilities: Singles
     cells: Indices | None = None
 
+    def __len__(self) -> int:
+        return len(self.points) - 1
+
     def as_dict(self) -> dict[str, Any]:
         """Nested lists for JSON, with as many digits as the check needs."""
         return {

@@ -2,13 +2,16 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from tests.fixtures.make_drawn import FOLDER
 from vm_embedded.errors import ModelError
 from vm_embedded.live.proof import prove
 from vm_embedded.network.bundled import model_path
+from vm_embedded.network.look_test import LookTest
 from vm_embedded.network.model_file import read_model
+from vm_embedded.network.self_test import SelfTest
 
 pytest.importorskip("onnxruntime")
 
@@ -26,13 +29,20 @@ def test_without_a_canary_the_self_tests_are_the_proof(ball):
     assert prove(replace(ball, canary=None)) == "self-test passed, no canary"
 
 
+@pytest.mark.parametrize("empty", [False, True], ids=["none", "empty"])
 @pytest.mark.parametrize("part", ["mesh network", "close look", "glance"])
-def test_a_model_without_a_self_test_is_refused(ball, part):
+def test_a_model_without_a_self_test_is_refused(ball, part, empty):
     manifest = ball.manifest
+    look, glance = manifest.look, manifest.look.glance
+    test = manifest.self_test
+    no_points = SelfTest(test.points[-1:], np.zeros_like(test.neighbors[-1:]), test.probabilities[-1:])
+    no_patches = [LookTest(each.self_test.patches[:0], each.self_test.answers[:0]) for each in (look, glance)]
     without = {
-        "mesh network": replace(manifest, self_test=None),
-        "close look": replace(manifest, look=replace(manifest.look, self_test=None)),
-        "glance": replace(manifest, look=replace(manifest.look, glance=replace(manifest.look.glance, self_test=None))),
+        "mesh network": replace(manifest, self_test=no_points if empty else None),
+        "close look": replace(manifest, look=replace(look, self_test=no_patches[0] if empty else None)),
+        "glance": replace(
+            manifest, look=replace(look, glance=replace(glance, self_test=no_patches[1] if empty else None))
+        ),
     }
     with pytest.raises(ModelError, match=f"its {part} has no self-test"):
         prove(replace(ball, manifest=without[part]))
