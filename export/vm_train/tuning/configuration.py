@@ -49,7 +49,7 @@ class TuningRecipe:
 
     epochs: int = number(8, "largest number of epochs; the network is validated after each epoch", "", (1, 1e4))
     steps: int = number(60, "steps of an epoch", "", (1, 1e6))
-    patience: int = number(3, "epochs without a better validation after which the training ends", "", (1, 1e4))
+    patience: int = number(5, "epochs without a better validation after which the training ends", "", (1, 1e4))
     own: float = number(
         0.25, "share of each batch that shows your own frames; the others are rendered", "", (0.01, 1.0)
     )

@@ -22,12 +22,10 @@ from vm_export.look_network import LookNetwork
 
 from ..learning.log import TrainingLog
 from ..learning.trainer import read_state
-from ..look.labels import OBJECT
 from ..look.patch_set import PatchSet
-from ..look.scores import balanced_loss, logits_of
 from ..look.teacher import LookTeacher
 from ..look.trainer import LookTrainer
-from .mixing import Remembered, most_of_the_new
+from .mixing import Mixer
 from .run_folder import TuningRun
 
 _SAVE_INTERVAL = 30.0
@@ -69,7 +67,8 @@ class StagePatches:
 class StageProgress:
     """How far a stage is, besides its weights; state.pt keeps these entries.
 
-    validated: number of validated epochs. best: the lowest loss of a validation; best_epoch: its epoch, from 1, or 0.
+    validated: number of validated epochs. best: the lowest loss of the user's frames; best_epoch: its epoch, from 1,
+    or 0.
     """
 
     stage: str
@@ -104,11 +103,10 @@ class _Stage:
         self._recipe = settings.training
         self._total = self._recipe.epochs * self._recipe.steps
         training, weights = patches.for_training(self._recipe.own)
-        self._before = copy.deepcopy(before.network)
-        self._remembered = Remembered.of(self._before, patches.rendered_validation)
-        network = before.network
-        shares = torch.arange(len(training)) >= len(patches.own)
-        teacher = LookTeacher(self._before, self._recipe.distillation * shares)
+        network, old = copy.deepcopy(before.network), before.network.eval()
+        self._mixer = Mixer(old, patches.rendered_validation, self._recipe.forgetting)
+        is_rendered = torch.arange(len(training)) >= len(patches.own)
+        teacher = LookTeacher(old, self._recipe.distillation * is_rendered)
         recipe = self._recipe.for_stage(stage)
         self._trainer = LookTrainer(
             network, training, before.contract.extent, recipe, settings.augmentation, self._total, weights, teacher
@@ -132,24 +130,8 @@ class _Stage:
                 if not self._train_epoch(log, stop_requested):
                     return None
         self._bar.clear()
-        return self._finished()
-
-    def _finished(self) -> LookNetwork:
-        """The network of the best epoch, mixed with the network before, and calibrated."""
-        network = self._trainer.network
+        network = self._trainer.network.eval()
         network.load_state_dict(self._best)
-        rendered, old = self._patches.rendered_validation, self._remembered
-        mixture = most_of_the_new(self._before, network, rendered, self._recipe.forgetting)
-        network, new = mixture.network, mixture.remembered
-        print(
-            f"{self._stage}: {mixture.share:.0%} of the weights of epoch {self._progress.best_epoch}, the others as "
-            f"before; loss {new.loss:.3f} for rendered patches, {old.loss:.3f} before",
-            flush=True,
-        )
-        # The probability of a rendered patch keeps its meaning: it was calibrated on what is found in whole pictures.
-        scale = new.calibration.scale / old.calibration.scale
-        offset = (new.calibration.offset - old.calibration.offset) / old.calibration.scale
-        network.calibration.copy_(torch.tensor([scale, offset]))
         return network
 
     def _is_late(self) -> bool:
@@ -173,27 +155,29 @@ class _Stage:
                 return False
             if perf_counter() - self._saved > _SAVE_INTERVAL:
                 self._save()
-        own, rendered = (self._loss(each) for each in (self._patches.own_validation, self._patches.rendered_validation))
-        loss = rendered if math.isnan(own) else 0.5 * (own + rendered)
-        self._progress.validated += 1
-        if loss < self._progress.best:
-            self._progress.best, self._progress.best_epoch = loss, self._progress.validated
-            self._best = _copy(self._trainer.network)
-        log.write(self._trainer.done, {"epoch": self._progress.validated, "own": own, "rendered": rendered})
-        self._bar.clear()
-        print(
-            f"{self._stage}, epoch {self._progress.validated} of {self._recipe.epochs}: loss {own:.3f} for your "
-            f"frames, {rendered:.3f} for rendered ones",
-            flush=True,
-        )
+        self._validate(log)
         self._save()
         return True
 
-    def _loss(self, patches: PatchSet) -> float:
-        """The balanced loss of the network's logits; NaN if one kind of patches is missing."""
-        logits = logits_of(self._trainer.network.eval(), patches.patches)[:, 0].astype(np.float64)
-        self._trainer.network.train()
-        return balanced_loss(logits, patches.labels == OBJECT)
+    def _validate(self, log: TrainingLog) -> None:
+        """Keep the network, mixed with the one before, if it is better on the user's frames than those so far.
+
+        Without frames for validation, the last one stays.
+        """
+        mixture = self._mixer.mix(self._trainer.network)
+        own = mixture.loss_of(self._patches.own_validation)
+        self._progress.validated += 1
+        if math.isnan(own) or own < self._progress.best:
+            self._progress.best, self._progress.best_epoch = own, self._progress.validated
+            self._best = _copy(mixture.network)
+        record = {"epoch": self._progress.validated, "own": own, "rendered": mixture.loss, "share": mixture.share}
+        log.write(self._trainer.done, record)
+        self._bar.clear()
+        print(
+            f"{self._stage}, epoch {self._progress.validated} of {self._recipe.epochs}: loss {own:.3f} for your "
+            f"frames, {mixture.loss:.3f} for rendered ones, with {mixture.share:.0%} of the new weights",
+            flush=True,
+        )
 
     def _save(self) -> None:
         self._trainer.save(self._run.state_path, {"progress": asdict(self._progress), "best": self._best})

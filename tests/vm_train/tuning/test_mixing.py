@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from tests.vm_train.look.test_trainer import patch_set, trainer, weights
 from vm_export.look_network import LookNetwork, LookShape
 from vm_train.look.configuration import LookRecipe
+from vm_train.look.labels import OBJECT
 from vm_train.look.patch_set import PatchSet
-from vm_train.tuning.mixing import Remembered, mixed, most_of_the_new
+from vm_train.look.scores import balanced_loss, logits_of
+from vm_train.tuning.mixing import Mixer, Remembered, mixed
 
 
 @given(st.floats(0.0, 1.0), st.integers(0, 99))
@@ -43,21 +45,39 @@ def networks():
 def test_what_it_knew_stays_within_the_limit_and_a_larger_share_would_exceed_it(networks, forgetting):
     before, after, patches = networks
     limit = (1.0 + forgetting) * Remembered.of(before, patches).loss
-    found = most_of_the_new(before, after, patches, forgetting)
+    found = Mixer(before, patches, forgetting).mix(after)
     assert 0.1 <= found.share < 1.0
-    assert found.remembered == Remembered.of(found.network, patches)
-    assert found.remembered.loss <= limit or found.share == 0.1
+    assert found.loss == Remembered.of(found.network, patches).loss
+    assert found.loss <= limit or found.share == 0.1
     assert Remembered.of(mixed(before, after, found.share + 0.1), patches).loss > limit
 
 
-def test_what_forgets_nothing_stays_as_it_is(networks):
-    before, after, patches = networks
-    found = most_of_the_new(after, before, patches, 0.0)
-    assert found.share == 1.0
-    assert all(torch.equal(value, before.state_dict()[name]) for name, value in found.network.state_dict().items())
-
-
 def test_more_forgetting_never_means_less_of_the_new(networks):
-    shares = [most_of_the_new(*networks, each).share for each in np.geomspace(0.01, 1000.0, 8)]
+    before, after, patches = networks
+    shares = [Mixer(before, patches, each).mix(after).share for each in np.geomspace(0.01, 1000.0, 8)]
     assert shares == sorted(shares)
     assert shares[-1] > shares[0]
+
+
+def test_what_forgets_nothing_keeps_its_probabilities(networks):
+    before, _, patches = networks
+    found = Mixer(before, patches, 0.0).mix(before)
+    assert found.share == 1.0
+    assert found.network.calibration.tolist() == pytest.approx([1.0, 0.0])
+    logits = logits_of(before, patches.patches)[:, 0].astype(np.float64)
+    assert found.loss_of(patches) == pytest.approx(balanced_loss(logits, patches.labels == OBJECT))
+    assert np.isnan(found.loss_of(patches.part(patches.labels == OBJECT)))
+
+
+@given(st.floats(0.3, 3.0), st.floats(-2.0, 2.0))
+def test_probabilities_of_old_patches_keep_their_meaning(networks, scale, offset):
+    """A network whose logits are those before, stretched and moved, gets the same probabilities as before."""
+    before, _, patches = networks
+    after = copy.deepcopy(before)
+    with torch.no_grad():
+        after.answers.weight[0] *= scale
+        after.answers.bias[0] = scale * after.answers.bias[0] + offset
+    found = Mixer(before, patches, 0.01).mix(after)
+    shown = torch.from_numpy(patches.patches)
+    with torch.no_grad():
+        torch.testing.assert_close(found.network(shown)[:, 0], before(shown)[:, 0], atol=2e-3, rtol=0.0)
