@@ -18,6 +18,10 @@ _LARGEST = 2**20
 """Largest picture [bytes]: it becomes a part of the model file."""
 
 
+class NotFoundError(InputError):
+    """A picture in which the networks do not find every class."""
+
+
 @dataclass(frozen=True, eq=False)
 class CanaryPicture:
     """A picture for a canary. name: for messages. content: a JPEG or PNG file. camera: its lens and pose."""
@@ -45,8 +49,8 @@ class CanaryPicture:
 def with_canary(content: bytes, picture: CanaryPicture) -> bytes:
     """A model file's bytes with a canary.
 
-    Raises InputError for a picture that can't be searched, or that does not show every class, and ModelError if the
-    networks do not run.
+    Raises InputError for a picture that can't be searched, NotFoundError for one in which the networks do not find every
+    class, and ModelError if the networks do not run.
     """
     model = parse_model("the new model", content)
     try:
@@ -58,7 +62,7 @@ def with_canary(content: bytes, picture: CanaryPicture) -> bytes:
     seen = {each.class_name for each in found.objects}
     for each in model.manifest.classes:
         if not (each.name in seen if each.kind == "object" else found.points[each.name]):
-            raise InputError(
+            raise NotFoundError(
                 f"{picture.name} can't be a canary: the networks find no {each.name} in it; choose a picture in which "
                 "they find every class"
             )

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vm_embedded.errors import ModelError
+from vm_embedded.network.canary import CANARY_KEY
 from vm_embedded.network.manifest import METADATA_KEY
 from vm_embedded.network.model_file import read_model
 
-from .attach_canary import CanaryPicture, with_canary
+from .attach_canary import CanaryPicture, NotFoundError, with_canary
 from .attach_look import attached, detached, look_self_test
 from .export import check_difference, write_model
 from .look_checkpoint import LookCheckpoint
@@ -19,16 +20,24 @@ from .network_weights import network_of
 from .strong_self_test import strong_self_test
 
 
-def change_look(model: str | Path, path: str | Path, look: LookCheckpoint | None) -> float | None:
-    """Write a copy of a model file with this look network, or without any; its mesh network stays as it is, and its
-    canary gets the new answers.
+@dataclass(frozen=True)
+class ChangedLook:
+    """What became of a model file. difference: largest one to torch of the look's answers, None without a look.
+    lost_canary: whether the file had a canary that its networks do not find any more."""
 
-    Return the largest difference to torch of the look's answers, None without a look. Raises ModelError if an answer
-    differs by more than LARGEST_DIFFERENCE, the look does not fit the file's classes, or there is none to remove, and
-    InputError if the file can't be written.
+    difference: float | None
+    lost_canary: bool
+
+
+def change_look(model: str | Path, path: str | Path, look: LookCheckpoint | None) -> ChangedLook:
+    """Write a copy of a model file with this look network, or without any; its mesh network stays as it is.
+
+    Its canary gets the new answers, or is removed if the networks do not find every class in it any more. Raises
+    ModelError if an answer differs from torch by more than LARGEST_DIFFERENCE, the look does not fit the file's classes,
+    or there is none to remove, and InputError if the file can't be written.
     """
     read = read_model(model)
-    difference = None
+    difference, lost = None, False
     if look is not None:
         content, difference = attached(read.content, read.manifest, look)
         check_difference(path, "answers of the close look", difference)
@@ -36,8 +45,13 @@ def change_look(model: str | Path, path: str | Path, look: LookCheckpoint | None
         raise ModelError(f"{model} has no close look to remove")
     else:
         content = detached(read.content, read.manifest)
-    write_model(path, content if read.canary is None else with_canary(content, CanaryPicture.of(read.canary)))
-    return difference
+    if read.canary is not None:
+        try:
+            content = with_canary(content, CanaryPicture.of(read.canary))
+        except NotFoundError:
+            content, lost = with_metadata(content, {CANARY_KEY: None}), True
+    write_model(path, content)
+    return ChangedLook(difference, lost)
 
 
 def change_canary(model: str | Path, path: str | Path, canary: CanaryPicture) -> None:

@@ -127,8 +127,14 @@ def _run(options: argparse.Namespace) -> int:
         _print_written(output, f"networks of {options.model} with a new canary", None, None)
         return EXIT_OK
     if _is_model_file(options.model):
-        difference = change_look(options.model, output, look)
-        _print_written(output, f"mesh network of {options.model}", look, difference)
+        changed = change_look(options.model, output, look)
+        _print_written(output, f"mesh network of {options.model}", look, changed.difference)
+        if changed.lost_canary:
+            print(
+                f"vm-export: {output} has no canary, because its networks do not find every class in that of "
+                f"{options.model}; give it another picture with vm-export {output} --canary IMAGE LENS",
+                file=sys.stderr,
+            )
         return EXIT_OK
     checkpoint = _load(options.model, _overrides(options))
     print(f"{options.model}: {_description(checkpoint)}")

@@ -5,7 +5,9 @@ import sys
 from pathlib import Path
 
 import pytest
+import torch
 
+from tests.vm_export.looks import look_checkpoint
 from vm_embedded.live.proof import prove
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.canary import PACKAGE_PICTURE
@@ -60,3 +62,19 @@ def test_pictures_that_can_not_be_a_canary_are_refused(tmp_path):
     both = refused("ball-small", "--canary", PACKAGE_PICTURE, LENS, "--no-look", "-o", output)
     assert "another close look or another canary" in both
     assert not output.exists()
+
+
+def test_a_look_that_finds_no_canary_gives_a_file_without_one_and_a_warning(tmp_path):
+    look = look_checkpoint()
+    with torch.no_grad():
+        look.network.calibration[1] = -20.0  # no patch shows a ball to it
+    look.save(tmp_path / "look.pt")
+    output = tmp_path / "new.onnx"
+    done = vm_export("ball-small", "--look", tmp_path / "look.pt", "-o", output)
+    assert done.returncode == 0, done.stderr
+    advice = f"give it another picture with vm-export {output} --canary IMAGE LENS\n"
+    assert done.stderr.startswith(f"vm-export: {output} has no canary, because ")
+    assert done.stderr.endswith(advice)
+    made = read_model(output)
+    assert made.canary is None
+    assert prove(made).startswith("self-test passed")

@@ -259,9 +259,9 @@ def test_a_model_file_holds_both_networks(tmp_path, layout):
 def test_a_look_changes_nothing_but_the_metadata(tmp_path):
     export.export(ball_checkpoint(), tmp_path / "without.onnx")
     export.export(ball_checkpoint(), tmp_path / "with.onnx", look=look_checkpoint())
-    assert change_look(tmp_path / "without.onnx", tmp_path / "attached.onnx", look_checkpoint()) < 1e-4
+    assert change_look(tmp_path / "without.onnx", tmp_path / "attached.onnx", look_checkpoint()).difference < 1e-4
     assert (tmp_path / "attached.onnx").read_bytes() == (tmp_path / "with.onnx").read_bytes()
-    assert change_look(tmp_path / "with.onnx", tmp_path / "removed.onnx", None) is None
+    assert change_look(tmp_path / "with.onnx", tmp_path / "removed.onnx", None).difference is None
     assert (tmp_path / "removed.onnx").read_bytes() == (tmp_path / "without.onnx").read_bytes()
     graphs = [onnx.load(tmp_path / name).graph for name in ("without.onnx", "with.onnx")]
     assert graphs[0] == graphs[1]
