@@ -49,8 +49,8 @@ class CanaryPicture:
 def with_canary(content: bytes, picture: CanaryPicture) -> bytes:
     """A model file's bytes with a canary.
 
-    Raises InputError for a picture that can't be searched, NotFoundError for one in which the networks do not find every
-    class, and ModelError if the networks do not run.
+    Raises InputError for a picture that can't be searched, NotFoundError for one in which the networks do not find
+    every class, and ModelError if the networks do not run.
     """
     model = parse_model("the new model", content)
     try:

@@ -33,8 +33,8 @@ def change_look(model: str | Path, path: str | Path, look: LookCheckpoint | None
     """Write a copy of a model file with this look network, or without any; its mesh network stays as it is.
 
     Its canary gets the new answers, or is removed if the networks do not find every class in it any more. Raises
-    ModelError if an answer differs from torch by more than LARGEST_DIFFERENCE, the look does not fit the file's classes,
-    or there is none to remove, and InputError if the file can't be written.
+    ModelError if an answer differs from torch by more than LARGEST_DIFFERENCE, the look does not fit the file's
+    classes, or there is none to remove, and InputError if the file can't be written.
     """
     read = read_model(model)
     difference, lost = None, False
