@@ -53,7 +53,7 @@ class BuiltMesh:
 
     @cached_property
     def walls(self) -> Indices | None:
-        """The wall (n,) of each point of a wall6 mesh; None for other models."""
+        """The number (n,) of each point's wall in a wall6 mesh (docs/meshes.md); None for other models."""
         if self.model != "wall6":
             return None
         counts = wall_counts(self.plan.shape, self.plan.intersections, self.plan.max_distance)
@@ -61,7 +61,8 @@ class BuiltMesh:
 
     @cached_property
     def distances(self) -> Floats:
-        """Distance (n,) [m] from the camera's foot to the object that each point serves."""
+        """Distance (n,) [m] from the camera's foot, the point of the plane below it, to the object that each point
+        serves."""
         plan, rays = self.plan, self.mesh.rays
         if self.walls is not None:
             return np.asarray(wall_distances(plan.shape, plan.intersections, plan.max_distance)[self.walls])

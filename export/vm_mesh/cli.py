@@ -19,7 +19,7 @@ _EPILOG = "Exit status: 0 done, 1 not done (standard error says why), 2 wrong us
 
 
 def parsers() -> dict[str, argparse.ArgumentParser]:
-    """The argument parsers of the commands."""
+    """The argument parsers of the commands. Long, because it lists every option."""
     show = _parser("show", "Draw a mesh from above, by direction, or on a picture.")
     show.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="drawing to write, .png or .svg")
     show.add_argument(
@@ -134,6 +134,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("\n".join(f"  {name:9s}{each.description}" for name, each in known.items()))
         return EXIT_OK if given else EXIT_USAGE
     if given[0] not in known and (given[0].startswith("-") or is_completing()):
+        # Which prints the version or completions, or refuses the option, and ends the program.
         Parser(prog="vm-mesh", commands=tuple(known)).parse_args(given)
     if given[0] not in known:
         print(f"vm-mesh: {unknown('command', given[0], known)}", file=sys.stderr)

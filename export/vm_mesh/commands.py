@@ -71,7 +71,7 @@ def quality(options: argparse.Namespace) -> None:
     if options.json is not None:
         check_writable(options.json)
     plan, _ = plan_and_model(options, None)
-    # Distances without a simple ratio, and closer together near the camera's foot, where meshes differ.
+    # Not evenly spaced, so that they do not fall on rings; closer together near the camera's foot, where meshes differ.
     distances = distances_or(options.distance, plan.max_distance * 0.8 * np.linspace(0.0, 1.0, 60) ** 2)
     found = {model: measure_quality(BuiltMesh.build(model, plan), distances) for model in models_for(options, plan)}
     print(plan)

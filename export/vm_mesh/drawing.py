@@ -28,9 +28,9 @@ _MOST_LINKS = 200_000
 def figure_from_above(built: BuiltMesh, view: str, reach: float, objects: tuple[float, ...] = ()) -> Figure:
     """A figure of the mesh out to `reach` [m], with outlines of objects at some distances [m].
 
-    view: ground is from above, where the rays meet the height of the objects' centers (for cylinders, the
-    plane). directions is by bearing around the middle, with the inclination from straight below as the distance from
-    it; it has room for points above the horizon.
+    view: "ground" is from above: each point is where its ray meets the height of the objects' centers (for cylinders,
+    the plane). "directions" has straight below in the middle; a point's angle around the middle is its bearing, and its
+    distance from the middle is its inclination from straight below. It has room for points above the horizon.
 
     The paper's fig:mesh_distance shows such rings.
     """
@@ -56,8 +56,8 @@ def draw_mesh(axes: Axes, built: BuiltMesh, view: str, reach: float, objects: tu
     step = 2.0 * np.pi / max(len(objects), 1)
     for number, distance in enumerate(objects):
         bearing = 0.5 + number * step
-        down = plan.shape.center_height - plan.height
-        center = np.array([distance * np.cos(bearing), distance * np.sin(bearing), down])
+        z = plan.shape.center_height - plan.height
+        center = np.array([distance * np.cos(bearing), distance * np.sin(bearing), z])
         outline = _places(plan.shape.outline(center, plan.height, 120), built, view)
         axes.fill(*outline.T, facecolor=_OBJECT, alpha=0.25, edgecolor=_OBJECT, linewidth=1.2)
     axes.set_aspect("equal")

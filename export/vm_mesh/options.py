@@ -59,7 +59,10 @@ def plan_and_model(options: argparse.Namespace, file: LensFile | None) -> tuple[
 
 
 def models_for(options: argparse.Namespace, plan: MeshPlan) -> list[str]:
-    """The models of --model, or else all models for the shape and height of a plan."""
+    """The models of --model, or else all models for the shape and height of a plan.
+
+    wall6 is for cylinders only. The others need a camera above the object.
+    """
     if options.model:
         return list(options.model)
     cylinder = plan.shape if isinstance(plan.shape, Cylinder) else None
@@ -93,7 +96,7 @@ def image_size(options: argparse.Namespace, file: LensFile) -> Size:
 def check_distances(given: Sequence[float]) -> None:
     """Raise InputError unless all distances are numbers from 0 to a million meters."""
     if not all(0.0 <= each < 1e6 for each in given):
-        raise InputError(f"distances must be numbers of at least 0 m, not {list(given)}")
+        raise InputError(f"distances must be numbers from 0 to a million meters, not {list(given)}")
 
 
 def distances_or(given: Sequence[float] | None, default: Floats) -> Floats:

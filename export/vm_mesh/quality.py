@@ -19,15 +19,16 @@ from vm_embedded.mesh.walls import NEAREST
 from .built_mesh import BuiltMesh
 
 BEARINGS = 61
-"""Number of bearings of an object, evenly spread; a prime, so that they repeat with no ring of points."""
+"""Number of bearings of an object, evenly spread; a prime, so that it shares no divisor with the number of points of a
+ring."""
 
 
 @dataclass(frozen=True, eq=False)
 class PointsOnObject:
     """The equivalent k of an object at distances (m,) [m]: mean, low and high (m,) over all bearings.
 
-    The equivalent k is the side of a square lattice with the same number of points on the object: sqrt(4 N / pi) for
-    circles and spheres. In wall6 only the points of the nearest wall count, by the ratio of distances.
+    N points on a circle or sphere have the equivalent k = sqrt(4 N / pi): a square lattice with k points across the
+    object has N points on it. In wall6 only the points of the nearest wall count, by the ratio of distances.
     """
 
     distances: Floats
@@ -92,7 +93,7 @@ def points_on_object(built: BuiltMesh, distances: Floats) -> PointsOnObject:
         distances = distances[distances >= NEAREST]
         if len(distances) == 0:
             raise InputError(f"wall6 begins at {NEAREST:g} m; give a greater --distance or --max-distance")
-    bearings = 2.0 * np.pi * (np.arange(BEARINGS) + 0.37) / BEARINGS
+    bearings = 2.0 * np.pi * (np.arange(BEARINGS) + 0.37) / BEARINGS  # none lies on an axis, where meshes are even
     found = np.empty((len(distances), BEARINGS))
     for row, distance in enumerate(distances.tolist()):
         centers = np.empty((BEARINGS, 3))
@@ -149,6 +150,7 @@ def _object_angles(built: BuiltMesh, points: np.ndarray) -> tuple[Floats, Floats
     if built.walls is not None:
         assert isinstance(shape, Cylinder)
         low, high = np.arctan2(-plan.height, distance), np.arctan2(shape.object_height - plan.height, distance)
+        # Above or below the horizon, the same azimuth is a smaller angle.
         level = np.hypot(rays[:, 0], rays[:, 1])
         return np.asarray(high - low), 2.0 * np.arcsin(shape.radius / distance) * level
     n = shape.n(np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), -rays[:, 2]), plan.height)

@@ -38,6 +38,7 @@ def useful_range(plan: MeshPlan, scale: float, distances: Floats) -> UsefulRange
     """The useful range for a lens of `scale` [px/rad] on its axis, with objects at distances (m,) [m]."""
     candidates = np.geomspace(0.01, _FARTHEST, 4001)
     fine = angular_size(plan, candidates).min(axis=1) * scale >= plan.intersections
+    # argmin: the first candidate that is not fine.
     limit = math.inf if fine.all() else float(candidates[np.argmin(fine)]) if fine[0] else 0.0
     points = plan.filled_share * plan.intersections**2
     return UsefulRange(distances, angular_size(plan, distances) * scale, points, limit)
@@ -50,7 +51,7 @@ def angular_size(plan: MeshPlan, distances: Floats) -> Floats:
     if isinstance(shape, Cylinder):
         across = 2.0 * np.arcsin(np.minimum(r / np.maximum(distances, r), 1.0))
         foot = np.arctan2(-h, np.maximum(distances - r, 1e-9))
-        top = shape.object_height - h
+        top = shape.object_height - h  # if it is below the camera, the far edge of the top is the upper outline
         return np.stack([across, np.arctan2(top, distances + (r if top < 0 else -r)) - foot], axis=1)
     away = np.hypot(distances, h - shape.center_height)
     across = 2.0 * np.arcsin(np.minimum(r / away, 1.0))

@@ -35,8 +35,8 @@ _ROUNDING = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class PreparedPoints:
-    """The part of a mesh that a bucket keeps: the points that may be on screen, in the network's order, and the picture
-    of the pyramid that colors each of them."""
+    """The part of a mesh that a bucket keeps: the points that may be on screen, in the network's order, and for each
+    the halved copy of the image (a level of its pyramid) that gives the point its color."""
 
     layout: Layout
     levels: Levels
@@ -50,6 +50,7 @@ class PreparedPoints:
 class MeshCache:
     """Keeps meshes and parts of meshes up to a limit of memory; it drops the least recently used first.
 
+    A mesh is kept under its height, and the prepared points of a bucket under (height, pitch, roll, lens, size).
     `hits`, `misses`, `prepared` (buckets that `prepare_nearby` made) and `nbytes` [bytes] may be read at any time.
     """
 
@@ -76,14 +77,15 @@ class MeshCache:
         """
         height = self.mesh_height(orientation.height)
         if self.settings.height_tolerance == 0.0:
+            # As in the reference: a mesh for each exact height, no buckets, and no turn of the mesh with the yaw.
             mesh = self._look_up(height, lambda: self._build(height))
             part = mesh.part(np.flatnonzero(may_be_on_screen(mesh, orientation.rotation, lens, size, _ROUNDING)))
-            points, rotation, heading = self._prepared(part, height, lens), orientation.rotation, np.eye(3)
+            points, rotation, heading = self._in_order(part, height, lens), orientation.rotation, np.eye(3)
         else:
             pitch = round(orientation.pitch / self.settings.pitch_step)
             roll = round(orientation.roll / self.settings.roll_step)
             key = (height, pitch, roll, lens, size)
-            points = self._look_up(key, lambda: self._prepare(height, pitch, roll, lens, size))
+            points = self._look_up(key, lambda: self._prepare_bucket(height, pitch, roll, lens, size))
             rotation, heading = orientation.level, rotation_z(orientation.yaw)
         return PreparedView(
             layout=points.layout,
@@ -101,20 +103,23 @@ class MeshCache:
         """Prepare the nearest bucket that is missing around an orientation's own; return whether there was one.
 
         A walking robot soon needs it. Only buckets that touch the orientation's own one count. lens: fitted to an image
-        of that size [px]. It drops nothing from the memory. It does nothing if memory is short, if the orientation's
-        own bucket is not kept, or if the height tolerance is 0. Raises GeometryError if the camera is too low for the
-        mesh's shape.
+        of that size [px]. It drops nothing from the memory. It does nothing if memory is short, if the mesh or the
+        orientation's own bucket is not kept, or if the height tolerance is 0. Raises GeometryError if the camera is
+        too low for the mesh's shape.
         """
         height = self.mesh_height(orientation.height)
-        up, lean = orientation.pitch / self.settings.pitch_step, orientation.roll / self.settings.roll_step
-        own = self._kept.get((height, round(up), round(lean), lens, size))
+        pitch_steps = orientation.pitch / self.settings.pitch_step
+        roll_steps = orientation.roll / self.settings.roll_step
+        own = self._kept.get((height, round(pitch_steps), round(roll_steps), lens, size))
+        # A neighbor is about as large as the own bucket. With less room than for one and a half, it would often be
+        # prepared in vain.
         if own is None or height not in self._kept or self.nbytes + 1.5 * own.nbytes > self._limit:
             return False
-        around = [(round(up) + i, round(lean) + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
-        for pitch, roll in sorted(around, key=lambda bucket: math.hypot(bucket[0] - up, bucket[1] - lean)):
+        around = [(round(pitch_steps) + i, round(roll_steps) + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
+        for pitch, roll in sorted(around, key=lambda each: math.hypot(each[0] - pitch_steps, each[1] - roll_steps)):
             key = (height, pitch, roll, lens, size)
             if key not in self._kept:
-                points = self._prepare(height, pitch, roll, lens, size)
+                points = self._prepare_bucket(height, pitch, roll, lens, size)
                 if self.nbytes + points.nbytes > self._limit:
                     return False
                 self._kept[key] = points
@@ -132,7 +137,7 @@ class MeshCache:
         manifest = self.manifest
         return manifest.model.build(self.shape, height, manifest.intersections, manifest.max_distance)
 
-    def _prepare(self, height: float, pitch: int, roll: int, lens: Lens, size: Size) -> PreparedPoints:
+    def _prepare_bucket(self, height: float, pitch: int, roll: int, lens: Lens, size: Size) -> PreparedPoints:
         """The points that an orientation of this bucket can bring on screen.
 
         The bucket is tested in four quarters. An orientation differs from the bucket's middle by at most half a step of
@@ -143,21 +148,22 @@ class MeshCache:
         mesh = self._look_up(height, lambda: self._build(height), counted=False)
         pitch_step, roll_step = self.settings.pitch_step, self.settings.roll_step
 
-        def possible(points: Mesh, up: float, lean: float, half_width: float) -> Mask:
+        def possible(points: Mesh, pitched: float, rolled: float, half_width: float) -> Mask:
             """Which points may be on screen in a piece of the bucket.
 
-            Its middle is `up` pitch steps and `lean` roll steps from the bucket's middle. It reaches `half_width` steps
-            to each side.
+            Its middle is `pitched` pitch steps and `rolled` roll steps from the bucket's middle. It reaches
+            `half_width` steps to each side.
             """
-            middle = Orientation.from_roll_pitch(height, (roll + lean) * roll_step, (pitch + up) * pitch_step)
+            middle = Orientation.from_roll_pitch(height, (roll + rolled) * roll_step, (pitch + pitched) * pitch_step)
             slack = half_width * (pitch_step + roll_step) + _ROUNDING
             return may_be_on_screen(points, middle.rotation, lens, size, slack)
 
         part = mesh.part(np.flatnonzero(possible(mesh, 0.0, 0.0, 0.5)))
-        quarters = [possible(part, up, lean, 0.25) for up in (-0.25, 0.25) for lean in (-0.25, 0.25)]
-        return self._prepared(part.part(np.flatnonzero(np.any(quarters, axis=0))), height, lens)
+        quarters = [possible(part, each, other, 0.25) for each in (-0.25, 0.25) for other in (-0.25, 0.25)]
+        return self._in_order(part.part(np.flatnonzero(np.any(quarters, axis=0))), height, lens)
 
-    def _prepared(self, mesh: Mesh, height: float, lens: Lens) -> PreparedPoints:
+    def _in_order(self, mesh: Mesh, height: float, lens: Lens) -> PreparedPoints:
+        """The points of a part of a mesh in the network's order, with the levels of their colors."""
         layout = choose_layout(mesh, self.manifest)
         return PreparedPoints(layout, levels_for(self.manifest, layout.rays, height, lens))
 

@@ -78,7 +78,7 @@ def _middle(observation: Observation, cluster: Members) -> Floats:
 
 
 def _around(observation: Observation, cluster: Members, center: Floats) -> Members:
-    """All points on screen as far from `center` as the cluster reaches, and up to three object radii farther."""
+    """All points on screen that are at most three object radii farther from `center` than the cluster's farthest."""
     rays, radius = observation.layout.rays, observation.view.shape.radius
     distance = float(np.linalg.norm(center))
     cosines = along(rays, center / distance)

@@ -57,13 +57,14 @@ class Detector:
         image: uint8 (height, width[, channels]) in the pixel format of the settings. orientation: of the camera at the
         time of the image. explain: also return the rejected candidates.
 
-        Raises InputError without an image or orientation (None is what cv2.imread and a lens file return that have
-        none), and for an image or lens that doesn't fit; GeometryError for a camera too low for the object.
+        Raises InputError for an image or lens that doesn't fit, GeometryError for a camera too low for the object. Also
+        raises InputError if image or orientation is None: cv2.imread returns None for a file that it can't read, and a
+        lens file without a pose has the orientation None.
         """
         return self.locate(self.observe(image, orientation, lens), explain)
 
     def prepare_nearby(self, orientation: Orientation, lens: Lens, size: Size) -> bool:
-        """Prepare one bucket of orientations beside a frame's, and return whether one was missing.
+        """Prepare one bucket beside the bucket of a frame's orientation, and return whether one was missing.
 
         Call it between frames, when there is time: it takes as long as a call of `detect`. When the camera moves on,
         the frame that needs the bucket is then as fast as the others. lens, orientation: of the last frame; size: of
@@ -76,7 +77,7 @@ class Detector:
         """Classify the mesh points in an image: the first step of `detect`, with the same arguments and errors."""
         frame = checked_image(image, self.settings.format)
         if orientation is None:
-            raise InputError("there is no orientation but None, which a lens file without Hoc has; see Orientation")
+            raise InputError("orientation is None: does the lens file have no pose (Hoc)? Give an Orientation")
         size = frame.shape[1], frame.shape[0]
         lens = lens.for_image(size)
         watch = Stopwatch()

@@ -40,7 +40,7 @@ def _misfit(view: PreparedView, candidate: Candidate, settings: Settings) -> str
     if center[2] >= 0.0 or np.linalg.norm(center) > _FARTHEST * view.height:
         return "on the horizon or above it"
     offset = view.shape.offset(view.layout.rays[candidate.near], center[None], view.height)[0]
-    whole = math.pi / 4.0 * view.rings**2
+    whole = math.pi / 4.0 * view.rings**2  # its bounding square has rings^2 points, and a disk fills pi / 4 of that
     visible = int((offset < 1.0).sum())
     if visible < settings.min_visible * whole:
         return f"{visible} of its points on screen, where a whole object has about {whole:.0f}"
@@ -49,9 +49,9 @@ def _misfit(view: PreparedView, candidate: Candidate, settings: Settings) -> str
         share = inside.mean() if len(inside) else 0.0
         return f"mean probability inside its outline is {share:.2f}, below {settings.min_inside:g}"
     inclination = math.atan2(math.hypot(center[0], center[1]), -center[2])
-    apparent = offset / (math.sqrt(2.0) if view.shape.n(inclination, view.height) < 1.0 else 1.0)
+    in_band = offset / (math.sqrt(2.0) if view.shape.n(inclination, view.height) < 1.0 else 1.0)
     first, last = 1.0 + _BAND_BEGINS * view.spacing, 1.0 + _BAND_ENDS * view.spacing
-    around = p[(apparent > first) & (apparent < last)]
+    around = p[(in_band > first) & (in_band < last)]
     if len(around) and around.mean() > settings.max_around:
         return f"mean probability around its outline is {around.mean():.2f}, above {settings.max_around:g}"
     return None

@@ -42,7 +42,7 @@ class Look(Protocol):
     def run(self, patches: Image) -> Singles:
         """Answers (n, 4) to patches (n, size, size, 3), RGB uint8.
 
-        They are the object's probability, the shift of its center to the right and down, in apparent radii, and the
+        They are the object's probability, the shift of its center to the right and down, in expected radii, and the
         logarithm of its apparent radius over the expected one. Raises ModelError.
         """
 
@@ -132,6 +132,7 @@ def look_at(places: Places, look: Look) -> Singles:
     From the second pass on, the answers to a patch and to its mirror image are averaged. Returns the last answers
     (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError if a network does not run.
     """
+    # Each pass has its network: first those of the glance, then those of the look.
     networks = [each for each in (look.glance, look) if each for _ in range(each.contract.passes)]
     answers = np.zeros((len(places), 4), dtype=np.float32)
     worth = np.arange(len(places))

@@ -24,7 +24,8 @@ from .settings import Settings
 from .stopwatch import Stopwatch
 
 _SAME_SIZE = 0.2
-"""With a close look, two distances agree if the apparent size differs from the expected one by at most this share."""
+"""With a close look, a Detection's `distance` and `distance_by_angle` agree if its apparent size differs from the
+expected one by at most this share."""
 
 
 def locate(
@@ -42,6 +43,7 @@ def locate(
         if object_class.kind != "object":
             continue
         if look is not None and look.contract.object_class == name:
+            # With `explain`, look_closely also returns the rejected proposals.
             judged = look_closely(observation, look, probabilities, settings, watch, explain)
             objects += [_describe_judgment(observation, name, each) for each in judged if each.reason is None]
             rejected += [_describe_judgment(observation, name, each) for each in judged if each.reason]
@@ -79,7 +81,8 @@ def _describe_candidate(observation: Observation, candidate: Candidate) -> Detec
         candidate.center,
         confidence=float(inside.mean()) if len(inside) else 0.0,
         scale=scale,
-        # The outline that fits best is at most one ring spacing larger or smaller; both are in expected radii.
+        # The outline that fits best is at most one ring spacing larger or smaller; scale - 1 and spacing are both in
+        # expected radii.
         distances_agree=abs(scale - 1.0) <= view.spacing,
         points=len(inside),
         reason=candidate.reason,

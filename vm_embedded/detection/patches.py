@@ -1,9 +1,9 @@
 """Patches: the picture around places where an object may be, in which an object has the same size at every distance.
 
 A patch is a square in the plane that touches the unit sphere around the camera in the direction of the object. One
-axis is level and points right; the other one points down. The side of the square is a fixed number of the object's
-apparent radii. So a ball at one meter gets as many samples as a ball at ten: the paper's constant sample density, one
-level deeper.
+axis is level and points right; the other one points down. The side of the square is a fixed multiple of the radius
+that the object is expected to have in the picture. So a ball at one meter gets as many samples as a ball at ten: the
+paper's constant sample density, one level deeper.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Tangents:
 def patch_nodes(view: PreparedView, tangents: Tangents, extent: float) -> Singles:
     """Pixels (2, c, N, N), x and y, of a grid over patches in these planes.
 
-    extent: half the side of a patch, in apparent radii. The grid goes from border to border, row by row from the upper
+    extent: half the side of a patch, in expected radii. The grid goes from border to border, row by row from the upper
     left. A ray outside of the lens's view is moved to the edge of the view.
     """
     steps = np.linspace(-extent, extent, _NODES)

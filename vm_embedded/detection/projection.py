@@ -92,8 +92,8 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     """
     reach = _view_angle(lens, size)
     ahead = along(mesh.rays, rotation[:, 0])
-    # Rounding errors of a rotation may shorten rays by up to 5e-4, and the lens compares their x without normalizing.
-    # Twice as much is allowed here.
+    # A rotation matrix with rounding errors may shorten rays by up to 5e-4, and the lens compares a ray's x with a
+    # cosine as if its length were 1. Twice as much is allowed here.
     near = np.flatnonzero(ahead > np.cos(min(reach + slack, np.pi)) - 1e-3)
     camera = to_camera(mesh.rays[near], rotation)
     cosine = np.maximum(camera[:, 0], np.cos(reach))
@@ -104,8 +104,9 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     camera[:, 2] *= inward
     camera[:, 0] = cosine
     # A turn moves a ray along a great arc. In a view wider than half a sphere, this arc may leave the view and pass
-    # behind the camera. A way along the edge of the view is at most pi / 2 times as long. Points outside of the view
-    # were moved to its edge, which at most doubles the way between two points. Both together: pi.
+    # behind the camera. A way along the edge of the view is at most pi / 2 times as long. A point outside
+    # of the view was moved to the nearest edge. That move is not longer than the point's way to any place in the view,
+    # so it at most doubles that way. Both together: pi.
     detour = 1.0 if reach <= np.pi / 2 else np.pi
     margin = detour * slack * _pixels_per_radian(lens, size)
     possible = np.zeros(len(mesh), dtype=bool)
@@ -127,7 +128,7 @@ def _view_angle(lens: Lens, size: Size) -> float:
     x, y = np.linspace(0.0, size[0] - 1.0, 65), np.linspace(0.0, size[1] - 1.0, 65)
     pixels = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2)
     angles = np.arccos(np.clip(lens.unproject(pixels, size)[:, 0], -1.0, 1.0))
-    if np.isnan(angles).any():
+    if np.isnan(angles).any():  # the lens does not reach some pixel
         return lens.limit
     # The farthest pixel is on the border, at most half a step of the 64 from one that was looked at.
     return min(lens.limit, float(angles.max()) * 1.02)
@@ -137,7 +138,7 @@ def _view_angle(lens: Lens, size: Size) -> float:
 def _pixels_per_radian(lens: Lens, size: Size) -> float:
     """Largest shift of a pixel [px] for each radian that its ray turns, anywhere in the view."""
     reach = _view_angle(lens, size)
-    # Straight behind the camera every direction is the same one, and the speed around the axis has no limit.
+    # The angles end just before pi. Straight behind the camera sin(theta) is 0, and `sideways` has no limit.
     grid = np.meshgrid(np.linspace(1e-3, min(reach, np.pi - 1e-3), 200), np.linspace(0.0, 2.0 * np.pi, 33))
     theta, around = (axis.reshape(-1) for axis in grid)
     step = 1e-5

@@ -7,8 +7,8 @@ inclination n objects out, seen from the height h (`Shape.phi`). The points have
 
 Take a line at the height c, parallel to an axis, at the distance d from the vertical through the camera. The plane
 through the line and the camera is a *slice*. In the slice, the camera is slant = sqrt(g^2 + d^2) away from the line.
-For d = 0 this is g; for any other d, slant takes the place of g, as if the camera were at the height slant + c. So n
-objects out, a point of the line has
+Below the camera, d is 0 and slant is g. Any other line looks, in its slice, like one below a camera that is slant
+above it: at the height slant + c over the plane. So the point of the line that is n objects out has
 
     coordinate(n, d) = slant tan(phi(n, slant + c)).
 
@@ -50,7 +50,7 @@ do not settle (as with thin cylinders), and the relative change at which a point
 KINDS = ("xy", "xm", "nm")
 
 _Coordinate = Callable[[Floats, Floats | float], Floats]
-"""coordinate(n, d) for n (c,) objects out: (c,) [m]. The distance d [m] is (c,), or one number for all of them."""
+"""coordinate(n, d) for n (m,) objects out: (m,) [m]. The distance d [m] is (m,), or one number for all of them."""
 
 
 class Grid(MeshModel):
@@ -92,14 +92,15 @@ class Grid(MeshModel):
     def _quarter(self, shape: Shape, height: float, intersections: float, max_distance: float) -> tuple[Floats, Floats]:
         """x and y [m] in the quarter of the lattice with x >= 0 and y >= 0; the other quarters are its mirror images.
 
-        Both are (rows, half steps), and NaN where the lattice has no point. Raises GeometryError for too many points.
+        Both are (rows, half steps). x is NaN where the lattice has no point; y then has no meaning. Raises
+        GeometryError for too many points.
         """
         six = self.neighbors == 6
         row_step = _ROW if six else 1.0
         border = _border(self.kind, shape, height, max_distance) * intersections  # [steps]
         u_most, v_most = border.max(axis=0).tolist()
         check_size(u_most * v_most)
-        # From 0 to one beyond the border.
+        # Rows and half steps are tried from 0 to one beyond the border.
         rows = math.floor(v_most / row_step) + 2
         halves = math.floor(u_most / 0.5) + 2
         row, half = (axis.reshape(-1) for axis in np.mgrid[:rows, :halves].astype(np.int32))
@@ -121,7 +122,7 @@ def _row_groups(steps: tuple[tuple[int, int], ...]) -> Groups:
 
 
 def _coordinate(shape: Shape, height: float) -> _Coordinate:
-    """The module's function coordinate(n, d), for a shape seen from a height [m]."""
+    """coordinate(n, d) of this module's docstring, for a shape seen from a height [m]."""
     c = shape.center_height
     g = height - c
 
@@ -213,7 +214,7 @@ def _within(points: Floats, border: Floats) -> Mask:
 
 
 def _connected_to_nadir(column: Indices, row: Indices, neighbors: int) -> Mask:
-    """Which cells in columns (c,) and rows (c,) are connected to the cell (0, 0) by links to 4, 6 or 8 neighbors.
+    """Which cells in columns (m,) and rows (m,) are connected to the cell (0, 0) by links to 4, 6 or 8 neighbors.
 
     The cells become pixels, and OpenCV finds their connected components.
     """
@@ -237,13 +238,13 @@ def _connected_to_nadir(column: Indices, row: Indices, neighbors: int) -> Mask:
 
 def lattice_neighbors(cells: Indices, steps: tuple[tuple[int, int], ...]) -> Indices:
     """Neighbors (n + 1, N) of cells (n, 2) at fixed steps (N, 2), each as (columns, rows)."""
-    missing = len(cells)
+    off_screen = len(cells)
     width, height = cells.max(axis=0) + 3  # with an empty cell all around, so that no step leaves the table
     flat = (cells[:, 1] + 1) * width + cells[:, 0] + 1
-    index = np.full(width * height, missing, dtype=np.int32)
-    index[flat] = np.arange(missing, dtype=np.int32)
-    neighbors: npt.NDArray[np.int32] = np.empty((missing + 1, len(steps)), dtype=np.int32)
-    for column, (right, up) in enumerate(steps):
-        neighbors[:missing, column] = index[flat + up * width + right]
-    neighbors[missing] = missing
+    index = np.full(width * height, off_screen, dtype=np.int32)
+    index[flat] = np.arange(off_screen, dtype=np.int32)
+    neighbors: npt.NDArray[np.int32] = np.empty((off_screen + 1, len(steps)), dtype=np.int32)
+    for number, (right, up) in enumerate(steps):
+        neighbors[:off_screen, number] = index[flat + up * width + right]
+    neighbors[off_screen] = off_screen
     return neighbors

@@ -93,8 +93,8 @@ def ring_places(counts: Indices) -> tuple[Indices, Indices]:
     return start, np.arange(start[-1], dtype=np.int32) - np.repeat(start[:-1], counts)
 
 
-class _Ring(NamedTuple):
-    """One ring for each point: the point's own ring, the next one inwards or the next one outwards.
+class _RingsOfPoints(NamedTuple):
+    """For each of n points one ring: its own, the next one inwards, or the next one outwards.
 
     first (n,): the ring's first point. size (n,): its number of points.
     """
@@ -110,17 +110,18 @@ class _Ring(NamedTuple):
 def ring_neighbors(counts: Indices, start: Indices, place: Indices, width: int, nudge: float = 0.0) -> Indices:
     """Neighbors (n + 1, width) of points in rings (paper: section "Graph Structure of the Mesh").
 
-    counts: (rings,) number of points in each ring. start, place: from `ring_places`. width: 4, 6 or 8 neighbors.
-    nudge: added to all places before rings are compared, so that float noise does not choose between two neighbors at
-    the same distance. Only cap6 needs it: the sizes of its inner rings have a common divisor, so many of its points
-    have two such neighbors.
+    The last row, n, is that of the off-screen point, which is its own neighbor. counts: (rings,) number of points in
+    each ring. start, place: from `ring_places`. width: 4, 6 or 8 neighbors. nudge: added to each place before its
+    fraction of the circle is computed, so that float noise does not choose between two neighbors at the same distance.
+    Only cap6 needs it: the sizes of its inner rings have a common divisor, so many of its points have two such
+    neighbors.
 
     A point is linked to the two adjacent points of its ring, and to the points of the next rings at the same fraction
     of the circle. In each of these rings, width 6 links the nearest two, and width 4 only the nearest one. Width 8
     links the nearest two and, as top and bottom, the nearest one again. The nadir's neighbors are spread evenly over
     ring 1.
     """
-    missing = int(start[-1])
+    off_screen = int(start[-1])
     inner, own, outer = _beside(counts, start)
     # A float, as in the reference: integer arithmetic would round some places differently.
     fraction = (place + nudge) / own.size
@@ -138,25 +139,25 @@ def ring_neighbors(counts: Indices, start: Indices, place: Indices, width: int, 
         "top": lambda: outer.at(np.floor(outwards + 0.5).astype(np.int32)),
         "bottom": lambda: inner.at(np.floor(inwards + 0.5).astype(np.int32)),
     }
-    neighbors = np.empty((missing + 1, width), dtype=np.int32)
+    neighbors = np.empty((off_screen + 1, width), dtype=np.int32)
     for column, name in enumerate(_NEIGHBORS[width]):
-        neighbors[:missing, column] = find[name]()
-    neighbors[missing] = missing
-    neighbors[0] = missing
+        neighbors[:off_screen, column] = find[name]()
+    neighbors[off_screen] = off_screen
+    neighbors[0] = off_screen
     if len(counts) > 1:  # the nadir's neighbors, spread over ring 1, whose first point is 1
         neighbors[0] = 1 + (np.arange(width) * counts[1]) // width
     return neighbors
 
 
-def _beside(counts: Indices, start: Indices) -> tuple[_Ring, _Ring, _Ring]:
+def _beside(counts: Indices, start: Indices) -> tuple[_RingsOfPoints, _RingsOfPoints, _RingsOfPoints]:
     """For each point, the next ring inwards, its own ring and the next ring outwards.
 
     Beyond the last ring is a ring with only the off-screen point. The nadir's inner ring is never used.
     """
     counts_around, start_around = np.pad(counts, 1, constant_values=1), np.pad(start, (1, 0))
 
-    def ring_of_points(step: int) -> _Ring:
+    def shifted_by(step: int) -> _RingsOfPoints:
         shifted = slice(step, step + len(counts))
-        return _Ring(np.repeat(start_around[shifted], counts), np.repeat(counts_around[shifted], counts))
+        return _RingsOfPoints(np.repeat(start_around[shifted], counts), np.repeat(counts_around[shifted], counts))
 
-    return ring_of_points(0), ring_of_points(1), ring_of_points(2)
+    return shifted_by(0), shifted_by(1), shifted_by(2)

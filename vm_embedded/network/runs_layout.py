@@ -7,11 +7,12 @@ The words that this file uses:
 - A *run* is a sequence of slots in which each point is followed by its right neighbor. A gap follows the last one.
 - A *group* is up to three neighbors of a point that should follow each other in a run (MeshModel.groups). The groups
   of ring6 are left, the point itself and right; top left and top right; bottom left and bottom right. The first group
-  of every mesh is left, itself and right: it says which points a run joins.
+  of every mesh is left, itself and right: it says which points a run joins. For a certain point, the *members* of a
+  group are the up to three points that are these neighbors of it.
 - The *middle* of a group is the second slot of a group of three, and the first slot of a shorter group.
 - A layer's *table* (vm_export/runs_graph.py) holds, for each group, m - 1 weighted sums over windows of three adjacent
   slots; slots outside of the group have the weight 0. So a point looks up one sum for each group, not one value for
-  each neighbor.
+  each neighbor. There are m - 1 sums, because runs_graph.py then makes all windows by one reshape, without copies.
 - A *column* is the position of a sum in the table. Within a group, column s + 1 is the window around slot s. The first
   two columns of each group are not used, and the last two slots, which are gaps, have no window.
 
@@ -21,8 +22,9 @@ and two upper neighbors: 3 4 above point 0, 4 5 above point 1, 6 3 above point 2
     slot   0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22
     point  - - - 0 1 2 - 3 4 5 6  -  -  5  6  3  6  3  4  6  3  -  -
 
-Slots 3 to 5 and 7 to 10 are runs; - is a gap. The ring closes between 6 and 3, and the runs tear three groups apart
-there: the upper neighbors 6 3 of point 2, and 5 6 3 and 6 3 4 around points 6 and 3. Copies of these groups follow.
+Slots 3 to 5 and 7 to 10 are runs; - is a gap. The ring closes between 6 and 3, and the runs tear the members
+of three groups apart there: the upper neighbors 6 3 of point 2, and 5 6 3 and 6 3 4 around points 6 and 3. Copies of
+these members follow.
 
 Point 1 is in slot 4. Its first group, 0 1 2, has its middle in slot 4, and its second group, 4 5, in slot 8. Each group
 has m - 1 = 22 columns of the table. Column j of a group holds the sum over the slots j - 2, j - 1 and j, so the sum
@@ -74,7 +76,8 @@ class RunsLayout(Layout):
 
     def links(self, members: npt.NDArray[np.integer]) -> Indices:
         places = np.append(self.places, np.int32(len(self)))  # with m for the off-screen point
-        found = np.empty((len(members), sum(map(len, self._groups)) - 1), dtype=np.int32)
+        neighbors = sum(map(len, self._groups)) - 1  # one member of a group is the point itself
+        found = np.empty((len(members), neighbors), dtype=np.int32)
         for group, columns, first in zip(self._groups, self.columns, self._first_columns, strict=True):
             middle = columns[members] - first
             for offset, neighbor in zip(group_offsets(group), group, strict=True):
@@ -116,8 +119,8 @@ def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Position
     the point in each slot, the slot of the middle of each of its groups, _GAP in gaps.
     """
     n = len(neighbors) - 1
-    # A second gap at the end. `_found_in_runs` reads two slots after the last point, if that is the first of a
-    # group of three.
+    # A second gap at the end. If the last point is the left one of a group of three, `_found_in_runs` reads the two
+    # slots after it.
     runs = np.append(_in_runs(neighbors[:n, groups[0][0]], neighbors[:n, groups[0][-1]]), n)
     slot_of = np.full(n + 1, _GAP)  # each point, and the off-screen point
     filled = np.flatnonzero(runs < n)

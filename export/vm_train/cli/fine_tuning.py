@@ -113,8 +113,8 @@ def _complain(faults: Sequence[str], folder: Path) -> None:
 
 def _fine_tune(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> int:
     """Train from the last state of a folder on. moved_to: where the frames are now. Returns the exit status."""
+    from ..learning.folder_access import locked
     from ..learning.hardware import set_up_hardware
-    from ..learning.run_folder import locked
     from ..tuning.fine_tuning import fine_tune
     from ..tuning.run_folder import read_tuning
 

@@ -164,8 +164,8 @@ def _train(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> 
 
 def _train_on(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> bool:
     """Train until the end, or until Ctrl-C or SIGTERM between two steps. Returns whether it is finished."""
+    from ..learning.folder_access import locked
     from ..learning.hardware import set_up_hardware
-    from ..learning.run_folder import locked
     from ..look.collected import collect
     from ..look.run_folder import read_look_run
     from ..look.training import is_finished, train_look

@@ -112,10 +112,11 @@ def _begin(
     options: argparse.Namespace, configuration: TrainConfiguration, hardware: Hardware, start: Start | None
 ) -> None:
     """Check all pictures, and write the folder of a new training."""
-    from ..learning.run_folder import begin_run, check_unused
+    from ..learning.folder_access import check_unused
+    from ..learning.run_folder import FILES, begin_run
     from ..learning.training_data import TrainingData
 
-    check_unused(options.output)
+    check_unused(options.output, FILES)
     source = stream_source(options, configuration, hardware)
     good = find_good_pictures(options.data, configuration, hardware, options.strict)
     if source is None:
@@ -147,8 +148,9 @@ def _split(options: argparse.Namespace, configuration: TrainConfiguration, good:
 
 def _train(folder: Path, hardware: Hardware, moved_to: Path | None = None) -> int:
     """Train from the last state of a folder on; moved_to: where the pictures are now. Returns the exit status."""
+    from ..learning.folder_access import locked
     from ..learning.rounds import train
-    from ..learning.run_folder import locked, read_run
+    from ..learning.run_folder import read_run
 
     run = read_run(folder)
     if moved_to is not None:

@@ -2,17 +2,16 @@
 
 train.toml: the configuration. pictures.json: the split of the pictures. run.json: where the pictures are, and the
 numbers of points of each class. teacher.pt, and start.pt or start.onnx: copies of the networks of --teacher and --from.
-state.pt: the state to resume from. log.jsonl, tensorboard/: the record of each step. round1.pt, ...: the best network
-of each round. model.pt: the best network of all rounds, for vm-evaluate and vm-export.
+unpacked/: a cache of decoded pictures, during the training. state.pt: the state to resume from. log.jsonl and
+tensorboard/: the record of each step. round1.pt, ...: the best network of each round. model.pt: the best network of all
+rounds, for vm-evaluate and vm-export.
 """
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,6 +30,7 @@ from ..data.split import read_split, write_split
 from ..graphs.loading import PictureGraphs
 from ..graphs.streamed import StreamedGraphs, StreamSource
 from .configuration import TrainConfiguration
+from .folder_access import check_unused
 from .selection import class_weights, selection_shares
 from .start import Start
 from .teacher import Teacher
@@ -41,7 +41,7 @@ _TEACHER = "teacher.pt"
 _STARTS = {".pt": "start.pt", ".onnx": "start.onnx"}
 """Copies of the network to begin with, by the suffix of its file."""
 
-_FILES = ("train.toml", "pictures.json", _TEACHER, *_STARTS.values(), "state.pt", "model.pt", "round1.pt", "log.jsonl")
+FILES = ("train.toml", "pictures.json", _TEACHER, *_STARTS.values(), "state.pt", "model.pt", "round1.pt", "log.jsonl")
 """Files that a new training would overwrite."""
 
 
@@ -78,7 +78,7 @@ class TrainingRun:
     def configuration_sha256(self) -> str:
         """Digest of configuration and split.
 
-        The name says only "configuration", but it can't change: run.json and model files contain it.
+        The digest also covers the split, although its name does not say so: run.json and model files use the name.
         """
         text = json.dumps([asdict(self.configuration), asdict(self.data.split)])
         return hashlib.sha256(text.encode()).hexdigest()
@@ -96,7 +96,8 @@ class TrainingRun:
 
     @property
     def selected_points_per_picture(self) -> float:
-        """Expected number of points of a training picture that give gradients."""
+        """Expected number of points of a training picture that give gradients, by the recipe's own rule of selection
+        (the first round may have another one)."""
         shares = selection_shares(self.configuration.training.selection, self.counts, self.objects)
         return float(shares @ self.counts) / self.data.counted
 
@@ -142,7 +143,7 @@ def begin_run(
     teacher: checkpoint of the teacher. start: the network to begin with, which fits the configuration. Raises
     InputError, also if the folder holds a training.
     """
-    check_unused(folder)
+    check_unused(folder, FILES)
     data = replace(data, folder=data.folder.resolve())
     loaded = None if teacher is None else _load_teacher(teacher, configuration)
     try:
@@ -201,28 +202,6 @@ def read_run(folder: Path) -> TrainingRun:
             "undo the change, or begin another training in a new folder"
         )
     return run
-
-
-def check_unused(folder: Path, names: Sequence[str] = _FILES) -> None:
-    """Raise InputError if a folder holds a training, or one of the files `names`, which a new one would overwrite."""
-    if (folder / "run.json").exists():
-        raise InputError(f"{folder} holds a training already: vm-train resume {folder}, or give another folder")
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder} is a file: give a new folder")
-    present = [name for name in names if (folder / name).exists()]
-    if present:
-        raise InputError(f"{folder} holds {', '.join(present)}, which a training would overwrite: give a new folder")
-
-
-@contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Keep other processes from resuming the same training. Raises InputError if one already does."""
-    with (folder / "run.json").open() as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise InputError(f"another process is training in {folder}") from error
-        yield
 
 
 def _description(run: TrainingRun) -> dict[str, Any]:

@@ -1,9 +1,9 @@
 """Trains a network step by step, and saves and loads the state between two steps.
 
 A step depends only on the seed, its number and the weights before it. With one computing thread on a CPU, a
-training that resumes from its last state therefore ends with the same weights. With several processes
-(torch.distributed), each takes its part of every batch, and the gradient is that of the mean loss over the selected
-points of all parts.
+training that resumes from its last state therefore ends with the weights of one that nobody interrupted. With several
+processes (torch.distributed), each takes its part of every batch, and the gradient is that of the mean loss over the
+selected points of all parts.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ from .optimizer import ScheduledOptimizer
 from .recipe import Recipe
 from .selection import class_totals, hardness_weights, point_errors, select_points
 
+_DRAWS = 2
+"""Parts the random numbers of the selection from others with the seed of the same item."""
+
 
 @dataclass(frozen=True)
 class StepResult:
@@ -45,7 +48,10 @@ class StepResult:
 
 @dataclass(frozen=True)
 class _BatchLoss:
-    """Sums over the selected points of this process's part of a batch: weighted loss (), weights, and their number."""
+    """Sums over the selected points of this process's part of a batch.
+
+    loss: weighted losses, a scalar tensor. weight: weights. points: number of points.
+    """
 
     loss: torch.Tensor
     weight: float
@@ -86,7 +92,7 @@ class Trainer:
         return self.network if self._average is None else cast(Network, self._average.module)
 
     def set_rate(self, rate: float) -> None:
-        """Set the learning rate of the next step. Lasts with a constant schedule only."""
+        """Set the learning rate of the next step. Any schedule but a constant one replaces it after that step."""
         self._optimizer.rate = rate
 
     def step(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> StepResult:
@@ -125,18 +131,20 @@ class Trainer:
         labels = torch.from_numpy(np.where(chosen, graph.labels, -1).astype(np.int64)).to(self._device)
         with torch.autocast(torch.device(self._device).type, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
             logits = self.network.logits(points, neighbors)
+        # The last row is the off-screen point.
         losses = point_losses(logits[:-1], self._targets(graph, points, neighbors, labels), self.recipe)
         weights = torch.where(labels >= 0, self._weights[labels], 0.0)
         return _BatchLoss(losses @ weights, float(weights.sum()), int(chosen.sum()))
 
     @torch.no_grad()
     def _targets(
-        self, graph: LabeledGraph, points: torch.Tensor, neighbors: torch.Tensor, chosen: torch.Tensor
+        self, graph: LabeledGraph, points: torch.Tensor, neighbors: torch.Tensor, selected: torch.Tensor
     ) -> torch.Tensor:
-        """Targets of the points: the chosen labels (n,), or probabilities (n, C) with smoothing or a teacher."""
+        """Targets of the points: `selected`, the labels (n,) with -1 for points that are not selected, or, with
+        smoothing or a teacher, probabilities (n, C)."""
         recipe = self.recipe
         if self._teacher is None and not recipe.smoothing:
-            return chosen
+            return selected
         labels = torch.from_numpy(graph.labels.astype(np.int64)).to(self._device)
         taught = None if self._teacher is None else self._teacher(points, neighbors)[:-1]
         classes = self.network.shape.classes
@@ -210,7 +218,7 @@ def _draws(items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> Floats:
     """A random number from 0 to 1 for each point of a batch, decided by the seeds of its items."""
     return np.concatenate(
         [
-            np.random.default_rng([2, *(item.seed or ())]).random(len(each))
+            np.random.default_rng([_DRAWS, *(item.seed or ())]).random(len(each))
             for item, each in zip(items, graphs, strict=True)
         ]
     )

@@ -24,7 +24,7 @@ from vm_export.look_checkpoint import LookCheckpoint
 
 from ..data.split import Split, read_split, write_split
 from ..evaluation.answers import ExactSubject, load_subject
-from ..learning.run_folder import check_unused
+from ..learning.folder_access import check_unused
 from .configuration import LookConfiguration
 
 KIND = "look"

@@ -29,7 +29,7 @@ from vm_export.look_weights import look_of
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.read import read_boxes
 from ..data.split import Split
-from ..learning.run_folder import check_unused
+from ..learning.folder_access import check_unused
 from .boxed_objects import all_objects, boxes_sha256, check_boxes, split_by_recording
 from .candidates import search_radii
 from .configuration import TuningConfiguration
