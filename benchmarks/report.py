@@ -136,7 +136,7 @@ def walks(found: dict[str, Any]) -> str:
         ]
         colds.append([name, *cold])
     heads = ["mesh of", "height [m]", "hits after the first swing", "cache [MiB]"]
-    cold_heads = ["mesh of", "cold call", "p99", "cold call with a new mesh", "p99"]
+    cold_heads = ["mesh of", "bucket", "p99", "bucket and mesh", "p99"]
     return table(heads, rows) + "\n\n" + table(cold_heads, colds)
 
 

@@ -94,7 +94,7 @@ def proposals(found: dict[str, Any]) -> str:
                 ]
             )
     heads = ["network", "test pictures", "proposed [%]", "proposals", "center error [radii]", "calibration error, all"]
-    return table([*heads, "reported", "accepted at half the radius", "at twice"], rows)
+    return table([*heads, "reported", "accepted with a mesh for half the radius", "for twice"], rows)
 
 
 def grid(found: dict[str, Any]) -> str:

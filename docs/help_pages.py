@@ -98,8 +98,9 @@ def _row(action: argparse.Action) -> str:
     if action.choices:
         names += " " + " \\| ".join(f"`{choice}`" for choice in action.choices)
     elif action.option_strings and action.nargs != 0:
-        names += f" `{action.metavar or action.dest.upper()}`"
-    return f"| {names} | {action.help} |"
+        values = action.metavar if isinstance(action.metavar, tuple) else (action.metavar or action.dest.upper(),)
+        names += f" `{' '.join(values)}`"
+    return f"| {names} | {(action.help or '') % vars(action)} |"
 
 
 if __name__ == "__main__":

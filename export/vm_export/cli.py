@@ -54,9 +54,8 @@ def parser() -> argparse.ArgumentParser:
         "--look-above",
         type=float,
         metavar="P",
-        help="probability of a mesh point from which it counts for a proposal, if this network needs another one than "
-        "the network that the look was trained with; a network of many classes is less sure of each; lower: more "
-        "proposals",
+        help="the mesh points from this probability on are proposed to the look; default: the probability that the "
+        "look was trained with. A network of many classes needs a lower one, because it is less sure of each class",
     )
     parser.add_argument(
         "--canary",
