@@ -15,20 +15,24 @@ PAGE = (Path(__file__).parents[2] / "docs" / "ros.md").read_text()
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("peer")  # a domain of its own
-def test_the_program_of_the_page_prints_where_the_ball_is(tmp_path, monkeypatch):
+def test_the_example_prints_where_the_ball_is_and_the_state(tmp_path, monkeypatch):
     (uri,) = re.findall(r'^export CYCLONEDDS_URI="(.*)"$', PAGE, re.MULTILINE)
     monkeypatch.setenv("CYCLONEDDS_URI", uri)
-    (program,) = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    (command,) = re.findall(r"^python (docs/examples/.*) 10$", PAGE, re.MULTILINE)
+    example = Path(__file__).parents[2] / command
+    assert example.name == "ros_listener.py"
     with running(tmp_path, "--camera", "synthetic") as node:
         node.wait(lambda: node.frames)
         done = subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, env=os.environ, timeout=120, check=False
+            [sys.executable, example, "5"], capture_output=True, text=True, env=os.environ, timeout=120, check=False
         )
         node.stop()
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert len(lines) > 3
-    assert all(re.fullmatch(r"ball -?[0-9.]+ -?[0-9.]+", each) for each in lines), lines
+    balls = [each for each in lines if re.fullmatch(r"ball at \(-?[\d.]+, -?[\d.]+\) m in base_footprint", each)]
+    assert len(balls) > 3
+    assert "state: ok" in lines
+    assert all(each in balls or each.startswith("state: ") for each in lines), lines
 
 
 def test_the_page_names_all_topics_and_messages():
