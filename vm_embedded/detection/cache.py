@@ -36,7 +36,7 @@ _ROUNDING = 2e-3
 @dataclass(frozen=True, eq=False)
 class PreparedPoints:
     """The part of a mesh that a bucket keeps: the points that may be on screen, in the network's order, and for each
-    the halved copy of the image (a level of its pyramid) that gives the point its color."""
+    the level of the image pyramid (how often the image is halved) that gives its color."""
 
     layout: Layout
     levels: Levels
@@ -50,7 +50,8 @@ class PreparedPoints:
 class MeshCache:
     """Keeps meshes and parts of meshes up to a limit of memory; it drops the least recently used first.
 
-    A mesh is kept under its height, and the prepared points of a bucket under (height, pitch, roll, lens, size).
+    A mesh is kept under its height, and the prepared points of a bucket under (height, pitch, roll, lens, size), with
+    pitch and roll as numbers of steps.
     `hits`, `misses`, `prepared` (buckets that `prepare_nearby` made) and `nbytes` [bytes] may be read at any time.
     """
 
@@ -100,7 +101,7 @@ class MeshCache:
         )
 
     def prepare_nearby(self, orientation: Orientation, lens: Lens, size: Size) -> bool:
-        """Prepare the nearest bucket that is missing around an orientation's own; return whether there was one.
+        """Prepare the nearest bucket that is missing around an orientation's own; return whether one was prepared.
 
         A walking robot soon needs it. Only buckets that touch the orientation's own one count. lens: fitted to an image
         of that size [px]. It drops nothing from the memory. It does nothing if memory is short, if the mesh or the

@@ -1,4 +1,4 @@
-"""Proposals: each cluster of likely points may be an object.
+"""Candidates: each cluster of likely points may be an object.
 
 The paper suggests two uses of the mesh after the network (section "Discussion and Conclusion"): the graph diameter of
 a cluster shows whether it can be an object, and the best fitting subgraph shows where. This module does the first,

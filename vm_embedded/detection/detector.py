@@ -64,7 +64,7 @@ class Detector:
         return self.locate(self.observe(image, orientation, lens), explain)
 
     def prepare_nearby(self, orientation: Orientation, lens: Lens, size: Size) -> bool:
-        """Prepare one bucket beside the bucket of a frame's orientation, and return whether one was missing.
+        """Prepare a missing bucket beside the bucket of a frame's orientation, and return whether one was prepared.
 
         Call it between frames, when there is time: it takes as long as a call of `detect`. When the camera moves on,
         the frame that needs the bucket is then as fast as the others. lens, orientation: of the last frame; size: of

@@ -49,9 +49,9 @@ def _misfit(view: PreparedView, candidate: Candidate, settings: Settings) -> str
         share = inside.mean() if len(inside) else 0.0
         return f"mean probability inside its outline is {share:.2f}, below {settings.min_inside:g}"
     inclination = math.atan2(math.hypot(center[0], center[1]), -center[2])
-    in_band = offset / (math.sqrt(2.0) if view.shape.n(inclination, view.height) < 1.0 else 1.0)
+    band_offset = offset / (math.sqrt(2.0) if view.shape.n(inclination, view.height) < 1.0 else 1.0)
     first, last = 1.0 + _BAND_BEGINS * view.spacing, 1.0 + _BAND_ENDS * view.spacing
-    around = p[(in_band > first) & (in_band < last)]
+    around = p[(band_offset > first) & (band_offset < last)]
     if len(around) and around.mean() > settings.max_around:
         return f"mean probability around its outline is {around.mean():.2f}, above {settings.max_around:g}"
     return None

@@ -27,7 +27,7 @@ WORTH = 0.02
 
 
 _LARGEST_SIZE = 3.0
-"""Limit of the logarithm of a size: a bad network must not lead to numbers that can't be written."""
+"""Limit of the logarithm of a size: with a bad network, math.exp would overflow, and JSON has no infinity."""
 
 
 class Look(Protocol):
@@ -53,11 +53,11 @@ class Places(Protocol):
     def __len__(self) -> int: ...
 
     def cut(self, rows: npt.NDArray[np.intp], contract: LookContract) -> Image:
-        """Patches (k, size, size, 3), RGB, as a network needs them, at k of the places, by their numbers."""
+        """Patches (k, size, size, 3), RGB, of the places with the numbers `rows` (k,), as a contract describes them."""
 
     def move(self, right: Floats, down: Floats) -> Mask:
-        """Move the k places that were cut last by shifts (k,) in expected radii. Returns which of them (k,) may hold an
-        object there."""
+        """Move the k places of the last `cut`, by these shifts (k,) in expected radii. Returns which of them (k,) may
+        hold an object there."""
 
 
 class PlanePlaces:
@@ -169,7 +169,7 @@ def _judged(
     kept: list[Floats] = []
     judged: list[Judgment] = []
     for number in np.argsort(-answers[:, 0], kind="stable"):
-        center, (probability, _, _, size) = centers[number], answers[number].tolist()
+        center, (probability, _, _, log_size) = centers[number], answers[number].tolist()
         if probability < settings.min_confidence and not explain:
             break
         reason = None
@@ -185,6 +185,6 @@ def _judged(
         if reason is None:
             kept.append(center)
         if reason is None or explain:
-            scale = math.exp(min(max(size, -_LARGEST_SIZE), _LARGEST_SIZE))
+            scale = math.exp(min(max(log_size, -_LARGEST_SIZE), _LARGEST_SIZE))
             judged.append(Judgment(center, probability, scale, reason))
     return judged

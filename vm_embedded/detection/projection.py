@@ -91,7 +91,7 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     wider than half a sphere. Points farther off the picture are left out.
     """
     reach = _view_angle(lens, size)
-    ahead = along(mesh.rays, rotation[:, 0])
+    ahead = along(mesh.rays, rotation[:, 0])  # cosine of the angle to the optical axis, the camera's x
     # A rotation matrix with rounding errors may shorten rays by up to 5e-4, and the lens compares a ray's x with a
     # cosine as if its length were 1. Twice as much is allowed here.
     near = np.flatnonzero(ahead > np.cos(min(reach + slack, np.pi)) - 1e-3)
@@ -103,10 +103,9 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     camera[:, 1] *= inward
     camera[:, 2] *= inward
     camera[:, 0] = cosine
-    # A turn moves a ray along a great arc. In a view wider than half a sphere, this arc may leave the view and pass
-    # behind the camera. A way along the edge of the view is at most pi / 2 times as long. A point outside
-    # of the view was moved to the nearest edge. That move is not longer than the point's way to any place in the view,
-    # so it at most doubles that way. Both together: pi.
+    # A turn moves a ray along a great arc. In a view of at most half a sphere the arc stays in the view, and moving a
+    # point to the edge makes no way longer. In a wider view the arc may pass behind the camera; the way along the edge
+    # is at most pi / 2 times as long. And moving a point from outside to the edge at most doubles its way. Both: pi.
     detour = 1.0 if reach <= np.pi / 2 else np.pi
     margin = detour * slack * _pixels_per_radian(lens, size)
     possible = np.zeros(len(mesh), dtype=bool)

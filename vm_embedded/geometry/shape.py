@@ -72,7 +72,7 @@ class Shape(ABC):
         """Distance (m, n) of rays from objects, relative to their outline: 0 at the center, 1 on the outline.
 
         rays: (n, 3) unit vectors from the camera. centers: (m, 3) of the objects, relative to the camera [m]. Both are
-        in the observation-plane frame.
+        in one frame whose z is up.
         """
 
     def covers(self, rays: Floats, centers: Floats, height: float, share: float = 1.0) -> Mask:

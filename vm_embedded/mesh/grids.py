@@ -75,8 +75,8 @@ class Grid(MeshModel):
         x, y = self._quarter(shape, height, intersections, max_distance)
         last_row, last_half = (size - 1 for size in x.shape)
         row, half = (each.astype(np.int32) for each in np.mgrid[-last_row : last_row + 1, -last_half : last_half + 1])
-        shown = np.isfinite(x[np.abs(row), np.abs(half)])
-        row, half = row[shown], half[shown]
+        exists = np.isfinite(x[np.abs(row), np.abs(half)])
+        row, half = row[exists], half[exists]
         column = (half - row) // 2 if self.neighbors == 6 else half // 2
         linked = _connected_to_nadir(column, row, self.neighbors)
         row, column, half = row[linked], column[linked], half[linked]
@@ -202,7 +202,8 @@ def _within(points: Floats, border: Floats) -> Mask:
 
     This filter is coarse. It only saves `_positions` from computing most points outside; `_quarter` then drops every
     point beyond max_distance. The border runs from the first axis to the second. It is drawn as a polygon, and each
-    point looks up its pixel. No point may lie more than one step beyond the largest u and v of the border.
+    point looks up its pixel. No point may lie more than one step beyond the largest u and v of the border, because
+    there the drawing ends.
     """
     width, height = (math.ceil(each) + 3 for each in border.max(axis=0))
     outline = np.concatenate([[[0.0, 0.0]], border])

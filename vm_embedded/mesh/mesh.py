@@ -34,7 +34,7 @@ class PointGraph(Protocol):
 
     @property
     def rays(self) -> Floats:
-        """Unit vectors (n, 3) from the camera, in the observation-plane frame."""
+        """Unit vectors (n, 3) from the camera, in the mesh frame."""
 
     def __len__(self) -> int: ...
 
@@ -46,7 +46,8 @@ class PointGraph(Protocol):
 class Mesh:
     """n points and their neighbors: a whole mesh or a part of one.
 
-    rays: (n, 3) unit vectors from the camera, in the observation-plane frame, column by column in memory.
+    rays: (n, 3) unit vectors from the camera, column by column in memory. They are in the mesh frame: that of the
+        observation plane without the camera's yaw, so x is ahead of the camera and z up.
     neighbors: (n + 1, N) indices of points. Index n is the off-screen point, which takes the place of every missing
         neighbor. It is linked to itself.
     cells: (n, 2) column and row of each point, in a lattice where all neighbors are fixed steps away; else None.

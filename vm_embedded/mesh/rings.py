@@ -154,6 +154,7 @@ def _beside(counts: Indices, start: Indices) -> tuple[_RingsOfPoints, _RingsOfPo
 
     Beyond the last ring is a ring with only the off-screen point. The nadir's inner ring is never used.
     """
+    # `start` already ends with n. So the ring beyond the last one begins at the off-screen point, and its size is 1.
     counts_around, start_around = np.pad(counts, 1, constant_values=1), np.pad(start, (1, 0))
 
     def shifted_by(step: int) -> _RingsOfPoints:

@@ -12,7 +12,8 @@ The words that this file uses:
 - The *middle* of a group is the second slot of a group of three, and the first slot of a shorter group.
 - A layer's *table* (vm_export/runs_graph.py) holds, for each group, m - 1 weighted sums over windows of three adjacent
   slots; slots outside of the group have the weight 0. So a point looks up one sum for each group, not one value for
-  each neighbor. There are m - 1 sums, because runs_graph.py then makes all windows by one reshape, without copies.
+  each neighbor. There are m - 1 sums, not m, because runs_graph.py then cuts all windows out of one row of values
+  by a single reshape.
 - A *column* is the position of a sum in the table. Within a group, column s + 1 is the window around slot s. The first
   two columns of each group are not used, and the last two slots, which are gaps, have no window.
 
@@ -75,8 +76,9 @@ class RunsLayout(Layout):
         self.columns = frozen(middles.astype(np.int32) + self._first_columns)
 
     def links(self, members: npt.NDArray[np.integer]) -> Indices:
+        """See Layout. members: slots; here these are not the members of a group."""
         places = np.append(self.places, np.int32(len(self)))  # with m for the off-screen point
-        neighbors = sum(map(len, self._groups)) - 1  # one member of a group is the point itself
+        neighbors = sum(map(len, self._groups)) - 1  # in all groups together, one member is the point itself
         found = np.empty((len(members), neighbors), dtype=np.int32)
         for group, columns, first in zip(self._groups, self.columns, self._first_columns, strict=True):
             middle = columns[members] - first
@@ -148,15 +150,16 @@ def _found_in_runs(
 ) -> tuple[_Positions, Mask]:
     """Where the group of each point lies in the runs, and whether the runs tear it apart.
 
-    members: (group size, n) points of each point's group, n off screen. runs: the point in each slot. slot_of: (n + 1,)
-    the slot of each point. Returns the slots of the groups' middles (n + 1,), _GAP where no member is on screen, and a
-    mask (n,) of the groups that are torn.
+    members: (group size, n) the points in the group of each point; the number n stands for a missing one. runs: the
+    point in each slot. slot_of: (n + 1,) the slot of each point. Returns the slots of the groups' middles (n + 1,), _GAP
+    where no member is on screen, and a mask (n,) of the groups that are torn.
     """
     n = members.shape[1]
     middle = np.full(n + 1, _GAP)
     # If the group is whole, each of its members on screen leads to the same middle.
     for offset, points in zip(offsets, members, strict=True):
         np.copyto(middle[:n], slot_of[points] - offset, where=points < n)
+    # The place of a missing member must be a gap. A group with another point there is torn, too.
     torn = np.zeros(n, dtype=bool)
     for offset, points in zip(offsets, members, strict=True):
         torn |= runs[middle[:n] + offset] != points

@@ -9,6 +9,9 @@ import numpy as np
 
 _VALIDATED = 8  # pictures in a batch of the validation
 
+_ORDER, _AUGMENTATION = 1, 3
+"""Keep random numbers of different uses apart that begin with the same seed."""
+
 
 @dataclass(frozen=True)
 class Item:
@@ -47,17 +50,18 @@ def schedule(
 ) -> Iterator[Batch]:
     """All batches of a training: each epoch uses all pictures `looks` times, shuffled, and then validates.
 
-    Positions below `training` are training pictures; the `validation` positions after them are validation pictures.
+    training, validation: numbers of pictures. Positions below `training` are training pictures; the `validation`
+    positions after them are validation pictures.
     """
     step = 0
     for epoch in range(epochs):
-        random = np.random.default_rng([*seed, 1, epoch])
+        random = np.random.default_rng([*seed, _ORDER, epoch])
         shuffled = np.concatenate([random.permutation(training) for _ in range(looks)])
         starts = range(0, len(shuffled), batch)
         for start in starts:
             step += 1
             chosen = shuffled[start : start + batch].tolist()
-            items = tuple(Item(each, (*seed, 3, epoch, start + place)) for place, each in enumerate(chosen))
+            items = tuple(Item(each, (*seed, _AUGMENTATION, epoch, start + place)) for place, each in enumerate(chosen))
             yield Batch(epoch, step, items, validates=False, last=start == starts[-1])
         for start in range(0, validation, _VALIDATED):
             end = min(start + _VALIDATED, validation)

@@ -42,7 +42,7 @@ _STARTS = {".pt": "start.pt", ".onnx": "start.onnx"}
 """Copies of the network to begin with, by the suffix of its file."""
 
 FILES = ("train.toml", "pictures.json", _TEACHER, *_STARTS.values(), "state.pt", "model.pt", "round1.pt", "log.jsonl")
-"""Files that a new training would overwrite."""
+"""Files that a new training would overwrite, besides run.json."""
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from .recipe import Recipe
 from .selection import class_totals, hardness_weights, point_errors, select_points
 
 _DRAWS = 2
-"""Parts the random numbers of the selection from others with the seed of the same item."""
+"""Keeps the random numbers of the selection apart from others with the seed of the same item."""
 
 
 @dataclass(frozen=True)
@@ -119,15 +119,15 @@ class Trainer:
 
     def _batch_loss(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> _BatchLoss:
         if not graphs:  # a small batch may leave this process nothing
-            if self._graders:  # the other processes wait for its part of the sum in _chances
+            if self._graders:  # the other processes wait for its part of the sum in _chance_factors
                 sum_over_processes(torch.zeros((2, self.network.shape.classes), dtype=torch.float64))
             return _BatchLoss(torch.zeros(()), 0.0, 0)
         graph, _ = join_graphs(graphs)
         points = torch.from_numpy(graph.points).to(self._device)
         neighbors = torch.from_numpy(graph.neighbors).to(self._device)
         # Section "Training" of the paper: gradients come from the selected points only; the others get label -1.
-        chances = self._chances(points, neighbors, graph) if self._graders else None
-        chosen = select_points(graph.labels, self._shares, _draws(items, graphs), chances)
+        factors = self._chance_factors(points, neighbors, graph) if self._graders else None
+        chosen = select_points(graph.labels, self._shares, _draws(items, graphs), factors)
         labels = torch.from_numpy(np.where(chosen, graph.labels, -1).astype(np.int64)).to(self._device)
         with torch.autocast(torch.device(self._device).type, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
             logits = self.network.logits(points, neighbors)
@@ -140,8 +140,11 @@ class Trainer:
     def _targets(
         self, graph: LabeledGraph, points: torch.Tensor, neighbors: torch.Tensor, selected: torch.Tensor
     ) -> torch.Tensor:
-        """Targets of the points: `selected`, the labels (n,) with -1 for points that are not selected, or, with
-        smoothing or a teacher, probabilities (n, C)."""
+        """Targets of the points.
+
+        selected: labels (n,), -1 for points that are not selected. They are the targets, unless the recipe has
+        smoothing or a teacher; then the targets are probabilities (n, C) of all points.
+        """
         recipe = self.recipe
         if self._teacher is None and not recipe.smoothing:
             return selected
@@ -151,7 +154,7 @@ class Trainer:
         return soft_targets(labels, classes, neighbors, recipe.smoothing, taught, recipe.distillation)
 
     @torch.no_grad()
-    def _chances(self, points: torch.Tensor, neighbors: torch.Tensor, graph: LabeledGraph) -> Floats:
+    def _chance_factors(self, points: torch.Tensor, neighbors: torch.Tensor, graph: LabeledGraph) -> Floats:
         """Factors (n,) of the points' chances to be selected, from the graders' errors; mean 1 in each class."""
         errors = np.zeros(len(graph), dtype=np.float32)
         for grader in self._graders:
@@ -165,7 +168,7 @@ class Trainer:
     @torch.no_grad()
     def probabilities(self, graph: LabeledGraph) -> Singles:
         """Probabilities (n, C) that `result` gives the points of a graph."""
-        points, neighbors = torch.from_numpy(graph.points), torch.tensor(graph.neighbors)
+        points, neighbors = torch.from_numpy(graph.points), torch.tensor(graph.neighbors)  # a mesh's are read-only
         answers: Singles = self.result(points.to(self._device), neighbors.to(self._device))[:-1].cpu().numpy()
         return answers
 
