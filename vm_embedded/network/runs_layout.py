@@ -151,8 +151,8 @@ def _found_in_runs(
     """Where the group of each point lies in the runs, and whether the runs tear it apart.
 
     members: (group size, n) the points in the group of each point; the number n stands for a missing one. runs: the
-    point in each slot. slot_of: (n + 1,) the slot of each point. Returns the slots of the groups' middles (n + 1,), _GAP
-    where no member is on screen, and a mask (n,) of the groups that are torn.
+    point in each slot. slot_of: (n + 1,) the slot of each point. Returns the slots of the groups' middles (n + 1,),
+    _GAP where no member is on screen, and a mask (n,) of the groups that are torn.
     """
     n = members.shape[1]
     middle = np.full(n + 1, _GAP)
