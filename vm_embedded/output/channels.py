@@ -42,7 +42,7 @@ class OutputSettings:
     )
     unix: str = text_line(
         "",
-        "Unix socket to create; each reader gets every line; a relative path is in $RUNTIME_DIRECTORY, "
+        "Unix socket to create; each reader gets all lines that it takes in time; a relative path is in $RUNTIME_DIRECTORY, "
         "$XDG_RUNTIME_DIR or /tmp",
     )
     format: str = one_of(FORMATS, "json", "json, or ros for the field names of vision_msgs and geometry_msgs in ROS 2")

@@ -87,7 +87,7 @@ def look_parser() -> argparse.ArgumentParser:
         type=Path,
         metavar="RUN",
         help="folder of the vm-train look training that made the close look of MODEL; its patches are mixed in, so "
-        "that the network forgets nothing; default: patches of the package, which show balls",
+        "that the network forgets little; default: patches of the package, which show balls",
     )
     return made
 

@@ -1,4 +1,4 @@
-"""Rendered patches that a fine-tuning learns from besides the user's own, so that the network forgets nothing.
+"""Rendered patches that a fine-tuning learns from besides the user's own, so that the network forgets little.
 
 They are a sample of those that the look of `ball` learned from, in one small file of the package: pictures of 32 x 32
 patches each, compressed as WebP. `make networks` writes it.
