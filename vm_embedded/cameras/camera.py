@@ -69,7 +69,11 @@ class CameraSettings:
     width: int = number(0, "width to request from a device; 0: the device's own", "px", (0, 20000))
     height: int = number(0, "height to request from a device; 0: the device's own", "px", (0, 20000))
     fps: float = number(
-        0.0, "frame rate to request from a device, or to play files at; 0: the device's or file's own", "1/s", (0, 1000)
+        0.0,
+        "frame rate to request from a device, or of files: --live plays them at it, and --track takes times from it; "
+        "0: the device's or file's own",
+        "1/s",
+        (0, 1000),
     )
     exposure_ms: float = number(0.0, "exposure time of a device; 0: automatic", "ms", (0, 1000))
     gain: float = number(-1.0, "gain of a device, in its own units; -1: the device decides", "", (-1, 100000))

@@ -21,8 +21,8 @@ class Settings:
     height_tolerance: float = number(
         0.5,
         "a new camera height gets its own mesh if the number of rings across an object changes by more than this; "
-        "0: as in the reference, for comparisons: each frame gets a mesh for its exact height, whose points keep their "
-        "place on the plane when the camera's yaw changes; slower",
+        "0, for comparisons with the reference: each frame gets a mesh for its exact height, and the mesh does not "
+        "turn with the camera's yaw; slower",
         "rings",
         (0.0, 2.0),
     )

@@ -42,8 +42,8 @@ class OutputSettings:
     )
     unix: str = text_line(
         "",
-        "Unix socket to create; each reader gets all lines that it takes in time; a relative path is in $RUNTIME_DIRECTORY, "
-        "$XDG_RUNTIME_DIR or /tmp",
+        "Unix socket to create; each reader gets all lines that it takes in time; a relative path is in "
+        "$RUNTIME_DIRECTORY, $XDG_RUNTIME_DIR or the private folder /tmp/vm-detect-UID",
     )
     format: str = one_of(FORMATS, "json", "json, or ros for the field names of vision_msgs and geometry_msgs in ROS 2")
     unix_format: str = one_of(

@@ -87,7 +87,11 @@ def _add_pictures(made: argparse.ArgumentParser) -> None:
         metavar="PX",
         help="ignore true objects of a smaller radius [px]; default 2",
     )
-    group.add_argument("--strict", action="store_true", help="stop at a picture that can't be used; default: skip it")
+    group.add_argument(
+        "--strict",
+        action="store_true",
+        help="stop at a picture that can't be used; default: skip it. An unknown color in a mask always stops",
+    )
 
 
 def points_parser() -> argparse.ArgumentParser:

@@ -78,8 +78,8 @@ def look_parser() -> argparse.ArgumentParser:
         "--boxes",
         type=Path,
         metavar="DIR",
-        help="folder of frames with boxes, in YOLO, Pascal VOC or COCO format; the close look that the model file "
-        "MODEL has learns from them",
+        help="folder of frames with boxes, in YOLO, Pascal VOC or COCO format; the close look of the model file "
+        "MODEL is fine-tuned on them",
     )
     add_box_options(group)
     group.add_argument(
