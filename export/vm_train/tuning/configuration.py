@@ -50,9 +50,7 @@ class TuningRecipe:
     epochs: int = number(8, "largest number of epochs; the network is validated after each epoch", "", (1, 1e4))
     steps: int = number(60, "steps of an epoch", "", (1, 1e6))
     patience: int = number(5, "epochs without a better validation after which the training ends", "", (1, 1e4))
-    own: float = number(
-        0.25, "share of each batch that shows your own frames; the others are rendered", "", (0.01, 1.0)
-    )
+    own: float = number(0.5, "share of each batch that shows your own frames; the others are rendered", "", (0.01, 1.0))
     distillation: float = number(
         1.0,
         "share of a rendered patch's target that is the answer of the network before; higher: it forgets less",
@@ -60,7 +58,7 @@ class TuningRecipe:
         (0.0, 1.0),
     )
     forgetting: float = number(
-        0.2,
+        0.4,
         "the largest increase of the loss on rendered patches, as a share of that of the network before; the weights "
         "are mixed with those before until it is kept; higher: it learns more and forgets more",
         "",
