@@ -42,9 +42,9 @@ class SelfTest:
         try:
             test = cls(
                 np.array(data["points"], dtype=np.float32),
-                np.array(data["neighbors"], dtype=np.int32),
+                _indices(data["neighbors"]),
                 np.array(data["probabilities"], dtype=np.float32),
-                None if data["cells"] is None else np.array(data["cells"], dtype=np.int32).reshape(-1, 2),
+                None if data["cells"] is None else _indices(data["cells"]).reshape(-1, 2),
             )
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise ModelError(f"self-test in the model file can't be read: {error}") from error
@@ -62,3 +62,11 @@ class SelfTest:
                     "self-test in the model file has cells that are too far out, repeated, or not one for each point"
                 )
         return test
+
+
+def _indices(values: Any) -> Indices:
+    """Whole numbers of nested lists. Raises OverflowError for too large ones, whose high bits numpy 1 would cut off."""
+    found, limits = np.array(values, dtype=np.int64), np.iinfo(np.int32)
+    if found.size and (found.min() < limits.min or found.max() > limits.max):
+        raise OverflowError("an index is too large")
+    return found.astype(np.int32)
