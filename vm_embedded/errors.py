@@ -7,7 +7,15 @@ from difflib import get_close_matches
 
 
 class VisualMeshError(Exception):
-    """Base of all errors that a user can fix; the message is one line."""
+    """Base of all errors that a user can fix; the message is one line of text.
+
+    Messages quote values from files and from the network, so what could end the line or control a terminal is escaped.
+    """
+
+    def __str__(self) -> str:
+        return "".join(
+            each if each.isprintable() else each.encode("unicode_escape").decode() for each in super().__str__()
+        )
 
 
 class GeometryError(VisualMeshError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import pickle
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -25,10 +26,13 @@ def save_values(path: str | Path, content: Mapping[str, Any]) -> None:
 def load_values(path: str | Path, what: str) -> Any:
     """Read a file of `save_values` without executing anything in it. Raises InputError if it is not `what`.
 
-    torch's own message advises to load the file without this protection, so it is not passed on.
+    torch's own message advises to load the file without this protection, so it is not passed on. Neither are its
+    warnings about parts of a damaged file.
     """
     try:
-        return torch.load(path, map_location="cpu", weights_only=True)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return torch.load(path, map_location="cpu", weights_only=True)
     except OSError as error:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
     except pickle.UnpicklingError as error:

@@ -17,9 +17,11 @@ from .library_messages import library_messages
 _TAIL = 1024
 """Bytes at the end of a file in which to look for its end marker; cameras and programs append other data to it."""
 
-_DAMAGED = re.compile(r"Premature end of JPEG|Corrupt JPEG data: (?!\d+ extraneous bytes before marker 0xd9)")
-"""What libjpeg says about an image with missing or wrong parts. Some cameras put bytes between the image and its end
-marker, which do no harm."""
+_DAMAGED = re.compile(
+    r"Premature end of JPEG|Corrupt JPEG data: (?!\d+ extraneous bytes before marker 0xd9)|libpng error: "
+)
+"""What libjpeg and libpng say about an image with missing or wrong parts. Some cameras put bytes between a JPEG and its
+end marker, which do no harm."""
 
 
 def decode(content: bytes, raw: bool = False, max_megapixels: float = MAX_MEGAPIXELS) -> Image:
@@ -41,15 +43,13 @@ def decode_as(content: bytes, flags: int, max_megapixels: float = MAX_MEGAPIXELS
     """Like `decode`, with the flags of cv2.imdecode, which may keep other types than uint8. Raises InputError."""
     check_size(content, max_megapixels)
     tail = content.rstrip(b"\x00")[-_TAIL:]  # some cameras pad their buffers
-    if content.startswith(b"\xff\xd8"):
-        if b"\xff\xd9" not in tail:
-            raise InputError("is cut short")
-        with library_messages() as messages:
-            image = _decoded(content, flags)
-        if any(map(_DAMAGED.match, messages)):
-            raise InputError(f"is cut short or damaged ({messages[0]})")
-    else:
+    if content.startswith(b"\xff\xd8") and b"\xff\xd9" not in tail:
+        raise InputError("is cut short")
+    with library_messages() as messages:
         image = _decoded(content, flags)
+    damage = next(filter(_DAMAGED.match, messages), None)
+    if damage:
+        raise InputError(f"is cut short or damaged ({damage})")
     if image is None:
         cut = content.startswith(b"\x89PNG") and b"IEND" not in tail
         raise InputError("is cut short" if cut else "can't be decoded as an image")

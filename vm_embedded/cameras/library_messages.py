@@ -1,6 +1,6 @@
-"""What other libraries print: the lines of libjpeg are collected while it decodes, and OpenCV is silenced.
+"""What other libraries print: the lines of libjpeg and libpng are collected while they decode; OpenCV is silenced.
 
-libjpeg reports damage only there: it fills the rest of the picture with gray, and OpenCV reports success.
+Damage is reported only there: libjpeg fills the rest of the picture with gray, and OpenCV reports success.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ _STDERR = 2
 
 _WARNING = re.compile(
     r"Corrupt JPEG data|Premature end of JPEG|Invalid SOS parameters|Inconsistent progression|Unknown Adobe|"
-    r"Warning: unknown JFIF"
+    r"Warning: unknown JFIF|libpng (?:error|warning): "
 )
-"""First words of libjpeg's warnings. It prints the first warning about each image."""
+"""First words of the warnings. libjpeg prints the first warning about each image."""
 
 _LOCK = threading.Lock()
 """Only one thread at a time may redirect standard error."""
@@ -27,7 +27,7 @@ _LOCK = threading.Lock()
 
 @contextmanager
 def library_messages() -> Iterator[list[str]]:
-    """Collect the lines that libjpeg prints in this block; the list is complete after the block.
+    """Collect the lines that libjpeg and libpng print in this block; the list is complete after the block.
 
     Lines of other threads go to standard error when the block ends.
     """

@@ -1,0 +1,186 @@
+"""Write the first inputs of the fuzz targets again: python -m tests.fuzz.make_corpus
+
+Inputs whose names begin with `found` were findings once; they stay as they are.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+
+from tests.vm_embedded.live.running import DEMO
+from tests.vm_export.checkpoints import checkpoint
+from tests.vm_export.looks import look_checkpoint
+from vm_embedded.config.toml_writer import to_commented_toml
+from vm_embedded.geometry.lens_files import read_lens_file
+from vm_embedded.live.configuration import Configuration
+from vm_export.checkpoint import Checkpoint
+from vm_export.export import export
+from vm_export.network import Network
+from vm_export.network_shape import NetworkShape
+from vm_train.learning.configuration import TrainConfiguration
+
+from .run import CORPORA
+
+_OPENCV = """%YAML:1.0
+---
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 612.25, 0., 318.5, 0., 611.75, 241.25, 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [ 0.1, -0.2, 0., 1e-3, 0. ]
+image_width: 640
+image_height: 480
+"""
+_ROS = """image_width: 640
+image_height: 480
+distortion_model: equidistant
+D: [0.01, -0.02, 0.003, 0.0]
+K: [500.0, 0.0, 320.0, 0.0, 500.0, 240.0, 0.0, 0.0, 1.0]
+"""
+_TOML_LENS = (
+    '[lens]\nprojection = "rectilinear"\nfocal_length = 448\nfov = 1.75\ncenter = [1, 2.5]\n'
+    "distortion = [0.0, 1e-7]\nsize = [320, 240]\n"
+)
+_VM = (
+    'model = "ball"\nfov = "70deg"\n[orientation]\nheight = 0.8\npitch = "20deg"\n[camera]\nsource = "synthetic"\n'
+    '[pose]\nsource = "udp:127.0.0.1:5600"\n[status]\npage = "127.0.0.1:8080"\n'
+)
+_TRAIN = (
+    '[classes]\nball = { color = [255, 0, 0], kind = "object" }\n[mesh]\nmodel = "ring6"\n[training]\nepochs = 3\n'
+    "[augmentation]\nbrightness = [0.8, 1.2]\n"
+)
+
+
+def main() -> None:
+    pose = {"t": 1.0, "height": 0.8, "quaternion": [1, 0, 0, 0]}
+    hoc = {"Hoc": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.8], [0, 0, 0, 1]], "t": 2}
+    _write("poses", {"quaternion": _line(pose), "hoc": _line(hoc), "two": _line(pose) + _line(pose | {"t": 1.1})})
+    _write("control", {"status": b"status\n", "metrics": b"metrics\n", "record": b"record"})
+    _write("web", {f"page{number}": each for number, each in enumerate(_requests())})
+    _write("lens", _lenses())
+    _write("toml", {"vm": _VM.encode(), "train": _TRAIN.encode(), **_whole_configurations()})
+    _write("mjpeg", _streams())
+    _write("checkpoint", _checkpoints())
+    _write("model", _models())
+    manifest = {"release": "1.0-abc", "machine": "x86_64", "glibc": "2.28", "python": "cp311", "disk_mib": 16}
+    sums = "".join(f"{number:064x}  {name}\n" for number, name in enumerate(("README.md", "etc/vm.toml")))
+    _write("bundle", {"manifest": json.dumps(manifest, indent=1).encode() + b"\n", "sums": sums.encode()})
+
+
+def _write(target: str, inputs: Mapping[str, bytes]) -> None:
+    folder = CORPORA / target
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in folder.iterdir():
+        if not path.name.startswith("found"):
+            path.unlink()
+    for name, content in inputs.items():
+        (folder / name).write_bytes(content)
+
+
+def _line(content: Mapping[str, object]) -> bytes:
+    return json.dumps(content).encode() + b"\n"
+
+
+def _requests() -> list[bytes]:
+    host, token = b" HTTP/1.1\r\nHost: 127.0.0.1\r\n", b"X-Token: TOKEN\r\n"
+    gets = [b"/", b"/state", b"/map", b"/preview?value=0.3", b"/metrics", b"/stream", b"/other"]
+    posts = [b"/threshold?value=0.5", b"/record"]
+    return [b"GET " + each + host + b"\r\n" for each in gets] + [
+        b"POST " + each + host + more + b"\r\n" for each in posts for more in (token, b"")
+    ]
+
+
+def _lenses() -> dict[str, bytes]:
+    files = {"reference": (DEMO / "lens0000000.yaml").read_bytes()}
+    assert read_lens_file(DEMO / "lens0000000.yaml").orientation is not None
+    return files | {"opencv": _OPENCV.encode(), "ros": _ROS.encode(), "toml": _TOML_LENS.encode()}
+
+
+def _whole_configurations() -> dict[str, bytes]:
+    """All entries of both configurations, without their comments."""
+    texts = {"all_vm": to_commented_toml(Configuration()), "all_train": to_commented_toml(TrainConfiguration())}
+    return {name: re.sub(r"(?m)^#.*\n", "", text).encode() for name, text in texts.items()}
+
+
+def _streams() -> dict[str, bytes]:
+    picture = np.random.default_rng(1).integers(0, 256, (6, 8, 3), dtype=np.uint8)
+    jpeg, gray = (cv2.imencode(".jpg", each)[1].tobytes() for each in (picture, picture[..., 0]))
+    progressive = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1].tobytes()
+    head = b"HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\n"
+    sized = b"".join(
+        b"--frame\r\nContent-Type: image/jpeg\r\nX-Timestamp: %d.5\r\nContent-Length: %d\r\n\r\n%s\r\n"
+        % (at, len(each), each)
+        for at, each in enumerate((jpeg, gray))
+    )
+    ended = b"".join(b"--frame\r\n\r\n" + each + b"\r\n" for each in (jpeg, progressive)) + b"--frame--\r\n"
+    chunked = b"".join(b"%x\r\n%s\r\n" % (len(each), each) for each in (sized[:100], sized[100:])) + b"0\r\n\r\n"
+    return {
+        "sized": head + b"\r\n" + sized,
+        "ended": head + b"\r\n" + ended,
+        "chunked": head + b"Transfer-Encoding: chunked\r\n\r\n" + chunked,
+        "png": head + b"\r\n--frame\r\n\r\n" + cv2.imencode(".png", picture)[1].tobytes() + b"\r\n--frame\r\n",
+        "page": b"HTTP/1.1 401 Unauthorized\r\nContent-Length: 2\r\n\r\nno",
+    }
+
+
+def _small() -> Checkpoint:
+    made = checkpoint(shape=NetworkShape.uniform(2, 2, 2, neighbors=6))
+    return Checkpoint(made.network, made.manifest, made.grid)
+
+
+def _saved(kind: str) -> bytes:
+    """A checkpoint's file. torch aligns each tensor to 64 bytes, so that even small networks take kilobytes."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.pt"
+        (_small() if kind == "mesh" else look_checkpoint()).save(path)
+        return path.read_bytes()
+
+
+def _checkpoints() -> dict[str, bytes]:
+    files = {}
+    for kind in ("mesh", "look"):
+        whole = _saved(kind)
+        with zipfile.ZipFile(io.BytesIO(whole)) as packed:
+            (name,) = [each for each in packed.namelist() if each.endswith("data.pkl")]
+            files[f"{kind}_pickle"] = packed.read(name)
+        if kind == "mesh":
+            files[kind] = whole
+    return files
+
+
+def _models() -> dict[str, bytes]:
+    made = {}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "model.onnx"
+        for layout in ("plain", "runs"):
+            export(_small(), path, layout)
+            made[layout] = path.read_bytes()
+        export(Checkpoint(Network(NetworkShape.uniform(1, 2, 2, neighbors=6)).eval(), _ball().manifest), path, "plain", look_checkpoint())
+        made["look"] = path.read_bytes()
+    return made
+
+
+def _ball() -> Checkpoint:
+    from tests.vm_export.checkpoints import manifest
+
+    return Checkpoint(_small().network, manifest())
+
+
+if __name__ == "__main__":
+    torch.manual_seed(0)
+    main()
