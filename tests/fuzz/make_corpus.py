@@ -18,14 +18,13 @@ import numpy as np
 import torch
 
 from tests.vm_embedded.live.running import DEMO
-from tests.vm_export.checkpoints import checkpoint
+from tests.vm_export.checkpoints import checkpoint, manifest
 from tests.vm_export.looks import look_checkpoint
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.live.configuration import Configuration
 from vm_export.checkpoint import Checkpoint
 from vm_export.export import export
-from vm_export.network import Network
 from vm_export.network_shape import NetworkShape
 from vm_train.learning.configuration import TrainConfiguration
 
@@ -74,6 +73,7 @@ def main() -> None:
     _write("web", {f"page{number}": each for number, each in enumerate(_requests())})
     _write("lens", _lenses())
     _write("toml", {"vm": _VM.encode(), "train": _TRAIN.encode(), **_whole_configurations()})
+    _write("picture", _pictures())
     _write("mjpeg", _streams())
     _write("checkpoint", _checkpoints())
     _write("model", _models())
@@ -117,6 +117,14 @@ def _whole_configurations() -> dict[str, bytes]:
     return {name: re.sub(r"(?m)^#.*\n", "", text).encode() for name, text in texts.items()}
 
 
+def _pictures() -> dict[str, bytes]:
+    picture = np.random.default_rng(1).integers(0, 256, (6, 8, 3), dtype=np.uint8)
+    files = {kind: cv2.imencode(f".{kind}", picture)[1].tobytes() for kind in ("jpg", "png", "bmp", "ppm", "webp", "tif")}
+    files["progressive"] = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1].tobytes()
+    files["deep"] = cv2.imencode(".png", picture.astype(np.uint16) << 8)[1].tobytes()
+    return files
+
+
 def _streams() -> dict[str, bytes]:
     picture = np.random.default_rng(1).integers(0, 256, (6, 8, 3), dtype=np.uint8)
     jpeg, gray = (cv2.imencode(".jpg", each)[1].tobytes() for each in (picture, picture[..., 0]))
@@ -139,8 +147,7 @@ def _streams() -> dict[str, bytes]:
 
 
 def _small() -> Checkpoint:
-    made = checkpoint(shape=NetworkShape.uniform(2, 2, 2, neighbors=6))
-    return Checkpoint(made.network, made.manifest, made.grid)
+    return checkpoint(shape=NetworkShape.uniform(2, 2, 2, neighbors=6))
 
 
 def _saved(kind: str) -> bytes:
@@ -170,15 +177,9 @@ def _models() -> dict[str, bytes]:
         for layout in ("plain", "runs"):
             export(_small(), path, layout)
             made[layout] = path.read_bytes()
-        export(Checkpoint(Network(NetworkShape.uniform(1, 2, 2, neighbors=6)).eval(), _ball().manifest), path, "plain", look_checkpoint())
+        export(Checkpoint(_small().network, manifest()), path, "plain", look_checkpoint())
         made["look"] = path.read_bytes()
     return made
-
-
-def _ball() -> Checkpoint:
-    from tests.vm_export.checkpoints import manifest
-
-    return Checkpoint(_small().network, manifest())
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from .shared_input import MOST_BYTES, SharedInput
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 CORPORA = Path(__file__).with_name("corpus")
-TARGETS = ("model", "lens", "toml", "poses", "mjpeg", "control", "web", "checkpoint", "bundle")
+TARGETS = ("model", "lens", "toml", "poses", "picture", "mjpeg", "control", "web", "checkpoint", "bundle")
 
 _LONGEST_WORK, _LONGEST = 2.0, 20.0
 """Processor time of an input that counts as a hang, and time that does on a busy machine or if it sleeps [s]."""
@@ -85,7 +85,7 @@ def _watched(target: str, folder: Path, corpus: Path, flags: list[str]) -> tuple
     shared_file, log = folder / "input", folder / "log"
     shared_file.unlink(missing_ok=True)
     shared = SharedInput(shared_file)
-    options = ["-timeout=0", "-rss_limit_mb=0", "-detect_leaks=0", "-print_final_stats=0"]
+    options = [f"-timeout={10**6}", "-rss_limit_mb=0", "-detect_leaks=0", "-print_final_stats=0"]
     dictionary = CORPORA / f"{target}.dict"
     options += [f"-dict={dictionary}"] if dictionary.exists() else []
     command = [sys.executable, "-m", "tests.fuzz.child", f"tests.fuzz.{target}", str(shared_file), str(corpus)]

@@ -42,8 +42,7 @@ def decode(content: bytes, raw: bool = False, max_megapixels: float = MAX_MEGAPI
 def decode_as(content: bytes, flags: int, max_megapixels: float = MAX_MEGAPIXELS) -> npt.NDArray[np.generic]:
     """Like `decode`, with the flags of cv2.imdecode, which may keep other types than uint8. Raises InputError."""
     check_size(content, max_megapixels)
-    tail = content.rstrip(b"\x00")[-_TAIL:]  # some cameras pad their buffers
-    if content.startswith(b"\xff\xd8") and b"\xff\xd9" not in tail:
+    if content.startswith(b"\xff\xd8") and b"\xff\xd9" not in content.rstrip(b"\x00")[-_TAIL:]:  # some cameras pad it
         raise InputError("is cut short")
     with library_messages() as messages:
         image = _decoded(content, flags)
@@ -51,8 +50,7 @@ def decode_as(content: bytes, flags: int, max_megapixels: float = MAX_MEGAPIXELS
     if damage:
         raise InputError(f"is cut short or damaged ({damage})")
     if image is None:
-        cut = content.startswith(b"\x89PNG") and b"IEND" not in tail
-        raise InputError("is cut short" if cut else "can't be decoded as an image")
+        raise InputError("can't be decoded as an image")
     return image
 
 

@@ -1,4 +1,4 @@
-"""The size of an image, read from its first bytes: decoding may take gigabytes, so its size is checked before."""
+"""The size of an image, read from its headers: decoding may take gigabytes, so its size is checked before."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ from ..geometry.lens import Size
 
 MAX_MEGAPIXELS = 50.0
 """Largest image that is decoded if no setting says otherwise [Mpx]."""
+
+_PNG_START = b"\x89PNG\r\n\x1a\n"
+_PNG_CHUNK = 12
+"""Bytes of a chunk besides its content: length, kind and checksum."""
 
 _STANDALONE = {0x01, *range(0xD0, 0xD9)}
 """Markers of a JPEG without a length: TEM, RST0 to RST7, SOI."""
@@ -65,8 +69,24 @@ def _jpeg(content: bytes) -> Size | None:
 
 
 def _png(content: bytes) -> Size | None:
-    kind, width, height = struct.unpack_from(">4sII", content, 12)
-    return (width, height) if kind == b"IHDR" else None
+    """The size of the image, or of a larger frame of its animation.
+
+    Raises InputError if the content ends within a chunk: OpenCV allocates the length that a chunk declares, up to 4 GiB.
+    """
+    sizes: list[Size] = []
+    at, kind = len(_PNG_START), b""
+    while kind != b"IEND":
+        if at + _PNG_CHUNK > len(content):
+            raise InputError("is cut short")
+        length, kind = struct.unpack_from(">I4s", content, at)
+        if at + _PNG_CHUNK + length > len(content):
+            raise InputError("is cut short")
+        if not sizes and kind != b"IHDR":
+            return None
+        if kind in (b"IHDR", b"fcTL"):  # fcTL: a frame of an animation, with its number before its size
+            sizes.append(struct.unpack_from(">II", content, at + (8 if kind == b"IHDR" else 12)))
+        at += _PNG_CHUNK + length
+    return max(width for width, _ in sizes), max(height for _, height in sizes)
 
 
 def _bmp(content: bytes) -> Size:
@@ -114,7 +134,7 @@ def _webp(content: bytes) -> Size | None:
 
 _READERS: dict[bytes, Callable[[bytes], Size | None]] = {
     b"\xff\xd8\xff": _jpeg,
-    b"\x89PNG\r\n\x1a\n": _png,
+    _PNG_START: _png,
     b"BM": _bmp,
     b"P5": _pnm,
     b"P6": _pnm,
