@@ -13,7 +13,7 @@ CANARY := --canary vm_embedded/models/canary.jpg export/networks/canary.yaml
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
 
-.PHONY: help setup demo test lint matrix release bundle deb deploy logs lock bench bench-external bench-synth bench-train data networks test-data score choices look-choices fixtures docs site clean
+.PHONY: help setup demo test fuzz lint matrix release bundle deb deploy logs lock bench bench-external bench-synth bench-train data networks test-data score choices look-choices fixtures docs site clean
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -28,6 +28,10 @@ demo: .venv/runtime ## find balls and field features in the twelve test pictures
 test: lint ## lint and tests; LONG=1 adds tests that take minutes: 200 camera faults, a booted robot
 	$(BIN)/python deploy/bundle.py --download
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder $(if $(LONG),,-m 'not long')
+
+SECONDS ?= 3600
+fuzz: .venv/dev ## attack everything that reads outside inputs: make fuzz [TARGETS='lens web'] [SECONDS=3600 for each] [SEED=1]
+	$(BIN)/python -m tests.fuzz.run $(TARGETS) --seconds $(SECONDS) --seed $(SEED)
 
 lint: .venv/dev ## style, spelling and types
 	$(BIN)/ruff check .

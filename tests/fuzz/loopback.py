@@ -1,10 +1,12 @@
 """A real daemon without a camera, whose sockets answer to a client in the same thread."""
 
 import asyncio
+import atexit
 import io
 import socket
 import time
 from collections.abc import Awaitable, Callable
+from functools import cache
 from pathlib import Path
 
 from tests.vm_embedded.live.running import DEMO
@@ -28,6 +30,7 @@ _LOOP = asyncio.new_event_loop()
 Connect = Callable[[], Awaitable[tuple[asyncio.StreamReader, asyncio.StreamWriter]]]
 
 
+@cache
 def opened_daemon() -> tuple[Daemon, int]:
     """A daemon that has answered one frame, and the port of its page."""
     with socket.create_server(("127.0.0.1", 0)) as free:
@@ -53,7 +56,13 @@ async def _opened(configuration: Configuration, detector: Detector) -> Daemon:
     )
     assert answer is not None
     daemon.page.show(answer)
+    atexit.register(lambda: _LOOP.run_until_complete(_close(daemon)))
     return daemon
+
+
+async def _close(daemon: Daemon) -> None:
+    for part in daemon._parts:
+        await part.close()
 
 
 def reply(connect: Connect, data: bytes, enough: bytes) -> bytes:
