@@ -82,9 +82,11 @@ class Orientation:
             raise GeometryError(f"camera height must be a number above 0 m, not {self.height}")
         if rotation.shape != (3, 3) or not np.isfinite(rotation).all():
             raise GeometryError("camera rotation must be 3 x 3 finite numbers; check it for NaN and infinity")
-        error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
-        if error > 1e-3 or np.linalg.det(rotation) < 0:
-            mirrored = ", and R mirrors" if np.linalg.det(rotation) < 0 else ""
+        with np.errstate(over="ignore", invalid="ignore"):  # of numbers that are no rotation anyway
+            error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+            mirrors = bool(np.linalg.det(rotation) < 0)
+        if not error <= 1e-3 or mirrors:
+            mirrored = ", and R mirrors" if mirrors else ""
             raise GeometryError(
                 f"camera rotation R must be a rotation, but R R^T differs from the identity by {error:.2g}{mirrored}"
             )
