@@ -147,7 +147,8 @@ def _pip(what: str, *words: str | Path, env: Mapping[str, str] | None = None) ->
     # The umask, because wheels contain file modes.
     ran = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **(env or {})}, umask=0o022)
     if ran.returncode:
-        raise InputError(f"{what}:\n{ran.stderr.strip()}")
+        sys.stderr.write(ran.stderr)
+        raise InputError(what)
 
 
 def configuration_files(configuration: Path | None, model: str | None) -> dict[str, bytes]:

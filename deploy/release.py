@@ -131,7 +131,8 @@ def build(top: Path, tag: str, home: str, dist: Path) -> list[Path]:
 def _run(*command: str) -> None:
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
-        raise InputError(f"{' '.join(command[1:4])} failed:\n{done.stdout}{done.stderr}")
+        sys.stderr.write(done.stdout + done.stderr)
+        raise InputError(f"{' '.join(command[1:4])} failed")
 
 
 def _git(top: Path, *words: str, check: bool = True) -> str:

@@ -119,7 +119,9 @@ def _whole_configurations() -> dict[str, bytes]:
 
 def _pictures() -> dict[str, bytes]:
     picture = np.random.default_rng(1).integers(0, 256, (6, 8, 3), dtype=np.uint8)
-    files = {kind: cv2.imencode(f".{kind}", picture)[1].tobytes() for kind in ("jpg", "png", "bmp", "ppm", "webp", "tif")}
+    files = {
+        kind: cv2.imencode(f".{kind}", picture)[1].tobytes() for kind in ("jpg", "png", "bmp", "ppm", "webp", "tif")
+    }
     files["progressive"] = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1].tobytes()
     files["deep"] = cv2.imencode(".png", picture.astype(np.uint16) << 8)[1].tobytes()
     return files

@@ -50,6 +50,13 @@ def test_attack_8_the_refusal_of_a_pickle_does_not_advise_to_load_it_without_pro
     told(path, capsys)
 
 
+def test_a_pickle_of_another_protocol_is_refused_without_a_warning(tmp_path, capfd, recwarn):
+    path = tmp_path / "model.pt"
+    path.write_bytes(pickle.dumps({"format": "other"}, protocol=3))
+    told(path, capfd)
+    assert [str(each.message) for each in recwarn] == []
+
+
 @pytest.mark.parametrize(("kind", "made"), [(Checkpoint, checkpoint), (LookCheckpoint, look_checkpoint)])
 def test_attack_8_damaged_checkpoints_raise_nothing_else(kind, made, tmp_path):
     path = tmp_path / "model.pt"

@@ -127,6 +127,24 @@ def test_attack_2_an_image_that_declares_a_huge_size_is_refused_before_it_is_dec
         decode(content, max_megapixels=100.0)
 
 
+def test_a_png_whose_chunk_declares_gigabytes_is_refused_before_it_is_decoded():
+    whole = cv2.imencode(".png", np.full((6, 8, 3), 90, np.uint8))[1].tobytes()
+    at = whole.index(b"IDAT")
+    with pytest.raises(InputError, match="^is cut short$"):
+        decode(whole[: at - 4] + b"\xff\xff\xff\xf0" + whole[at:])
+    frame = chunk(b"fcTL", struct.pack(">IIIIIHHBB", 0, *LARGE, 0, 0, 1, 1, 0, 0))
+    with pytest.raises(InputError, match="1048 Mpx"):
+        decode(whole[: at - 4] + frame + whole[at - 4 :])
+
+
+def test_a_png_with_wrong_data_is_no_picture_and_prints_nothing(capfd):
+    head = struct.pack(">IIBBBBB", 8, 6, 8, 2, 0, 0, 0)
+    parts = chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(bytes(150))[:-4] + b"1234") + chunk(b"IEND", b"")
+    with pytest.raises(InputError, match=r"is cut short or damaged \(libpng error: "):
+        decode(b"\x89PNG\r\n\x1a\n" + parts)
+    assert capfd.readouterr() == ("", "")
+
+
 def test_attack_2_vm_detect_refuses_it_and_its_limit_is_an_option(tmp_path):
     path = tmp_path / "image.jpg"
     path.write_bytes(bomb(".jpg"))

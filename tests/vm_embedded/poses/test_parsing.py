@@ -109,3 +109,10 @@ def test_ten_thousand_lines_of_anything_are_read_or_refused(lines):
             refusals.append(str(error))
     assert len(poses) + len(refusals) == len(lines)
     assert all("\n" not in each and len(each) < 400 for each in refusals)
+
+
+@pytest.mark.parametrize("t", [r"a\nb", r"\u001b[31m", r"\ud800"])
+def test_a_message_about_a_pose_is_one_line_whatever_the_pose_holds(t):
+    with pytest.raises(InputError) as refused:
+        parse_pose_line(b'{"height": 1, "quaternion": [1, 0, 0, 0], "t": "%s"}' % t.encode())
+    assert str(refused.value).isprintable()
