@@ -1,4 +1,4 @@
-"""Checkpoints of networks, as vm-export reads them: whole files, and pickles put into a file whose checksums are right."""
+"""Checkpoints, as vm-export reads them: whole files, and pickles put into a file whose checksums are right."""
 
 import io
 import zipfile
