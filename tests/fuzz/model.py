@@ -34,7 +34,7 @@ def _load(model: ModelFile) -> None:
             Detector(model, Settings())
         except (VisualMeshError, MemoryError):
             os._exit(1)
-        except BaseException:
+        except Exception:  # noqa: BLE001 - to find these is what this is for
             traceback.print_exc()
             sys.stderr.flush()
         os._exit(0)

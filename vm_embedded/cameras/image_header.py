@@ -71,7 +71,7 @@ def _jpeg(content: bytes) -> Size | None:
 def _png(content: bytes) -> Size | None:
     """The size of the image, or of a larger frame of its animation.
 
-    Raises InputError if the content ends within a chunk: OpenCV allocates the length that a chunk declares, up to 4 GiB.
+    Raises InputError if the content ends within a chunk: OpenCV allocates the length that a chunk declares.
     """
     sizes: list[Size] = []
     at, kind = len(_PNG_START), b""
