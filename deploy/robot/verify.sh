@@ -9,11 +9,13 @@ check_listing() { # FOLDER: fail unless it contains exactly the files of its SHA
     # First of all: reading a FIFO would never end, and reading a link would copy a private file.
     odd=$(cd "$1" && find . ! -type f ! -type d | head -n 3)
     [ -z "$odd" ] || fail "the bundle has links or special files, and a bundle has only regular files: $odd"
-    [ -f "$1/SHA256SUMS" ] || fail "the bundle is incomplete: SHA256SUMS is missing"
+    [ -f "$1/SHA256SUMS" ] || fail "the bundle is incomplete; copy it again: SHA256SUMS"
     listed=$(sed 's/^[0-9a-f]*  //' "$1/SHA256SUMS")
     found=$(cd "$1" && find . -type f ! -path ./SHA256SUMS ! -path ./SHA256SUMS.sig | sed 's|^\./||')
     more=$(printf '%s\n' "$found" | grep -vxF -e "$listed" || :)
     [ -z "$more" ] || fail "the bundle's folder has files that are not part of it: unpack it into an empty folder: $more"
+    missing=$(printf '%s\n' "$listed" | grep -vxF -e "$found" || :)
+    [ -z "$missing" ] || fail "the bundle is incomplete; copy it again: $missing"
     wrong=$(cd "$1" && LC_ALL=C sha256sum --check --strict SHA256SUMS 2>&1 | grep -v ': OK$' || :)
     [ -z "$wrong" ] || fail "the bundle is damaged; copy it again: $wrong"
 }

@@ -312,32 +312,6 @@ def test_a_model_alone_is_exchanged_while_it_runs(team, bundle):
     assert team.status()["model_sha256"] == now["model_sha256"]
 
 
-def test_with_a_key_only_signed_models_are_taken(team, bundle, tmp_path):
-    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", tmp_path / "key"], check=True)
-    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", tmp_path / "other"], check=True)
-    used = team.robot.root / "opt/vm-embedded/current/etc/vm.toml"
-    before = used.read_text()
-    used.write_text(before.replace('signer = ""', f'signer = "{(tmp_path / "key.pub").read_text().strip()}"'))
-    (tmp_path / "new.onnx").write_bytes((bundle / "etc" / "model.onnx").read_bytes())
-    signatures = {}
-    for key in ("key", "other"):
-        sign = ["ssh-keygen", "-q", "-Y", "sign", "-f", tmp_path / key, "-n", "vm-embedded", tmp_path / "new.onnx"]
-        subprocess.run(sign, check=True, capture_output=True)
-        signatures[key] = (tmp_path / "new.onnx.sig").read_bytes()
-        (tmp_path / "new.onnx.sig").unlink()
-    model = (tmp_path / "new.onnx").read_bytes()
-    try:
-        for signature, words in ((None, "is missing"), (signatures["other"], "not signed"), (b"", "not signed")):
-            status, said = _model_command(team, model, signature)
-            assert status == 1
-            assert words in said
-        status, said = _model_command(team, model, signatures["key"])
-        assert status == 0, said
-    finally:
-        used.write_text(before)
-    team.check("1-first")
-
-
 def test_removed_nothing_is_left_but_the_configuration(team):
     team.robot.run(f"{CURRENT}/bundle/uninstall.sh")
     assert team.robot.run("systemctl", "is-active", "vm-detect", check=False)[1].strip() == "inactive"
