@@ -4,7 +4,9 @@ After each bad upgrade, and each kill, the release that runs must be whole and w
 """
 
 import os
+import random
 import re
+import shutil
 import subprocess
 import time
 
@@ -312,6 +314,25 @@ def test_a_model_alone_is_exchanged_while_it_runs(team, bundle):
     assert team.status()["model_sha256"] == now["model_sha256"]
 
 
+@pytest.mark.parametrize("kind", ["model", "rollback"])
+def test_killed_at_random_moments_of_a_change_a_detector_works(team, kind):
+    """Also under systemd; test_kills.py does it more often without."""
+    chance = random.Random(kind)
+    for number in range(6):
+        model = CHECKOUT / "vm_embedded" / "models" / ("ball.onnx", "ball-small.onnx")[number % 2]
+        shutil.copy(model, team.robot.root / "var/tmp/new.onnx")
+        words = [DEPLOY, kind, *(["/var/tmp/new.onnx"] if kind == "model" else [])]
+        with team.robot.start("setsid", "sh", "-c", 'echo $$; exec "$@"', "sh", *words) as process:
+            group = process.stdout.readline().strip()
+            time.sleep(chance.uniform(0.0, 6.0))
+            team.robot.run("kill", "-KILL", "--", f"-{group}", check=False)
+            process.stdout.read()
+            process.wait()
+        team.check("1-first", "2-second")
+        team.robot.run(DEPLOY, "settle")
+        team.check("1-first", "2-second")
+
+
 def test_removed_nothing_is_left_but_the_configuration(team):
     team.robot.run(f"{CURRENT}/bundle/uninstall.sh")
     assert team.robot.run("systemctl", "is-active", "vm-detect", check=False)[1].strip() == "inactive"
@@ -337,6 +358,11 @@ def test_deployed_from_a_workstation_in_one_command(team, bundle_file, tmp_path)
     assert "unit      active" in ran.stdout
     assert WELL.search(ran.stdout)
     assert '"detections"' in ran.stdout
+    assert "checking hashes" in ran.stdout
+    ran = subprocess.run(command, env=os.environ | path, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert ran.returncode == 0, ran.stdout + ran.stderr  # now with vm-deploy install
+    assert "is already in use" in ran.stdout
+    assert not (team.robot.root / "opt/vm-embedded/.bundle").exists()
     assert not list((team.robot.root / "var/tmp").glob("vm-embedded.*"))
 
 

@@ -137,7 +137,7 @@ def one_liner():
     """The command of deploy/README.md for the first installation, without its sudo."""
     (found,) = re.findall(r"^test -z .*$", (CHECKOUT / "deploy" / "README.md").read_text(), re.MULTILINE)
     assert found.endswith(" && sudo ./install.sh")
-    return found.replace("sudo ./install.sh", "./install.sh --prefix /nowhere")
+    return found.replace("sudo ./install.sh", "./install.sh --no-systemd --dry-run")
 
 
 def _flip(path, old, new):
