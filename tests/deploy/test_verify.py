@@ -291,3 +291,13 @@ def test_attack_11_with_a_key_only_signed_models_that_are_not_older_are_accepted
     assert used.read_bytes() == second
     assert ask(first, "key", f"vm-embedded model {OLD}", "--allow-older").returncode == 0
     assert used.read_bytes() == first
+
+
+def test_a_signed_bundle_is_unpacked_checked_and_installed_by_the_release_in_use(prefix, bundle, keys):
+    whole = signed(changed(bundle, keys / "whole", "4-whole", time=NEW), keys / "key")
+    ran = prefix.deploy("install", packed(whole))
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert "4-whole is in use" in ran.stdout
+    assert (prefix.link("current"), prefix.link("previous")) == ("4-whole", "2-first")
+    assert not (prefix.path / ".bundle").exists()
+    assert (prefix.path / "current" / "bundle" / "SHA256SUMS.sig").exists()
