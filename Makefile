@@ -46,18 +46,18 @@ release: .venv/dev ## make a release in dist/: make release VERSION=0.2.0 [URL=h
 	@test -n "$(VERSION)" || { echo 'make release needs VERSION, as in make release VERSION=0.2.0'; exit 1; }
 	$(BIN)/python deploy/release.py $(VERSION) $(if $(URL),--url '$(URL)')
 
-bundle: .venv/bundle ## pack all that a robot needs in one file: make bundle [MODEL=model.onnx] [CONFIG=vm.toml] [TARGET=linux_x86_64-cp311]
-	$(BIN)/python deploy/bundle.py --target $(TARGET) $(if $(MODEL),--model '$(MODEL)') $(if $(CONFIG),--config '$(CONFIG)')
+bundle: .venv/bundle ## pack all that a robot needs in one file: make bundle [MODEL=model.onnx] [CONFIG=vm.toml] [TARGET=linux_x86_64-cp311] [KEY=id_ed25519]
+	$(BIN)/python deploy/bundle.py --target $(TARGET) $(if $(MODEL),--model '$(MODEL)') $(if $(CONFIG),--config '$(CONFIG)') $(if $(KEY),--key '$(KEY)')
 
 BUNDLE = dist/vm-embedded-robot-$(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' vm_embedded/__init__.py)-$(TARGET).tar.gz
 
 deb: bundle ## pack the bundle as a Debian package
 	$(BIN)/python deploy/debian.py $(BUNDLE)
 
-deploy: ## bundle, copy, install, and show the detections: make deploy ROBOT=user@host [MODEL=] [CONFIG=] [TARGET=]
+deploy: ## bundle, copy, install, and show the detections: make deploy ROBOT=user@host [MODEL=] [CONFIG=] [TARGET=] [KEY=] [OPTIONS=--allow-older]
 	@test -n "$(ROBOT)" || { echo 'make deploy needs ROBOT=user@host'; exit 1; }
 	@$(MAKE) bundle
-	sh deploy/deploy.sh $(BUNDLE) $(ROBOT)
+	sh deploy/deploy.sh $(BUNDLE) $(ROBOT) $(OPTIONS)
 
 logs: ## follow the log of a robot: make logs ROBOT=user@host
 	@test -n "$(ROBOT)" || { echo 'make logs needs ROBOT=user@host'; exit 1; }

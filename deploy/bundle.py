@@ -23,6 +23,7 @@ import tomllib
 import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 TOP = Path(__file__).parents[1]
@@ -54,6 +55,9 @@ OLDEST_GLIBC = 5
 """First minor version of glibc in the names of wheels (PEP 600)."""
 
 MODEL, CONFIGURATION = "model.onnx", "vm.toml"
+
+SIGNATURES = "vm-embedded-bundle"
+"""ssh-keygen's namespace of a bundle's signature; deploy/robot/verify.sh has it, too."""
 
 
 @dataclass(frozen=True)
@@ -191,8 +195,10 @@ def _with_entry(text: str, key: str, value: str) -> str:
     return text
 
 
-def write_bundle(target: Target, configuration: Path | None, model: str | None, wheels: Path, dist: Path) -> Path:
-    """Write a bundle and return its path. Raises VisualMeshError."""
+def write_bundle(
+    target: Target, configuration: Path | None, model: str | None, wheels: Path, dist: Path, key: Path | None
+) -> Path:
+    """Write a bundle and return its path. key: signs its listing. Raises VisualMeshError."""
     origin = Origin.of(TOP)
     files = {f"etc/{name}": content for name, content in configuration_files(configuration, model).items()}
     packages = wheelhouse(target, wheels)
@@ -206,6 +212,8 @@ def write_bundle(target: Target, configuration: Path | None, model: str | None, 
     release = f"{__version__}-{hashlib.sha256(_sums(files)).hexdigest()[:8]}"
     files["manifest.json"] = (json.dumps(_manifest(target, origin, release, files), indent=1) + "\n").encode()
     files["SHA256SUMS"] = _sums(files)
+    if key is not None:
+        files["SHA256SUMS.sig"] = _signature(files["SHA256SUMS"], key)
     path = dist / f"{NAME}-{__version__}-{target.name}.tar.gz"
     dist.mkdir(parents=True, exist_ok=True)
     with atomic_write(path) as part:
@@ -225,12 +233,25 @@ def _sums(files: dict[str, bytes]) -> bytes:
     return "".join(f"{hashlib.sha256(files[name]).hexdigest()}  {name}\n" for name in sorted(files)).encode()
 
 
+def _signature(listing: bytes, key: Path) -> bytes:
+    """The signature of a listing with an Ed25519 key, the same each time. Raises InputError."""
+    command = ["ssh-keygen", "-q", "-Y", "sign", "-f", key, "-n", SIGNATURES]
+    try:
+        ran = subprocess.run(command, input=listing, capture_output=True)
+    except OSError as error:
+        raise InputError(f"can't run ssh-keygen, which signs the bundle: {error.strerror}") from error
+    if ran.returncode:
+        raise InputError(f"can't sign the bundle with the key {key}: {ran.stderr.decode(errors='replace').strip()}")
+    return ran.stdout
+
+
 def _manifest(target: Target, origin: Origin, release: str, files: dict[str, bytes]) -> dict[str, object]:
     wheels = {name: content for name, content in files.items() if name.endswith(".whl")}
     sizes = [each.file_size for content in wheels.values() for each in zipfile.ZipFile(io.BytesIO(content)).infolist()]
     return {
         "release": release,
         "commit": origin.commit,
+        "time": datetime.fromtimestamp(origin.time, UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
         "machine": target.machine,
         "glibc": ".".join(map(str, target.glibc)),
         "python": target.python,
@@ -262,6 +283,7 @@ def main() -> int:
         "--model", help="network (.onnx file, or one of the package); default: that of the configuration"
     )
     parser.add_argument("--config", type=Path, help="vm.toml; default: a synthetic camera, to try it out")
+    parser.add_argument("--key", type=Path, help="private Ed25519 key of ssh-keygen that signs the bundle")
     parser.add_argument("--wheels", type=Path, default=TOP / "build" / "wheels", help="folder for downloads")
     parser.add_argument("--dist", type=Path, default=TOP / "dist", help="folder for the bundle")
     parser.add_argument("--download", action="store_true", help="only download the packages")
@@ -270,7 +292,8 @@ def main() -> int:
         if options.download:
             wheelhouse(Target.parse(options.target), options.wheels)
             return 0
-        path = write_bundle(Target.parse(options.target), options.config, options.model, options.wheels, options.dist)
+        target = Target.parse(options.target)
+        path = write_bundle(target, options.config, options.model, options.wheels, options.dist, options.key)
     except VisualMeshError as error:
         print(f"make bundle: {error}", file=sys.stderr)
         return 1

@@ -8,19 +8,23 @@ HERE=$(cd "$(dirname "$0")" && pwd -P)
 PREFIX=/opt/vm-embedded
 SUPERVISOR=
 DRY=
+ALLOW_OLDER=
 OWN_MIB=32 # size of a release that shares its packages with the one before
-TOOLS="awk cat chmod cmp cut df find flock getconf grep mv readlink sed sha256sum sort"
+TOOLS="awk base64 cat chmod cmp cut df find flock getconf grep mv readlink sed sha256sum sort tar"
 
 # shellcheck source=deploy/robot/releases.sh
 . "$HERE/releases.sh"
+# shellcheck source=deploy/robot/verify.sh
+. "$HERE/verify.sh"
 
 usage() {
     cat <<END
-usage: install.sh [--prefix DIR] [--systemd | --no-systemd] [--dry-run]
+usage: install.sh [--prefix DIR] [--systemd | --no-systemd] [--allow-older] [--dry-run]
 
   --prefix DIR   folder of the releases; default $PREFIX
   --systemd      install it as a service; the default, unless the last installation used --no-systemd
   --no-systemd   install only the program; start it with vm-deploy run, and again after each change
+  --allow-older  install it even if it is older than the release in use
   --dry-run      check everything, change nothing
 
 Exit status: 0 the release is in use; 1 it failed, and the previous release stays in use; 2 wrong usage.
@@ -43,6 +47,7 @@ while [ $# -gt 0 ]; do
     --prefix=*) PREFIX=${1#*=} ;;
     --systemd) SUPERVISOR=systemd ;;
     --no-systemd) SUPERVISOR=none ;;
+    --allow-older) ALLOW_OLDER=1 ;;
     --dry-run) DRY=1 ;;
     -h | --help)
         usage
@@ -62,15 +67,12 @@ manifest=$HERE/manifest.json
 check_files() {
     say "checking hashes"
     for each in $TOOLS; do
-        command -v "$each" >/dev/null || fail "$each is missing: install it (coreutils, util-linux, diffutils)"
+        command -v "$each" >/dev/null || fail "$each is missing: install it (coreutils, util-linux, diffutils, tar)"
     done
-    cd "$HERE"
-    wrong=$(sha256sum -c SHA256SUMS 2>&1 | grep -v ': OK$' || :)
-    [ -z "$wrong" ] || fail "the bundle is damaged; copy it again: $wrong"
-    listed=$(sed 's/^[0-9a-f]*  //' SHA256SUMS | sort)
-    found=$(find . -type f ! -path ./SHA256SUMS | sed 's|^\./||' | sort)
-    [ "$listed" = "$found" ] || fail "the bundle's folder has files that are not part of it: unpack it into an empty folder"
-    cd - >/dev/null
+    check_listing "$HERE"
+    case $(field release "$manifest") in
+    "" | .* | *[!A-Za-z0-9.+-]*) fail "manifest.json has no release of letters, digits and .+-" ;;
+    esac
 }
 
 check_machine() {
@@ -140,10 +142,10 @@ copy_files() {
     mkdir -p "$target/bundle" "$target/etc"
     sed 's/^[0-9a-f]*  //; /^wheels\//d' "$HERE/SHA256SUMS" | while read -r each; do
         mkdir -p "$target/bundle/$(dirname "$each")"
-        cp "$HERE/$each" "$target/bundle/$each"
+        cp -P "$HERE/$each" "$target/bundle/$each"
     done
-    cp "$HERE/SHA256SUMS" "$target/bundle/"
-    cp "$HERE"/etc/* "$target/etc/"
+    cp -P "$HERE"/SHA256SUMS* "$target/bundle/"
+    cp -P "$target/bundle/etc/"* "$target/etc/"
     used=$PREFIX/current
     [ -d "$used/etc" ] || used=$PREFIX/left
     for each in "$used"/etc/*; do
@@ -188,6 +190,7 @@ abandon() { # the new release, before it was in use
 check_files
 check_machine
 choose_supervisor
+check_age "$HERE"
 python=$(find_python)
 check_folder
 release=$(field release "$manifest")
@@ -197,6 +200,8 @@ if [ -n "$DRY" ]; then
 fi
 
 mkdir -p "$PREFIX" || fail "can't write $PREFIX"
+# Root's service and its rollback work only with files of root.
+if [ "$SUPERVISOR" = systemd ] && [ "$(stat -c %u "$PREFIX")" != 0 ]; then chown -R 0:0 "$PREFIX"; fi
 lock 0
 [ -e "$PREFIX/supervisor" ] || write_file supervisor "$SUPERVISOR"
 mkdir -p "$PREFIX/releases"

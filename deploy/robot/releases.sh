@@ -7,6 +7,8 @@
 #   PREFIX/releases/ID/complete written last: a release without it is incomplete
 #   PREFIX/current, previous    links to releases; the unit starts `current`
 #   PREFIX/trial                the two links before the switch; exists until `current` has proved healthy
+#   PREFIX/model-signed         signing time and hash of the last signed model that was accepted
+#   PREFIX/.bundle              a bundle that vm-deploy install has unpacked
 #   PREFIX/supervisor           systemd or none; marks the folder as ours
 #   PREFIX/run                  sockets of the detector, without systemd
 # shellcheck shell=sh
@@ -61,8 +63,12 @@ uses_systemd() {
 systemd_runs() { [ -d /run/systemd/system ]; } # it does not in a chroot, while the image of a robot is built
 
 lock() { # SECONDS: wait for other commands of this program for so long, then fail
-    (umask 077 && : >>"$PREFIX/.lock") 2>/dev/null || fail "can't write $PREFIX: run as root or choose another --prefix"
-    exec 9>>"$PREFIX/.lock"
+    # install.sh inherits the lock of vm-deploy install.
+    if [ "$(readlink /proc/self/fd/9)" != "$PREFIX/.lock" ]; then
+        (umask 077 && : >>"$PREFIX/.lock") 2>/dev/null ||
+            fail "can't write $PREFIX: run as root or choose another --prefix"
+        exec 9>>"$PREFIX/.lock"
+    fi
     flock -w "$1" 9 || fail "another install.sh or vm-deploy is running"
 }
 
@@ -202,7 +208,8 @@ end_trial() { # roll back the model and the release on trial
     if [ -e "$PREFIX/trial" ]; then roll_back; fi
 }
 
-prune() { # remove releases that are neither current nor previous
+prune() { # remove releases that are neither current nor previous, and what a killed vm-deploy install left
+    rm -rf "$PREFIX/.bundle"
     for each in "$PREFIX"/releases/*; do
         case ${each##*/} in
         "$(linked current)" | "$(linked previous)") ;;

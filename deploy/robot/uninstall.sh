@@ -53,7 +53,7 @@ if [ -d "$PREFIX/current/etc" ]; then
     rm -rf "$PREFIX/left"
     mv "$PREFIX/.left.new" "$PREFIX/left"
 fi
-rm -rf "$PREFIX/current" "$PREFIX/previous" "$PREFIX/trial" "$PREFIX/run" "$PREFIX/vm-deploy"
+rm -rf "$PREFIX/current" "$PREFIX/previous" "$PREFIX/trial" "$PREFIX/model-signed" "$PREFIX/.bundle" "$PREFIX/run" "$PREFIX/vm-deploy"
 if [ -e "$PREFIX/supervisor" ]; then rm -rf "$PREFIX/releases" "$PREFIX/supervisor"; fi
 if [ -n "$PURGE" ]; then
     rm -rf "$PREFIX/left" "$PREFIX/.lock"

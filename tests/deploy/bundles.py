@@ -50,9 +50,31 @@ def changed(bundle, folder, release, files=(), **manifest):
     entries = json.loads((folder / "manifest.json").read_text()) | {"release": release} | manifest
     (folder / "manifest.json").unlink()
     (folder / "manifest.json").write_text(json.dumps(entries, indent=1) + "\n")
-    names = sorted(str(each.relative_to(folder)) for each in folder.rglob("*") if each.is_file())
-    names.remove("SHA256SUMS")
+    list_again(folder)
+    return folder
+
+
+def list_again(folder):
+    """Make the sums of a changed bundle right again, as anybody could."""
+    names = {str(each.relative_to(folder)) for each in folder.rglob("*") if each.is_file()}
+    names = sorted(names - {"SHA256SUMS", "SHA256SUMS.sig"})
     sums = "".join(f"{hashlib.sha256((folder / each).read_bytes()).hexdigest()}  {each}\n" for each in names)
     (folder / "SHA256SUMS").unlink()
     (folder / "SHA256SUMS").write_text(sums)
+
+
+def signed(folder, key):
+    """Sign a bundle's listing; return the bundle."""
+    beside = folder / "SHA256SUMS.sig"
+    beside.unlink(missing_ok=True)
+    command = ["ssh-keygen", "-q", "-Y", "sign", "-f", key, "-n", "vm-embedded-bundle", folder / "SHA256SUMS"]
+    subprocess.run(command, check=True, capture_output=True)
     return folder
+
+
+def packed(folder):
+    """The bundle file of a folder."""
+    path = folder.with_name(folder.name + ".tar.gz")
+    with tarfile.open(path, "w:gz", compresslevel=1) as tar:
+        tar.add(folder, folder.name)
+    return path

@@ -19,7 +19,15 @@ def test_everything_a_robot_needs_is_in_it_and_nothing_else(bundle, bundle_file)
     packages = {"numpy", "onnxruntime", "opencv_python_headless", "flatbuffers", "packaging", "protobuf"}
     assert wheels == {"vm_embedded", "pip"} | packages
     assert {each for each in names if not each.startswith("wheels/")} == {
-        *("SHA256SUMS", "manifest.json", "requirements.txt", "README.md", "releases.sh", "60-vm-embedded.rules"),
+        *(
+            "SHA256SUMS",
+            "manifest.json",
+            "requirements.txt",
+            "README.md",
+            "releases.sh",
+            "verify.sh",
+            "60-vm-embedded.rules",
+        ),
         *("install.sh", "uninstall.sh", "vm-deploy", "vm-detect.service", "vm-detect-rollback.service"),
         *("etc/vm.toml", "etc/model.onnx"),
     }

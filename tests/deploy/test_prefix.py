@@ -13,40 +13,7 @@ import pytest
 from tests.messages import read_message
 
 from .bundles import changed
-
-CUT_OFF = ["unshare", "--user", "--map-root-user", "--net"]
-"""Words before a command that leave it no network."""
-
-
-@pytest.fixture(scope="module")
-def alone():
-    """Words before a command that leave it no network, where this machine can do that."""
-    if subprocess.run([*CUT_OFF, "true"], capture_output=True).returncode:
-        pytest.skip("needs user and network namespaces (unshare)")
-    seen = subprocess.run([*CUT_OFF, "ip", "route"], capture_output=True, text=True)
-    assert not seen.stdout
-    return CUT_OFF
-
-
-class Prefix:
-    """A folder with releases."""
-
-    def __init__(self, path, alone):
-        self.path, self._alone = path, alone
-
-    def install(self, bundle, *options):
-        command = [*self._alone, bundle / "install.sh", "--prefix", self.path, "--no-systemd", *options]
-        return subprocess.run(list(map(str, command)), capture_output=True, text=True)
-
-    def deploy(self, *words):
-        command = [*self._alone, self.path / "vm-deploy", *words]
-        return subprocess.run(list(map(str, command)), capture_output=True, text=True)
-
-    def link(self, name):
-        return (self.path / name).readlink().name
-
-    def releases(self):
-        return {each.name for each in (self.path / "releases").iterdir()}
+from .prefixes import Prefix
 
 
 @pytest.fixture(scope="module")

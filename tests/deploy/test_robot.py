@@ -4,7 +4,9 @@ After each bad upgrade, and each kill, the release that runs must be whole and w
 """
 
 import os
+import random
 import re
+import shutil
 import subprocess
 import time
 
@@ -312,30 +314,23 @@ def test_a_model_alone_is_exchanged_while_it_runs(team, bundle):
     assert team.status()["model_sha256"] == now["model_sha256"]
 
 
-def test_with_a_key_only_signed_models_are_taken(team, bundle, tmp_path):
-    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", tmp_path / "key"], check=True)
-    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", tmp_path / "other"], check=True)
-    used = team.robot.root / "opt/vm-embedded/current/etc/vm.toml"
-    before = used.read_text()
-    used.write_text(before.replace('signer = ""', f'signer = "{(tmp_path / "key.pub").read_text().strip()}"'))
-    (tmp_path / "new.onnx").write_bytes((bundle / "etc" / "model.onnx").read_bytes())
-    signatures = {}
-    for key in ("key", "other"):
-        sign = ["ssh-keygen", "-q", "-Y", "sign", "-f", tmp_path / key, "-n", "vm-embedded", tmp_path / "new.onnx"]
-        subprocess.run(sign, check=True, capture_output=True)
-        signatures[key] = (tmp_path / "new.onnx.sig").read_bytes()
-        (tmp_path / "new.onnx.sig").unlink()
-    model = (tmp_path / "new.onnx").read_bytes()
-    try:
-        for signature, words in ((None, "is missing"), (signatures["other"], "not signed"), (b"", "not signed")):
-            status, said = _model_command(team, model, signature)
-            assert status == 1
-            assert words in said
-        status, said = _model_command(team, model, signatures["key"])
-        assert status == 0, said
-    finally:
-        used.write_text(before)
-    team.check("1-first")
+@pytest.mark.parametrize("kind", ["model", "rollback"])
+def test_killed_at_random_moments_of_a_change_a_detector_works(team, kind):
+    """Also under systemd; test_kills.py does it more often without."""
+    chance = random.Random(kind)
+    for number in range(6):
+        model = CHECKOUT / "vm_embedded" / "models" / ("ball.onnx", "ball-small.onnx")[number % 2]
+        shutil.copy(model, team.robot.root / "var/tmp/new.onnx")
+        words = [DEPLOY, kind, *(["/var/tmp/new.onnx"] if kind == "model" else [])]
+        with team.robot.start("setsid", "sh", "-c", 'echo $$; exec "$@"', "sh", *words) as process:
+            group = process.stdout.readline().strip()
+            time.sleep(chance.uniform(0.0, 6.0))
+            team.robot.run("kill", "-KILL", "--", f"-{group}", check=False)
+            process.stdout.read()
+            process.wait()
+        team.check("1-first", "2-second")
+        team.robot.run(DEPLOY, "settle")
+        team.check("1-first", "2-second")
 
 
 def test_removed_nothing_is_left_but_the_configuration(team):
@@ -363,6 +358,11 @@ def test_deployed_from_a_workstation_in_one_command(team, bundle_file, tmp_path)
     assert "unit      active" in ran.stdout
     assert WELL.search(ran.stdout)
     assert '"detections"' in ran.stdout
+    assert "checking hashes" in ran.stdout
+    ran = subprocess.run(command, env=os.environ | path, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert ran.returncode == 0, ran.stdout + ran.stderr  # now with vm-deploy install
+    assert "is already in use" in ran.stdout
+    assert not (team.robot.root / "opt/vm-embedded/.bundle").exists()
     assert not list((team.robot.root / "var/tmp").glob("vm-embedded.*"))
 
 

@@ -19,7 +19,7 @@ from ..cameras.opencv import device_path
 from ..errors import InputError, VisualMeshError, one_line
 from ..live.configuration import Configuration
 from ..live.control import control_path
-from ..live.load_detector import load_checked_detector
+from ..live.load_detector import prove_model
 
 GOOD, WARNING, BAD = "ok", "warning", "failure"
 
@@ -122,12 +122,11 @@ def check_opencv(installed: set[str]) -> Finding:
 
 
 def check_model(configuration: Configuration) -> Finding:
-    """Whether the model loads, passes its self-tests and finds its canary."""
+    """Whether the model loads, passes its self-tests and finds its canary, in another process."""
     try:
-        detector, proved = asyncio.run(load_checked_detector(configuration))
+        model, proved = asyncio.run(prove_model(configuration))
     except VisualMeshError as error:
         return Finding("model", BAD, str(error), "vm-detect --check-config tells whether it works after a change")
-    model = detector.session.model
     seen = f"{configuration.model}: {proved}, sha256 {model.sha256[:16]}..."
     if model.canary is None:
         return Finding("model", WARNING, seen, "vm-export --canary IMAGE LENS writes a picture that it must find")

@@ -20,7 +20,7 @@ from ..errors import InputError, VisualMeshError
 from ..live.configuration import HEADER, Configuration
 from ..live.control import REFUSED, ask, control_path
 from ..live.daemon import EXIT_CONFIGURATION, Daemon
-from ..live.load_detector import load_checked_detector
+from ..live.load_detector import prove_model
 from ..live.log import EventLog
 from .detect_files import complain, detect_in_files
 from .options import ANGLES, add_live, add_model, add_pose, add_settings, add_track, read_options
@@ -186,9 +186,9 @@ def _ask(given: Configuration, command: str) -> int:
 
 
 def _check_configuration(given: Configuration) -> int:
-    """Load the model and check that the configuration fits together. Raises VisualMeshError."""
-    detector, proved = asyncio.run(load_checked_detector(given))
-    print(f"{given.model}: {len(detector.manifest.classes)} classes, {proved}; the configuration is good")
+    """Check the configuration and the model. Raises VisualMeshError."""
+    model, proved = asyncio.run(prove_model(given))
+    print(f"{given.model}: {len(model.manifest.classes)} classes, {proved}; the configuration is good")
     return EXIT_OK
 
 

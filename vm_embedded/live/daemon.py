@@ -161,6 +161,7 @@ class Daemon:
             for address in getattr(self.configuration.status, name).split(","):
                 if address and is_open_to_network(address):
                     self._log("open to the network", "warning", entry=f"[status] {name}", address=address)
+        self.recorder.finish_left()
         self.grabber.start()
         self._watchdog.start()
         self._update_state()

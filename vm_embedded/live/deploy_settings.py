@@ -1,4 +1,4 @@
-"""Section [deploy]: when vm-deploy keeps a new release, and which models it accepts."""
+"""Section [deploy]: when vm-deploy keeps a new release, and whose bundles and models it accepts."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def check_signer(entry: Field[Any], value: Any) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class DeploySettings:
-    """How long a new release has to become healthy, and who must sign models."""
+    """How long a new release has to become healthy, and who must sign bundles and models."""
 
     healthy_s: float = number(
         30.0, "time within which a new release must be ready and ok; otherwise vm-deploy rolls it back", "s", (5, 600)
@@ -41,8 +41,8 @@ class DeploySettings:
     signer: str = entry(
         check_signer,
         "",
-        "Ed25519 public key, from ssh-keygen's .pub file; vm-deploy model accepts only models signed with its private "
-        "key; empty: it accepts unsigned models",
+        "Ed25519 public key, from ssh-keygen's .pub file; vm-deploy accepts only bundles and models signed with its "
+        "private key; empty: it accepts unsigned ones",
     )
 
     def __post_init__(self) -> None:

@@ -7,25 +7,32 @@ from ..cameras.open_camera import ROS, brings_lens_and_pose, camera_opener, is_l
 from ..detection.detector import Detector
 from ..errors import InputError
 from ..network.bundled import model_path
-from ..network.model_file import parse_model, read_content
+from ..network.model_file import ModelFile, parse_model, read_content
 from .configuration import Configuration
 from .proving_process import prove_in_process
 
 
-async def load_checked_detector(configuration: Configuration) -> tuple[Detector, str]:
-    """Load the configured network, prove that it works, and check camera, lens, poses and trigger class.
+async def prove_model(configuration: Configuration) -> tuple[ModelFile, str]:
+    """Check camera, lens, poses and trigger class, and prove the configured network in another process.
 
-    Return the detector, and in words what was proved. Another process proves it first. Raises VisualMeshError for the
-    first thing that is missing or invalid.
+    Return the model file and in words what was proved. This process does not run the network, so root may call it for
+    a file of an enemy. Raises VisualMeshError for the first thing that is missing or invalid.
     """
     _check_camera(configuration)
     path = model_path(configuration.model)
     content = read_content(path)
     proved = await prove_in_process(path, content)
-    detector = Detector(parse_model(path, content), configuration.detector)
+    model, settings = parse_model(path, content), configuration.detector
+    model.manifest.used_for(settings.object_radius, settings.max_distance)  # raises ModelError
     if configuration.recorder.trigger_class:
-        detector.manifest.column(configuration.recorder.trigger_class)
-    return detector, proved
+        model.manifest.column(configuration.recorder.trigger_class)
+    return model, proved
+
+
+async def load_checked_detector(configuration: Configuration) -> tuple[Detector, str]:
+    """Load the configured network after `prove_model`, whose errors it raises; return also what was proved."""
+    model, proved = await prove_model(configuration)
+    return Detector(model, configuration.detector), proved
 
 
 def _check_camera(configuration: Configuration) -> None:

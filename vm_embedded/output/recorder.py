@@ -7,7 +7,6 @@ recording.jsonl with the messages. Running the detector on a recording gives the
 
 from __future__ import annotations
 
-import shutil
 import threading
 import time
 from collections import deque
@@ -27,6 +26,7 @@ from ..geometry.lens import Lens
 from ..geometry.lens_files import format_lens_file
 from ..geometry.orientation import Orientation
 from .messages import Message, to_json_line
+from .recordings import PART, delete_oldest_recordings, finish, finish_left_recordings, locked, recording_name
 
 # Smaller and faster than the default strategy for pictures with noise.
 _PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY)
@@ -117,9 +117,7 @@ class Recorder:
             raise InputError("the previous recording is still being written; try again later")
         if not self._moments:
             raise InputError("no frame to record yet")
-        now = time.time()
-        name = f"{time.strftime('%Y-%m-%dT%H-%M-%S', time.localtime(now))}.{int(1e3 * now) % 1000:03d}"
-        folder = Path(self.settings.folder) / name
+        folder = Path(self.settings.folder) / recording_name(time.time())
         moments = list(self._moments)
         arguments = (folder, moments, files)
         self._writer = threading.Thread(target=self._write, args=arguments, name="recorder", daemon=True)
@@ -131,10 +129,18 @@ class Recorder:
 
         Each frame's message follows its files at once, so vm-detect reads even the folder of a process that was killed.
         """
-        part = folder.with_name(folder.name + ".part")
-        written, trouble = 0, ""
+        part = folder.with_name(folder.name + PART)
         try:
             part.mkdir(parents=True)
+            with locked(part):
+                self._fill(part, folder, moments, files)
+        except OSError as error:
+            self._report("recording failed", "error", f"{folder}: {error.strerror or error}")
+
+    def _fill(self, part: Path, folder: Path, moments: Sequence[Moment], files: Mapping[str, bytes]) -> None:
+        """Write the files of a recording into its folder, and finish it. Raises OSError if it can't be finished."""
+        written, trouble = 0, ""
+        try:
             for name, content in files.items():
                 (part / name).write_bytes(content)
             with (part / MESSAGES).open("wb") as messages:
@@ -147,10 +153,8 @@ class Recorder:
                     raise InputError("the detector has stopped")
         except (OSError, InputError) as error:
             trouble = getattr(error, "strerror", None) or str(error)
-        try:
-            self._finish(part, folder, written)
-        except OSError as error:
-            written, trouble = 0, error.strerror or str(error)
+        finish(part, written)
+        self._delete_oldest()
         if written == 0:
             self._report("recording failed", "error", f"{folder}: {trouble}")
         elif written < len(moments):
@@ -167,13 +171,21 @@ class Recorder:
             nbytes += _write_moment(part, index, each, self._closing)
             yield nbytes
 
-    def _finish(self, part: Path, folder: Path, written: int) -> None:
-        """Give the folder its final name and delete old recordings, or remove it if it has no frames."""
-        if written == 0:
-            shutil.rmtree(part, ignore_errors=True)
+    def _delete_oldest(self) -> None:
+        delete_oldest_recordings(Path(self.settings.folder), 2**20 * self.settings.disk_mib)
+
+    def finish_left(self) -> None:
+        """Finish the recordings of killed detectors, so that they count for the disk limit. Call it at the start."""
+        if not self.settings.folder:
             return
-        part.rename(folder)
-        delete_oldest_recordings(folder.parent, 2**20 * self.settings.disk_mib)
+        try:
+            for path, written in finish_left_recordings(Path(self.settings.folder)):
+                result = f"only {written} frames" if written else "removed, because it has no frames"
+                self._report("recorded", "warning", f"{path}: {result}: the detector was killed")
+            if Path(self.settings.folder).is_dir():
+                self._delete_oldest()
+        except OSError as error:
+            self._report("recording failed", "error", f"{self.settings.folder}: {error.strerror or error}")
 
     def clear(self) -> None:
         """Drop all moments; call it when settings change, since a recording has one vm.toml."""
@@ -209,12 +221,3 @@ def _write_moment(folder: Path, index: int, moment: Moment, quick: bool) -> int:
 def encode_png(image: Image) -> bytes:
     """A lossless PNG of an image (height, width[, channels]), which takes little time to compress."""
     return cv2.imencode(".png", image, _PNG)[1].tobytes()
-
-
-def delete_oldest_recordings(folder: Path, limit: float) -> None:
-    """Delete the oldest recordings in a folder until the rest take at most `limit` [bytes]; keep the newest."""
-    recordings = sorted(each for each in folder.iterdir() if (each / MESSAGES).is_file())
-    sizes = [sum(file.stat().st_size for file in each.iterdir()) for each in recordings]
-    while len(recordings) > 1 and sum(sizes) > limit:
-        shutil.rmtree(recordings.pop(0), ignore_errors=True)
-        sizes.pop(0)

@@ -3,14 +3,16 @@
 import asyncio
 import os
 import signal
+import socket
 import subprocess
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
-from tests.vm_embedded.live.running import arguments, running
+from tests.vm_embedded.live.running import COMMAND, arguments, running
 from tests.vm_embedded.network.burdened import endless, endless_on_many_points, huge
 from vm_embedded.errors import ModelError
 from vm_embedded.live.daemon import EXIT_HUNG
@@ -87,6 +89,45 @@ def test_attack_3_check_config_refuses_a_model_without_end(tmp_path):
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
     assert "proof takes" in done.stderr
+
+
+SPY = """
+import os
+import socket
+import onnxruntime
+
+class Session(onnxruntime.InferenceSession):
+    def __init__(self, *words, **more):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as told:
+            told.sendto(f"{os.getuid()} {os.getpid()}".encode(), os.environ["SESSIONS"].replace("@", chr(0)))
+        super().__init__(*words, **more)
+
+onnxruntime.InferenceSession = Session
+"""
+"""A module that Python imports at its start: it tells who runs a network, and then runs it."""
+
+
+@pytest.mark.parametrize("command", [("vm-detect", "--check-config"), ("vm-doctor",)])
+def test_attack_11_the_process_that_checks_a_model_never_runs_it(tmp_path, command):
+    """As root, what vm-deploy and install.sh start would otherwise run a network of an enemy with all rights."""
+    (tmp_path / "sitecustomize.py").write_text(SPY)
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as heard:
+        heard.bind(f"\0{tmp_path}")  # an abstract address, which needs no rights
+        line = [COMMAND.with_name(command[0]), *command[1:], "--camera", "synthetic"]
+        environment = os.environ | {"SESSIONS": f"@{tmp_path}", "PYTHONPATH": path}
+        with subprocess.Popen(line, env=environment, stdout=subprocess.PIPE, text=True) as process:
+            said = process.communicate(timeout=120)[0]
+        heard.setblocking(False)
+        sessions = []
+        with suppress(BlockingIOError):
+            while True:
+                sessions.append(heard.recv(100).decode().split())
+    assert "self-test passed" in said
+    assert sessions
+    assert str(process.pid) not in [pid for _, pid in sessions]
+    if os.geteuid() == 0 and modules_are_public():
+        assert {uid for uid, _ in sessions} == {"65534"}
 
 
 def test_attack_3_frames_and_signals_go_on_while_a_new_model_is_proved(tmp_path):

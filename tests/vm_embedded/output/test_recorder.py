@@ -8,6 +8,7 @@ import time
 from tests.drawn_scenes import MODEL
 from tests.messages import read_message
 from tests.vm_embedded.live.running import COMMAND, arguments, running
+from vm_embedded.output.recordings import locked
 
 
 def test_a_recording_is_detected_in_again_bit_by_bit(tmp_path):
@@ -103,6 +104,43 @@ def test_a_killed_detector_leaves_a_recording_that_is_read(tmp_path):
     (folder,) = kept.iterdir()
     assert folder.suffix == ".part"
     assert 0 < count_found(folder) <= promised
+
+
+def test_the_next_detector_finishes_recordings_of_a_killed_one_and_nothing_else(tmp_path):
+    kept = tmp_path / "recordings"
+    options = ("--camera", "synthetic", *LARGE, "--recorder-folder", kept)
+    with running(tmp_path, *options) as found:
+        found.wait(lambda: len(found.frames) > 20)
+        count_promised(ask_to_record(tmp_path))
+        found.wait(lambda: len(list(kept.glob("*/lens*.yaml"))) > 2)
+        found.stop(signal.SIGKILL)
+    (left,) = kept.iterdir()
+    assert left.suffix == ".part"
+    whole, empty = kept / "2026-01-01T00-00-00.000", kept / "2026-01-02T00-00-00.000.part"
+    others = kept / "mine.part", kept / "2026-01-03T00-00-00.000.part"
+    for each in (whole, empty, *others):
+        each.mkdir()
+        (each / "picture.png").write_bytes(bytes(5000))
+    (whole / "recording.jsonl").write_bytes(b"{}\n")
+    (others[0] / "recording.jsonl").write_bytes(b"{}\n")
+    (kept / "2026-01-04T00-00-00.000.part").symlink_to(tmp_path)
+    with locked(others[1]), running(tmp_path, *options) as found:  # as if another detector wrote it
+        found.wait_for_state("ok")
+        told = [each["folder"] for each in found.events if each["event"] == "recorded"]
+        found.stop()
+    assert count_found(kept / left.stem) > 0
+    assert [each.partition(": ")[2] for each in told] == [
+        "removed, because it has no frames: the detector was killed",
+        f"only {count_found(kept / left.stem)} frames: the detector was killed",
+    ]
+    assert {each.name for each in kept.iterdir()} == {
+        *(whole.name, left.stem, "mine.part", "2026-01-03T00-00-00.000.part", "2026-01-04T00-00-00.000.part")
+    }
+    with running(tmp_path, *options, "--recorder-disk-mib", 1) as found:
+        found.wait_for_state("ok")
+        found.stop()
+    assert not whole.exists()  # it is the oldest of more than 1 MiB
+    assert (kept / left.stem).exists()
 
 
 def test_a_recording_larger_than_its_limit_keeps_its_first_frames(tmp_path):
