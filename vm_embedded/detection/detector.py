@@ -77,7 +77,7 @@ class Detector:
         """Classify the mesh points in an image: the first step of `detect`, with the same arguments and errors."""
         frame = checked_image(image, self.settings.format)
         if orientation is None:
-            raise InputError("no orientation, but None: does the lens file have no pose (Hoc)? Give an Orientation")
+            raise InputError("there is no orientation: perhaps the lens file has no pose (Hoc); give an Orientation")
         size = frame.shape[1], frame.shape[0]
         lens = lens.for_image(size)
         watch = Stopwatch()

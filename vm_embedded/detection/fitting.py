@@ -36,7 +36,7 @@ def fit(view: PreparedView, candidate: Candidate) -> Candidate:
         axis = center / distance
         across, up = view.shape.radius, view.shape.half_size
         tried = axis + reach / distance * ((_GRID * (across, up)) @ tangents(axis))
-        centers = view.shape.center_along(tried, view.height)
+        centers = view.shape.center_along(tried, view.height)  # which takes rays of any length
         inside = _share_inside(view.shape.offset(rays, centers, view.height), view)
         center = centers[int(np.argmax(inside @ candidate.log_odds))]
     return replace(candidate, center=center)

@@ -103,9 +103,10 @@ def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack
     camera[:, 1] *= inward
     camera[:, 2] *= inward
     camera[:, 0] = cosine
-    # A turn moves a ray along a great arc. In a view of at most half a sphere the arc stays in the view, and moving a
-    # point to the edge makes no way longer. In a wider view the arc may pass behind the camera; the way along the edge
-    # is at most pi / 2 times as long. And moving a point from outside to the edge at most doubles its way. Both: pi.
+    # The bound needs a path inside of the view: from the point, which is moved to the edge if it is outside, to where
+    # the turn brings it. In a view of at most half a sphere the great arc is such a path, and moving the point to the
+    # edge makes it no longer. In a wider view the arc may pass behind the camera, and a path along the edge is at most
+    # pi / 2 times as long; moving the point to the edge at most doubles that. Together: 2 pi / 2 = pi.
     detour = 1.0 if reach <= np.pi / 2 else np.pi
     margin = detour * slack * _pixels_per_radian(lens, size)
     possible = np.zeros(len(mesh), dtype=bool)

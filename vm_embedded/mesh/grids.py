@@ -50,7 +50,7 @@ do not settle (as with thin cylinders), and the relative change at which a point
 KINDS = ("xy", "xm", "nm")
 
 _Coordinate = Callable[[Floats, Floats | float], Floats]
-"""coordinate(n, d) for n (m,) objects out: (m,) [m]. The distance d [m] is (m,), or one number for all of them."""
+"""coordinate(n, d) of p points [m]. n (p,): how many objects out they are. d: distance (p,) [m], or one number."""
 
 
 class Grid(MeshModel):

@@ -152,11 +152,11 @@ def _found_in_runs(
 
     members: (group size, n) the points in the group of each point; the number n stands for a missing one. runs: the
     point in each slot. slot_of: (n + 1,) the slot of each point. Returns the slots of the groups' middles (n + 1,),
-    _GAP where no member is on screen, and a mask (n,) of the groups that are torn.
+    _GAP where all members are missing, and a mask (n,) of the groups that are torn.
     """
     n = members.shape[1]
     middle = np.full(n + 1, _GAP)
-    # If the group is whole, each of its members on screen leads to the same middle.
+    # If the group is whole, each member that is not missing leads to the same middle.
     for offset, points in zip(offsets, members, strict=True):
         np.copyto(middle[:n], slot_of[points] - offset, where=points < n)
     # The place of a missing member must be a gap. A group with another point there is torn, too.

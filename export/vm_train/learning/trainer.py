@@ -168,7 +168,8 @@ class Trainer:
     @torch.no_grad()
     def probabilities(self, graph: LabeledGraph) -> Singles:
         """Probabilities (n, C) that `result` gives the points of a graph."""
-        points, neighbors = torch.from_numpy(graph.points), torch.tensor(graph.neighbors)  # a mesh's are read-only
+        # torch.tensor copies the neighbors: those of a mesh are read-only, and torch.from_numpy warns about that.
+        points, neighbors = torch.from_numpy(graph.points), torch.tensor(graph.neighbors)
         answers: Singles = self.result(points.to(self._device), neighbors.to(self._device))[:-1].cpu().numpy()
         return answers
 
