@@ -63,7 +63,7 @@ def parser() -> argparse.ArgumentParser:
         nargs=2,
         metavar=("IMAGE", "LENS"),
         help="small picture that shows an object of every class, and its lens file with Hoc; the detector must find "
-        "them again at each start. For a model file (.onnx), also renew the self-tests",
+        "them again at each start. For a model file (.onnx), this also makes new self-tests",
     )
     facts = parser.add_argument_group("entries that the file lacks, or that you want to replace")
     facts.add_argument(

@@ -43,9 +43,8 @@ def import_boxes_parser() -> argparse.ArgumentParser:
         "--from",
         dest="start",
         metavar="MODEL",
-        help="the network that you will train on the masks, which get its classes and object shape: a checkpoint "
-        f"(.pt), a model file (.onnx), or a network of the package ({', '.join(SHIPPED)}); default: those of the "
-        "configuration",
+        help="the network that you will train: a checkpoint (.pt), a model file (.onnx), or a network of the package "
+        f"({', '.join(SHIPPED)}). The masks get its classes and object shape; default: those of the configuration",
     )
     made.add_argument(
         "--object-radius", type=float, metavar="M", help="radius of the real object [m]; default: that of the mesh"
