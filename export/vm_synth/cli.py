@@ -152,7 +152,9 @@ def config_parser() -> argparse.ArgumentParser:
         description="Print a scene.toml with all entries, their meanings, units, limits and defaults.",
     )
     made.add_argument(
-        "--example", choices=_EXAMPLES, help="print one of the configurations of the package instead: only its entries"
+        "--example",
+        choices=_EXAMPLES,
+        help="print this configuration of the package instead, with only the entries that are not the default",
     )
     return made
 

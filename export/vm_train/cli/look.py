@@ -49,7 +49,7 @@ def look_parser() -> argparse.ArgumentParser:
         "--glance",
         type=Path,
         metavar="LOOK",
-        help="small close look (look.pt) that goes first; the new one judges only what it passes on, and contains it",
+        help="glance (look.pt) that judges first; the new close look judges what it passes on, and its file has both",
     )
     made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
     made.add_argument(
