@@ -58,7 +58,7 @@ class TuningRecipe:
         (0.0, 1.0),
     )
     forgetting: float = number(
-        0.4,
+        0.2,
         "the largest increase of the loss on rendered patches, as a share of that of the network before; the weights "
         "are mixed with those before until it is kept; higher: it learns more and forgets more",
         "",
