@@ -70,7 +70,7 @@ class CameraSettings:
     height: int = number(0, "height to request from a device; 0: the device's own", "px", (0, 20000))
     fps: float = number(
         0.0,
-        "frame rate to request from a device; for files, the rate of --live and of the times for --track; "
+        "frame rate to request from a device; for files, the rate at which --live plays them and --track counts time; "
         "0: the device's or file's own",
         "1/s",
         (0, 1000),
