@@ -21,8 +21,8 @@ class Settings:
     height_tolerance: float = number(
         0.5,
         "a new camera height gets its own mesh if the number of rings across an object changes by more than this; "
-        "0, for comparisons with the reference: each frame gets a mesh for its exact height, aligned with the plane's "
-        "frame instead of the camera's yaw, which takes more time",
+        "0, for comparisons with the reference: each frame gets its own mesh, which does not turn with the camera's "
+        "yaw; slower",
         "rings",
         (0.0, 2.0),
     )

@@ -62,7 +62,9 @@ def add_check_boxes(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="do not look for objects without a box, which takes about 0.2 s for each image",
     )
-    group.add_argument("--sheet", type=Path, metavar="FILE", help="draw the boxes of these objects to a .jpg or .png")
+    group.add_argument(
+        "--sheet", type=Path, metavar="FILE", help="draw the boxes of the objects of --network to a .jpg or .png"
+    )
     group.add_argument(
         "--count", type=at_least(1), metavar="N", help=f"boxes to draw, the most unusual ones; default {_ON_SHEET}"
     )

@@ -32,7 +32,7 @@ def import_boxes_parser() -> argparse.ArgumentParser:
     made = Parser(
         prog="vm-train import-boxes",
         description="Convert frames with boxes, lens and pose to a folder of pictures with masks, to train a mesh "
-        "network on. The object that stands on the plane in the direction of a box gives the labels. Boxes whose size "
+        "network on. For each box, the outline of an object on the plane gives the labels. Boxes whose size "
         "does not fit the plane are reported and left unlabeled. Frames without lens or pose are left out.",
     )
     made.add_argument(

@@ -25,8 +25,8 @@ class RosSettings:
     clock: str = one_of(
         CLOCKS,
         "wall",
-        "clock of the stamps; wall: the system's clock; arrival: an unknown one, as when a bag is played; times of "
-        "arrival then tell its difference",
+        "clock of the stamps; wall: the system's clock; arrival: another clock, as when a bag is played; its offset is "
+        "estimated from the times of arrival",
     )
     namespace: str = text_line(f"/{NODE}", "first part of the topics that vm-ros publishes")
 
