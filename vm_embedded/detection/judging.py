@@ -34,7 +34,7 @@ def _misfit(view: PreparedView, candidate: Candidate, settings: Settings) -> str
 
     Nearer to the nadir than one object's size, the mesh is singular (the paper's second limitation, section
     "Discussion and Conclusion"): ring6 has too few points there, and uneven links. An object may seem to cover twice
-    its area, so the band is farther out by sqrt(2).
+    its area, so the band begins and ends sqrt(2) times as far out.
     """
     center, p = candidate.center, candidate.probabilities
     if center[2] >= 0.0 or np.linalg.norm(center) > _FARTHEST * view.height:

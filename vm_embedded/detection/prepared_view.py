@@ -21,7 +21,7 @@ class PreparedView(NamedTuple):
     real object. rings: number of mesh rings that cross it. height: of the camera over the observation plane [m]. The
     mesh frame is the observation plane's without the camera's yaw: x is ahead of the camera, z up. Objects are sought
     in it. rotation (3, 3): camera to mesh frame. heading (3, 3): mesh frame to the observation plane's, a turn around
-    the vertical. lens, size [px]: of the frame. A named tuple, because each frame makes one: a frozen dataclass takes
+    the vertical; with a height tolerance of 0 the yaw is not removed, and heading is the identity. lens, size [px]: of the frame. A named tuple, because each frame makes one: a frozen dataclass takes
     four times as long.
     """
 
@@ -51,7 +51,7 @@ class PreparedView(NamedTuple):
         return np.where(self.lens.sees(camera)[:, None], self.lens.project(camera, self.size), np.nan)
 
     def plane_pixels(self, places: Floats) -> Floats:
-        """Pixels (n, 2) of places (n, 2) [m] on the plane, in its frame; NaN where the lens sees nothing."""
+        """Pixels (n, 2) of places (n, 2) [m] on the plane, from below the camera; NaN where the lens sees nothing."""
         toward = np.column_stack([places, np.full(len(places), -self.height)]) @ self.heading
         return self.ray_pixels(toward / np.linalg.norm(toward, axis=1, keepdims=True))
 

@@ -67,8 +67,8 @@ def render_all(job: Job, indices: Sequence[int], workers: int, report: Callable[
     _set_environment()
     with worker_pool(min(workers, max(len(indices), 1)), _start, (job,)) as pool:
         waiting = iter(indices)
-        # The pool starts its processes during these submits, with Ctrl-C blocked. Otherwise it could end a worker
-        # before `_start` makes the worker ignore it.
+        # The pool starts its processes during these submits, with Ctrl-C blocked. Otherwise Ctrl-C could end a worker
+        # before `_start` makes the worker ignore Ctrl-C.
         with interrupts_blocked():
             running: set[Future[FinishedPicture]] = {
                 pool.submit(_render_one, index) for index in islice(waiting, 2 * workers)
