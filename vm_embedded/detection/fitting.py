@@ -55,9 +55,10 @@ def best_scale(view: PreparedView, candidate: Candidate, offset: Floats) -> floa
 
 
 def _share_inside(offset: Floats, view: PreparedView) -> Floats:
-    """1 for points inside the outline, 0 outside; it falls from a quarter of a ring spacing inside of it to a quarter outside.
+    """1 for points inside the outline, 0 outside.
 
-    offset: from the center, 1 on the outline, as `Shape.offset` gives it, or 1 on another outline that is tried. The
-    ring spacing is that of the expected size.
+    It falls from a quarter of a ring spacing inside of the outline to a quarter outside. offset: from the center, 1 on
+    the outline, as `Shape.offset` gives it, or 1 on another outline that is tried. The ring spacing is that of the
+    expected size.
     """
     return np.clip(0.5 + (1.0 - offset) / (0.5 * view.spacing), 0.0, 1.0)

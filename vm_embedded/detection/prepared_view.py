@@ -21,8 +21,8 @@ class PreparedView(NamedTuple):
     real object. rings: number of mesh rings that cross it. height: of the camera over the observation plane [m]. The
     mesh frame is the observation plane's without the camera's yaw: x is ahead of the camera, z up. Objects are sought
     in it. rotation (3, 3): camera to mesh frame. heading (3, 3): mesh frame to the observation plane's, a turn around
-    the vertical; with a height tolerance of 0 the yaw is not removed, and heading is the identity. lens, size [px]: of the frame. A named tuple, because each frame makes one: a frozen dataclass takes
-    four times as long.
+    the vertical; with a height tolerance of 0 the yaw is not removed, and heading is the identity. lens, size [px]: of
+    the frame. A named tuple, because each frame makes one: a frozen dataclass takes four times as long.
     """
 
     layout: Layout

@@ -1,9 +1,9 @@
 """Trains a network step by step, and saves and loads the state between two steps.
 
 A step depends only on the seed, its number and the state before it: the weights, their average, and the state of the
-optimizer. With one computing thread on a CPU, a training that resumes from its last state therefore ends with the weights of one that nobody interrupted. With several
-processes (torch.distributed), each takes its part of every batch, and the gradient is that of the mean loss over the
-selected points of all parts.
+optimizer. With one computing thread on a CPU, a training that resumes from its last state therefore ends with the
+weights of one that nobody interrupted. With several processes (torch.distributed), each takes its part of every batch,
+and the gradient is that of the mean loss over the selected points of all parts.
 """
 
 from __future__ import annotations
