@@ -32,9 +32,10 @@ class ChangedLook:
 def change_look(model: str | Path, path: str | Path, look: LookCheckpoint | None) -> ChangedLook:
     """Write a copy of a model file with this look network, or without any; its mesh network stays as it is.
 
-    Its canary gets the new answers, or is removed if the networks do not find every class in it any more. Raises
-    ModelError if an answer differs from torch by more than LARGEST_DIFFERENCE, the look does not fit the file's
-    classes, or there is none to remove, and InputError if the file can't be written.
+    Its canary gets the new answers, or is removed if the networks do not find every class in it any more.
+
+    Raises ModelError if an answer differs from torch by more than LARGEST_DIFFERENCE, if the look does not fit the
+    file's classes, or if there is no look to remove. Raises InputError if the file can't be written.
     """
     read = read_model(model)
     difference, lost = None, False

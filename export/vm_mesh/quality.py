@@ -93,7 +93,7 @@ def points_on_object(built: BuiltMesh, distances: Floats) -> PointsOnObject:
         distances = distances[distances >= NEAREST]
         if len(distances) == 0:
             raise InputError(f"wall6 begins at {NEAREST:g} m; give a greater --distance or --max-distance")
-    bearings = 2.0 * np.pi * (np.arange(BEARINGS) + 0.37) / BEARINGS  # none lies on an axis, where meshes are even
+    bearings = 2.0 * np.pi * (np.arange(BEARINGS) + 0.37) / BEARINGS  # not at 0, where each ring has its first point
     found = np.empty((len(distances), BEARINGS))
     for row, distance in enumerate(distances.tolist()):
         centers = np.empty((BEARINGS, 3))

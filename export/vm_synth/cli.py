@@ -154,7 +154,7 @@ def config_parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--example",
         choices=_EXAMPLES,
-        help="print this configuration of the package instead, with only the entries that are not the default",
+        help="print this configuration of the package instead, with only the entries that it sets",
     )
     return made
 

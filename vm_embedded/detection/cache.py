@@ -52,6 +52,7 @@ class MeshCache:
 
     A mesh is kept under its height, and the prepared points of a bucket under (height, pitch, roll, lens, size), with
     pitch and roll as numbers of steps.
+
     `hits`, `misses`, `prepared` (buckets that `prepare_nearby` made) and `nbytes` [bytes] may be read at any time.
     """
 
@@ -160,7 +161,7 @@ class MeshCache:
             return may_be_on_screen(points, middle.rotation, lens, size, slack)
 
         part = mesh.part(np.flatnonzero(possible(mesh, 0.0, 0.0, 0.5)))
-        quarters = [possible(part, each, other, 0.25) for each in (-0.25, 0.25) for other in (-0.25, 0.25)]
+        quarters = [possible(part, pitched, rolled, 0.25) for pitched in (-0.25, 0.25) for rolled in (-0.25, 0.25)]
         return self._in_order(part.part(np.flatnonzero(np.any(quarters, axis=0))), height, lens)
 
     def _in_order(self, mesh: Mesh, height: float, lens: Lens) -> PreparedPoints:

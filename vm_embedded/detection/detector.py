@@ -57,9 +57,9 @@ class Detector:
         image: uint8 (height, width[, channels]) in the pixel format of the settings. orientation: of the camera at the
         time of the image. explain: also return the rejected candidates.
 
-        Raises InputError for an image or lens that doesn't fit, GeometryError for a camera too low for the object. Also
-        raises InputError if image or orientation is None: cv2.imread returns None for a file that it can't read, and a
-        lens file without a pose has the orientation None.
+        Raises InputError for an image or lens that doesn't fit, and if image or orientation is None. GeometryError: the
+        camera is too low for the object. cv2.imread returns None if it can't read a file. A lens file without a pose
+        has the orientation None.
         """
         return self.locate(self.observe(image, orientation, lens), explain)
 

@@ -16,7 +16,7 @@ async def prove_model(configuration: Configuration) -> tuple[ModelFile, str]:
     """Check camera, lens, poses and trigger class, and prove the configured network in another process.
 
     Return the model file and in words what was proved. This process does not run the network, so root may call it for
-    a file of an enemy. Raises VisualMeshError for the first thing that is missing or invalid.
+    a file that it does not trust. Raises VisualMeshError for the first thing that is missing or invalid.
     """
     _check_camera(configuration)
     path = model_path(configuration.model)

@@ -60,8 +60,8 @@ class Mixer:
         self._remembered = Remembered.of(before, old)
 
     def mix(self, after: LookNetwork) -> Mixture:
-        """The mixture with most of the new weights whose loss of old patches is at most (1 + `forgetting`) times that
-        of the network before; if there is none, the one with least of the new weights.
+        """The mixture with the largest share of the new weights that is within the limit: its loss of old patches is at
+        most (1 + `forgetting`) times that of the network before. If none is, the one with the smallest share.
 
         The probability of an old patch keeps its meaning: it was calibrated on what is found in whole pictures.
         """
