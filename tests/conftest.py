@@ -7,6 +7,10 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+# The tests run side by side. Threads of torch that wait for each other while other tests use their cores took four
+# times as long. The environment reaches torch, which is imported later, and the programs that tests start.
+os.environ["OMP_NUM_THREADS"] = "1"
+
 settings.register_profile(
     "repeatable", deadline=None, max_examples=50, derandomize=True, database=None, print_blob=False
 )

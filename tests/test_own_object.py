@@ -57,7 +57,7 @@ def run(words, folder):
     module, function = PROGRAMS[program].split(":")
     code = f"import sys; from {module} import {function}; sys.argv[0] = {program!r}; sys.exit({function}())"
     paths = os.pathsep.join([str(TOP), str(TOP / "export")])
-    environment = {**os.environ, "PYTHONPATH": paths, "OMP_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""}
+    environment = {**os.environ, "PYTHONPATH": paths, "CUDA_VISIBLE_DEVICES": ""}
     done = subprocess.run(
         [sys.executable, "-c", code, *arguments],
         cwd=folder,

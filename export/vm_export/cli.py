@@ -104,12 +104,17 @@ def _run(options: argparse.Namespace) -> int:
         options.model = model_path(options.model)
     _check_options(options)
     # Imported here: without torch, --help still works and the error is one clear line.
+    import torch
+
     from .attach_canary import CanaryPicture
     from .change_model import change_canary, change_look
     from .export import export, fastest_layout
     from .look_checkpoint import LookCheckpoint
     from .reference import write_reference
 
+    # These networks are small: one thread is as fast as several, and much faster while other programs use the cores.
+    # The last digits of its sums are also the same on every machine.
+    torch.set_num_threads(1)
     output = options.output or options.model.with_suffix(".yaml" if options.to_yaml else ".onnx")
     portable = output.with_suffix(".plain" + output.suffix)
     one_file = options.to_yaml or options.layout or _is_model_file(options.model)

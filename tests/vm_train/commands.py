@@ -21,7 +21,7 @@ rounds = 2
 
 
 def environment():
-    return {**os.environ, "OMP_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""}
+    return {**os.environ, "CUDA_VISIBLE_DEVICES": ""}
 
 
 def run(*arguments, code=0):

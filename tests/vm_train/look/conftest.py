@@ -1,7 +1,6 @@
 """Drawn pictures and a short configuration, for the tests of the close look."""
 
 import pytest
-import torch
 
 from ..drawn import draw_set
 
@@ -22,15 +21,6 @@ rounds = 2
 batch = 16
 """
 """A look.toml for which seconds are enough."""
-
-
-@pytest.fixture(autouse=True)
-def _one_thread():
-    """The tests run side by side, and results do not depend on the machine."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,6 @@
 import cv2
 import numpy as np
 import pytest
-import torch
 
 from ..drawn import draw_set
 
@@ -20,15 +19,6 @@ steps = 4
 batch = 16
 """
 """A tune.toml for which seconds are enough."""
-
-
-@pytest.fixture(autouse=True)
-def _one_thread():
-    """The tests run side by side, and results do not depend on the machine."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 @pytest.fixture(scope="session")
