@@ -95,7 +95,6 @@ def test_the_python_of_a_page_works_as_pasted(page, printed, tmp_path, monkeypat
     assert printed in capsys.readouterr().out
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("page", [README, DOCS / "use.md", DOCS / "meshes.md"], ids=name_of)
 def test_the_python_of_a_page_has_right_types(page, tmp_path):
     """A user's strict type checker accepts it: images as OpenCV's stubs declare them, py.typed, all annotations."""
@@ -204,7 +203,6 @@ def test_targets_of_make_exist(page):
         assert re.search(rf"^{target}:", makefile, re.MULTILINE), f"{name_of(page)} names make {target}"
 
 
-@pytest.mark.slow
 def test_the_site_builds_without_warnings_and_needs_no_network(tmp_path):
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", DOCS / "site" / "mkdocs.yml"]
     environment = {"NO_MKDOCS_2_WARNING": "1", "PATH": ""}

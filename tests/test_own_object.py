@@ -71,7 +71,6 @@ def run(words, folder):
     return done.stdout
 
 
-@pytest.mark.slow
 def test_the_page_can_be_followed_command_by_command(tmp_path, mitsuba):
     followed = []
     for line in shell_lines(PAGE):

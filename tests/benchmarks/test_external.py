@@ -27,7 +27,6 @@ def engine(tmp_path, answer):
     return f"{sys.executable} {tmp_path / 'engine.py'}"
 
 
-@pytest.mark.slow
 def test_both_are_timed_on_the_same_pictures(tmp_path):
     done = compare(engine(tmp_path, 4000.0), "--rounds", "1", "--model", "ball-small")
     assert done.returncode == 0, done.stderr

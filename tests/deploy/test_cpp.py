@@ -29,8 +29,6 @@ EXAMPLE = CHECKOUT / "docs" / "examples" / "behavior.cpp"
 STRICT = ("-std=c++17", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wshadow", "-pedantic")
 BINARY = ("--output-unix-format", "binary")
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def compiled(tmp_path_factory):

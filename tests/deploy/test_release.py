@@ -59,7 +59,6 @@ def released(clone):
     return clone / "dist"
 
 
-@pytest.mark.slow
 def test_a_release_is_tagged_and_its_files_have_checksums(clone, released):
     assert git(clone, "describe") == "v9.8.7"
     assert not git(clone, "status", "--porcelain")
@@ -71,7 +70,6 @@ def test_a_release_is_tagged_and_its_files_have_checksums(clone, released):
     assert "exists" in release(clone, "9.8.7", "--url", URL).stderr
 
 
-@pytest.mark.slow
 def test_the_wheel_is_complete_and_small_and_its_page_has_pictures(clone, released):
     with zipfile.ZipFile(released / "vm_embedded-9.8.7-py3-none-any.whl") as wheel:
         metadata = wheel.read("vm_embedded-9.8.7.dist-info/METADATA").decode()
@@ -92,7 +90,6 @@ def test_the_wheel_is_complete_and_small_and_its_page_has_pictures(clone, releas
     assert all(each.startswith("http") for each in links), links
 
 
-@pytest.mark.slow
 def test_the_source_distribution_runs_its_tests(released, tmp_path):
     with tarfile.open(released / "vm_embedded-9.8.7.tar.gz") as tar:
         tar.extractall(tmp_path, filter="data")

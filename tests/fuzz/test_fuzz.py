@@ -32,7 +32,6 @@ def test_inputs_made_from_the_corpus_are_read_or_refused_in_a_line(target, tmp_p
     assert report.inputs >= runs
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("data", "text"),
     [

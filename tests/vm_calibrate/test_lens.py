@@ -40,7 +40,6 @@ def folders(tmp_path_factory):
     return folder
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_lens_of_pictures_is_found(kind, folders, tmp_path, capsys):
     printed = run(capsys, "lens", folders(kind), *BOARD, "--lens", kind, "-o", tmp_path / "lens.yaml")
@@ -63,7 +62,6 @@ def test_the_kind_of_lens_is_chosen(folders, tmp_path, capsys):
         check(lens, LENSES[kind])
 
 
-@pytest.mark.slow
 def test_a_charuco_video(tmp_path, capsys):
     camera = film("rectilinear")
     pictures = camera.pictures(15, charuco_texture())

@@ -74,7 +74,6 @@ def seen_balls(lens, camera, random, box=False, noise=1.0, spots=SPOTS, each=6, 
     return made
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_pose_over_a_board_is_found(kind, tmp_path, capsys):
     spots = ((0.8, 0.0, 0.3), (1.2, -0.3, -0.7), (1.0, 0.3, 1.9))

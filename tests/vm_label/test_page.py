@@ -3,8 +3,6 @@
 import random
 import time
 
-import pytest
-
 from vm_label.answers import read_answers
 from vm_label.box_folder import read_box_folder
 from vm_label.crops import most_doubtful_first
@@ -50,7 +48,6 @@ def port_of(address):
     return address.rstrip("/").rpartition(":")[2]
 
 
-@pytest.mark.slow
 def test_200_crops_judged_by_keys_survive_a_reload_and_a_killed_server(tmp_path, browser):
     folder = make_folder(tmp_path / "boxes", 100)
     crops = most_doubtful_first(read_box_folder(folder).crops)
@@ -87,7 +84,6 @@ def test_200_crops_judged_by_keys_survive_a_reload_and_a_killed_server(tmp_path,
     assert faults == []
 
 
-@pytest.mark.slow
 def test_undo_selection_and_the_whole_picture(tmp_path, browser):
     folder = make_folder(tmp_path / "boxes", 6, near=False)
     crops = most_doubtful_first(read_box_folder(folder).crops)
@@ -122,7 +118,6 @@ def test_undo_selection_and_the_whole_picture(tmp_path, browser):
     assert "left out: 5 images with unanswered crops" in out
 
 
-@pytest.mark.slow
 def test_a_reload_without_a_server_loses_nothing(tmp_path, browser):
     folder = make_folder(tmp_path / "boxes", 4, near=False)
     with serving(folder) as (_, address):

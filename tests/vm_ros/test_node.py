@@ -35,7 +35,6 @@ def states(peer):
     return found
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("poses", ["tf", "topic:/camera_pose"])
 def test_another_process_decodes_the_same_numbers(tmp_path, peer, poses):
     peer.listen(ON_PLANE, "Detection3DArray")
@@ -82,7 +81,6 @@ def test_another_process_decodes_the_same_numbers(tmp_path, peer, poses):
     assert (np.median(errors, axis=0) < 0.002).all(), np.median(errors, axis=0)
 
 
-@pytest.mark.slow
 def test_the_numbers_are_those_of_the_lines_of_json(tmp_path, peer):
     """A camera with its own poses: nothing is interpolated, so that the numbers are equal."""
     peer.listen(ON_PLANE, "Detection3DArray")
@@ -104,7 +102,6 @@ def test_the_numbers_are_those_of_the_lines_of_json(tmp_path, peer):
     assert compared > 15
 
 
-@pytest.mark.slow
 def test_a_lost_camera_is_a_status_within_a_second_and_never_an_empty_array(tmp_path, peer):
     peer.listen(ON_PLANE, "Detection3DArray")
     peer.listen(IN_IMAGE, "Detection2DArray")
@@ -135,7 +132,6 @@ def test_a_lost_camera_is_a_status_within_a_second_and_never_an_empty_array(tmp_
         assert any(each.detections for each in arrays)
 
 
-@pytest.mark.slow
 def test_a_bag_that_is_played_has_a_clock_of_its_own(tmp_path, peer):
     peer.listen(ON_PLANE, "Detection3DArray")
     peer.listen(STATES, "DiagnosticArray")
@@ -152,7 +148,6 @@ def test_a_bag_that_is_played_has_a_clock_of_its_own(tmp_path, peer):
     assert seconds_of(peer.received(ON_PLANE)[-1].header.stamp) <= max(robot.shown)
 
 
-@pytest.mark.slow
 def test_another_camera_may_be_fixed_in_tf(tmp_path, peer):
     peer.listen(ON_PLANE, "Detection3DArray")
     fixed = peer.middleware.publisher("/tf_static", "TFMessage", FIXED_TRANSFORMS)
@@ -173,7 +168,6 @@ def test_another_camera_may_be_fixed_in_tf(tmp_path, peer):
             assert abs(position[1]) < 2.0
 
 
-@pytest.mark.slow
 def test_a_robot_that_starts_anew_is_used_again(tmp_path, peer):
     peer.listen(ON_PLANE, "Detection3DArray")
     peer.listen(STATES, "DiagnosticArray")
@@ -188,7 +182,6 @@ def test_a_robot_that_starts_anew_is_used_again(tmp_path, peer):
         assert node.stop()[0] == 0
 
 
-@pytest.mark.slow
 def test_the_debug_image_is_made_for_who_subscribes(tmp_path, peer):
     peer.listen(DRAWN, "CompressedImage")
     peer.middleware.start()
@@ -203,7 +196,6 @@ def test_the_debug_image_is_made_for_who_subscribes(tmp_path, peer):
     assert 0.5 < difference < 30  # the image, with something drawn into it
 
 
-@pytest.mark.slow
 def test_the_status_says_what_is_missing(tmp_path, peer):
     peer.listen(STATES, "DiagnosticArray")
     peer.middleware.start()

@@ -43,7 +43,6 @@ def test_a_rolling_ball_is_where_the_track_says_more_than_where_single_detection
     assert np.median(velocity) < 2.0  # the error of the velocity is what it is said to be
 
 
-@pytest.mark.slow
 def test_a_ball_that_the_detector_finds_is_where_its_track_says():
     """Drawn frames, the detector of the package, and poses with errors of 0.3 degrees and 1 cm."""
     camera, detector, tracker = (

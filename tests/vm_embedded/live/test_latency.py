@@ -43,7 +43,6 @@ def test_a_detector_five_times_slower_than_its_camera_works_on_the_newest_frame(
     assert np.median(waited) < 0.5 * took
 
 
-@pytest.mark.slow
 def test_a_message_leaves_soon_after_its_frame(tmp_path, video):
     (tmp_path / "vm.toml").write_text(LENS)
     played = ("--live", "--camera-loop", "--camera-fps", 30)

@@ -100,7 +100,7 @@ def test_attack_1_every_changed_bit_is_refused(name, count):
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-@pytest.mark.parametrize("count", [pytest.param(12, marks=pytest.mark.slow), pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [12, pytest.param(100, marks=pytest.mark.long)])
 def test_attack_1_wrong_weights_under_a_right_checksum_are_refused(name, count):
     whole, chance = model_path(name).read_bytes(), random.Random(2)
     before = list(answers(parse_model("model.onnx", whole)))

@@ -27,7 +27,6 @@ def scene_folder(tmp_path):
     return tmp_path / "frames"
 
 
-@pytest.mark.slow
 def test_pictures_detections_and_states_are_in_the_file(tmp_path, scene_folder):
     path = tmp_path / "out.mcap"
     (scene_folder / "image002.png").write_bytes(b"no image")
@@ -56,7 +55,6 @@ def test_pictures_detections_and_states_are_in_the_file(tmp_path, scene_folder):
     assert [message.status[0].level for message in found["/diagnostics"]] == [0, 0, 1, 0, 0]
 
 
-@pytest.mark.slow
 def test_the_file_is_a_bag_with_lens_and_poses(tmp_path, scene_folder):
     path = tmp_path / "out.mcap"
     first = lines(run(scene_folder, "--save-mcap", path))
@@ -67,7 +65,6 @@ def test_the_file_is_a_bag_with_lens_and_poses(tmp_path, scene_folder):
             assert np.abs(np.subtract(each["position"], found["position"])).max() < 0.02  # the pictures are JPEG
 
 
-@pytest.mark.slow
 def test_the_stamps_of_a_bag_stay(tmp_path):
     bag = Scene(count=3).write_bag(tmp_path / "bag")
     run(bag, "--save-mcap", tmp_path / "out.mcap")
@@ -85,7 +82,6 @@ def test_the_stamps_of_a_bag_stay(tmp_path):
     assert len(stamps[0]) == 3
 
 
-@pytest.mark.slow
 def test_frames_before_an_interrupt_are_in_the_file(tmp_path):
     Scene(count=40).write_frames(tmp_path / "frames")
     path = tmp_path / "out.mcap"

@@ -284,7 +284,6 @@ def test_another_suffix_than_matplotlib_s(folder, capsys):
     assert "its suffix must be one of" in capsys.readouterr().err
 
 
-@pytest.mark.slow
 def test_as_a_user_runs_it(folder):
     command = [sys.executable, "-m", "vm_synth", "check", str(folder)]
     found = subprocess.run(command, capture_output=True, text=True, timeout=60)

@@ -15,8 +15,6 @@ from vm_embedded.errors import InputError
 from vm_synth.dataset.files import PARTS, file_of, indices_in
 from vm_synth.render.mitsuba import load_mitsuba
 
-pytestmark = pytest.mark.slow
-
 SMALL = """
 [camera]
 picture_width = 128

@@ -89,7 +89,6 @@ def test_things_above_the_horizon_have_no_distance(tmp_path):
     assert as_json(found)["distances"]["no plane"] == 1
 
 
-@pytest.mark.slow
 def test_worker_processes_find_the_same(tmp_path):
     write_pictures(tmp_path, [f"{index:02d}" for index in range(20)])
     (tmp_path / "mask07.png").unlink()

@@ -105,7 +105,6 @@ def test_the_same_command_gives_the_same_weights(whole, data, configuration, tmp
     assert same(tmp_path / "run" / "round2.pt", whole[0] / "round2.pt")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "steps"),
     [
@@ -140,7 +139,6 @@ def test_what_is_stopped_at_any_moment_ends_with_the_same_weights(how, steps, wh
     assert (folder / "log.jsonl").read_text() == (whole[0] / "log.jsonl").read_text()
 
 
-@pytest.mark.slow
 def test_a_reader_that_leaves_loses_no_training(data, configuration, tmp_path):
     """As in vm-train DATA -o RUN | head -1: no traceback, and the training is finished or can be resumed."""
     folder = tmp_path / "run"

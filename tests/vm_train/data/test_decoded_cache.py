@@ -118,7 +118,6 @@ def put_with_small_files(folder, files):
     same(read_through_cache(files, CLASSES, folder), read_picture(files, CLASSES))
 
 
-@pytest.mark.slow
 def test_a_write_that_fails_in_another_process_is_seen_here(files, kept):
     other = multiprocessing.get_context("spawn").Process(target=put_with_small_files, args=(kept, files))
     other.start()

@@ -120,7 +120,6 @@ def assert_same(folder, expected):
         assert (folder / name).read_bytes() == (expected / name).read_bytes(), name
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "steps"),
     [

@@ -35,7 +35,6 @@ def frames(path, **reading):
     return found
 
 
-@pytest.mark.slow
 @BOTH
 def test_a_bag_gives_the_same_detections_as_its_frames(tmp_path, storage):
     scene = Scene(count=100)
@@ -126,7 +125,6 @@ def test_images_after_the_end_of_tf_have_no_pose(tmp_path):
     assert "newest pose is" in found[-1][3]
 
 
-@pytest.mark.slow
 def test_one_of_several_topics_must_be_chosen(tmp_path):
     left, right = Scene(count=2), Scene(count=3)
     messages = [
@@ -195,7 +193,6 @@ def whole(tmp_path_factory):
     return {each.suffix: each.read_bytes() for each in bags}
 
 
-@pytest.mark.slow
 @settings(max_examples=150)
 @given(data=st.data())
 def test_damaged_bags_are_errors_of_one_line(whole, tmp_path_factory, data):
