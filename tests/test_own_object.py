@@ -71,6 +71,7 @@ def run(words, folder):
     return done.stdout
 
 
+@pytest.mark.long
 def test_the_page_can_be_followed_command_by_command(tmp_path, mitsuba):
     followed = []
     for line in shell_lines(PAGE):

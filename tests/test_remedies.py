@@ -71,6 +71,7 @@ def install(tmp_path_factory):
     return installed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("module", "package", "arguments"), CALLS, ids=[f"{each[0]}-{each[1]}" for each in CALLS])
 def test_a_program_without_its_packages_advises_a_command_that_installs_them(
     module, package, arguments, tmp_path, install
@@ -87,6 +88,7 @@ def test_a_program_without_its_packages_advises_a_command_that_installs_them(
     assert "Would install vm-embedded" in tried.stdout
 
 
+@pytest.mark.long
 def test_the_install_commands_of_the_pages_work(install):
     """With their extras, from the checkout and from the wheel that a release makes."""
     pages = [TOP / "README.md", TOP / "docs" / "use.md"]

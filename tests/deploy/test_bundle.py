@@ -55,6 +55,7 @@ def test_its_manifest_says_what_it_is(bundle):
     assert manifest["model_sha256"] == hashlib.sha256((bundle / "etc/model.onnx").read_bytes()).hexdigest()
 
 
+@pytest.mark.long
 def test_twice_gives_the_same_bytes(bundle_file, tmp_path):
     before = os.umask(0o077)
     try:
@@ -66,6 +67,7 @@ def test_twice_gives_the_same_bytes(bundle_file, tmp_path):
     assert (tmp_path / "dist" / bundle_file.name).read_bytes() == bundle_file.read_bytes()
 
 
+@pytest.mark.long
 def test_a_configuration_brings_its_model_and_its_lens(tmp_path):
     need_wheels()
     lens = '[lens]\nprojection = "equisolid"\nfocal_length = 420.0\nfov = 3.14\n'

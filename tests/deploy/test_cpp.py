@@ -218,6 +218,7 @@ def behaving(compiled, path):
             process.kill()
 
 
+@pytest.mark.long
 def test_a_behavior_walks_to_the_ball_and_stands_while_the_camera_is_lost(compiled, tmp_path):
     source, path = tmp_path / "script.toml", tmp_path / "lines"
     source.write_text('faults = [{ kind = "unplug", at = 4.0, seconds = 4.0 }]\n')
@@ -230,6 +231,7 @@ def test_a_behavior_walks_to_the_ball_and_stands_while_the_camera_is_lost(compil
             robot.wait_for("walk: ")
 
 
+@pytest.mark.long
 def test_a_behavior_goes_on_while_the_detector_hangs_dies_and_comes_back(compiled, tmp_path):
     path = tmp_path / "lines"
     options = ("--camera", "synthetic", "--output-unix", path, *BINARY)

@@ -90,6 +90,7 @@ def test_the_wheel_is_complete_and_small_and_its_page_has_pictures(clone, releas
     assert all(each.startswith("http") for each in links), links
 
 
+@pytest.mark.long
 def test_the_source_distribution_runs_its_tests(released, tmp_path):
     with tarfile.open(released / "vm_embedded-9.8.7.tar.gz") as tar:
         tar.extractall(tmp_path, filter="data")

@@ -59,6 +59,7 @@ def test_each_unit_is_exposed_to_little(units, name):
     assert float(found[1]) <= 2.0
 
 
+@pytest.mark.long
 def test_the_debian_package_holds_the_bundle_and_has_no_errors(bundle_file, tmp_path):
     needed("dpkg-deb")
     needed("lintian")

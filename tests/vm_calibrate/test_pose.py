@@ -99,6 +99,7 @@ def test_the_pose_over_balls_is_found(kind, box, height, pitch, roll, seed):
     check(fit_balls(balls, LENSES[kind], SIZE).orientation, true)
 
 
+@pytest.mark.long
 @settings(max_examples=15)
 @given(lens=lenses(0.2), pitch=reals(0.2, 0.8), roll=reals(-0.2, 0.2), box=st.booleans(), seed=seeds)
 def test_the_true_pose_is_within_the_stated_uncertainty(lens, pitch, roll, box, seed):

@@ -32,6 +32,7 @@ def refused(*arguments):
     return done.stderr
 
 
+@pytest.mark.long
 def test_a_model_file_gets_a_picture_of_the_user(tmp_path):
     output = tmp_path / "mine.onnx"
     done = vm_export("ball-small", "--canary", DEMO / "image0000001.jpg", DEMO / "lens0000001.yaml", "-o", output)
@@ -41,6 +42,7 @@ def test_a_model_file_gets_a_picture_of_the_user(tmp_path):
     assert prove(made).startswith("self-test passed, canary found (1 ball, ")
 
 
+@pytest.mark.long
 def test_the_networks_of_the_package_are_what_the_command_writes(tmp_path):
     output = tmp_path / "again.onnx"
     done = vm_export("ball-small", "--canary", PACKAGE_PICTURE, LENS, "-o", output)
@@ -50,6 +52,7 @@ def test_the_networks_of_the_package_are_what_the_command_writes(tmp_path):
     assert again.canary == shipped.canary
 
 
+@pytest.mark.long
 def test_pictures_that_can_not_be_a_canary_are_refused(tmp_path):
     output = tmp_path / "new.onnx"
     empty = DEMO / "image0000005.jpg", DEMO / "lens0000005.yaml"

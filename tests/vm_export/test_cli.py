@@ -36,6 +36,7 @@ def test_command_exports_a_checkpoint_and_prints_the_difference(tmp_path):
     assert read.edge == "same"
 
 
+@pytest.mark.long
 def test_command_names_its_output_after_the_model(tmp_path):
     checkpoint().save(tmp_path / "model.pt")
     run(tmp_path / "model.pt")
@@ -65,6 +66,7 @@ def test_command_writes_the_fastest_layout_and_the_portable_one_beside_it(tmp_pa
         assert "largest difference" in line
 
 
+@pytest.mark.long
 def test_command_names_the_portable_file_after_the_output(tmp_path):
     checkpoint().save(tmp_path / "model.pt")
     run(tmp_path / "model.pt", "-o", tmp_path / "ball.v2.onnx")
@@ -109,6 +111,7 @@ def test_command_never_writes_over_its_input(tmp_path):
     assert names_in(tmp_path) == ["model.plain.pt"]
 
 
+@pytest.mark.long
 def test_command_takes_class_names(tmp_path):
     path = reference_file(tmp_path / "model.yaml")
     run(path, "--classes", "penguin:object, nothing:background")
@@ -160,6 +163,7 @@ def test_command_refuses_a_layout_for_the_reference_s_format(tmp_path):
     assert names_in(tmp_path) == ["model.pt"]
 
 
+@pytest.mark.long
 def test_a_portable_file_that_can_not_be_written_leaves_no_half_of_the_work(tmp_path):
     checkpoint().save(tmp_path / "model.pt")
     (tmp_path / "model.plain.onnx").mkdir()

@@ -63,6 +63,7 @@ def test_a_probability_without_a_look_or_out_of_range_is_refused(folder, options
     assert "--look-above" in run(folder / "model.pt", *given, code=1).stderr
 
 
+@pytest.mark.long
 def test_command_attaches_a_look_to_a_model_file_and_removes_it(folder):
     run(folder / "model.pt")
     before = (folder / "model.onnx").read_bytes()

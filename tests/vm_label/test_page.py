@@ -3,6 +3,8 @@
 import random
 import time
 
+import pytest
+
 from vm_label.answers import read_answers
 from vm_label.box_folder import read_box_folder
 from vm_label.crops import most_doubtful_first
@@ -48,6 +50,7 @@ def port_of(address):
     return address.rstrip("/").rpartition(":")[2]
 
 
+@pytest.mark.long
 def test_200_crops_judged_by_keys_survive_a_reload_and_a_killed_server(tmp_path, browser):
     folder = make_folder(tmp_path / "boxes", 100)
     crops = most_doubtful_first(read_box_folder(folder).crops)

@@ -13,6 +13,7 @@ from .loopback import running
 PAGE = (Path(__file__).parents[2] / "docs" / "ros.md").read_text()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("peer")  # a domain of its own
 def test_the_example_prints_where_the_ball_is_and_the_state(tmp_path, monkeypatch):
     (uri,) = re.findall(r'^export CYCLONEDDS_URI="(.*)"$', PAGE, re.MULTILINE)

@@ -35,6 +35,7 @@ def states(peer):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("poses", ["tf", "topic:/camera_pose"])
 def test_another_process_decodes_the_same_numbers(tmp_path, peer, poses):
     peer.listen(ON_PLANE, "Detection3DArray")
@@ -102,6 +103,7 @@ def test_the_numbers_are_those_of_the_lines_of_json(tmp_path, peer):
     assert compared > 15
 
 
+@pytest.mark.long
 def test_a_lost_camera_is_a_status_within_a_second_and_never_an_empty_array(tmp_path, peer):
     peer.listen(ON_PLANE, "Detection3DArray")
     peer.listen(IN_IMAGE, "Detection2DArray")
@@ -132,6 +134,7 @@ def test_a_lost_camera_is_a_status_within_a_second_and_never_an_empty_array(tmp_
         assert any(each.detections for each in arrays)
 
 
+@pytest.mark.long
 def test_a_bag_that_is_played_has_a_clock_of_its_own(tmp_path, peer):
     peer.listen(ON_PLANE, "Detection3DArray")
     peer.listen(STATES, "DiagnosticArray")
@@ -168,6 +171,7 @@ def test_another_camera_may_be_fixed_in_tf(tmp_path, peer):
             assert abs(position[1]) < 2.0
 
 
+@pytest.mark.long
 def test_a_robot_that_starts_anew_is_used_again(tmp_path, peer):
     peer.listen(ON_PLANE, "Detection3DArray")
     peer.listen(STATES, "DiagnosticArray")
@@ -182,6 +186,7 @@ def test_a_robot_that_starts_anew_is_used_again(tmp_path, peer):
         assert node.stop()[0] == 0
 
 
+@pytest.mark.long
 def test_the_debug_image_is_made_for_who_subscribes(tmp_path, peer):
     peer.listen(DRAWN, "CompressedImage")
     peer.middleware.start()
@@ -196,6 +201,7 @@ def test_the_debug_image_is_made_for_who_subscribes(tmp_path, peer):
     assert 0.5 < difference < 30  # the image, with something drawn into it
 
 
+@pytest.mark.long
 def test_the_status_says_what_is_missing(tmp_path, peer):
     peer.listen(STATES, "DiagnosticArray")
     peer.middleware.start()

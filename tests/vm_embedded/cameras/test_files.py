@@ -15,6 +15,7 @@ from vm_embedded.cameras.open_camera import camera_opener
 from vm_embedded.cameras.synthetic import SIZE, SyntheticCamera
 
 
+@pytest.mark.long
 def test_a_video_is_played_at_its_rate_again_and_again(tmp_path):
     camera = SyntheticCamera(CameraSettings())
     path = tmp_path / "field.avi"

@@ -155,6 +155,7 @@ def test_attack_8_a_chunk_of_any_length_is_a_camera_error(length):
 STAMPS = pytest.mark.parametrize("stamps", [None, 5000.0], ids=["without stamps", "X-Timestamp"])
 
 
+@pytest.mark.long
 @STAMPS
 def test_attack_5_after_a_stall_of_the_network_a_frame_is_as_old_as_it_is(pictures, stamps):
     server = LiveServer(pictures, stamps)
@@ -178,6 +179,7 @@ def test_attack_5_after_a_stall_of_the_network_a_frame_is_as_old_as_it_is(pictur
         server.kill()
 
 
+@pytest.mark.long
 @STAMPS
 @pytest.mark.parametrize("what", ["the network", "the detector"])
 def test_attack_5_after_a_stall_no_old_frame_is_reported(tmp_path, pictures, stamps, what):
@@ -273,6 +275,7 @@ def test_attack_12_a_trickle_ends_a_read_in_time(pictures, after):
         server.kill()
 
 
+@pytest.mark.long
 def test_attack_12_a_stream_of_one_frame_and_a_trickle_is_opened_again_and_again(tmp_path, pictures):
     (tmp_path / "vm.toml").write_text(LENS)
     stop = threading.Event()
@@ -295,6 +298,7 @@ def test_attack_12_a_stream_of_one_frame_and_a_trickle_is_opened_again_and_again
         server.kill()
 
 
+@pytest.mark.long
 def test_attack_12_a_camera_can_not_lead_to_another_address(tmp_path):
     """By a redirect, by a playlist (HLS), or by a session description (SDP)."""
     (tmp_path / "vm.toml").write_text(LENS)

@@ -56,6 +56,7 @@ def test_command_takes_the_user_s_frame_lens_and_orientation():
     assert len(found["runs"]) == 1
 
 
+@pytest.mark.long
 def test_tuned_settings_are_written_and_read_by_vm_detect(tmp_path):
     path = tmp_path / "vm.toml"
     path.write_text('# ours\nmodel = "ball.onnx"\n\n[detector]\nthreads = 7 # too many\nmax_proposals = 9\n')

@@ -98,6 +98,7 @@ def test_an_option_like_no_other_is_named():
     assert done.stderr == "vm-detect: unknown option --xyzzy; vm-detect --help lists the options\n"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command",
     [

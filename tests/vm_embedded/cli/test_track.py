@@ -18,6 +18,7 @@ def tracks(messages):
     return [each["track"] for message in messages for each in message["detections"]]
 
 
+@pytest.mark.long
 def test_a_live_camera_and_its_recording_have_tracks(tmp_path):
     kept = tmp_path / "recordings"
     configuration = tmp_path / "vm.toml"

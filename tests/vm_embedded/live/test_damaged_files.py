@@ -4,6 +4,8 @@ import random
 import subprocess
 import time
 
+import pytest
+
 from tests.vm_embedded.live.running import COMMAND
 from tests.vm_embedded.live.test_faults import resident
 from tests.vm_export.looks import look_checkpoint
@@ -45,6 +47,7 @@ def refused(work):
     return None
 
 
+@pytest.mark.long
 def test_ten_thousand_damaged_configurations_are_read_or_refused_in_a_line(tmp_path):
     chance = random.Random(1)
     path = tmp_path / "vm.toml"
@@ -62,6 +65,7 @@ def test_ten_thousand_damaged_configurations_are_read_or_refused_in_a_line(tmp_p
     assert resident("self") - before < 32 * 2**20
 
 
+@pytest.mark.long
 def test_ten_thousand_damaged_models_are_loaded_or_refused_in_a_line(tmp_path):
     chance = random.Random(2)
     path = tmp_path / "damaged.onnx"

@@ -55,6 +55,7 @@ def check_frames(found):
         assert fault not in HARMFUL, each
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_fault_is_seen_and_got_over(tmp_path, kind):
     source = script(tmp_path / "script.toml", f'faults = [{{ kind = "{kind}", at = 2.5, seconds = 1.2 }}]\n')
@@ -113,6 +114,7 @@ def test_two_hundred_faults_in_any_order_leave_nothing_behind(tmp_path):
     assert np.median(memory[-quarter:]) < 1.03 * np.median(memory[quarter : 2 * quarter])
 
 
+@pytest.mark.long
 def test_threads_that_hang_too_often_end_it_with_a_status_that_asks_for_a_new_start(tmp_path):
     faults = ", ".join(f'{{ kind = "hang", at = {2 + 0.5 * at}, seconds = 60.0 }}' for at in range(30))
     source = script(tmp_path / "script.toml", f"faults = [{faults}]\n")

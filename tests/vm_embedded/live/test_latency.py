@@ -25,6 +25,7 @@ def video(tmp_path):
     return path
 
 
+@pytest.mark.long
 def test_a_detector_five_times_slower_than_its_camera_works_on_the_newest_frame(tmp_path, video):
     (tmp_path / "vm.toml").write_text(LENS)
     # A tiny ball needs a mesh with many points, on which the detector takes tens of milliseconds.
@@ -43,6 +44,7 @@ def test_a_detector_five_times_slower_than_its_camera_works_on_the_newest_frame(
     assert np.median(waited) < 0.5 * took
 
 
+@pytest.mark.long
 def test_a_message_leaves_soon_after_its_frame(tmp_path, video):
     (tmp_path / "vm.toml").write_text(LENS)
     played = ("--live", "--camera-loop", "--camera-fps", 30)

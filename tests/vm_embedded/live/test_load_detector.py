@@ -2,9 +2,12 @@
 
 import subprocess
 
+import pytest
+
 from tests.vm_embedded.live.running import COMMAND, arguments
 
 
+@pytest.mark.long
 def test_what_can_never_work_ends_it_at_the_start_with_a_status_of_its_own(tmp_path):
     for options, says in (
         (("--camera", "synthetic:fast"), "synthetic:TURN"),

@@ -50,6 +50,7 @@ def test_a_model_that_needs_too_much_memory_is_refused():
         proved(huge())
 
 
+@pytest.mark.long
 def test_a_model_without_end_is_refused_and_its_process_has_no_rights_and_is_ended():
     seen = []
     without_rights = os.geteuid() == 0 and modules_are_public()
@@ -78,6 +79,7 @@ def test_a_model_without_end_is_refused_and_its_process_has_no_rights_and_is_end
         assert "Gid:\t65534\t65534\t65534\t65534" in status
 
 
+@pytest.mark.long
 def test_attack_3_check_config_refuses_a_model_without_end(tmp_path):
     path = tmp_path / "model.onnx"
     path.write_bytes(endless())
@@ -145,6 +147,7 @@ def test_attack_3_frames_and_signals_go_on_while_a_new_model_is_proved(tmp_path)
     assert not [each for each in found.events if each["event"] in ("reloaded", "reload refused")]
 
 
+@pytest.mark.long
 def test_attack_3_a_frame_that_hangs_ends_the_detector_with_state_and_status(tmp_path):
     model = tmp_path / "model.onnx"
     model.write_bytes(endless_on_many_points())
@@ -160,6 +163,7 @@ def test_attack_3_a_frame_that_hangs_ends_the_detector_with_state_and_status(tmp
     assert (last["event"], last["level"]) == ("stopped", "error")
 
 
+@pytest.mark.long
 def test_a_detector_that_was_stopped_for_long_does_not_count_as_hanging(tmp_path):
     with running(tmp_path, "--camera", "synthetic") as found:
         found.wait_for_state("ok")

@@ -3,6 +3,8 @@
 import socket
 import time
 
+import pytest
+
 from tests.vm_embedded.live.running import running
 from tests.vm_embedded.live.test_faults import QUICK, script
 
@@ -30,6 +32,7 @@ def free_address():
         return f"127.0.0.1:{made.getsockname()[1]}"
 
 
+@pytest.mark.long
 def test_the_page_previews_a_threshold_uses_it_and_records_with_the_token_of_the_log(tmp_path, browser):
     where, kept = free_address(), tmp_path / "recordings"
     options = ("--camera", "synthetic", "--status-page", where, "--recorder-folder", kept, "--recorder-seconds", 0.5)
@@ -83,6 +86,7 @@ def test_the_page_previews_a_threshold_uses_it_and_records_with_the_token_of_the
     assert "\nmin_confidence = 1\n" in (folder / "vm.toml").read_text()
 
 
+@pytest.mark.long
 def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_camera(tmp_path, browser):
     where = free_address()
     source = script(tmp_path / "script.toml", 'faults = [{ kind = "unplug", at = 20.0, seconds = 3.0 }]\n')

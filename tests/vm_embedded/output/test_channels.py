@@ -3,11 +3,14 @@
 import signal
 import socket
 
+import pytest
+
 from tests.messages import read_message
 from tests.vm_embedded.live.running import running
 from vm_embedded.live.control import ask
 
 
+@pytest.mark.long
 def test_many_read_the_socket_and_one_that_sleeps_holds_nobody_up(tmp_path):
     path = tmp_path / "lines"
     options = ("--camera", "synthetic", "--output-unix", path, "--output-backlog-kib", 8, "--no-output-stdout")

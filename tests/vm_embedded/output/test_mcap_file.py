@@ -85,13 +85,15 @@ def test_the_stamps_of_a_bag_stay(tmp_path):
 def test_frames_before_an_interrupt_are_in_the_file(tmp_path):
     Scene(count=40).write_frames(tmp_path / "frames")
     path = tmp_path / "out.mcap"
-    # The pipe has room for a few lines, so that the command can't end before the interrupt.
+    # The pipe has room for a few lines, so that the command can't end before the interrupt. A shell that starts the
+    # tests in the background lets them ignore interrupts.
     process = subprocess.Popen(
         [COMMAND, tmp_path / "frames", "--save-mcap", path],
         bufsize=0,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         pipesize=4096,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     try:
         for _ in range(3):

@@ -53,6 +53,7 @@ def test_each_message_is_of_one_kind(messages):
     assert messages[2]["detections"]["detections"][0]["id"] == str(messages[0]["detections"][0]["track"]["id"])
 
 
+@pytest.mark.long
 def test_files_with_all_options_and_a_status_fit(tmp_path):
     options = ("--model", "soccer", "--explain", "--emit-points", "field,line", "--track", "--camera-fps", 10)
     for each in lines(run(DEMO, *options)):

@@ -5,12 +5,15 @@ import signal
 import subprocess
 import time
 
+import pytest
+
 from tests.drawn_scenes import MODEL
 from tests.messages import read_message
 from tests.vm_embedded.live.running import COMMAND, arguments, running
 from vm_embedded.output.recordings import locked
 
 
+@pytest.mark.long
 def test_a_recording_is_detected_in_again_bit_by_bit(tmp_path):
     kept = tmp_path / "recordings"
     options = ("--camera", "synthetic", "--recorder-folder", kept, "--recorder-seconds", 0.5)
@@ -78,6 +81,7 @@ def count_found(folder):
     return len(recorded)
 
 
+@pytest.mark.long
 def test_a_detector_that_is_stopped_finishes_its_recording(tmp_path):
     """Also while reads of the camera hang."""
     source, kept = tmp_path / "script.toml", tmp_path / "recordings"
@@ -106,6 +110,7 @@ def test_a_killed_detector_leaves_a_recording_that_is_read(tmp_path):
     assert 0 < count_found(folder) <= promised
 
 
+@pytest.mark.long
 def test_the_next_detector_finishes_recordings_of_a_killed_one_and_nothing_else(tmp_path):
     kept = tmp_path / "recordings"
     options = ("--camera", "synthetic", *LARGE, "--recorder-folder", kept)

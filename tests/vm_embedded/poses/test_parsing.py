@@ -97,6 +97,7 @@ LINES = (
 )
 
 
+@pytest.mark.long
 @settings(max_examples=2000)
 @given(st.lists(LINES, min_size=5, max_size=5))
 def test_ten_thousand_lines_of_anything_are_read_or_refused(lines):

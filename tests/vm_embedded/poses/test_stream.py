@@ -8,6 +8,7 @@ import threading
 import time
 
 import numpy as np
+import pytest
 
 from tests.messages import read_message
 from tests.vm_embedded.live.running import arguments, running
@@ -74,6 +75,7 @@ def measured(tmp_path, *options):
     return errors_of(found)
 
 
+@pytest.mark.long
 def test_a_ball_is_in_its_place_while_the_camera_turns_fast(tmp_path):
     interpolated = np.median(measured(tmp_path))
     newest = np.median(measured(tmp_path, "--no-pose-interpolate"))
@@ -119,6 +121,7 @@ def test_poses_come_by_standard_input_too(tmp_path):
         found.stop()
 
 
+@pytest.mark.long
 def test_ten_thousand_bad_poses_change_nothing(tmp_path):
     chance = random.Random(3)
     port = free_port()

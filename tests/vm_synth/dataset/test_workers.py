@@ -85,11 +85,13 @@ def test_a_set_has_all_parts_of_all_pictures(whole):
     assert [each["index"] for each in truth] == list(range(6))
 
 
+@pytest.mark.long
 def test_two_workers_make_the_same_bytes(tmp_path, small, whole):
     assert run(tmp_path, [*small, "--workers", "2"]).returncode == 0
     assert contents(tmp_path) == whole
 
 
+@pytest.mark.long
 def test_shards_join_to_the_same_set(tmp_path, small, whole):
     joined = {}
     for shard in ("1/2", "2/2"):
@@ -141,6 +143,7 @@ def wait_for_end_of(group):
         time.sleep(0.05)
 
 
+@pytest.mark.long
 def test_a_killed_worker_is_reported_in_one_line_and_nothing_is_lost(tmp_path, small, whole):
     arguments = [*COMMAND, str(tmp_path), *small, "--workers", "1"]
     process = started(arguments)
@@ -159,6 +162,7 @@ def children(pid):
     return [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
+@pytest.mark.long
 def test_a_full_disk_ends_in_one_line_and_can_be_continued(tmp_path, small, whole):
     """A limit on the size of files stands for the disk: writing fails in the middle of an image."""
     limited = ["bash", "-c", 'ulimit -f 2; exec "$@"', "bash", *COMMAND, str(tmp_path), *small, "--workers", "1"]

@@ -102,6 +102,7 @@ def test_names_are_pairs():
         parse_names(["0=ball", "0=cup"])
 
 
+@pytest.mark.long
 def test_a_clear_ball_without_a_box_is_told(tmp_path):
     """Pictures of the demo with boxes of what the detector found, except one."""
     saved, demo = tmp_path / "saved", CHECKOUT / "tests" / "fixtures" / "demo"

@@ -110,6 +110,7 @@ def looking(tmp_path_factory):
     return path
 
 
+@pytest.mark.long
 def test_a_close_look_s_proposals_have_scores_of_their_own(capsys, looking, data, tmp_path):
     out = tmp_path / "out"
     options = ("--radius-of", "scene", "--max-proposals", 7, "--min-confidence", 0)
@@ -155,6 +156,7 @@ def test_the_report_needs_nothing_else(evaluated):
     assert "image00" in page
 
 
+@pytest.mark.long
 def test_the_same_run_gives_the_same_files(evaluated, data, tmp_path):
     out, _ = evaluated
     assert main([str(MODEL), str(data), "-o", str(tmp_path / "again"), "--workers", "1", "--radius-of", "scene"]) == 0
@@ -209,6 +211,7 @@ def test_strange_colors_come_with_advice_and_a_strict_run_ends_at_the_first_bad_
     assert "mask0000.png" in complaint(capsys, MODEL, bad, *out, "--strict")
 
 
+@pytest.mark.long
 def test_bad_pictures_are_skipped_and_a_robot_s_configuration_counts_unless_an_option_says_otherwise(bad, tmp_path):
     (tmp_path / "vm.toml").write_text('[detector]\nthreshold = 0.6\nmin_inside = 0.6\nformat = "rgb"\n')
     robot = ("--as-robot", "--config", tmp_path / "vm.toml", "--min-inside", 0.5)
@@ -253,6 +256,7 @@ def test_wrong_usage_exits_with_2(arguments):
     assert "--help lists the options" in run(*arguments, code=2).stderr
 
 
+@pytest.mark.long
 def test_the_figure_alone_needs_no_model(tmp_path):
     done = run("points", "-o", tmp_path / "figure.svg", "--intersections", "3", "--equal-at", "4")
     assert "visual" in done.stdout

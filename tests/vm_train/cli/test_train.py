@@ -10,6 +10,7 @@ import pytest
 from tests.vm_train.commands import COMMAND, environment, run
 
 
+@pytest.mark.long
 def test_faults_are_named_before_the_training_begins_and_skipped_or_refused(data, configuration, tmp_path):
     folder = tmp_path / "data"
     folder.mkdir()
@@ -29,6 +30,7 @@ def test_faults_are_named_before_the_training_begins_and_skipped_or_refused(data
     assert not {"0003", "0005", "0007"} & {number for part in used.values() for number in part}
 
 
+@pytest.mark.long
 def test_an_empty_part_is_named(data, configuration, tmp_path):
     done = run(data, "-o", tmp_path / "run", "--config", configuration, "--set", "data.validation=0", code=1)
     assert "validation" in done.stderr
@@ -62,11 +64,13 @@ def test_without_torch_it_says_what_to_install(arguments, tmp_path):
     assert done.stderr == said
 
 
+@pytest.mark.long
 def test_a_folder_without_pictures_or_a_training_ends_in_one_line(tmp_path):
     assert "no pictures in" in run(tmp_path, "-o", tmp_path / "run", code=1).stderr
     assert "holds no training" in run("resume", tmp_path, code=1).stderr
 
 
+@pytest.mark.long
 def test_the_rate_finder_proposes_a_rate(data, configuration, tmp_path):
     done = run("rate", data, "--config", configuration, "--steps", 60, "--plot", tmp_path / "rate.png")
     proposed = float(re.search(r"proposed: training\.rate = (\S+)", done.stdout)[1])
@@ -86,12 +90,14 @@ def test_a_configuration_can_be_written_and_used(data, tmp_path):
     assert "no picture shows class goal" in done.stderr  # of the usual classes, this set has no goals and no robots
 
 
+@pytest.mark.long
 def test_a_loss_that_is_no_number_ends_the_training_at_once(data, configuration, tmp_path):
     wild = ["--set", "training.rate=1000", "--set", "training.clip=0", "--set", "training.optimizer=sgd"]
     done = run(data, "-o", tmp_path / "run", "--config", configuration, *wild, code=1)
     assert "is NaN or infinite: begin again with a lower training.rate" in done.stderr
 
 
+@pytest.mark.long
 def test_a_full_disk_ends_in_one_line(data, configuration, tmp_path):
     """A limit on the size of files stands for the disk."""
     limited = ["bash", "-c", 'trap "" XFSZ; ulimit -f 8; exec "$@"', "bash", *COMMAND, data, "-o", tmp_path / "run"]

@@ -13,6 +13,7 @@ from vm_export.checkpoint import Checkpoint
 from vm_train.learning.log import read_log
 
 
+@pytest.mark.long
 def test_a_validation_without_objects_chooses_by_all_classes(data, configuration, tmp_path):
     without = [each for each in range(30) if json.loads((data / f"scene{each:04d}.json").read_text())["ball"] is None]
     assert without
@@ -23,6 +24,7 @@ def test_a_validation_without_objects_chooses_by_all_classes(data, configuration
     assert min(scores) > 0.0
 
 
+@pytest.mark.long
 def test_a_rare_class_does_not_leave_the_training_without_points(data, configuration, tmp_path):
     folder = Path(shutil.copytree(data, tmp_path / "data"))
     mask = cv2.imread(str(folder / "mask0002.png"), cv2.IMREAD_UNCHANGED)

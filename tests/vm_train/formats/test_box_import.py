@@ -237,6 +237,7 @@ def test_what_is_missing_is_named(frames, configuration, tmp_path):
     assert not out.exists()
 
 
+@pytest.mark.long
 def test_a_network_of_the_package_is_fine_tuned_as_a_user_types_it(frames, tmp_path):
     """Import for a network of any radius, mix with rendered pictures, train it on, and export it with a close look."""
     out, mixed, folder, days = (tmp_path / name for name in ("own", "mixed", "run", "days"))

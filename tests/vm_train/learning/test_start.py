@@ -49,6 +49,7 @@ def weights(path):
     return Checkpoint.load(path).network.state_dict()
 
 
+@pytest.mark.long
 def test_with_a_tiny_rate_the_network_stays_the_same_from_a_checkpoint_and_from_its_model_file(first, data, tmp_path):
     export(Checkpoint.load(first), tmp_path / "model.onnx", "runs")
     tables = tmp_path / "classes.toml"
@@ -67,6 +68,7 @@ def test_with_a_tiny_rate_the_network_stays_the_same_from_a_checkpoint_and_from_
     assert Checkpoint.load(first).manifest.provenance["start_sha256"] == "none"
 
 
+@pytest.mark.long
 def test_a_stopped_training_goes_on_from_the_copy_to_the_same_bytes(first, data, configuration, tmp_path):
     start = tmp_path / "mine.pt"
     shutil.copy(first, start)
@@ -104,6 +106,7 @@ def test_what_differs_is_named(entry, said, first, data, configuration, tmp_path
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.long
 def test_an_unknown_network_is_refused(data, tmp_path):
     assert "did you mean 'ball'?" in run(data, "-o", tmp_path / "run", "--from", "bal", code=1).stderr
     assert "can't read" in run(data, "-o", tmp_path / "run", "--from", tmp_path / "no.pt", code=1).stderr

@@ -38,6 +38,7 @@ def change(path):
     checkpoint.save(path)
 
 
+@pytest.mark.long
 def test_a_teacher_goes_along_and_changes_what_is_learned(one, data, configuration, tmp_path):
     teacher = tmp_path / "teacher.pt"
     teacher.write_bytes((one / "model.pt").read_bytes())
@@ -56,6 +57,7 @@ def test_a_teacher_goes_along_and_changes_what_is_learned(one, data, configurati
     assert "teacher.pt was changed since the training began" in refused.stderr
 
 
+@pytest.mark.long
 def test_a_teacher_of_another_mesh_or_without_a_file_is_refused(one, data, configuration, tmp_path):
     settings = ("--config", configuration, "--set", "mesh.intersections=5")
     refused = run(data, "-o", tmp_path / "run", "--teacher", one / "model.pt", *settings, code=1)

@@ -189,6 +189,7 @@ def _part(rank, size, folder, hard):
     assert not [each for each in threads if "gloo" in each], "threads of the group outlive it and may abort the exit"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hard", [False, True])
 def test_two_processes_train_as_one(hard, tmp_path):
     alone = training(Recipe(epochs=2, batch=4), [network(8)] if hard else ())

@@ -75,6 +75,7 @@ def test_patches_have_labels_and_come_from_all_kinds_of_places(begin):
     assert 3 <= sum(each.proposed for each in chunks) <= sum(each.objects for each in chunks) <= len(validation)
 
 
+@pytest.mark.long
 def test_two_workers_write_the_same_files_as_one(begin):
     one, two = begin("one"), begin("two")
     collect_patches(one, 1)

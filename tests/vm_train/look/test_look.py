@@ -82,6 +82,7 @@ def test_its_network_knows_its_contract_and_where_it_comes_from(whole, drawn):
     assert (scale, offset) == pytest.approx((calibration["scale"], calibration["offset"]))
 
 
+@pytest.mark.long
 def test_the_next_command_attaches_it_to_its_mesh_network(whole):
     folder, done = whole
     _, *arguments = done.stdout.splitlines()[-1].removeprefix("next: ").split()
@@ -93,6 +94,7 @@ def test_the_next_command_attaches_it_to_its_mesh_network(whole):
     (folder / "model.onnx").unlink()
 
 
+@pytest.mark.long
 def test_a_look_learns_from_what_its_glance_passes_on(whole, look, tmp_path):
     glance = whole[0] / "look.pt"
     folder = tmp_path / "run"
@@ -164,6 +166,7 @@ def wait_for_steps(folder, count, process):
         time.sleep(0.005)
 
 
+@pytest.mark.long
 def test_a_finished_training_says_so_and_a_begun_one_is_not_begun_again(whole, look):
     folder, _ = whole
     assert "finished already" in run("resume", folder).stdout
@@ -239,6 +242,7 @@ def test_files_of_others_are_not_written_over(complaint, tmp_path):
     assert "holds look.toml, which a training would overwrite" in complaint()
 
 
+@pytest.mark.long
 def test_a_loss_that_is_no_number_ends_the_training(look, tmp_path):
     done = look(tmp_path / "run", "--set", "training.rate=1000", "--set", "training.epochs=60", code=1)
     assert "begin again with a lower training.rate" in done.stderr
@@ -249,6 +253,7 @@ def test_a_training_of_a_look_stays_on_the_processor(whole):
     assert "runs on the CPU" in run("resume", whole[0], "--device", "cuda", code=1).stderr
 
 
+@pytest.mark.long
 def test_pictures_without_the_object_end_in_one_line(drawn, tiny, tmp_path):
     """Only pictures without a ball: their scenes and masks say so."""
     folder = draw_set(tmp_path / "data", 12, seed=3)

@@ -127,12 +127,14 @@ def test_what_is_stopped_at_any_moment_ends_with_the_same_bytes(how, wait, whole
     assert_same(folder, whole[0])
 
 
+@pytest.mark.long
 def test_a_finished_one_says_so_and_a_begun_one_is_not_begun_again(whole, tune):
     folder, _ = whole
     assert "finished already" in run("resume", folder).stdout
     assert f"vm-train resume {folder}" in tune(folder, code=1).stderr
 
 
+@pytest.mark.long
 def test_changed_boxes_or_settings_are_refused(whole, frames, tmp_path):
     folder = shutil.copytree(whole[0], tmp_path / "run")
     moved = shutil.copytree(frames, tmp_path / "moved")

@@ -35,6 +35,7 @@ def frames(path, **reading):
     return found
 
 
+@pytest.mark.long
 @BOTH
 def test_a_bag_gives_the_same_detections_as_its_frames(tmp_path, storage):
     scene = Scene(count=100)
