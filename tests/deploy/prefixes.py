@@ -23,7 +23,9 @@ class Prefix:
         return subprocess.run(list(map(str, words)), capture_output=True, text=True, timeout=300)
 
     def link(self, name):
-        return (self.path / name).readlink().name
+        """The release that a link names; None without the link."""
+        path = self.path / name
+        return path.readlink().name if path.is_symlink() else None
 
     def releases(self):
         return {each.name for each in (self.path / "releases").iterdir()}
