@@ -13,7 +13,7 @@ CANARY := --canary vm_embedded/models/canary.jpg export/networks/canary.yaml
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
 
-.PHONY: help setup demo test fuzz lint matrix release bundle deb deploy logs lock bench bench-external bench-synth bench-train data networks test-data score choices look-choices fixtures docs site clean
+.PHONY: help setup demo test fuzz soak lint matrix release bundle deb deploy logs lock bench bench-external bench-synth bench-train data networks test-data score choices look-choices fixtures docs site clean
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -25,13 +25,16 @@ demo: .venv/runtime ## find balls and field features in the twelve test pictures
 	@$(BIN)/vm-detect --model soccer --camera $(DEMO) --save-overlay demo-out
 	@echo "Annotated pictures: $(CURDIR)/demo-out/"
 
-test: lint ## lint and tests (10 minutes); LONG=1 adds the long ones (30 minutes): 200 camera faults, a booted robot
+test: lint ## lint and tests (10 minutes); LONG=1 adds the long ones (30 minutes): camera faults, a booted robot
 	$(BIN)/python deploy/bundle.py --download
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder $(if $(LONG),,-m 'not long')
 
 SECONDS ?= 3600
 fuzz: .venv/dev ## attack everything that reads outside inputs: make fuzz [TARGETS='lens web'] [SECONDS=3600 for each] [SEED=1]
 	$(BIN)/python -m tests.fuzz.run $(TARGETS) --seconds $(SECONDS) --seed $(SEED)
+
+soak: .venv/dev ## 12,000 camera faults, a million calls of detect, thousands of connections: make soak [SOAKS='calls connections'] (80 minutes)
+	$(BIN)/python -m tests.soak.run $(SOAKS)
 
 lint: .venv/dev ## style, spelling and types
 	$(BIN)/ruff check .

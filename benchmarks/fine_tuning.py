@@ -62,20 +62,25 @@ def link_frames(frames: Sequence[BoxedPicture], folder: Path) -> None:
 
 
 def fine_tune(model: str, frames: Sequence[BoxedPicture], seed: int, folder: Path, names: Sequence[str]) -> Path:
-    """Fine-tune a network on frames, or continue that. Returns the new model file."""
+    """Fine-tune a network on frames, or continue that. Returns the new model file.
+
+    The file `seconds` gets the time that it took; null if it was interrupted.
+    """
     made = folder / "run" / "model.onnx"
     if (folder / "seconds").exists():
         return made
     link_frames(frames, folder / "frames")
     command = [sys.executable, "-m", "vm_train"]
-    if (folder / "run" / "run.json").exists():
+    is_continued = (folder / "run" / "run.json").exists()
+    if is_continued:
         command += ["resume", str(folder / "run")]
     else:
         command += ["look", "--from", model, "--boxes", str(folder / "frames"), "--names", *names]
         command += ["-o", str(folder / "run"), "--set", f"training.seed={seed}", "--set", f"data.split_seed={seed}"]
     start = time.perf_counter()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    (folder / "seconds").write_text(f"{time.perf_counter() - start:.0f}\n")
+    seconds = None if is_continued else round(time.perf_counter() - start)
+    (folder / "seconds").write_text(json.dumps(seconds))
     return made
 
 
@@ -125,7 +130,7 @@ def main() -> None:
             frames = frames[:count] if count else frames
             folder = options.output / f"{len(frames)}-{seed}"
             made = fine_tune(options.model, frames, seed, folder, options.names)
-            row = {"frames": len(frames), "seed": seed, "seconds": float((folder / "seconds").read_text())}
+            row = {"frames": len(frames), "seed": seed, "seconds": json.loads((folder / "seconds").read_text())}
             result["after"].append(row | measure(made, test, name))
             print(result["after"][-1], flush=True)
             options.json.write_text(json.dumps(result, indent=1) + "\n")

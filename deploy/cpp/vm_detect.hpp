@@ -359,7 +359,8 @@ class Client {
     // Why it is in this state; it may be empty.
     std::string reason() const {
         if (socket_ < 0) return trouble_;
-        if (heard_ < 0.0 || silent()) return "vm-detect is silent";
+        if (heard_ < 0.0) return "waiting for the first message";
+        if (silent()) return "vm-detect is silent";
         return reason_;
     }
 

@@ -177,6 +177,12 @@ install_packages() {
 
 test_release() {
     say "testing the model"
+    RUNTIME_DIRECTORY=/run/vm-detect # where the sockets will be
+    if [ "$SUPERVISOR" = none ]; then
+        RUNTIME_DIRECTORY=$PREFIX/run
+        mkdir -p "$RUNTIME_DIRECTORY"
+    fi
+    export RUNTIME_DIRECTORY
     "$target/venv/bin/vm-detect" --config "$target/etc/vm.toml" --check-config
     "$target/venv/bin/vm-doctor" --config "$target/etc/vm.toml" || say "note: vm-doctor found the problems above"
 }

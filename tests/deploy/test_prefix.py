@@ -94,12 +94,17 @@ def test_without_systemd_it_says_how_to_start_it_and_when_to_restart_it(bundle, 
     here = Prefix(tmp_path / "prefix", [])
     said = here.install(changed(bundle, tmp_path / "a", "1-a")).stdout
     (command,) = re.findall(r"start the detector with (.* run)$", said, re.MULTILINE)
-    assert f"start the detector with {command}" in here.deploy("status").stdout
+    assert f"status socket: {here.path}/run/vm-detect.sock" in said
+    assert "the synthetic camera" not in said
+    stopped = here.deploy("status")
+    assert f"start the detector with {command}" in stopped.stdout
+    assert stopped.returncode == 1
     model = here.path / "current" / "etc" / "model.onnx"
     with started(f"exec {command}"):
         deadline = time.monotonic() + 60.0
-        while "detector  ok" not in here.deploy("status").stdout:
+        while (seen := here.deploy("status")).returncode:
             assert time.monotonic() < deadline
+        assert "detector  ok" in seen.stdout
         with socket.socket(socket.AF_UNIX) as reader:
             reader.connect(str(here.path / "run" / "lines.sock"))
             assert read_message(reader.makefile().readline())["state"] == "ok"

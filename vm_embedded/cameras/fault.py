@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import time
 from bisect import bisect_right
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -31,7 +31,11 @@ KINDS = {
     "frozen": "the same image repeats",
     "truncated": "images end in the middle",
     "slow": "frames arrive long after they were taken",
+    "burst": "frames wait until the fault ends, then arrive at once",
     "resize": "images have another size",
+    "empty": "images have no pixels",
+    "blank": "images have a single color",
+    "depth": "images have 16 bits for each channel",
     "ahead": "timestamps are an hour in the future, as after a clock jump",
     "behind": "timestamps are an hour in the past",
 }
@@ -42,6 +46,12 @@ _SLOW = 0.6
 
 _JUMP = 3600.0
 """Error of the timestamps of frames ahead and behind [s]."""
+
+_WAITING = 30
+"""Most frames that wait for the end of a burst; the oldest are lost."""
+
+_BLANK = 128
+"""Gray value of blank images."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +137,8 @@ class Faults:
         self._began: float | None = None
         self.last: Shot | None = None
         """The last good shot, which a frozen camera repeats even after it was opened again."""
+        self.waiting: deque[Shot] = deque(maxlen=_WAITING)
+        """The shots of a burst that wait for its end, the oldest first."""
 
     def now(self) -> Fault | None:
         """The active fault, or None."""
@@ -156,29 +168,49 @@ class FaultCamera:
         _check_plugged(fault)
         if fault is not None and fault.kind == "hang":
             time.sleep(self._faults.remaining(fault))
+        while fault is not None and fault.kind == "burst":
+            self._wait(self._camera.read())
+            fault = self._faults.now()
+        if self._faults.waiting:
+            return self._faults.waiting.popleft()
         shot = self._camera.read()
         if shot is None or fault is None:
             self._faults.last = shot
             return shot
         return self._apply(fault.kind, shot)
 
+    def _wait(self, shot: Shot | None) -> None:
+        if shot is not None:
+            self._faults.waiting.append(_marked(shot, "burst"))
+
     def _apply(self, kind: str, shot: Shot) -> Shot:
-        truth: dict[str, Any] = {**shot.truth, "fault": kind}
+        shot = _marked(shot, kind)
         if kind == "frozen" and self._faults.last is not None:
-            return replace(shot, image=self._faults.last.image, truth=truth)
+            return replace(shot, image=self._faults.last.image)
         if kind == "truncated":
             content = cv2.imencode(".jpg", shot.image)[1].tobytes()
-            return replace(shot, image=decode_frame(content[: len(content) // 2]), truth=truth)
+            return replace(shot, image=decode_frame(content[: len(content) // 2]))
         if kind == "slow":
             time.sleep(_SLOW)
         if kind == "resize":
-            return replace(shot, image=np.ascontiguousarray(shot.image[: shot.image.shape[0] // 2]), truth=truth)
+            return replace(shot, image=np.ascontiguousarray(shot.image[: shot.image.shape[0] // 2]))
+        if kind == "empty":
+            return replace(shot, image=shot.image[:0, :0])
+        if kind == "blank":
+            return replace(shot, image=np.full_like(shot.image, _BLANK))
+        if kind == "depth":
+            return replace(shot, image=shot.image.astype(np.uint16) << 8)
         jump = {"ahead": _JUMP, "behind": -_JUMP}.get(kind, 0.0)
-        return replace(shot, captured=shot.captured + jump, truth=truth)
+        return replace(shot, captured=shot.captured + jump)
 
     def close(self) -> None:
         """Close the other camera."""
         self._camera.close()
+
+
+def _marked(shot: Shot, kind: str) -> Shot:
+    """The shot, with the kind of its fault in its truth."""
+    return replace(shot, truth={**shot.truth, "fault": kind})
 
 
 def _check_plugged(fault: Fault | None) -> None:

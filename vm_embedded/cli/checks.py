@@ -200,6 +200,8 @@ def check_lens(configuration: Configuration) -> Finding:
     lens, camera = configuration.lens, configuration.camera
     if configuration.fov is not None:
         return Finding("lens", GOOD, f"{math.degrees(configuration.fov):g} degrees wide, without distortion")
+    if lens is None and brings_lens_and_pose(camera.source):
+        return Finding("lens", GOOD, f"{camera.source} has its own")
     if lens is None:
         return Finding("lens", WARNING, "no lens is configured", "vm-detect --lens FILE, or set lens in vm.toml")
     if lens.lens.size is None:
@@ -250,6 +252,8 @@ def check_status_socket(configuration: Configuration) -> Finding:
         path = control_path(configuration.status.socket)
     except InputError as error:
         return Finding("status socket", BAD, str(error), "ls -ld /tmp/vm-detect-$(id -u)")
+    if not path.parent.exists() and path.parent == Path(os.environ.get("RUNTIME_DIRECTORY", "")):
+        return Finding("status socket", GOOD, f"{path}; systemd creates its folder")
     if not os.access(path.parent, os.W_OK):
         return Finding("status socket", BAD, f"can't write to {path.parent}", f"sudo install -d -o $USER {path.parent}")
     return Finding("status socket", GOOD, str(path))

@@ -169,7 +169,7 @@ def _notes(options: argparse.Namespace, settings: Settings, subject: Subject, re
             "the radius of each picture's ball."
         )
     if options.radius_of == "scene":
-        notes.append("The detector expects the radius of each picture's ball.")
+        notes.append("--radius-of scene: the detector was given the radius of each picture's ball.")
     return notes
 
 

@@ -182,7 +182,9 @@ def _report(run: TrainingRun, outcome: TrainingOutcome) -> None:
     else:
         print(f"{model}: the training was finished already")
     if data.split.test:
-        print(f"next: vm-evaluate {model} {data.folder} --list {run.folder / 'pictures.json'} --part test -o report")
+        radius = " --radius-of scene" if run.configuration.mesh.radius_of == "scene" else ""
+        pictures = f"--list {run.folder / 'pictures.json'} --part test"
+        print(f"next: vm-evaluate {model} {data.folder} {pictures}{radius} -o report")
     print(f"next: vm-export {model}")
 
 
