@@ -257,6 +257,9 @@ def test_a_behavior_survives_what_is_no_detector(compiled, tmp_path, messages):
         listening.listen()
         listening.settimeout(PATIENCE)
         with behaving(compiled, path) as robot:
+            connection, _ = listening.accept()
+            with connection:
+                robot.wait_for("stand: unreachable: waiting for the first message")
             for content, start in (
                 (b'{"type": "state"}\n', "stand: unreachable: the socket sends lines of JSON"),
                 (b"\xff" * 1000, "stand: unreachable: a message of"),

@@ -20,10 +20,8 @@ from vm_embedded.cameras.fault import KINDS, Fault, FaultScript
 from .detectors import Detector, detector, status
 
 MAX_AGE_MS = 200.0
-SETTINGS = (
-    *("--camera-lost-ms", 250, "--camera-open-ms", 500, "--camera-retry-ms", 20, "--camera-longest-retry-ms", 80),
-    *("--camera-width", 320, "--camera-height", 240, "--camera-fps", 12, "--camera-max-age-ms", MAX_AGE_MS),
-)
+QUICK = ("--camera-lost-ms", 250, "--camera-open-ms", 500, "--camera-retry-ms", 20, "--camera-longest-retry-ms", 80)
+SMALL = ("--camera-width", 320, "--camera-height", 240, "--camera-fps", 12, "--camera-max-age-ms", MAX_AGE_MS)
 
 HARMFUL = ("frozen", "truncated", "ahead", "behind", "empty", "depth")
 """Faults whose frames must never be reported."""
@@ -72,7 +70,7 @@ class FaultReport:
         ]
         return "\n".join(
             [
-                f"faults: {sum(self.faults.values())} in {self.seconds:.0f} s, {len(self.growth)} detectors side by side",
+                f"faults: {sum(self.faults.values())} in {self.seconds:.0f} s, {len(self.growth)} detectors",
                 *rows,
                 f"  {self.frames} frames reported, not reported {dict(self.rejected)}",
                 f"  stale frames and unexpected lines: {len(self.unexpected)}",
@@ -110,7 +108,7 @@ def soak_faults(
         running = [
             stack.enter_context(
                 detector(
-                    folder / str(at), "--camera", f"fault:{folder / f'{at}.toml'}", *SETTINGS, check_frame=is_fresh
+                    folder / str(at), "--camera", f"fault:{folder / f'{at}.toml'}", *QUICK, *SMALL, check_frame=is_fresh
                 )
             )
             for at in range(detectors)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from ..cameras.open_camera import camera_opener
+from ..cameras.open_camera import brings_lens_and_pose, camera_opener
 from ..cameras.opencv import device_path
 from ..errors import InputError, VisualMeshError, one_line
 from ..live.configuration import Configuration

@@ -92,7 +92,9 @@ def test_a_lens_for_another_size_is_seen(root):
     other = replace(HEALTHY, camera=CameraSettings(source="synthetic", width=640, height=480))
     assert found(other, root)["lens"].state == BAD
     assert "other proportions" in found(other, root)["lens"].seen
-    assert found(replace(HEALTHY, lens=None), root)["lens"].state == WARNING
+    file = CameraSettings(source=str(root))
+    assert found(replace(HEALTHY, lens=None, camera=file), root)["lens"].state == WARNING
+    assert found(replace(HEALTHY, lens=None), root)["lens"].seen == "synthetic has its own"
     without = replace(HEALTHY, lens=LensFile(Equisolid(focal_length=300.0, fov=2.0), None))
     assert found(without, root)["lens"].state == WARNING
     assert "size: [width, height] in YAML" in found(without, root)["lens"].mend
@@ -101,6 +103,12 @@ def test_a_lens_for_another_size_is_seen(root):
 def test_a_status_socket_without_a_folder_is_seen(root):
     nowhere = replace(HEALTHY, status=StatusSettings(socket="/nowhere/at/all"))
     assert found(nowhere, root)["status socket"].state == BAD
+
+
+def test_a_folder_that_systemd_will_create_is_no_fault(root, monkeypatch):
+    monkeypatch.setenv("RUNTIME_DIRECTORY", "/nowhere/at/all")
+    socket = found(HEALTHY, root)["status socket"]
+    assert (socket.state, socket.seen) == (GOOD, "/nowhere/at/all/vm-detect.sock; systemd creates its folder")
 
 
 def test_every_fault_has_a_command_that_mends_it(root):

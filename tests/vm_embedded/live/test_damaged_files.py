@@ -6,8 +6,8 @@ import time
 
 import pytest
 
+from tests.soak.detectors import resident_memory
 from tests.vm_embedded.live.running import COMMAND
-from tests.vm_embedded.live.test_faults import resident
 from tests.vm_export.looks import look_checkpoint
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.detection.detector import Detector
@@ -59,10 +59,10 @@ def test_ten_thousand_damaged_configurations_are_read_or_refused_in_a_line(tmp_p
         path.write_bytes(damaged(chance, whole, 3))
         outcomes.append(refused(lambda: read_configuration(path)))
         if at == 2000:
-            before = resident("self")
+            before = resident_memory("self")
     assert all(each is None or ("\n" not in each and "vm.toml" in each) for each in outcomes)
     assert 100 < sum(each is None for each in outcomes) < 9900
-    assert resident("self") - before < 32 * 2**20
+    assert resident_memory("self") - before < 32 * 2**20
 
 
 @pytest.mark.long
@@ -77,10 +77,10 @@ def test_ten_thousand_damaged_models_are_loaded_or_refused_in_a_line(tmp_path):
         path.write_bytes(damaged(chance, whole, 4))
         outcomes.append(refused(lambda: Detector.from_file(path)))
         if at == 2000:
-            before = resident("self")
+            before = resident_memory("self")
     assert all(each is None or ("\n" not in each and len(each) < 600) for each in outcomes)
     assert sum(each is not None for each in outcomes) > 5000
-    assert resident("self") - before < 64 * 2**20
+    assert resident_memory("self") - before < 64 * 2**20
     assert time.monotonic() - started < 300
 
 

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from tests.soak.faults import SETTINGS, is_fresh
+from tests.soak.faults import QUICK, SMALL, is_fresh
 from tests.vm_embedded.live.running import running
 from vm_embedded.cameras.fault import KINDS
 
@@ -40,7 +40,7 @@ def check_frames(found):
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_fault_is_seen_and_got_over(tmp_path, kind):
     source = script(tmp_path / "script.toml", f'faults = [{{ kind = "{kind}", at = 2.5, seconds = 1.2 }}]\n')
-    with running(tmp_path, *source, *SETTINGS) as found:
+    with running(tmp_path, *source, *QUICK, *SMALL) as found:
         found.wait_for_state("ok")
         found.wait_for_state(STATES[kind])
         found.wait_for_state("ok")
@@ -52,6 +52,6 @@ def test_each_fault_is_seen_and_got_over(tmp_path, kind):
 def test_threads_that_hang_too_often_end_it_with_a_status_that_asks_for_a_new_start(tmp_path):
     faults = ", ".join(f'{{ kind = "hang", at = {2 + 0.5 * at}, seconds = 60.0 }}' for at in range(30))
     source = script(tmp_path / "script.toml", f"faults = [{faults}]\n")
-    with running(tmp_path, *source, *SETTINGS) as found:
+    with running(tmp_path, *source, *QUICK, *SMALL) as found:
         assert found.process.wait(60.0) == 75
         assert threading.active_count() < 50

@@ -1,12 +1,18 @@
 """The status page in a real browser, without a screen."""
 
+import re
 import socket
 import time
+from pathlib import Path
+from urllib.request import Request, urlopen
 
 import pytest
 
+from tests.soak.faults import QUICK
 from tests.vm_embedded.live.running import running
-from tests.vm_embedded.live.test_faults import QUICK, script
+from tests.vm_embedded.live.test_faults import script
+
+DAEMON = Path(__file__).parents[3] / "docs" / "daemon.md"
 
 MARK = """
 const picture = document.getElementById("picture"), canvas = document.createElement("canvas");
@@ -84,6 +90,25 @@ def test_the_page_previews_a_threshold_uses_it_and_records_with_the_token_of_the
         found.stop()
     (folder,) = kept.iterdir()
     assert "\nmin_confidence = 1\n" in (folder / "vm.toml").read_text()
+
+
+@pytest.mark.long
+def test_the_addresses_of_the_documentation_answer(tmp_path):
+    addresses = re.findall(r"^\| `(GET|POST) (\S+)`", DAEMON.read_text(), re.MULTILINE)
+    assert len(addresses) == 8
+    where = free_address()
+    options = ("--camera", "synthetic", "--status-page", where, "--recorder-folder", tmp_path / "recordings")
+    with running(tmp_path, *options) as found:
+        found.wait_for_state("ok")
+        (token,) = [each["token"] for each in found.events if each["event"] == "status page"]
+        for method, address in addresses:
+            request = Request(f"http://{where}{address}", method=method, headers={"X-Token": token})
+            with urlopen(request, timeout=60.0) as answer:
+                assert answer.status == 200
+                content = answer.read(100)
+            if address in ("/state", "/map"):
+                assert content.startswith(b'{"'), address
+        found.stop()
 
 
 @pytest.mark.long
