@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import resource
 import socket
+import struct
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -18,8 +19,8 @@ from .detectors import Detector, detector, status
 
 SOCKETS = ("poses", "lines", "control", "page", "metrics")
 
-_LIMIT = 5.0
-"""Longest time to connect or to get an answer [s]."""
+_LIMIT = 5
+"""Longest time to connect [s]."""
 
 _AT_ONCE = 100
 """Connections that are made without a pause."""
@@ -121,6 +122,7 @@ def _connected(address: Any, stack: ExitStack) -> socket.socket:
     """A connection that stays open until the end."""
     made = socket.socket(socket.AF_UNIX if isinstance(address, str) else socket.AF_INET)
     stack.enter_context(made)
-    made.settimeout(_LIMIT)
+    # settimeout would give up at once while other connections wait to be accepted.
+    made.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", _LIMIT, 0))
     made.connect(address)
     return made
