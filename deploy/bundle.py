@@ -43,7 +43,10 @@ from vm_embedded.output.channels import OutputSettings  # noqa: E402
 NAME = "vm-embedded-robot"
 LOCK = TOP / "deploy" / "robot.txt"
 SCRIPTS = TOP / "deploy" / "robot"
-OWN = ("vm_embedded", "export", "pyproject.toml", "README.md", "LICENSE")
+NOT_ON_ROBOTS = ":!export/vm_train/tuning/rendered_patches.npz"
+"""Only trainings need it, and it is as large as the networks."""
+
+OWN = ("vm_embedded", "export", "pyproject.toml", "README.md", "LICENSE", NOT_ON_ROBOTS)
 PACKED = (*OWN, "deploy")
 """Paths of the checkout in the project's wheel (OWN) and in the bundle."""
 

@@ -6,6 +6,8 @@ import os
 import subprocess
 import tomllib
 
+from zipfile import ZipFile
+
 import pytest
 
 import vm_embedded
@@ -35,6 +37,9 @@ def test_everything_a_robot_needs_is_in_it_and_nothing_else(bundle, bundle_file)
     release = json.loads((bundle / "manifest.json").read_text())["release"]
     assert bundle.name == f"vm-embedded-robot-{release}-linux_x86_64-cp311"
     assert bundle_file.stat().st_size < 120e6
+    (own,) = bundle.glob("wheels/vm_embedded-*.whl")
+    with ZipFile(own) as wheel:
+        assert not [each for each in wheel.namelist() if each.endswith(".npz")]
 
 
 def test_its_sums_and_hashes_are_true(bundle):
