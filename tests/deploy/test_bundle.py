@@ -5,7 +5,6 @@ import json
 import os
 import subprocess
 import tomllib
-
 from zipfile import ZipFile
 
 import pytest
