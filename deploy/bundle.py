@@ -244,7 +244,8 @@ def _signature(listing: bytes, key: Path) -> bytes:
     except OSError as error:
         raise InputError(f"can't run ssh-keygen, which signs the bundle: {error.strerror}") from error
     if ran.returncode:
-        raise InputError(f"can't sign the bundle with the key {key}: {ran.stderr.decode(errors='replace').strip()}")
+        why = "; ".join(ran.stderr.decode(errors="replace").split("\n")).strip("; ")
+        raise InputError(f"can't sign the bundle with the key {key}: {why}")
     return ran.stdout
 
 

@@ -51,9 +51,8 @@ def mitsuba():
 
 
 def run(words, folder):
-    """Run a command of the project as a user types it, with small numbers; returns its standard output."""
+    """Run a command of the project as a user types it; returns its standard output."""
     program, *arguments = words
-    arguments += LESS.get(program, {}).get(arguments[0], [])
     module, function = PROGRAMS[program].split(":")
     code = f"import sys; from {module} import {function}; sys.argv[0] = {program!r}; sys.exit({function}())"
     paths = os.pathsep.join([str(TOP), str(TOP / "export")])
@@ -82,7 +81,7 @@ def test_the_page_can_be_followed_command_by_command(tmp_path, mitsuba):
         if ">" in words:
             target = tmp_path / words[words.index(">") + 1]
             words = words[: words.index(">")]
-        shown = run(words, tmp_path)
+        shown = run(words + LESS.get(words[0], {}).get(words[1], []), tmp_path)
         if target is not None:
             target.write_text(shown)
         followed.append(words[0])
