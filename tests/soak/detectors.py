@@ -116,10 +116,8 @@ def detector(
 ) -> Iterator[Detector]:
     """A detector with its sockets in a folder. It ends with the block, whatever happens in it."""
     folder.mkdir(parents=True, exist_ok=True)
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    with subprocess.Popen(
-        arguments(folder, *options), stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment
-    ) as process:
+    command = arguments(folder, *options)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         try:
             yield Detector(process, check_frame)
         finally:

@@ -98,7 +98,7 @@ def soak_faults(
     first: float = 30.0,
     show: Callable[[float], None] = lambda _: None,
 ) -> FaultReport:
-    """Run detectors side by side, each with `count` faults. pause: between two faults [s]. first: when the first
+    """Run detectors side by side, each with `count` faults, and write the memory of each at every second [MiB]. pause: between two faults [s]. first: when the first
     one begins, after all detectors have started [s]. show: is called with the part that is done. Raises TimeoutError if
     a detector is not well before the first fault or after the last one."""
     report = FaultReport()
@@ -133,6 +133,7 @@ def soak_faults(
                 report.rejected[name] += status(folder / str(at))["counts"][name]
             report.left += _left(each, before)
             report.growth.append(growth(memory[at]) / 2**20)
+            (folder / f"memory{at}.txt").write_text("".join(f"{each / 2**20:.1f}\n" for each in memory[at]))
             report.unexpected += [] if each.stop() == 0 else ["exit status is not 0"]
             report.unexpected += each.unexpected
             report.frames += each.frames

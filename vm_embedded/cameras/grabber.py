@@ -7,10 +7,12 @@ abandoned thread delivers.
 
 from __future__ import annotations
 
+import ctypes
 import math
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import cv2
@@ -26,6 +28,10 @@ MOST_HANGING = 8
 
 _EARLY = 0.005
 """How far in the future a frame's time may be [s]: the two clocks are read one after the other."""
+
+
+_M_ARENA_MAX, _ARENAS = -8, 2
+"""Parameter of glibc's mallopt, and the arenas from which threads get memory: one for the first, one for all others."""
 
 
 @dataclass
@@ -73,6 +79,7 @@ class Grabber:
         self._pause = 1e-3 * settings.retry_ms
         self._reader: _Reader | None = None
         self._abandoned: list[_Reader] = []
+        _share_arenas()
 
     def start(self) -> None:
         """Open the camera."""
@@ -169,6 +176,13 @@ class Grabber:
             if reader is self._reader:
                 self.ended = True
         self._wake()
+
+
+def _share_arenas() -> None:
+    """Limit the arenas of this process. Otherwise each thread that opens a lost camera may get its own, which then
+    keeps some MiB. Does nothing if the C library has no arenas."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).mallopt(_M_ARENA_MAX, _ARENAS)
 
 
 class _Reader(threading.Thread):
