@@ -98,9 +98,12 @@ def soak_faults(
     first: float = 30.0,
     show: Callable[[float], None] = lambda _: None,
 ) -> FaultReport:
-    """Run detectors side by side, each with `count` faults, and write the memory of each at every second [MiB]. pause: between two faults [s]. first: when the first
-    one begins, after all detectors have started [s]. show: is called with the part that is done. Raises TimeoutError if
-    a detector is not well before the first fault or after the last one."""
+    """Run detectors side by side, each with `count` faults, and write the memory of each at every second [MiB].
+
+    pause: between two faults [s]. first: when the first one begins, after all detectors have started [s]. show: is
+    called with the part that is done. Raises TimeoutError if a detector is not well before the first fault or after the
+    last one.
+    """
     report = FaultReport()
     scripts = [_write_script(folder / f"{at}.toml", count, seed + at, pause, first) for at in range(detectors)]
     began = time.monotonic()
