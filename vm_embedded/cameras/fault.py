@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -199,7 +200,8 @@ class FaultCamera:
         if kind == "blank":
             return replace(shot, image=np.full_like(shot.image, _BLANK))
         if kind == "depth":
-            return replace(shot, image=shot.image.astype(np.uint16) << 8)
+            wrong: Any = shot.image.astype(np.uint16) << 8
+            return replace(shot, image=wrong)
         jump = {"ahead": _JUMP, "behind": -_JUMP}.get(kind, 0.0)
         return replace(shot, captured=shot.captured + jump)
 
