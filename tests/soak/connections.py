@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.vm_embedded.live.running import LENS
-from tests.vm_embedded.poses.test_stream import MOTION, Sender, free_port
+from tests.vm_embedded.poses.test_stream import MOTION, Sender
 
 from .detectors import Detector, detector, status
 
@@ -74,7 +74,7 @@ def _soak_socket(folder: Path, name: str, count: int, seconds: float) -> Connect
     folder.mkdir(parents=True)
     (folder / "vm.toml").write_text(LENS)
     addresses: dict[str, Any] = {each: str(folder / each) for each in ("poses", "lines", "control")}
-    addresses |= {each: ("127.0.0.1", free_port()) for each in ("page", "metrics")}
+    addresses |= zip(("page", "metrics"), _free_addresses(2), strict=True)
     options = (
         *("--config", folder / "vm.toml", "--camera", "synthetic", "--pose-source", f"unix:{addresses['poses']}"),
         *("--output-unix", addresses["lines"]),
@@ -107,6 +107,15 @@ def _soak_socket(folder: Path, name: str, count: int, seconds: float) -> Connect
         found.stop()
     lines = sum(found.events.values())
     return ConnectionsReport(name, count - left, before, during, max(waits), lines, found.unexpected)
+
+
+def _free_addresses(count: int) -> list[tuple[str, int]]:
+    """Addresses of TCP at which nothing listens, all different."""
+    with ExitStack() as stack:
+        made = [stack.enter_context(socket.socket()) for _ in range(count)]
+        for each in made:
+            each.bind(("127.0.0.1", 0))
+        return [each.getsockname() for each in made]
 
 
 def _rate(found: Detector, seconds: float, act: Callable[[], None]) -> float:

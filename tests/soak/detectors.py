@@ -74,7 +74,8 @@ class Detector:
         deadline = time.monotonic() + seconds
         while not what():
             if time.monotonic() > deadline or self.process.poll() is not None:
-                raise TimeoutError(f"waited in vain; status {self.process.poll()}, states {self.states[-5:]}")
+                status = self.process.poll()
+                raise TimeoutError(f"waited in vain; status {status}, {self.states[-5:]}, {self.unexpected[-3:]}")
             time.sleep(0.02)
 
     def is_ok(self) -> bool:

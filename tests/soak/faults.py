@@ -15,6 +15,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+import numpy as np
+
 from vm_embedded.cameras.fault import KINDS, Fault, FaultScript
 
 from .detectors import Detector, detector, status
@@ -50,19 +52,23 @@ class FaultReport:
     """What became of all faults.
 
     faults, recovered: by their kind, all of them and those after which the state was ok before the next one. frames:
-    how many were reported. unexpected: frames that must not be reported and lines that must not be written. growth:
-    largest difference of the memory of parts of the time, for each detector [MiB]. left: threads and descriptors that
-    a detector had in the end and not in the beginning. rejected: frames that the detectors did not report, by reason.
+    how many were reported. unexpected: frames that must not be reported and lines that must not be written. memory: of
+    each detector at every second [bytes]. left: threads and descriptors that a detector had in the end and not in the
+    beginning. rejected: frames that the detectors did not report, by reason.
     """
 
     faults: Counter[str] = field(default_factory=Counter)
     recovered: Counter[str] = field(default_factory=Counter)
     frames: int = 0
     unexpected: list[str] = field(default_factory=list)
-    growth: list[float] = field(default_factory=list)
+    memory: list[list[int]] = field(default_factory=list)
     left: int = 0
     rejected: Counter[str] = field(default_factory=Counter)
     seconds: float = 0.0
+
+    def growth(self, settled: float = _SETTLED) -> float:
+        """The largest growth of a detector's memory [MiB], see the function `growth`."""
+        return max(growth(each, settled) for each in self.memory) / 2**20
 
     def __str__(self) -> str:
         rows = [
@@ -70,11 +76,11 @@ class FaultReport:
         ]
         return "\n".join(
             [
-                f"faults: {sum(self.faults.values())} in {self.seconds:.0f} s, {len(self.growth)} detectors",
+                f"faults: {sum(self.faults.values())} in {self.seconds:.0f} s, {len(self.memory)} detectors",
                 *rows,
                 f"  {self.frames} frames reported, not reported {dict(self.rejected)}",
                 f"  stale frames and unexpected lines: {len(self.unexpected)}",
-                f"  memory of each detector changes by at most {max(self.growth, default=0.0):.1f} MiB; "
+                f"  memory of each detector changes by at most {self.growth():.1f} MiB; "
                 f"threads and descriptors left: {self.left}",
                 *self.unexpected[:10],
             ]
@@ -98,7 +104,7 @@ def soak_faults(
     first: float = 30.0,
     show: Callable[[float], None] = lambda _: None,
 ) -> FaultReport:
-    """Run detectors side by side, each with `count` faults, and write the memory of each at every second [MiB].
+    """Run detectors side by side, each with `count` faults.
 
     pause: between two faults [s]. first: when the first one begins, after all detectors have started [s]. show: is
     called with the part that is done. Raises TimeoutError if a detector is not well before the first fault or after the
@@ -120,14 +126,14 @@ def soak_faults(
             each.wait(each.is_ok)
         time.sleep(1.0)
         things = [each.open_things() for each in running]
-        memory: list[list[int]] = [[] for _ in running]
+        report.memory = [[] for _ in running]
         last = max(
             each.ready + faults[-1].at + faults[-1].seconds for each, faults in zip(running, scripts, strict=True)
         )
         total = last - time.time()
         while (left := last - time.time()) > 0.0:
             show(1.0 - left / total)
-            for each, kept in zip(running, memory, strict=True):
+            for each, kept in zip(running, report.memory, strict=True):
                 kept.append(each.resident())
             time.sleep(1.0)
         for at, (each, faults, before) in enumerate(zip(running, scripts, things, strict=True)):
@@ -135,8 +141,6 @@ def soak_faults(
             for name in ("broken", "frozen", "ahead", "late", "failed", "reconnects"):
                 report.rejected[name] += status(folder / str(at))["counts"][name]
             report.left += _left(each, before)
-            report.growth.append(growth(memory[at]) / 2**20)
-            (folder / f"memory{at}.txt").write_text("".join(f"{each / 2**20:.1f}\n" for each in memory[at]))
             report.unexpected += [] if each.stop() == 0 else ["exit status is not 0"]
             report.unexpected += each.unexpected
             report.frames += each.frames
@@ -169,13 +173,10 @@ def recovered(found: Detector, faults: Sequence[Fault]) -> list[str]:
     return kinds
 
 
-def growth(memory: Sequence[int]) -> int:
-    """Largest difference between the median memory of parts of the time, after it has settled [bytes]."""
-    settled = memory[int(_SETTLED * len(memory)) :]
-    length = max(len(settled) // _PARTS, 1)
-    medians = [
-        median(settled[at : at + length]) for at in range(0, length * _PARTS, length) if settled[at : at + length]
-    ]
+def growth(memory: Sequence[int], settled: float = _SETTLED) -> int:
+    """Largest difference between the median memory of parts of the time, without the first part `settled` [bytes]."""
+    rest = np.array(memory[int(settled * len(memory)) :])
+    medians = [median(each) for each in np.array_split(rest, _PARTS) if each.size]
     return int(max(medians) - min(medians))
 
 

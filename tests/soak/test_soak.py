@@ -19,7 +19,7 @@ def test_faults_of_every_kind_leave_no_stale_frame_and_the_detector_well(tmp_pat
     assert report.recovered == report.faults == dict.fromkeys(KINDS, 10)
     assert min(report.rejected.values()) > 10
     assert report.left == 0
-    assert max(report.growth) <= 5.0
+    assert report.growth(settled=0.6) <= 5.0  # caches take a minute to fill
     assert "stale frames and unexpected lines: 0" in str(report)
 
 
@@ -45,6 +45,7 @@ def test_connections_to_no_socket_stop_the_frames(tmp_path):
 def test_growth_ignores_the_start_and_finds_a_leak():
     assert growth([10**9] * 10 + [5] * 90) == 0
     assert growth(list(range(100))) == 80
+    assert growth(list(range(100)), settled=0.5) < 50
 
 
 def test_a_change_of_memory_is_seen():
