@@ -1,5 +1,6 @@
 """No input of the corpora, and none of some thousands made from them, does what must not happen."""
 
+import gc
 import importlib
 import subprocess
 import sys
@@ -30,6 +31,23 @@ def test_inputs_made_from_the_corpus_are_read_or_refused_in_a_line(target, tmp_p
     report = fuzz(target, tmp_path, runs=runs)
     assert [path.with_suffix(".txt").read_text() for path in report.findings] == []
     assert report.inputs >= runs
+
+
+def test_requests_to_the_page_leave_nothing_behind():
+    """The fuzzed process can't show it: there, atheris keeps something for each request."""
+    run = importlib.import_module("tests.fuzz.web").run
+    # A stream notices only after a while that nobody reads it.
+    inputs = [each for path in (CORPORA / "web").iterdir() if b"/stream" not in (each := path.read_bytes())]
+
+    def blocks_after(rounds):
+        for _ in range(rounds):
+            for data in inputs:
+                run(data)
+        gc.collect()
+        return sys.getallocatedblocks()
+
+    before = blocks_after(3)
+    assert blocks_after(20) - before < 2 * 20 * len(inputs)  # the log and counters keep something; atheris 15 a request
 
 
 @pytest.mark.parametrize(
