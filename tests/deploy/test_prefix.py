@@ -95,7 +95,7 @@ def test_without_systemd_it_says_how_to_start_it_and_when_to_restart_it(bundle, 
     said = here.install(changed(bundle, tmp_path / "a", "1-a")).stdout
     (command,) = re.findall(r"start the detector with (.* run)$", said, re.MULTILINE)
     assert f"status socket: {here.path}/run/vm-detect.sock" in said
-    assert "the synthetic camera" not in said
+    assert "no lens is configured" not in said
     stopped = here.deploy("status")
     assert f"start the detector with {command}" in stopped.stdout
     assert stopped.returncode == 1

@@ -200,9 +200,9 @@ def check_lens(configuration: Configuration) -> Finding:
     lens, camera = configuration.lens, configuration.camera
     if configuration.fov is not None:
         return Finding("lens", GOOD, f"{math.degrees(configuration.fov):g} degrees wide, without distortion")
-    if lens is None and brings_lens_and_pose(camera.source):
-        return Finding("lens", GOOD, f"{camera.source} has its own")
     if lens is None:
+        if brings_lens_and_pose(camera.source):
+            return Finding("lens", GOOD, f"{camera.source} has its own")
         return Finding("lens", WARNING, "no lens is configured", "vm-detect --lens FILE, or set lens in vm.toml")
     if lens.lens.size is None:
         return Finding(
