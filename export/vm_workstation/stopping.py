@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+_QUIET = "ignore::UserWarning:multiprocessing.resource_tracker"
 
 
 @contextmanager
@@ -15,6 +18,10 @@ def stoppable() -> Iterator[None]:
         raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGTERM, interrupt)
+    # Python removes the semaphores of a program that ended at once, and would print a warning after its last line.
+    warnings = os.environ.get("PYTHONWARNINGS", "")
+    if _QUIET not in warnings:
+        os.environ["PYTHONWARNINGS"] = f"{warnings},{_QUIET}".lstrip(",")
     try:
         yield
     finally:
