@@ -34,7 +34,7 @@ from vm_export.network import Network
 
 from .frames import Frame, demo_frames, frames
 from .networks import NETWORKS, NumpyLoop, checkpoint, model_file
-from .peers import PEERS, PeerDetector
+from .peers.networks import PEERS, PeerDetector
 from .timing import interleaved, summary
 
 RESULTS = Path(__file__).with_name("results.json")

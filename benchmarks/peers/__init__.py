@@ -1,0 +1,1 @@
+"""Detectors to compare with: their networks, times and accuracy."""
