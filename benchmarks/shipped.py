@@ -65,10 +65,10 @@ def evaluation(
 
 
 def _job(model: Path, settings: Settings) -> Job:
-    return Job(model, settings, False, _classes(model), Rules("scene"))
+    return Job(model, settings, False, classes_of(model), Rules("scene"))
 
 
-def _classes(model: Path) -> Classes:
+def classes_of(model: Path) -> Classes:
     """A network's classes with their colors in masks; the class other has those of all that is no ball."""
     manifest = read_model(model).manifest
     rest = tuple(color for name, color in CLASS_COLORS.items() if name != "ball")

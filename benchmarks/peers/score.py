@@ -1,0 +1,242 @@
+"""Scores the trained peers and the networks of the package on the same pictures.
+
+    python -m benchmarks.peers.score data/test build/peers
+
+Thresholds and the tolerance of sizes are chosen on the validation pictures of the training, where F1 is best. Writes
+benchmarks/peer_scores.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from benchmarks import measured_frames
+from vm_embedded.detection.detector import Detector
+from vm_embedded.detection.settings import Settings
+from vm_embedded.errors import GeometryError
+from vm_embedded.files import atomic_write
+from vm_embedded.geometry.lens_files import LensFile
+from vm_embedded.network.bundled import model_path
+from vm_embedded.network.model_file import read_model
+from vm_train.data.picture_files import PictureFiles
+from vm_train.data.pictures import Picture, find_pictures
+from vm_train.scores.object_scores import ObjectScores
+
+from ..shipped import CANDIDATES, METERS, RANGES, SETS, classes_of
+from .boxes import read_truths
+from .detector import TRAINED, BoxDetector, FrameDetector, located, reported
+
+RESULTS = Path(__file__).parents[1] / "peer_scores.json"
+OURS = ("ball", "ball-small")
+TOLERANCES = (1.25, 1.5, 2.0, 3.0)
+FACTORS = (1.0, 0.5, 0.25)
+"""Sizes of the test pictures of 1280 x 1024 px: twice, as large as, and half as large as those of the training."""
+
+BEYOND = {"0.5 to 6 m": RANGES["0.5 to 6 m"], "6 to 10 m": RANGES["6 to 10 m"], "4 to 10 m": range(8, 20), "all": None}
+SHARED = (("real", 0.11), ("reference", 0.075))
+"""Folders with frames of real cameras, and the radius of their ball [m]."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the validation pictures chose for a peer: score and tolerance, each with the F1 that they give."""
+
+    threshold: float
+    tolerance: float
+    threshold_with_tolerance: float
+    f1: float
+    f1_with_tolerance: float
+
+
+def resized(picture: Picture, factor: float) -> tuple[np.ndarray, LensFile]:
+    """A picture and its lens in another size."""
+    if factor == 1.0:
+        return picture.image, picture.lens
+    image = cv2.resize(picture.image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+    size = (picture.image.shape[1], picture.image.shape[0])
+    lens = picture.lens.lens.for_image(size).scaled(factor, (image.shape[1], image.shape[0]))
+    return np.asarray(image), LensFile(lens, picture.lens.orientation)
+
+
+def projection(files: PictureFiles) -> str:
+    """`rectilinear` or `fisheye`."""
+    return "rectilinear" if "RECTILINEAR" in files.lens.read_text() else "fisheye"
+
+
+class Tally:
+    """Scores of a detector on a test set: of all pictures, and by the kind of lens."""
+
+    def __init__(self) -> None:
+        self.all = ObjectScores(min_radius=2.0)
+        self.by_lens = {kind: ObjectScores(min_radius=2.0) for kind in ("rectilinear", "fisheye")}
+
+    def add(self, lens: str, truths: Sequence[Any], found: Sequence[Any]) -> None:
+        self.all.add(truths, found)
+        self.by_lens[lens].add(truths, found)
+
+
+def tally_peer(
+    detector: BoxDetector, pictures: Iterable[PictureFiles], tolerances: Sequence[float | None], factor: float = 1.0
+) -> dict[float | None, Tally]:
+    """Scores of a peer for each tolerance. Boxes of a smaller picture count in the pixels of the whole picture."""
+    classes = classes_of(model_path("ball"))
+    found = {each: Tally() for each in tolerances}
+    for files in pictures:
+        picture, radius, truths = read_truths(files, classes)
+        image, _ = resized(picture, factor)
+        boxes, scores = detector.detect(image)
+        size = (picture.image.shape[1], picture.image.shape[0])
+        orientation = picture.lens.orientation
+        assert orientation is not None
+        objects = located(boxes / factor, scores, size, picture.lens.lens, orientation, radius)
+        for tolerance, tally in found.items():
+            tally.add(projection(files), truths, reported(objects, 0.0, tolerance))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Enlarged:
+    """A detection of a smaller picture in the pixels of the whole picture."""
+
+    confidence: float
+    outline: np.ndarray
+    position: np.ndarray
+    bearing: np.ndarray
+
+
+def tally_ours(name: str, pictures: Iterable[PictureFiles], factor: float, settings: Settings) -> Tally:
+    """Scores of a network of the package, whose mesh has the radius of each picture's ball."""
+    classes, model, found = classes_of(model_path(name)), read_model(model_path(name)), Tally()
+    for files in pictures:
+        picture, radius, truths = read_truths(files, classes)
+        image, lens = resized(picture, factor)
+        assert lens.orientation is not None
+        detector = Detector(model, replace(settings, object_radius=radius))
+        try:
+            objects = detector.detect(image, lens.orientation, lens.lens).objects
+        except GeometryError:  # the camera is too low for this ball
+            objects = ()
+        large = [_Enlarged(each.confidence, each.outline / factor, each.position, each.bearing) for each in objects]
+        found.add(projection(files), truths, large)
+    return found
+
+
+def choose(detector: BoxDetector, pictures: Sequence[PictureFiles]) -> Choice:
+    """Threshold and tolerance with the best F1 on validation pictures."""
+    tallies = tally_peer(detector, pictures, (None, *TOLERANCES))
+    best = {tolerance: _best(tally.all) for tolerance, tally in tallies.items()}
+    tolerance = max(TOLERANCES, key=lambda each: best[each][0])
+    return Choice(best[None][1], tolerance, best[tolerance][1], best[None][0], best[tolerance][0])
+
+
+def _best(scores: ObjectScores) -> tuple[float, float]:
+    """The best F1 and its threshold."""
+    curve = scores.ranking(0.5).precision_recall
+    if not len(curve.thresholds):
+        return 0.0, 1.0
+    f1 = 2.0 * curve.precision * curve.recall / np.maximum(curve.precision + curve.recall, 1e-9)
+    return float(f1.max()), float(curve.thresholds[f1.argmax()])
+
+
+def numbers(scores: ObjectScores, threshold: float) -> dict[str, Any]:
+    """Average precisions by distance, and balls found and false from a threshold on."""
+    found: dict[str, Any] = {"balls": scores.ranking(0.5).truths}
+    for name, bins in (BEYOND | METERS).items():
+        rankings = {overlap: scores.ranking(overlap, bins) for overlap in (0.5, 0.75)}
+        found[name] = {f"ap{100 * overlap:.0f}": _ap(each) for overlap, each in rankings.items()}
+        outcome = rankings[0.5].at(threshold)
+        found[name] |= {"found": _rounded(outcome.recall), "false": _rounded(outcome.false_per_picture)}
+    return found
+
+
+def _ap(ranking: Any) -> float | None:
+    return _rounded(ranking.precision_recall.average_precision)
+
+
+def _rounded(value: float) -> float | None:
+    return None if np.isnan(value) else round(float(value), 4)
+
+
+def _by_lens(tally: Tally, threshold: float) -> dict[str, Any]:
+    return {kind: numbers(scores, threshold)["all"] for kind, scores in tally.by_lens.items()}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("test", type=Path, help="folder of make test-data")
+    parser.add_argument("trained", type=Path, help="folder of benchmarks.peers.train")
+    parser.add_argument("--shared", type=Path, help="folder with the real and reference frames")
+    options = parser.parse_args()
+    found: dict[str, Any] = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    validation = _validation(options.trained / "boxes")
+    for peer in TRAINED:
+        detector = BoxDetector(peer, options.trained / f"{peer.stem}.onnx")
+        choice = choose(detector, validation)
+        row: dict[str, Any] = {"choice": vars(choice)}
+        for each in SETS:
+            pictures = find_pictures(options.test / each)
+            tallies = tally_peer(detector, pictures, (None, choice.tolerance))
+            plain, fitting = tallies[None], tallies[choice.tolerance]
+            row[each] = numbers(plain.all, choice.threshold)
+            row[f"{each}, sizes checked"] = numbers(fitting.all, choice.threshold_with_tolerance)
+            if each == "field":
+                row["lenses"] = _by_lens(plain, choice.threshold)
+        row["sizes"] = {}
+        for factor in FACTORS:
+            tally = tally_peer(detector, find_pictures(options.test / "field"), (None,), factor)[None]
+            row["sizes"][f"{factor:g}"] = numbers(tally.all, choice.threshold)["all"]
+        if options.shared:
+            row["frames"] = {
+                name: measured_frames.score(
+                    options.shared / name,
+                    FrameDetector(detector, radius, choice.threshold_with_tolerance, choice.tolerance),
+                ).summary(6.0)
+                for name, radius in SHARED
+            }
+        found[peer.name] = row
+        _write(found, peer.name)
+    for name in OURS:
+        row = {}
+        for each in SETS:
+            tally = tally_ours(name, find_pictures(options.test / each), 1.0, CANDIDATES)
+            row[each] = numbers(tally.all, Settings().min_confidence)
+            if each == "field":
+                row["lenses"] = _by_lens(tally, Settings().min_confidence)
+        row["sizes"] = {}
+        for factor in FACTORS:
+            tally = tally_ours(name, find_pictures(options.test / "field"), factor, CANDIDATES)
+            row["sizes"][f"{factor:g}"] = numbers(tally.all, Settings().min_confidence)["all"]
+        if options.shared:
+            row["frames"] = {
+                folder: measured_frames.score(
+                    options.shared / folder, Detector.from_file(model_path(name), Settings(object_radius=radius))
+                ).summary(6.0)
+                for folder, radius in SHARED
+            }
+        found[name] = row
+        _write(found, name)
+
+
+def _validation(boxes: Path) -> list[PictureFiles]:
+    """The validation pictures of a folder of `write_boxes`."""
+    links = sorted((boxes / "images" / "validation").iterdir())
+    numbers = {each.stem for each in links}
+    return [each for each in find_pictures(links[0].resolve().parent) if each.number in numbers]
+
+
+def _write(found: dict[str, Any], name: str) -> None:
+    with atomic_write(RESULTS) as path:
+        path.write_text(json.dumps(found, indent=1) + "\n")
+    print(name, json.dumps(found[name].get("field", {}).get("all")), flush=True)
+
+
+if __name__ == "__main__":
+    main()
