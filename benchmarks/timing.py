@@ -13,15 +13,15 @@ import numpy as np
 
 
 def interleaved(
-    calls: Mapping[str, Callable[[], object]], rounds: int, row: int = 2, warm: int = 2
+    calls: Mapping[str, Callable[[], object]], rounds: int, row: int | Mapping[str, int] = 2, warm: int = 2
 ) -> dict[str, dict[str, float]]:
     """Times of each call, which is made `row` times in each turn [ms]: p50 and p99 of all but the first of a row, and
-    `first`, the p50 of the first ones. The first `warm` turns don't count."""
+    `first`, the p50 of the first ones. row: one number, or one for each call. The first `warm` turns don't count."""
     times: dict[str, list[list[float]]] = {name: [] for name in calls}
     for number in range(rounds + warm):
         for name, call in calls.items():
             rows = []
-            for _ in range(row):
+            for _ in range(row if isinstance(row, int) else row[name]):
                 started = perf_counter()
                 call()
                 rows.append(1e3 * (perf_counter() - started))

@@ -299,30 +299,53 @@ PEERS = (
 )
 
 
+def loaded(
+    network: nn.Module,
+    examples: dict[str, torch.Tensor],
+    outputs: list[str],
+    free: dict[str, dict[int, str]] | None = None,
+) -> onnxruntime.InferenceSession:
+    """A network in ONNX Runtime on one thread.
+
+    examples: its inputs by name. outputs: their names. free: axes whose length is free, by input, with a name for each.
+    """
+    file = io.BytesIO()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        torch.onnx.export(
+            network.eval(),
+            tuple(examples.values()),
+            file,
+            dynamo=False,
+            input_names=list(examples),
+            output_names=outputs,
+            dynamic_axes=free,
+            opset_version=17,
+        )
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.log_severity_level = 3
+    return onnxruntime.InferenceSession(file.getvalue(), options, providers=["CPUExecutionProvider"])
+
+
+def prepared(image: np.ndarray, width: int, height: int) -> np.ndarray:
+    """A BGR image scaled to this size [px], as RGB (1, 3, height, width) from -1 to 1."""
+    return cv2.dnn.blobFromImage(image, 1.0 / 127.5, (width, height), (127.5, 127.5, 127.5), swapRB=True)
+
+
 class PeerDetector:
     """A peer from frame to boxes on one thread: preparing the frame, network, selection and suppression of boxes."""
 
     def __init__(self, peer: Peer) -> None:
         torch.manual_seed(0)
-        network = peer.network().eval()
-        file = io.BytesIO()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            example = torch.zeros(1, 3, peer.side, peer.side)
-            names = ["boxes", "scores"]
-            torch.onnx.export(
-                network, (example,), file, dynamo=False, input_names=["x"], output_names=names, opset_version=17
-            )
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = 1
-        options.log_severity_level = 3
-        self._session = onnxruntime.InferenceSession(file.getvalue(), options, providers=["CPUExecutionProvider"])
+        example = torch.zeros(1, 3, peer.side, peer.side)
+        self._session = loaded(peer.network(), {"x": example}, ["boxes", "scores"])
         self._side = peer.side
 
     def detect(self, image: np.ndarray) -> int:
         """Number of objects in a BGR image."""
-        x = cv2.dnn.blobFromImage(image, 1.0 / 127.5, (self._side, self._side), (127.5, 127.5, 127.5), swapRB=True)
-        boxes, scores = self._session.run(None, {"x": x})
+        boxes, scores = self._session.run(None, {"x": prepared(image, self._side, self._side)})
         best = scores.max(axis=1)
-        chosen = np.argpartition(best, -_KEPT)[-_KEPT:]
+        kept = min(_KEPT, len(best))
+        chosen = np.argpartition(best, -kept)[-kept:]
         return len(cv2.dnn.NMSBoxes(boxes[chosen].tolist(), best[chosen].tolist(), _SCORE, _OVERLAP))
