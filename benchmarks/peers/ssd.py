@@ -1,4 +1,4 @@
-"""Trains SSDLite with MobileNet v3 at 320 x 320 px: torchvision's network, loss and augmentation (licence BSD).
+"""Trains SSDLite with MobileNet v3 at 320 x 320 px: torchvision's network, loss and augmentation (license BSD).
 
 No package ships weights of it, so it starts at random. Its default boxes are smaller than torchvision's, whose smallest
 has 64 px: a ball at 10 m has three.

@@ -20,7 +20,7 @@ from .boxes import SEED, VALIDATION, write_boxes
 from .detector import TRAINED
 
 LOG = Path(__file__).parents[1] / "peer_training.json"
-EPOCHS = {"ssdlite": 8, "yolo320": 4, "yolo640": 2}
+EPOCHS = {"ssdlite": 6, "yolo320": 4, "yolo640": 2}
 BEST = {"ssdlite": ("validation_loss", min), "yolo320": ("ap50", max), "yolo640": ("ap50", max)}
 """The value of an epoch that chooses the best one."""
 

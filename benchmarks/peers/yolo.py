@@ -1,4 +1,4 @@
-"""Trains a nano YOLO with the trainer of the package ultralytics (licence AGPL-3.0; only the extra bench has it).
+"""Trains a nano YOLO with the trainer of the package ultralytics (license AGPL-3.0; only the extra bench has it).
 
 The network starts from the weights that the package nudenet ships, a YOLO v8 nano that was trained on photographs of
 people at 320 px: it is the package on PyPI with weights of this network, and the trainer would fetch others from the

@@ -1,0 +1,166 @@
+"""Peers that learn from boxes get the same truth as our networks, and are scored by the same rules."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from torch import nn
+
+from benchmarks.peers.boxes import box_of, read_boxes, read_truths, write_boxes
+from benchmarks.peers.detector import BoxDetector, TrainedPeer, located, reported
+from benchmarks.peers.score import _best, choose, tally_ours, tally_peer
+from benchmarks.peers.train import still_improved
+from benchmarks.shipped import CANDIDATES, classes_of
+from tests.vm_train.drawn import draw_set
+from vm_embedded import Orientation
+from vm_embedded.geometry.radial_lenses import Equidistant, Rectilinear
+from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.network.bundled import model_path
+from vm_train.data.pictures import find_pictures
+from vm_train.scores.object_scores import ObjectScores
+from vm_workstation.outlines import shape_outline
+
+SIZE = (640, 512)
+LENSES = (Rectilinear(focal_length=500.0, fov=1.6), Equidistant(focal_length=250.0, fov=2.6))
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory):
+    return draw_set(tmp_path_factory.mktemp("drawn"), 40)
+
+
+@pytest.fixture(scope="module")
+def boxes(pictures, tmp_path_factory):
+    out = tmp_path_factory.mktemp("boxes")
+    write_boxes(pictures, out)
+    return out
+
+
+def test_boxes_surround_the_balls_of_both_parts(pictures, boxes):
+    seen = 0
+    for files in find_pictures(pictures):
+        picture, _, balls = read_truths(files, classes_of(model_path("ball")))
+        height, width = picture.labels.shape
+        part = next(
+            each for each in ("training", "validation") if (boxes / "labels" / each / f"{files.number}.txt").exists()
+        )
+        assert (boxes / "images" / part / f"{files.number}.jpg").resolve() == files.image
+        found = read_boxes(boxes / "labels" / part / f"{files.number}.txt", width, height)
+        expected = [box_of(each) for each in balls if not each.is_ignored(0.25, 1.5)]
+        np.testing.assert_allclose(found, np.reshape(expected, (-1, 4)), atol=1e-2)
+        seen += len(found)
+    assert seen > 20
+    assert "train: images/training" in (boxes / "data.yaml").read_text()
+
+
+def test_only_pictures_of_one_lens(pictures, tmp_path):
+    write_boxes(pictures, tmp_path / "none", "EQUIDISTANT")
+    write_boxes(pictures, tmp_path / "all", "RECTILINEAR")
+    count = {each: len(list((tmp_path / each / "images").glob("*/*"))) for each in ("none", "all")}
+    assert count == {"none": 0, "all": 40}
+
+
+@given(
+    st.sampled_from(LENSES),
+    st.floats(0.5, 6.0),
+    st.floats(-0.3, 0.3),
+    st.floats(0.05, 0.12),
+    st.floats(0.1, 0.5),
+)
+def test_a_box_around_a_ball_tells_its_place_and_that_its_size_is_possible(lens, ahead, aside, radius, pitch):
+    orientation = Orientation.from_roll_pitch(0.9, pitch=pitch)
+    center = np.array([ahead, aside, radius])
+    outline = shape_outline(lens, orientation, Sphere(radius), center, SIZE)
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    if not np.isfinite(outline).all() or (low < 0).any() or (high > SIZE).any():
+        return
+    boxes = np.concatenate([low, high])[None]
+    (found,) = located(boxes, np.array([0.7]), SIZE, lens, orientation, radius)
+    assert math.hypot(*(found.position - center)) < 0.1 * ahead
+    assert found.size == pytest.approx(1.0, abs=0.1)
+    assert reported([found], 0.5, 1.25) == [found]
+    assert reported([found], 0.8, 1.25) == []
+    (twice,) = located(boxes, np.array([0.7]), SIZE, lens, orientation, 2.0 * radius)
+    assert not twice.is_possible(1.5)
+
+
+def test_a_box_above_the_horizon_is_no_ball():
+    orientation = Orientation.from_roll_pitch(0.9, pitch=0.1)
+    (found,) = located(np.array([[300.0, 10, 320, 30]]), np.ones(1), SIZE, LENSES[0], orientation, 0.1)
+    assert math.isnan(found.distance)
+    assert not found.is_possible(100.0)
+    assert reported([found], 0.0, None) == [found]
+
+
+class Constant(nn.Module):
+    """A network with the same output for each picture; it uses the picture, so the input remains."""
+
+    def __init__(self, *outputs):
+        super().__init__()
+        self.outputs = [torch.tensor(each) for each in outputs]
+
+    def forward(self, x):
+        return tuple(each + 0.0 * x.mean() for each in self.outputs)
+
+
+def constant_peer(path: Path, stretches: bool) -> BoxDetector:
+    """A peer of 320 px that reports the same box three times, two of them hardly moved, and one far away."""
+    corners = torch.tensor([[80.0, 40, 120, 60], [81.0, 40, 121, 60], [200.0, 100, 220, 120]] + [[0.0, 0, 1, 1]] * 200)
+    scores = torch.tensor([0.9, 0.8, 0.3] + [0.0] * 200)
+    if stretches:
+        network = Constant(corners.tolist(), scores.tolist())
+    else:
+        centers, sizes = (corners[:, :2] + corners[:, 2:]) / 2, corners[:, 2:] - corners[:, :2]
+        network = Constant(torch.cat([centers, sizes, scores[:, None]], dim=1).T[None].tolist())
+    torch.onnx.export(network, (torch.zeros(1, 3, 320, 320),), str(path), dynamo=False, opset_version=17)
+    return BoxDetector(TrainedPeer("constant", path.stem, 320, stretches), path)
+
+
+@pytest.mark.parametrize(("stretches", "scale"), [(True, (4.0, 3.2)), (False, (4.0, 4.0))])
+def test_boxes_are_in_pixels_of_the_picture_and_each_object_has_one(stretches, scale, tmp_path):
+    detector = constant_peer(tmp_path / "peer.onnx", stretches)
+    boxes, scores = detector.detect(np.zeros((1024, 1280, 3), dtype=np.uint8))
+    np.testing.assert_allclose(scores, [0.9, 0.3], atol=1e-6)
+    np.testing.assert_allclose(boxes, np.array([[80.0, 40, 120, 60], [200, 100, 220, 120]]) * np.tile(scale, 2))
+
+
+def test_a_perfect_peer_has_the_best_scores_and_a_smaller_picture_the_same(pictures):
+    class Oracle:
+        def detect(self, image):
+            truths = next(
+                balls for shown, balls in known if shown.image.shape == image.shape and (shown.image == image).all()
+            )
+            found = np.reshape([box_of(each) for each in truths], (-1, 4))
+            return found, np.full(len(found), 0.9)
+
+    known = [read_truths(each, classes_of(model_path("ball")))[::2] for each in find_pictures(pictures)]
+    tallies = tally_peer(Oracle(), find_pictures(pictures), (None, 1.5))
+    for tally in tallies.values():
+        assert tally.all.ranking(0.5).precision_recall.average_precision > 0.9
+    assert tallies[None].by_lens["fisheye"].pictures == 0
+    assert choose(Oracle(), find_pictures(pictures)).threshold == pytest.approx(0.9)
+
+
+def test_our_networks_are_scored_in_pixels_of_the_whole_picture(pictures):
+    scores = {factor: tally_ours("ball", find_pictures(pictures), factor, CANDIDATES).all for factor in (1.0, 0.5)}
+    assert all(each.ranking(0.5).precision_recall.average_precision > 0.3 for each in scores.values())
+
+
+def test_nothing_found_has_no_threshold():
+    scores = ObjectScores()
+    scores.add([], [])
+    assert _best(scores) == (0.0, 1.0)
+
+
+def test_a_training_that_ends_with_its_best_epoch_still_improved():
+    rows = [{"ap50": each, "validation_loss": -each} for each in (0.1, 0.3, 0.2)]
+    assert still_improved("yolo320", rows[:2])
+    assert not still_improved("yolo320", rows)
+    assert still_improved("ssdlite", rows[:2])
+    assert not still_improved("ssdlite", rows)
