@@ -1,11 +1,22 @@
-"""From peer_times.json to the tables about other detectors in docs/results.md: `python -m benchmarks.peers.report`."""
+"""From the results of the peers to the tables and plots of docs/results.md: `python -m benchmarks.peers.report`.
+
+It reads peer_times.json, peer_training.json and peer_scores.json of this folder's parent.
+"""
 
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+
 from ..report import DOCS, fill, machine, ms, table
+from . import score, train
+from .detector import TRAINED
 from .times import RESULTS, TWO_STAGE
 
 PAGE = DOCS / "results.md"
@@ -55,6 +66,124 @@ def proposals(found: dict[str, Any]) -> str:
     return table(["network", "MFLOP", "alone", f"in a call of {part['batch']}"], rows)
 
 
+def trainings(found: dict[str, Any]) -> str:
+    pictures = round(found["pictures"] * (1.0 - found["validation"]))
+    rows = []
+    for peer in TRAINED:
+        part = found[peer.stem]
+        epochs, improved = part["epochs"], "yes" if part["still_improved"] else "no"
+        ap50 = f"{epochs[-1]['ap50']:.3f}" if "ap50" in epochs[-1] else "-"
+        minutes = sum(row["seconds"] for row in epochs) if peer.stem == "ssdlite" else epochs[-1]["seconds"]
+        seen = f"{pictures * len(epochs):,}"
+        rows.append(
+            [peer.name, str(len(epochs)), seen, f"{minutes / 60:.0f}", f"{epochs[-1]['loss']:.2f}", ap50, improved]
+        )
+    heads = ["detector", "epochs", "pictures seen", "minutes", "last loss", "validation AP50", "still improved"]
+    return table(heads, rows)
+
+
+def _number(value: float | None, factor: float = 1.0, digits: int = 3) -> str:
+    return "-" if value is None else f"{factor * value:.{digits}f}"
+
+
+def _kinds(found: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Name of the row, detector, and ending of the names of its test sets."""
+    checked = [(f"{peer.name}, sizes checked", peer.name, ", sizes checked") for peer in TRAINED]
+    plain = [(peer.name, peer.name, "") for peer in TRAINED]
+    rows = [(name, name, "") for name in score.OURS]
+    return rows + [each for pair in zip(plain, checked, strict=True) for each in pair]
+
+
+def accuracy(found: dict[str, Any], which: str) -> str:
+    rows = []
+    for title, name, ending in _kinds(found):
+        part = found[name][which + ending]
+        values = [_number(part[bins]["ap50"]) for bins in ("0.5 to 6 m", "6 to 10 m", "4 to 10 m", "all")]
+        values += [_number(part[bins]["ap75"]) for bins in ("0.5 to 6 m", "6 to 10 m")]
+        values += [_number(part["all"]["found"], 100.0, 1), _number(part["all"]["false"])]
+        rows.append([title, *values])
+    heads = ["detector", "AP50, 0.5 to 6 m", "6 to 10 m", "4 to 10 m", "all", "AP75, 0.5 to 6 m", "6 to 10 m"]
+    return table([*heads, "found [%]", "false per picture"], rows)
+
+
+def frames(found: dict[str, Any]) -> str:
+    rows = []
+    for name in (*score.OURS, *(peer.name for peer in TRAINED)):
+        row = [name]
+        for folder, _ in score.SHARED:
+            part = found[name]["frames"][folder]
+            row += [
+                f"{part['found']} of {part['balls']}",
+                f"{part['found_near']} of {part['balls_near']}",
+                str(part["false"]),
+            ]
+        rows.append(row)
+    heads = ["real frames: found", "nearer than 6 m", "false", "reference frames: found", "nearer than 6 m", "false"]
+    return table(["detector", *heads], rows)
+
+
+def lenses(found: dict[str, Any]) -> str:
+    rows = []
+    for name in (*score.OURS, *(peer.name for peer in TRAINED)):
+        part = found[name]
+        values = [part["lenses"][kind]["ap50"] for kind in ("rectilinear", "fisheye")]
+        values += [part["sizes"][f"{factor:g}"]["ap50"] for factor in reversed(score.FACTORS)]
+        rows.append([name, *map(_number, values)])
+    sizes = [f"{1280 * factor:.0f} x {1024 * factor:.0f} px" for factor in reversed(score.FACTORS)]
+    return table(["detector", "rectilinear", "fisheye", *sizes], rows)
+
+
+def _style(name: str) -> dict[str, Any]:
+    if name in score.OURS:
+        return {"color": "#2a7f62", "linestyle": "-" if name == "ball" else ":", "label": name}
+    color = {"ssdlite": "#c0504d", "yolo320": "#8064a2", "yolo640": "#4f81bd"}
+    return {"color": color[next(each.stem for each in TRAINED if each.name == name)], "label": name}
+
+
+def plot_accuracy(found: dict[str, Any], path: Path) -> None:
+    """As in the paper's fig:plots: precision over recall, and average precision over distance; IoU 0.75, and 0.5."""
+    figure, panels = pyplot.subplots(1, 3, figsize=(11, 3.6), layout="constrained")
+    curves, ap75, ap50 = panels
+    for name in (*score.OURS, *(peer.name for peer in TRAINED)):
+        if found[name]["curve"]:
+            curves.plot(*zip(*found[name]["curve"], strict=True), **_style(name))
+        for axes, which in ((ap75, "ap75"), (ap50, "ap50")):
+            bins = [found[name]["field"][each][which] for each in score.METERS]
+            axes.plot([meter + 0.5 for meter in range(len(bins))], bins, marker="o", markersize=3, **_style(name))
+    curves.set_xlabel("recall at IoU 0.75")
+    curves.set_ylabel("precision")
+    for axes, which in ((ap75, "AP75"), (ap50, "AP50")):
+        axes.set_xlabel("distance [m]")
+        axes.set_ylabel(which)
+    for axes in panels:
+        axes.set_ylim(0.0, 1.02)
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.legend(*ap50.get_legend_handles_labels(), frameon=False, fontsize=8, loc="outside lower center", ncols=5)
+    figure.savefig(path, metadata={"Date": None})
+    pyplot.close(figure)
+
+
+def plot_times(found: dict[str, Any], calls: dict[str, Any], path: Path) -> None:
+    """AP50 of each detector, at all distances, over the time of a whole call."""
+    figure, axes = pyplot.subplots(figsize=(7.5, 3.6), layout="constrained")
+    for name in (*score.OURS, *(peer.name for peer in TRAINED)):
+        x, ours = calls[name]["p50"], name in score.OURS
+        y = found[name]["field"]["all"]["ap50"]
+        axes.plot(x, y, "o", color="#2a7f62" if ours else "#9aa5b1")
+        axes.annotate(name, (x, y), xytext=(6, 0), textcoords="offset points", fontsize=8, va="center")
+        checked = found[name].get("field, sizes checked")
+        if checked:
+            axes.plot(x, checked["all"]["ap50"], "o", color="#9aa5b1", fillstyle="none")
+    axes.set_xscale("log")
+    axes.set_xlim(2, 400)
+    axes.set_ylim(0.0, 1.02)
+    axes.set_xlabel("whole call on one core [ms], log scale")
+    axes.set_ylabel("AP50 on fields")
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, metadata={"Date": None})
+    pyplot.close(figure)
+
+
 TABLES = {"machine of the times": machine, "paper's table": times, "per proposal": proposals}
 """The tables from peer_times.json, by the marks of the page."""
 
@@ -62,6 +191,12 @@ TABLES = {"machine of the times": machine, "paper's table": times, "per proposal
 def main() -> None:
     found = json.loads(RESULTS.read_text())
     fill(PAGE, {name: made(found) for name, made in TABLES.items()})
+    scores = json.loads(score.RESULTS.read_text())
+    made = {"peers' trainings": trainings(json.loads(train.LOG.read_text()))}
+    made |= {"peers on fields": accuracy(scores, "field"), "peers in clutter": accuracy(scores, "clutter")}
+    fill(PAGE, made | {"peers on frames": frames(scores), "peers by lens": lenses(scores)})
+    plot_accuracy(scores, DOCS / "peers-accuracy.svg")
+    plot_times(scores, found["calls"], DOCS / "peers-time.svg")
 
 
 if __name__ == "__main__":

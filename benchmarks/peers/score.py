@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,7 @@ from .detector import TRAINED, BoxDetector, FrameDetector, located, reported
 
 RESULTS = Path(__file__).parents[1] / "peer_scores.json"
 OURS = ("ball", "ball-small")
+FIELD = "field"
 TOLERANCES = (1.25, 1.5, 2.0, 3.0)
 FACTORS = (1.0, 0.5, 0.25)
 """Sizes of the test pictures of 1280 x 1024 px: twice, as large as, and half as large as those of the training."""
@@ -165,10 +166,6 @@ def _rounded(value: float) -> float | None:
     return None if np.isnan(value) else round(float(value), 4)
 
 
-def _by_lens(tally: Tally, threshold: float) -> dict[str, Any]:
-    return {kind: numbers(scores, threshold)["all"] for kind, scores in tally.by_lens.items()}
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("test", type=Path, help="folder of make test-data")
@@ -179,50 +176,63 @@ def main() -> None:
     validation = _validation(options.trained / "boxes")
     for peer in TRAINED:
         detector = BoxDetector(peer, options.trained / f"{peer.stem}.onnx")
-        choice = choose(detector, validation)
-        row: dict[str, Any] = {"choice": vars(choice)}
-        for each in SETS:
-            pictures = find_pictures(options.test / each)
-            tallies = tally_peer(detector, pictures, (None, choice.tolerance))
-            plain, fitting = tallies[None], tallies[choice.tolerance]
-            row[each] = numbers(plain.all, choice.threshold)
-            row[f"{each}, sizes checked"] = numbers(fitting.all, choice.threshold_with_tolerance)
-            if each == "field":
-                row["lenses"] = _by_lens(plain, choice.threshold)
-        row["sizes"] = {}
-        for factor in FACTORS:
-            tally = tally_peer(detector, find_pictures(options.test / "field"), (None,), factor)[None]
-            row["sizes"][f"{factor:g}"] = numbers(tally.all, choice.threshold)["all"]
-        if options.shared:
-            row["frames"] = {
-                name: measured_frames.score(
-                    options.shared / name,
-                    FrameDetector(detector, radius, choice.threshold_with_tolerance, choice.tolerance),
-                ).summary(6.0)
-                for name, radius in SHARED
-            }
-        found[peer.name] = row
+        found[peer.name] = peer_row(detector, choose(detector, validation), options.test, options.shared)
         _write(found, peer.name)
     for name in OURS:
-        row = {}
-        for each in SETS:
-            tally = tally_ours(name, find_pictures(options.test / each), 1.0, CANDIDATES)
-            row[each] = numbers(tally.all, Settings().min_confidence)
-            if each == "field":
-                row["lenses"] = _by_lens(tally, Settings().min_confidence)
-        row["sizes"] = {}
-        for factor in FACTORS:
-            tally = tally_ours(name, find_pictures(options.test / "field"), factor, CANDIDATES)
-            row["sizes"][f"{factor:g}"] = numbers(tally.all, Settings().min_confidence)["all"]
-        if options.shared:
-            row["frames"] = {
-                folder: measured_frames.score(
-                    options.shared / folder, Detector.from_file(model_path(name), Settings(object_radius=radius))
-                ).summary(6.0)
-                for folder, radius in SHARED
-            }
-        found[name] = row
+        found[name] = our_row(name, options.test, options.shared)
         _write(found, name)
+
+
+def peer_row(detector: BoxDetector, choice: Choice, test: Path, shared: Path | None) -> dict[str, Any]:
+    """All figures of a peer."""
+    row: dict[str, Any] = {"choice": vars(choice)}
+    for name in SETS:
+        tallies = tally_peer(detector, find_pictures(test / name), (None, choice.tolerance))
+        row[name] = numbers(tallies[None].all, choice.threshold)
+        row[f"{name}, sizes checked"] = numbers(tallies[choice.tolerance].all, choice.threshold_with_tolerance)
+        if name == FIELD:
+            row |= _details(tallies[None], choice.threshold)
+    row["sizes"] = {"1": row[FIELD]["all"]}
+    for factor in FACTORS[1:]:
+        tally = tally_peer(detector, find_pictures(test / FIELD), (None,), factor)[None]
+        row["sizes"][f"{factor:g}"] = numbers(tally.all, choice.threshold)["all"]
+    used = choice.threshold_with_tolerance, choice.tolerance
+    row["frames"] = _frames(shared, lambda radius: FrameDetector(detector, radius, *used))
+    return row
+
+
+def our_row(name: str, test: Path, shared: Path | None) -> dict[str, Any]:
+    """The same figures of a network of the package, with its default threshold."""
+    row: dict[str, Any] = {}
+    threshold = Settings().min_confidence
+    for each in SETS:
+        tally = tally_ours(name, find_pictures(test / each), 1.0, CANDIDATES)
+        row[each] = numbers(tally.all, threshold)
+        if each == FIELD:
+            row |= _details(tally, threshold)
+    row["sizes"] = {"1": row[FIELD]["all"]}
+    for factor in FACTORS[1:]:
+        tally = tally_ours(name, find_pictures(test / FIELD), factor, CANDIDATES)
+        row["sizes"][f"{factor:g}"] = numbers(tally.all, threshold)["all"]
+    row["frames"] = _frames(shared, lambda radius: Detector.from_file(model_path(name), Settings(object_radius=radius)))
+    return row
+
+
+def _details(tally: Tally, threshold: float) -> dict[str, Any]:
+    """Figures by the kind of lens, and precision over recall at the paper's overlap."""
+    lenses = {kind: numbers(scores, threshold)["all"] for kind, scores in tally.by_lens.items()}
+    curve = tally.all.ranking(0.75).precision_recall
+    chosen = np.unique(np.linspace(0, len(curve.recall) - 1, 150).astype(int)) if len(curve.recall) else []
+    return {
+        "lenses": lenses,
+        "curve": [[round(float(each[at]), 4) for each in (curve.recall, curve.precision)] for at in chosen],
+    }
+
+
+def _frames(shared: Path | None, detector: Callable[[float], Any]) -> dict[str, Any]:
+    """Figures on frames of real cameras. detector: by the radius of the ball [m]."""
+    folders = [] if shared is None else SHARED
+    return {name: measured_frames.score(shared / name, detector(radius)).summary(6.0) for name, radius in folders}
 
 
 def _validation(boxes: Path) -> list[PictureFiles]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import os
 from importlib.resources import files
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -61,11 +62,13 @@ def start(path: Path) -> None:
 
 
 def train(data: Path, out: Path, side: int, epochs: int, begin: Path | None = None) -> None:
-    """Train for pictures of side x side px, or continue an interrupted training.
+    """Train for pictures of side x side px, or continue an interrupted training; a finished one stays.
 
     data: folder of `write_boxes`. out: gets `weights/best.pt`, `weights/last.pt` and `results.csv`. begin: a network to
     start from, or None for the packaged weights.
     """
+    if (out / "results.csv").exists() and len(log(out)) >= epochs:
+        return
     os.environ.setdefault("YOLO_CONFIG_DIR", str(out.parent.resolve()))
     from ultralytics import YOLO, settings
 
@@ -94,13 +97,14 @@ def log(out: Path) -> list[dict[str, float]]:
     """Loss and average precision on validation pictures after each epoch."""
     with (out / "results.csv").open() as file:
         rows = [{name.strip(): float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+    ends = [0.0, *(row["time"] for row in rows)]
     return [
         {
-            "epoch": row["epoch"],
-            "seconds": round(row["time"]),
+            "epoch": int(row["epoch"]),
+            "seconds": round(end - begin),
             "loss": round(sum(row[f"train/{part}_loss"] for part in ("box", "cls", "dfl")), 4),
             "ap50": row["metrics/mAP50(B)"],
             "ap50_95": row["metrics/mAP50-95(B)"],
         }
-        for row in rows
+        for row, (begin, end) in zip(rows, pairwise(ends), strict=True)
     ]
