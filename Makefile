@@ -13,7 +13,7 @@ CANARY := --canary vm_embedded/models/canary.jpg export/networks/canary.yaml
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
 
-.PHONY: help setup demo test fuzz soak lint matrix release bundle deb deploy logs lock bench bench-external bench-synth bench-train data networks test-data score choices look-choices fixtures docs site clean
+.PHONY: help setup demo test fuzz soak lint matrix release bundle deb deploy logs lock bench bench-external bench-synth bench-train data networks test-data score choices look-choices peers fixtures docs site clean
 .DELETE_ON_ERROR:
 
 help: ## list the targets
@@ -69,8 +69,8 @@ logs: ## follow the log of a robot: make logs ROBOT=user@host
 lock: ## choose the robot's packages, and write their hashes to deploy/robot.txt
 	$(PYTHON) -m venv build/lock
 	build/lock/bin/pip install --disable-pip-version-check --quiet 'pip-tools>=7.4,<8'
-	cd deploy && echo pip | CUSTOM_COMPILE_COMMAND='make lock' ../build/lock/bin/pip-compile --quiet --generate-hashes \
-		--allow-unsafe --strip-extras --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-annotate \
+	cd deploy && echo installer | CUSTOM_COMPILE_COMMAND='make lock' ../build/lock/bin/pip-compile --quiet --generate-hashes \
+		--strip-extras --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-annotate \
 		--constraint constraints.txt --output-file robot.txt ../pyproject.toml -
 
 bench: .venv/bench ## measure the speed, also of other detectors; write docs/performance.md (10 minutes)
@@ -129,6 +129,13 @@ choices: .venv/dev ## measure what each choice of a training is worth: make choi
 look-choices: .venv/dev ## measure what each choice of a close look is worth: make look-choices [TEST=data/test], after networks and test-data (hours)
 	$(BIN)/python -m benchmarks.look_choices data/soccer $(TEST)/field build/look-choices
 	$(BIN)/python -m benchmarks.look_choices_report
+
+peers: .venv/bench ## train other detectors, and compare their speed and accuracy: make peers HDRI=folder-of-maps [TEST=data/test] (hours)
+	$(MAKE) data OUT=data/peers COUNT=2500 SEED=1 SCENES=export/vm_synth/soccer.toml
+	$(BIN)/python -m benchmarks.peers.train data/peers build/peers
+	$(BIN)/python -m benchmarks.peers.score $(TEST) build/peers --shared ../shared
+	$(BIN)/python -m benchmarks.peers.times
+	$(BIN)/python -m benchmarks.peers.report
 
 fixtures: .venv/dev ## draw the frames of the tests and train their network again (about 20 minutes)
 	$(BIN)/python -m tests.fixtures.make_drawn

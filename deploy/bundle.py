@@ -21,7 +21,7 @@ import tarfile
 import tempfile
 import tomllib
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -43,12 +43,18 @@ from vm_embedded.output.channels import OutputSettings  # noqa: E402
 NAME = "vm-embedded-robot"
 LOCK = TOP / "deploy" / "robot.txt"
 SCRIPTS = TOP / "deploy" / "robot"
-NOT_ON_ROBOTS = ":!export/vm_train/tuning/rendered_patches.npz"
-"""Only trainings need it, and it is as large as the networks."""
+ROOMS = ("vm_embedded", "vm_ros")
+"""Packages of this project that run on robots; the others are for a workstation."""
 
-OWN = ("vm_embedded", "export", "pyproject.toml", "README.md", "LICENSE", NOT_ON_ROBOTS)
+OWN = ("vm_embedded", "export/vm_ros", "pyproject.toml", "README.md", "LICENSE")
 PACKED = (*OWN, "deploy")
 """Paths of the checkout in the project's wheel (OWN) and in the bundle."""
+
+NETWORKS = ":!vm_embedded/models/*.onnx"
+"""Not in the project's wheel: a robot uses the network in etc/."""
+
+UNUSED = ("flatbuffers", "packaging", "protobuf")
+"""Packages of deploy/robot.txt that are left out: ONNX Runtime imports them only in its tools that change models."""
 
 DEFAULT_TARGET = "linux_x86_64-cp311"
 DEFAULT_GLIBC = (2, 28)
@@ -133,20 +139,31 @@ def wheelhouse(target: Target, folder: Path) -> list[Path]:
 
 
 def project_wheel(top: Path, origin: Origin, folder: Path) -> Path:
-    """Build the wheel of this project from the files of the checkout that git does not ignore. Raises InputError."""
+    """Build the robot's wheel of this project from the files of the checkout that git does not ignore.
+
+    Raises InputError.
+    """
     with tempfile.TemporaryDirectory() as name:
         source = Path(name)
-        listed = _git(top, "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", *OWN)
+        listed = _git(top, "ls-files", "-z", "--cached", "--others", "--exclude-standard", "--", *OWN, NETWORKS)
         for each in filter(None, listed.split("\0")):
             copy = source / each
             copy.parent.mkdir(parents=True, exist_ok=True)
             with contextlib.suppress(FileNotFoundError):  # a removed file that is still in git's index
                 copy.write_bytes((top / each).read_bytes())
                 copy.chmod(0o644)
+        project = source / "pyproject.toml"
+        project.write_text(_with_programs_of(ROOMS, project.read_text()))
         words: list[str | Path] = ["wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, source]
         _pip("the project's own wheel can't be built", *words, env={"SOURCE_DATE_EPOCH": str(origin.time)})
     (wheel,) = folder.glob("vm_embedded-*.whl")
     return wheel
+
+
+def _with_programs_of(packages: tuple[str, ...], project: str) -> str:
+    """A pyproject.toml without the programs of other packages, which would only print a traceback."""
+    programs = re.compile(r'^vm-\w+ = "(\w+)\..*\n', re.MULTILINE)
+    return programs.sub(lambda found: found[0] if found[1] in packages else "", project)
 
 
 def _pip(what: str, *words: str | Path, env: Mapping[str, str] | None = None) -> None:
@@ -204,11 +221,10 @@ def write_bundle(
     """Write a bundle and return its path. key: signs its listing. Raises VisualMeshError."""
     origin = Origin.of(TOP)
     files = {f"etc/{name}": content for name, content in configuration_files(configuration, model).items()}
-    packages = wheelhouse(target, wheels)
+    packages = [each for each in wheelhouse(target, wheels) if each.name.split("-")[0] not in UNUSED]
     with tempfile.TemporaryDirectory() as folder:
         packages = sorted([*packages, project_wheel(TOP, origin, Path(folder))], key=lambda each: each.name)
         files |= {f"wheels/{each.name}": each.read_bytes() for each in packages}
-    files["requirements.txt"] = "".join(_requirements(files)).encode()
     for each in sorted(SCRIPTS.iterdir()):
         files[each.name] = each.read_bytes()
     files["README.md"] = (TOP / "deploy" / "README.md").read_bytes()
@@ -222,14 +238,6 @@ def write_bundle(
     with atomic_write(path) as part:
         part.write_bytes(_pack(f"{NAME}-{release}-{target.name}", files, origin.time))
     return path
-
-
-def _requirements(files: dict[str, bytes]) -> Iterator[str]:
-    """Lines of requirements.txt: each wheel except pip's, with its hash."""
-    for name, content in files.items():
-        if name.startswith("wheels/") and not name.startswith("wheels/pip-"):
-            project, version, *_ = Path(name).name.split("-")
-            yield f"{project}=={version} --hash=sha256:{hashlib.sha256(content).hexdigest()}\n"
 
 
 def _sums(files: dict[str, bytes]) -> bytes:

@@ -12,8 +12,10 @@ import pytest
 from tests.messages import read_message
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
+from vm_embedded.errors import InputError
 from vm_embedded.live.configuration import read_configuration
-from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
+from vm_embedded.network import bundled
+from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path, shipped_name
 from vm_embedded.network.model_file import read_model
 
 TOP = Path(__file__).parents[1]
@@ -58,6 +60,17 @@ def test_a_configuration_may_name_one(tmp_path):
     assert read_configuration(path).model == str(model_path("ball"))
     path.write_text('model = "mine.onnx"\n')
     assert read_configuration(path).model == str(tmp_path / "mine.onnx")
+
+
+def test_a_network_has_its_name_only_in_the_package(tmp_path):
+    assert [shipped_name(model_path(name)) for name in SHIPPED] == list(SHIPPED)
+    assert shipped_name(tmp_path / "ball.onnx") is None
+
+
+def test_a_robot_without_the_networks_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(bundled, "_FOLDER", tmp_path)
+    with pytest.raises(InputError, match=r"network soccer is not installed.*etc/model\.onnx"):
+        model_path("soccer")
 
 
 def test_the_mesh_follows_the_ball():

@@ -156,7 +156,7 @@ copy_files() {
     if [ "$(id -u)" = 0 ]; then chown -R 0:0 "$target"; fi
 }
 
-dependencies() { grep -v '^vm_embedded==' "$1/requirements.txt"; } # FOLDER: print other packages with their hashes
+dependencies() { grep ' wheels/' "$1/SHA256SUMS" | grep -v ' wheels/vm_embedded-'; } # FOLDER: print wheels with hashes
 
 same_packages() { # whether the current release has the same dependencies
     is_complete "$(linked current)" && [ "$(dependencies "$HERE")" = "$(dependencies "$PREFIX/current/bundle")" ]
@@ -165,14 +165,18 @@ same_packages() { # whether the current release has the same dependencies
 install_packages() {
     say "installing packages"
     "$python" -m venv --without-pip "$target/venv"
-    needed=$HERE/requirements.txt
     if same_packages && (cd "$PREFIX/current/venv" && cp -al --parents lib/python*/site-packages "$target/venv/"); then
-        needed=$target/own.txt # the dependencies are hard links
-        grep '^vm_embedded==' "$HERE/requirements.txt" >"$needed"
+        rm -rf "$target"/venv/lib/python*/site-packages/vm_* # the rest are hard links to the dependencies
+        set -- "$HERE"/wheels/vm_embedded-*.whl
+    else
+        rm -rf "$target"/venv/lib/python*/site-packages/* # what an incomplete cp has left
+        for each in "$HERE"/wheels/*.whl; do
+            case ${each##*/} in installer-*) ;; *) set -- "$@" "$each" ;; esac
+        done
     fi
-    "$target/venv/bin/python" "$(echo "$HERE"/wheels/pip-*.whl)/pip" --isolated install --quiet --no-index \
-        --find-links "$HERE/wheels" --no-deps --require-hashes --force-reinstall --requirement "$needed" \
-        --disable-pip-version-check --no-cache-dir --root-user-action ignore
+    problem=$(PYTHONPATH=$(echo "$HERE"/wheels/installer-*.whl) \
+        "$target/venv/bin/python" -m installer --compile-bytecode 0 "$@" 2>&1) ||
+        fail "can't unpack the packages: $(say "$problem" | sed -n '$p')"
 }
 
 test_release() {

@@ -1,5 +1,6 @@
 """make bundle: what is in it, that it is always the same, and what it refuses."""
 
+import configparser
 import hashlib
 import json
 import os
@@ -13,17 +14,21 @@ import vm_embedded
 
 from .bundles import CHECKOUT, bundle_command, need_wheels, unpacked
 
+LARGEST_BUNDLE = 99 * 2**20
+"""[bytes]"""
+
+LARGEST_RUNTIME = 1_000_000
+"""Of the robot's wheel of this project, which has no network [bytes]."""
+
 
 def test_everything_a_robot_needs_is_in_it_and_nothing_else(bundle, bundle_file):
     names = {str(each.relative_to(bundle)) for each in bundle.rglob("*") if each.is_file()}
     wheels = {each.split("/")[1].split("-")[0] for each in names if each.startswith("wheels/")}
-    packages = {"numpy", "onnxruntime", "opencv_python_headless", "flatbuffers", "packaging", "protobuf"}
-    assert wheels == {"vm_embedded", "pip"} | packages
+    assert wheels == {"vm_embedded", "installer", "numpy", "onnxruntime", "opencv_python_headless"}
     assert {each for each in names if not each.startswith("wheels/")} == {
         *(
             "SHA256SUMS",
             "manifest.json",
-            "requirements.txt",
             "README.md",
             "releases.sh",
             "verify.sh",
@@ -35,10 +40,20 @@ def test_everything_a_robot_needs_is_in_it_and_nothing_else(bundle, bundle_file)
     assert bundle_file.name == f"vm-embedded-robot-{vm_embedded.__version__}-linux_x86_64-cp311.tar.gz"
     release = json.loads((bundle / "manifest.json").read_text())["release"]
     assert bundle.name == f"vm-embedded-robot-{release}-linux_x86_64-cp311"
-    assert bundle_file.stat().st_size < 120e6
+    assert bundle_file.stat().st_size < LARGEST_BUNDLE
+
+
+def test_the_runtime_is_small_and_has_only_what_runs_on_robots(bundle):
     (own,) = bundle.glob("wheels/vm_embedded-*.whl")
+    assert own.stat().st_size < LARGEST_RUNTIME
     with ZipFile(own) as wheel:
-        assert not [each for each in wheel.namelist() if each.endswith(".npz")]
+        names = [each for each in wheel.namelist() if ".dist-info/" not in each]
+        (listed,) = (each for each in wheel.namelist() if each.endswith("/entry_points.txt"))
+        programs = configparser.ConfigParser()
+        programs.read_string(wheel.read(listed).decode())
+    assert {each.split("/")[0] for each in names} == {"vm_embedded", "vm_ros"}
+    assert not [each for each in names if each.endswith(".onnx")]
+    assert set(programs["console_scripts"]) == {"vm-detect", "vm-doctor", "vm-bench", "vm-ros"}
 
 
 def test_its_sums_and_hashes_are_true(bundle):

@@ -25,7 +25,7 @@ from ..geometry.lens import Lens, Size
 from ..geometry.lens_files import LensFile, lens_from_table, read_lens_file
 from ..geometry.orientation import Orientation
 from ..geometry.radial_lenses import RadialLens, Rectilinear
-from ..network.bundled import DEFAULT, SHIPPED, model_path
+from ..network.bundled import DEFAULT, SHIPPED, model_path, shipped_name
 from ..network.model_file import ModelFile
 from ..output.channels import OutputSettings
 from ..output.recorder import CONFIGURATION, RecorderSettings
@@ -223,7 +223,7 @@ def recording_files(configuration: Configuration, model: ModelFile) -> dict[str,
 
     So a recording can be used on another machine. model: the network that runs.
     """
-    shipped = next((name for name in SHIPPED if model_path(name).resolve() == model.path.resolve()), None)
+    shipped = shipped_name(model.path)
     recorded = Configuration(
         model=shipped or _RECORDED_MODEL, detector=configuration.detector, track=configuration.track
     )

@@ -19,10 +19,22 @@ _FOLDER = Path(__file__).parents[1] / "models"
 def model_path(model: str | Path) -> Path:
     """The file of a network: a name of the package, else a path.
 
-    Raises InputError for a name that is neither.
+    Raises InputError for a name that is neither, and for a network that is not installed.
     """
     if str(model) in SHIPPED:
-        return _FOLDER / f"{model}.onnx"
+        path = _FOLDER / f"{model}.onnx"
+        if not path.exists():
+            raise InputError(
+                f"network {model} is not installed; a robot has only that of its bundle: give the path of a model "
+                "file, such as /opt/vm-embedded/current/etc/model.onnx"
+            )
+        return path
     if not Path(model).suffix and not os.path.exists(model):  # noqa: PTH110 (Path.exists raises for long names)
         raise InputError(f"{unknown('network', str(model), SHIPPED)}, or the path of a model file")
     return Path(model)
+
+
+def shipped_name(path: Path) -> str | None:
+    """The name of the network of the package that is in a file; None for other files."""
+    path = path.resolve()
+    return path.stem if path.parent == _FOLDER.resolve() and path.stem in SHIPPED else None
