@@ -149,7 +149,7 @@ def _best(scores: ObjectScores) -> tuple[float, float]:
 
 def numbers(scores: ObjectScores, threshold: float) -> dict[str, Any]:
     """Average precisions by distance, and balls found and false from a threshold on."""
-    found: dict[str, Any] = {"balls": scores.ranking(0.5).truths}
+    found: dict[str, Any] = {"pictures": scores.pictures, "balls": scores.ranking(0.5).truths}
     for name, bins in (BEYOND | METERS).items():
         rankings = {overlap: scores.ranking(overlap, bins) for overlap in (0.5, 0.75)}
         found[name] = {f"ap{100 * overlap:.0f}": _ap(each) for overlap, each in rankings.items()}
@@ -171,14 +171,17 @@ def main() -> None:
     parser.add_argument("test", type=Path, help="folder of make test-data")
     parser.add_argument("trained", type=Path, help="folder of benchmarks.peers.train")
     parser.add_argument("--shared", type=Path, help="folder with the real and reference frames")
+    names = [*(each.name for each in TRAINED), *OURS]
+    parser.add_argument("--only", choices=names, action="append", help="score only this detector; repeatable")
     options = parser.parse_args()
+    chosen = options.only or names
     found: dict[str, Any] = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
     validation = _validation(options.trained / "boxes")
-    for peer in TRAINED:
+    for peer in [each for each in TRAINED if each.name in chosen]:
         detector = BoxDetector(peer, options.trained / f"{peer.stem}.onnx")
         found[peer.name] = peer_row(detector, choose(detector, validation), options.test, options.shared)
         _write(found, peer.name)
-    for name in OURS:
+    for name in [each for each in OURS if each in chosen]:
         found[name] = our_row(name, options.test, options.shared)
         _write(found, name)
 
