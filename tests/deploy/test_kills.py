@@ -20,6 +20,8 @@ pytestmark = pytest.mark.long
 
 SEED = 29
 KILLS = {"install": 20, "upgrade": 60, "model": 60, "rollback": 60}
+"""Numbers of kills before the command has ended by itself."""
+
 MODELS = [CHECKOUT / "vm_embedded" / "models" / f"{name}.onnx" for name in ("ball", "ball-small")]
 
 
@@ -96,18 +98,16 @@ def test_killed_at_random_moments_a_detector_works_every_time(bundle, tmp_path):
     for kind in KILLS:
         victim.prepare(kind)
         took[kind] = victim.done(kind)
-    kinds = [kind for kind, count in KILLS.items() for _ in range(count)]
-    chance.shuffle(kinds)
     killed = dict.fromkeys(KILLS, 0)
     began = time.monotonic()
-    for kind in kinds:
+    while killed != KILLS:
+        kind = chance.choice([each for each, count in killed.items() if count < KILLS[each]])
         victim.prepare(kind)
         killed[kind] += victim.killed(kind, chance.uniform(0.0, took[kind]), everything=chance.random() < 0.5)
         if kind == "install" and not (victim.prefix.path / "current").exists():
             victim.done("install")  # nothing worked before, so nothing may work after the kill, but the next time
         victim.check()
-    print(f"killed {killed} in {time.monotonic() - began:.0f} s; uninterrupted they take {took} s")
-    assert sum(killed.values()) >= 0.75 * sum(KILLS.values())
+    print(f"killed in {time.monotonic() - began:.0f} s; uninterrupted they take {took} s")
     victim.done("upgrade")
     victim.check()
     left = {each.name for each in Path(victim.prefix.path).iterdir()}
