@@ -9,6 +9,7 @@ SEED ?= 1
 SCENES ?= export/vm_synth/polyhaven.toml
 NETWORKS := ball ball-small soccer
 BUILD ?= build/networks
+PICTURES ?= data/soccer
 CANARY := --canary vm_embedded/models/canary.jpg export/networks/canary.yaml
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
@@ -93,17 +94,20 @@ networks: .venv/dev ## train the networks of the package from their seeds: make 
 
 $(BUILD)/mesh/model.pt $(BUILD)/soccer/model.pt: $(BUILD)/%/model.pt: export/networks/%.toml
 	if test -e $(BUILD)/$*/run.json; then $(BIN)/vm-train resume $(BUILD)/$*; \
-		else $(BIN)/vm-train data/soccer -o $(BUILD)/$* --config $< --unpacked $(BUILD)/unpacked; fi
+		else $(BIN)/vm-train $(PICTURES) -o $(BUILD)/$* --config $< --unpacked $(BUILD)/unpacked; fi
 
 $(BUILD)/glance/look.pt: export/networks/glance.toml $(BUILD)/mesh/model.pt
 	if test -e $(BUILD)/glance/run.json; then $(BIN)/vm-train resume $(BUILD)/glance; \
-		else $(BIN)/vm-train look data/soccer --from $(BUILD)/mesh/model.pt -o $(BUILD)/glance --config $<; fi
+		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/mesh/model.pt -o $(BUILD)/glance --config $<; fi
 
-vm_embedded/models/%.onnx: export/networks/%-look.toml $(BUILD)/glance/look.pt
+.PRECIOUS: $(BUILD)/%-look/look.pt
+$(BUILD)/%-look/look.pt: export/networks/%-look.toml $(BUILD)/glance/look.pt
 	if test -e $(BUILD)/$*-look/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-look; \
-		else $(BIN)/vm-train look data/soccer --from $(BUILD)/mesh/model.pt --glance $(BUILD)/glance/look.pt \
+		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/mesh/model.pt --glance $(BUILD)/glance/look.pt \
 			-o $(BUILD)/$*-look --config $<; fi
-	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $(BUILD)/$*-look/look.pt --layout runs $(CANARY) -o $@
+
+vm_embedded/models/%.onnx: $(BUILD)/%-look/look.pt
+	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs $(CANARY) -o $@
 
 vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx
 	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $@
@@ -133,7 +137,9 @@ look-choices: .venv/dev ## measure what each choice of a close look is worth: ma
 peers: .venv/bench ## train other detectors, and compare their speed and accuracy: make peers HDRI=folder-of-maps [TEST=data/test] (hours)
 	$(MAKE) data OUT=data/peers COUNT=2500 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(BIN)/python -m benchmarks.peers.train data/peers build/peers
-	$(BIN)/python -m benchmarks.peers.score $(TEST) build/peers --shared ../shared
+	$(MAKE) build/peers/ball-look/look.pt BUILD=build/peers PICTURES=data/peers
+	$(BIN)/vm-export build/peers/mesh/model.pt --look build/peers/ball-look/look.pt --layout runs -o build/peers/ball.onnx
+	$(BIN)/python -m benchmarks.peers.score $(TEST) build/peers $(if $(wildcard ../shared/real),--shared ../shared)
 	$(BIN)/python -m benchmarks.peers.times
 	$(BIN)/python -m benchmarks.peers.report
 

@@ -135,7 +135,8 @@ def lenses(found: dict[str, Any]) -> str:
 
 def _style(name: str) -> dict[str, Any]:
     if name in score.OURS:
-        return {"color": "#2a7f62", "linestyle": "-" if name == "ball" else ":", "label": name}
+        lines = dict(zip(score.OURS, ("-", ":", "--"), strict=True))
+        return {"color": "#2a7f62", "linestyle": lines[name], "label": name}
     color = {"ssdlite": "#c0504d", "yolo320": "#8064a2", "yolo640": "#4f81bd"}
     return {"color": color[next(each.stem for each in TRAINED if each.name == name)], "label": name}
 
@@ -167,7 +168,7 @@ def plot_times(found: dict[str, Any], calls: dict[str, Any], path: Path) -> None
     """AP50 of each detector, at all distances, over the time of a whole call."""
     figure, axes = pyplot.subplots(figsize=(7.5, 3.6), layout="constrained")
     for name in (*score.OURS, *(peer.name for peer in TRAINED)):
-        x, ours = calls[name]["p50"], name in score.OURS
+        x, ours = calls[name.partition(", same")[0]]["p50"], name in score.OURS
         y = found[name]["field"]["all"]["ap50"]
         axes.plot(x, y, "o", color="#2a7f62" if ours else "#9aa5b1")
         axes.annotate(name, (x, y), xytext=(6, 0), textcoords="offset points", fontsize=8, va="center")

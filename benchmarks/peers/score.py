@@ -35,7 +35,11 @@ from .boxes import read_truths
 from .detector import TRAINED, BoxDetector, FrameDetector, located, reported
 
 RESULTS = Path(__file__).parents[1] / "peer_scores.json"
-OURS = ("ball", "ball-small")
+SAME = "ball, same pictures"
+"""A network with the recipe of `ball` that learned from the pictures of the peers."""
+
+OURS = ("ball", "ball-small", SAME)
+
 FIELD = "field"
 TOLERANCES = (1.25, 1.5, 2.0, 3.0)
 FACTORS = (1.0, 0.5, 0.25)
@@ -113,9 +117,9 @@ class _Enlarged:
     bearing: np.ndarray
 
 
-def tally_ours(name: str, pictures: Iterable[PictureFiles], factor: float, settings: Settings) -> Tally:
-    """Scores of a network of the package, whose mesh has the radius of each picture's ball."""
-    classes, model, found = classes_of(model_path(name)), read_model(model_path(name)), Tally()
+def tally_ours(file: Path, pictures: Iterable[PictureFiles], factor: float, settings: Settings) -> Tally:
+    """Scores of a network of ours, whose mesh has the radius of each picture's ball."""
+    classes, model, found = classes_of(file), read_model(file), Tally()
     for files in pictures:
         picture, radius, truths = read_truths(files, classes)
         image, lens = resized(picture, factor)
@@ -182,7 +186,8 @@ def main() -> None:
         found[peer.name] = peer_row(detector, choose(detector, validation), options.test, options.shared)
         _write(found, peer.name)
     for name in [each for each in OURS if each in chosen]:
-        found[name] = our_row(name, options.test, options.shared)
+        file = options.trained / "ball.onnx" if name == SAME else model_path(name)
+        found[name] = our_row(file, options.test, options.shared)
         _write(found, name)
 
 
@@ -204,20 +209,20 @@ def peer_row(detector: BoxDetector, choice: Choice, test: Path, shared: Path | N
     return row
 
 
-def our_row(name: str, test: Path, shared: Path | None) -> dict[str, Any]:
-    """The same figures of a network of the package, with its default threshold."""
+def our_row(file: Path, test: Path, shared: Path | None) -> dict[str, Any]:
+    """The same figures of a network of ours, with its default threshold."""
     row: dict[str, Any] = {}
     threshold = Settings().min_confidence
     for each in SETS:
-        tally = tally_ours(name, find_pictures(test / each), 1.0, CANDIDATES)
+        tally = tally_ours(file, find_pictures(test / each), 1.0, CANDIDATES)
         row[each] = numbers(tally.all, threshold)
         if each == FIELD:
             row |= _details(tally, threshold)
     row["sizes"] = {"1": row[FIELD]["all"]}
     for factor in FACTORS[1:]:
-        tally = tally_ours(name, find_pictures(test / FIELD), factor, CANDIDATES)
+        tally = tally_ours(file, find_pictures(test / FIELD), factor, CANDIDATES)
         row["sizes"][f"{factor:g}"] = numbers(tally.all, threshold)["all"]
-    row["frames"] = _frames(shared, lambda radius: Detector.from_file(model_path(name), Settings(object_radius=radius)))
+    row["frames"] = _frames(shared, lambda radius: Detector.from_file(file, Settings(object_radius=radius)))
     return row
 
 
