@@ -73,12 +73,9 @@ def trainings(found: dict[str, Any]) -> str:
         part = found[peer.stem]
         epochs, improved = part["epochs"], "yes" if part["still_improved"] else "no"
         ap50 = f"{epochs[-1]['ap50']:.3f}" if "ap50" in epochs[-1] else "-"
-        minutes = sum(row["seconds"] for row in epochs) if peer.stem == "ssdlite" else epochs[-1]["seconds"]
-        seen = f"{pictures * len(epochs):,}"
-        rows.append(
-            [peer.name, str(len(epochs)), seen, f"{minutes / 60:.0f}", f"{epochs[-1]['loss']:.2f}", ap50, improved]
-        )
-    heads = ["detector", "epochs", "pictures seen", "minutes", "last loss", "validation AP50", "still improved"]
+        seen, loss = f"{pictures * len(epochs):,}", f"{epochs[-1]['loss']:.2f}"
+        rows.append([peer.name, str(len(epochs)), seen, loss, ap50, improved])
+    heads = ["detector", "epochs", "pictures seen", "last loss", "validation AP50", "still improved"]
     return table(heads, rows)
 
 
@@ -171,12 +168,14 @@ def plot_times(found: dict[str, Any], calls: dict[str, Any], path: Path) -> None
         x, ours = calls[name.partition(", same")[0]]["p50"], name in score.OURS
         y = found[name]["field"]["all"]["ap50"]
         axes.plot(x, y, "o", color="#2a7f62" if ours else "#9aa5b1")
-        axes.annotate(name, (x, y), xytext=(6, 0), textcoords="offset points", fontsize=8, va="center")
+        left = name == "ball-small"
+        place = {"xytext": (-6 if left else 6, 0), "ha": "right" if left else "left"}
+        axes.annotate(name, (x, y), textcoords="offset points", fontsize=8, va="center", **place)
         checked = found[name].get("field, sizes checked")
         if checked:
             axes.plot(x, checked["all"]["ap50"], "o", color="#9aa5b1", fillstyle="none")
     axes.set_xscale("log")
-    axes.set_xlim(2, 400)
+    axes.set_xlim(1, 400)
     axes.set_ylim(0.0, 1.02)
     axes.set_xlabel("whole call on one core [ms], log scale")
     axes.set_ylabel("AP50 on fields")
