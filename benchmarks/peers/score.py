@@ -3,7 +3,8 @@
     python -m benchmarks.peers.score data/test build/peers
 
 Thresholds and the tolerance of sizes are chosen on the validation pictures of the training, where F1 is best. Writes
-benchmarks/peer_scores.json.
+benchmarks/peer_scores.json. The paper compares average precision over distance, too (section "Discussion and
+Conclusion").
 """
 
 from __future__ import annotations

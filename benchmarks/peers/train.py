@@ -3,7 +3,8 @@
     python -m benchmarks.peers.train data/peers build/peers
 
 The folder OUT gets an ONNX file for each peer, and benchmarks/peer_training.json the course of each training. The
-nano YOLO for 640 px continues from that for 320 px, which takes a quarter of the time for a picture.
+nano YOLO for 640 px continues from that for 320 px, which takes a quarter of the time for a picture. The paper trained
+other detectors on the same pictures, too (section "Training").
 """
 
 from __future__ import annotations
