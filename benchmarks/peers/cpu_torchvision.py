@@ -18,7 +18,7 @@ def suppress(boxes: torch.Tensor, scores: torch.Tensor, overlap: float) -> torch
     return torch.as_tensor(kept, dtype=torch.int64).flatten()
 
 
-if not torch.cuda.is_available():
+if torch.version.cuda is None:
     for name in ("nms", "qnms"):
         torch.library.define(f"torchvision::{name}", "(Tensor dets, Tensor scores, float iou_threshold) -> Tensor")
     torch.library.impl("torchvision::nms", "CPU", suppress)

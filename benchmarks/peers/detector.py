@@ -63,14 +63,15 @@ class BoxDetector:
     def detect(self, image: Image) -> tuple[Floats, Floats]:
         """Left, top, right, bottom (n, 4) [px] and scores (n,) of the balls in a BGR image (h, w, 3), best first."""
         side, (height, width) = self._peer.side, image.shape[:2]
+        how = cv2.INTER_AREA if max(width, height) > side else cv2.INTER_LINEAR
         if self._peer.stretches:
             scale = np.array([width / side, height / side])
-            square = cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA)
+            square = cv2.resize(image, (side, side), interpolation=how)
         else:
             scale = np.full(2, max(width, height) / side)
             size = round(width / scale[0]), round(height / scale[0])
             square = cv2.copyMakeBorder(
-                cv2.resize(image, size, interpolation=cv2.INTER_AREA),
+                cv2.resize(image, size, interpolation=how),
                 *(0, side - size[1], 0, side - size[0]),
                 cv2.BORDER_CONSTANT,
                 value=GRAY,
@@ -115,7 +116,11 @@ class FoundBox:
 def located(
     boxes: Floats, scores: Floats, size: Size, lens: Lens, orientation: Orientation, radius: float
 ) -> list[FoundBox]:
-    """Found boxes (n, 4) [px] in a picture of this size [px], for balls of a radius [m]."""
+    """Found boxes (n, 4) [px] in a picture of this size [px], for balls of a radius [m].
+
+    Boxes count from the edge of the first pixel, lenses and outlines from its center.
+    """
+    boxes = boxes - 0.5
     around = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
     circle = np.stack([np.cos(around), np.sin(around)], axis=1)
     lens, sphere, found = lens.for_image(size), Sphere(radius), []

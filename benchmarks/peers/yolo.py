@@ -22,7 +22,7 @@ from . import cpu_torchvision  # noqa: F401  # before ultralytics
 
 RATE = {"optimizer": "AdamW", "lr0": 1e-3, "lrf": 0.01, "cos_lr": True, "warmup_epochs": 0.3, "weight_decay": 5e-4}
 AUGMENTATION = {"mosaic": 0.5, "close_mosaic": 1, "scale": 0.5, "fliplr": 0.5}
-"""As the trainer's own, but mosaics of four pictures in half of the cases: they halve the balls, which are small."""
+"""As the trainer's own, but mosaics of four pictures in half of the cases."""
 
 
 def packaged_weights() -> dict[str, torch.Tensor]:

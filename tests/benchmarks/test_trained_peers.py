@@ -14,7 +14,7 @@ from torch import nn
 
 from benchmarks.peers.boxes import box_of, read_boxes, read_truths, write_boxes
 from benchmarks.peers.detector import BoxDetector, TrainedPeer, located, reported
-from benchmarks.peers.score import _best, choose, tally_ours, tally_peer
+from benchmarks.peers.score import _best, choose, enlarged, tally_ours, tally_peer
 from benchmarks.peers.train import still_improved
 from benchmarks.shipped import CANDIDATES, classes_of
 from tests.vm_train.drawn import draw_set
@@ -24,6 +24,7 @@ from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.bundled import model_path
 from vm_train.data.pictures import find_pictures
 from vm_train.scores.object_scores import ObjectScores
+from vm_train.scores.overlaps import TrueObject, common_areas, coverage
 from vm_workstation.outlines import shape_outline
 
 SIZE = (640, 512)
@@ -80,7 +81,7 @@ def test_a_box_around_a_ball_tells_its_place_and_that_its_size_is_possible(lens,
     low, high = outline.min(axis=0), outline.max(axis=0)
     if not np.isfinite(outline).all() or (low < 0).any() or (high > SIZE).any():
         return
-    boxes = np.concatenate([low, high])[None]
+    boxes = np.concatenate([low, high])[None] + 0.5
     (found,) = located(boxes, np.array([0.7]), SIZE, lens, orientation, radius)
     assert math.hypot(*(found.position - center)) < 0.1 * ahead
     assert found.size == pytest.approx(1.0, abs=0.1)
@@ -88,6 +89,28 @@ def test_a_box_around_a_ball_tells_its_place_and_that_its_size_is_possible(lens,
     assert reported([found], 0.8, 1.25) == []
     (twice,) = located(boxes, np.array([0.7]), SIZE, lens, orientation, 2.0 * radius)
     assert not twice.is_possible(1.5)
+
+
+@pytest.mark.parametrize("radius", [3.0, 5.0, 9.0])
+def test_the_box_of_a_small_ball_overlaps_it_almost_wholly(radius):
+    """The ellipse is where the pixels of the box are, not half a pixel beside them."""
+    center, orientation = np.array([102.4, 203.7]), Orientation.from_roll_pitch(0.9, pitch=0.4)
+    around = np.linspace(0.0, 2.0 * np.pi, 90)
+    window, share = coverage(center + radius * np.stack([np.cos(around), np.sin(around)], axis=1), SIZE)
+    mask = np.zeros(SIZE[::-1], dtype=np.float32)
+    mask[window] = share
+    truth = TrueObject(mask, np.zeros(3), radius)
+    found = located(box_of(truth)[None], np.ones(1), SIZE, LENSES[0], orientation, 0.1)
+    assert common_areas([truth], found).iou[0, 0] > 0.85
+    np.testing.assert_allclose(found[0].center, center, atol=0.5)
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.25])
+def test_an_outline_in_a_smaller_picture_lies_at_the_same_place_of_the_whole_one(factor):
+    """A pixel of a picture of half the size covers the pixels 2 x and 2 x + 1 of the whole picture."""
+    x = np.arange(10.0)
+    count = round(1.0 / factor)
+    np.testing.assert_allclose(enlarged(x, factor), x * count + (count - 1) / 2.0)
 
 
 def test_a_box_above_the_horizon_is_no_ball():

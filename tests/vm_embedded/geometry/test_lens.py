@@ -5,12 +5,25 @@ import pytest
 from hypothesis import assume, example, given
 
 from vm_embedded.errors import InputError
+from vm_embedded.geometry.calibrated_lenses import BrownLens
 from vm_embedded.geometry.radial_lenses import PROJECTIONS, Rectilinear
 
 from ..strategies import SIZE, lenses, rays_at, rays_within, seeds
 
 
+NEARLY_FLAT = BrownLens(
+    fov=2.0,
+    size=SIZE,
+    focal_lengths=(150.0, 150.0),
+    optical_center=(280.0, 200.0),
+    coefficients=(-0.3125, 0.0703125, 0.0, 0.001953125, 0.0, 0.0, 0.0625, 0.0),
+)
+"""Its radial part hardly grows at 1.3 focal lengths, so the tangential part folds it there."""
+
+
 @given(lenses(), seeds)
+@example(NEARLY_FLAT, 0)
+@example(NEARLY_FLAT, 249)
 def test_unproject_undoes_project(lens, seed):
     rays = rays_within(0.97 * lens.limit, 40, np.random.default_rng(seed))
     assert lens.sees(rays).all()

@@ -198,7 +198,12 @@ def test_attack_12_a_pose_in_the_future_is_refused_and_blocks_no_good_one(tmp_pa
         before, accepted = len(found.frames), json.loads(ask(tmp_path / "control", "status"))["counts"]["poses"]
         found.wait(lambda: len(found.frames) > before + 5)
         assert json.loads(ask(tmp_path / "control", "status"))["counts"]["poses"] > accepted
-        assert any("from now on the monotonic clock" in each.get("reason", "") for each in found.messages)
+
+        def says_why():
+            sending.sendto(pose_line(MOTION, time.monotonic() + 0.5), ("127.0.0.1", port))
+            return any("from now on the monotonic clock" in each.get("reason", "") for each in found.messages)
+
+        found.wait(says_why)
         sender.on = False
         sender.join()
         found.stop()
