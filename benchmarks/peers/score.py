@@ -136,7 +136,7 @@ def tally_ours(file: Path, pictures: Iterable[PictureFiles], factor: float, sett
         except GeometryError:  # the camera is too low for this ball
             objects = ()
         large = [
-            _Enlarged(each.confidence, _enlarged(each.outline, factor), each.position, each.bearing) for each in objects
+            _Enlarged(each.confidence, enlarged(each.outline, factor), each.position, each.bearing) for each in objects
         ]
         found.add(projection(files), truths, large)
     return found

@@ -10,7 +10,6 @@ from vm_embedded.geometry.radial_lenses import PROJECTIONS, Rectilinear
 
 from ..strategies import SIZE, lenses, rays_at, rays_within, seeds
 
-
 NEARLY_FLAT = BrownLens(
     fov=2.0,
     size=SIZE,
