@@ -42,7 +42,7 @@ SAME = "ball, same pictures"
 OURS = ("ball", "ball-small", SAME)
 
 FIELD = "field"
-TOLERANCES = (1.15, 1.25, 1.5, 2.0, 3.0)
+TOLERANCES = (1.25, 1.5, 2.0, 3.0)
 FACTORS = (1.0, 0.5, 0.25)
 """Sizes of the test pictures of 1280 x 1024 px: twice, as large as, and half as large as those of the training."""
 
