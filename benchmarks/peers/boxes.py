@@ -8,12 +8,14 @@ same ones that vm-train uses. OUT/data.yaml names the folders for the trainer of
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from vm_embedded.arrays import Floats
 from vm_embedded.network.bundled import DEFAULT, model_path
+from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import read_model
 from vm_train.data.classes import Classes
 from vm_train.data.picture_files import PictureFiles
@@ -35,11 +37,15 @@ MIN_RADIUS = 1.5
 
 def read_truths(files: PictureFiles, classes: Classes) -> tuple[Picture, float, list[TrueObject]]:
     """A picture, the radius of its ball [m], and its balls. Raises PictureFault."""
-    manifest = read_model(model_path(DEFAULT)).manifest
     picture = read_picture(files, classes)
     scene = read_scene(files.image.with_name(f"scene{files.number}.json"))
     assert scene is not None
-    return picture, scene.radius, true_objects(picture, scene, manifest)["ball"]
+    return picture, scene.radius, true_objects(picture, scene, _manifest())["ball"]
+
+
+@cache
+def _manifest() -> Manifest:
+    return read_model(model_path(DEFAULT)).manifest
 
 
 def box_of(ball: TrueObject) -> Floats:
@@ -69,8 +75,8 @@ def read_boxes(path: Path, width: int, height: int) -> Floats:
     return np.asarray(corners * (width, height, width, height))
 
 
-def write_boxes(data: Path, out: Path, lens: str | None = None) -> None:
-    """Write the folders of both parts. lens: use only pictures with this projection, such as RECTILINEAR."""
+def write_boxes(data: Path, out: Path) -> None:
+    """Write the folders of both parts for a data set; files that are there stay."""
     classes = classes_of(model_path(DEFAULT))
     pictures = {each.number: each for each in find_pictures(data)}
     split = split_by_seed(list(pictures), VALIDATION, 0.0, SEED)
@@ -82,8 +88,6 @@ def write_boxes(data: Path, out: Path, lens: str | None = None) -> None:
             if label.exists():
                 continue
             picture, _, balls = read_truths(pictures[number], classes)
-            if lens is not None and f"projection: {lens}" not in pictures[number].lens.read_text():
-                continue
             link = out / "images" / part / f"{number}{pictures[number].image.suffix}"
             link.unlink(missing_ok=True)
             link.symlink_to(pictures[number].image.resolve())

@@ -10,7 +10,6 @@ from types import SimpleNamespace
 
 import cv2
 import numpy as np
-import onnxruntime
 
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.geometry.lens import Lens, Size
@@ -18,8 +17,7 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.sphere import Sphere
 from vm_workstation.outlines import shape_outline
 
-KEPT, OVERLAP = 100, 0.45
-"""Number of boxes that are looked at, and the overlap from which two of them are one object."""
+from .networks import KEPT, OVERLAP, one_thread
 
 LOWEST = 0.005
 """Boxes with a lower score are not reported."""
@@ -53,10 +51,7 @@ class BoxDetector:
     """
 
     def __init__(self, peer: TrainedPeer, path: Path) -> None:
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = 1
-        options.log_severity_level = 3
-        self._session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        self._session = one_thread(str(path))
         self._input = self._session.get_inputs()[0].name
         self._peer = peer
 

@@ -21,7 +21,7 @@ import torch
 from torch import nn
 
 CLASSES = 4
-_KEPT, _SCORE, _OVERLAP = 100, 0.5, 0.45
+KEPT, SCORE, OVERLAP = 100, 0.5, 0.45
 """Non-maximum suppression: number of boxes, lowest score, and the overlap from which two boxes are one object."""
 
 
@@ -322,10 +322,15 @@ def loaded(
             dynamic_axes=free,
             opset_version=17,
         )
+    return one_thread(file.getvalue())
+
+
+def one_thread(model: bytes | str) -> onnxruntime.InferenceSession:
+    """A network in ONNX Runtime on one thread, from the content or the path of a file."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.log_severity_level = 3
-    return onnxruntime.InferenceSession(file.getvalue(), options, providers=["CPUExecutionProvider"])
+    return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
 
 
 def prepared(image: np.ndarray, width: int, height: int) -> np.ndarray:
@@ -346,6 +351,6 @@ class PeerDetector:
         """Number of objects in a BGR image."""
         boxes, scores = self._session.run(None, {"x": prepared(image, self._side, self._side)})
         best = scores.max(axis=1)
-        kept = min(_KEPT, len(best))
+        kept = min(KEPT, len(best))
         chosen = np.argpartition(best, -kept)[-kept:]
-        return len(cv2.dnn.NMSBoxes(boxes[chosen].tolist(), best[chosen].tolist(), _SCORE, _OVERLAP))
+        return len(cv2.dnn.NMSBoxes(boxes[chosen].tolist(), best[chosen].tolist(), SCORE, OVERLAP))

@@ -72,12 +72,12 @@ class BoxedPictures(Dataset[tuple[torch.Tensor, Target]]):
         return self._augment(image, target)  # type: ignore[no-any-return]
 
 
-def _batches(pictures: BoxedPictures, seed: int | None, skip: int = 0) -> Iterator[Any]:
-    """Batches of pictures and targets in random order, or in order without a seed. skip: number of batches left out."""
+def _batches(pictures: BoxedPictures, seed: int | None) -> Iterator[Any]:
+    """Batches of pictures and targets in random order, or in order without a seed."""
     order = range(len(pictures))
     if seed is not None:
         order = np.random.default_rng(seed).permutation(len(pictures)).tolist()
-    chunks = [list(order[start : start + BATCH]) for start in range(skip * BATCH, len(order), BATCH)]
+    chunks = [list(order[start : start + BATCH]) for start in range(0, len(order), BATCH)]
     yield from DataLoader(pictures, batch_sampler=chunks, num_workers=1, collate_fn=_lists)
 
 

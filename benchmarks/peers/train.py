@@ -22,8 +22,9 @@ from .detector import TRAINED
 
 LOG = Path(__file__).parents[1] / "peer_training.json"
 EPOCHS = {"ssdlite": 6, "yolo320": 4, "yolo640": 2}
-BEST = {"ssdlite": ("validation_loss", min), "yolo320": ("ap50", max), "yolo640": ("ap50", max)}
-"""The value of an epoch that chooses the best one."""
+JUDGED_BY = {"ssdlite": ("validation_loss", min), "yolo320": ("ap50", max), "yolo640": ("ap50", max)}
+"""The value of an epoch that decides whether a training still improved. The trainer of YOLO keeps the epoch with the
+best AP50 to AP95; SSDLite keeps its last one."""
 
 
 def train(stem: str, boxes: Path, out: Path) -> list[dict[str, float]]:
@@ -45,7 +46,7 @@ def train(stem: str, boxes: Path, out: Path) -> list[dict[str, float]]:
 
 def still_improved(stem: str, log: list[dict[str, float]]) -> bool:
     """Whether the last epoch was the best one."""
-    value, best = BEST[stem]
+    value, best = JUDGED_BY[stem]
     return log[-1][value] == best(row[value] for row in log)
 
 

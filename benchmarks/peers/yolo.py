@@ -29,7 +29,8 @@ def packaged_weights() -> dict[str, torch.Tensor]:
     """The weights of the package nudenet by the names of the trainer's network.
 
     They have no batch normalization, because an exported network multiplies it into its convolutions. So each
-    normalization gets the scale 1 and the bias of its convolution.
+    normalization gets the bias of its convolution, and with a scale of 1, a mean of 0 and a variance of 1 the network
+    gives the same answers. A training replaces mean and variance by those of its batches, so it first changes them.
     """
     graph = onnx.load(str(files("nudenet") / "320n.onnx")).graph
     found = {each.name: torch.from_numpy(numpy_helper.to_array(each).copy()) for each in graph.initializer}

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _QUIET = "ignore::UserWarning:multiprocessing.resource_tracker"
+"""For PYTHONWARNINGS, which the processes that a program starts inherit."""
 
 
 @contextmanager

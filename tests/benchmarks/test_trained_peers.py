@@ -60,13 +60,6 @@ def test_boxes_surround_the_balls_of_both_parts(pictures, boxes):
     assert "train: images/training" in (boxes / "data.yaml").read_text()
 
 
-def test_only_pictures_of_one_lens(pictures, tmp_path):
-    write_boxes(pictures, tmp_path / "none", "EQUIDISTANT")
-    write_boxes(pictures, tmp_path / "all", "RECTILINEAR")
-    count = {each: len(list((tmp_path / each / "images").glob("*/*"))) for each in ("none", "all")}
-    assert count == {"none": 0, "all": 40}
-
-
 @given(
     st.sampled_from(LENSES),
     st.floats(0.5, 6.0),
