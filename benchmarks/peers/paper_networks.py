@@ -19,7 +19,7 @@ from torch.nn import functional
 
 from vm_embedded.arrays import Floats, Singles
 
-from .networks import CLASSES, convolution, loaded, prepared
+from .networks import CLASSES, convolution, loaded, one_thread, prepared
 
 _Layers = tuple[tuple[int, int] | tuple[int, int, int] | None, ...]
 """Layers in a row: outputs, size of the kernel and stride, which is 1 if it is left out; None is a pool that halves."""
@@ -363,9 +363,7 @@ def _suppression() -> onnxruntime.InferenceSession:
     output = helper.make_tensor_value_info("kept", TensorProto.INT64, ("k", 3))
     graph = helper.make_graph([node], "suppression", inputs, [output], limits)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    return onnxruntime.InferenceSession(model.SerializeToString(), options, providers=["CPUExecutionProvider"])
+    return one_thread(model.SerializeToString())
 
 
 class FasterRcnn:
