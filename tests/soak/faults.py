@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -44,7 +43,11 @@ _SETTLED = 0.1
 """Part of a soak after which memory must be flat."""
 
 _PARTS = 9
-"""Parts of the rest, whose median memory is compared."""
+"""Parts of the rest, whose memory is compared."""
+
+_OFTEN = 0.9
+"""Share of a part's seconds in which the memory is at most what counts. The allocator gives some MiB back and takes
+them again seconds later, so a median depends on how long it waits."""
 
 
 @dataclass
@@ -66,9 +69,9 @@ class FaultReport:
     rejected: Counter[str] = field(default_factory=Counter)
     seconds: float = 0.0
 
-    def growth(self, settled: float = _SETTLED) -> float:
+    def growth(self, settled: float = _SETTLED, parts: int = _PARTS) -> float:
         """The largest growth of a detector's memory [MiB], see the function `growth`."""
-        return max(growth(each, settled) for each in self.memory) / 2**20
+        return max(growth(each, settled, parts) for each in self.memory) / 2**20
 
     def __str__(self) -> str:
         rows = [
@@ -173,11 +176,14 @@ def recovered(found: Detector, faults: Sequence[Fault]) -> list[str]:
     return kinds
 
 
-def growth(memory: Sequence[int], settled: float = _SETTLED) -> int:
-    """Largest difference between the median memory of parts of the time, without the first part `settled` [bytes]."""
+def growth(memory: Sequence[int], settled: float = _SETTLED, parts: int = _PARTS) -> int:
+    """Largest difference between the memory of parts of the time, without the first part `settled` [bytes].
+
+    The memory of a part is what it has at most in nine of ten seconds.
+    """
     rest = np.array(memory[int(settled * len(memory)) :])
-    medians = [median(each) for each in np.array_split(rest, _PARTS) if each.size]
-    return int(max(medians) - min(medians))
+    levels = [np.quantile(each, _OFTEN, method="lower") for each in np.array_split(rest, parts) if each.size]
+    return int(max(levels) - min(levels))
 
 
 def _left(found: Detector, before: tuple[int, int]) -> int:
