@@ -106,6 +106,9 @@ $(BUILD)/%-look/look.pt: export/networks/%-look.toml $(BUILD)/glance/look.pt
 		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/mesh/model.pt --glance $(BUILD)/glance/look.pt \
 			-o $(BUILD)/$*-look --config $<; fi
 
+$(BUILD)/ball.onnx: $(BUILD)/ball-look/look.pt
+	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs -o $@
+
 vm_embedded/models/%.onnx: $(BUILD)/%-look/look.pt
 	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs $(CANARY) -o $@
 
@@ -137,9 +140,11 @@ look-choices: .venv/dev ## measure what each choice of a close look is worth: ma
 peers: .venv/bench ## train other detectors, and compare their speed and accuracy: make peers HDRI=folder-of-maps [TEST=data/test] (hours)
 	$(MAKE) data OUT=data/peers COUNT=2500 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(BIN)/python -m benchmarks.peers.train data/peers build/peers
-	$(MAKE) build/peers/ball-look/look.pt BUILD=build/peers PICTURES=data/peers
-	$(BIN)/vm-export build/peers/mesh/model.pt --look build/peers/ball-look/look.pt --layout runs -o build/peers/ball.onnx
+	$(BIN)/python -m benchmarks.peers.train data/peers build/peers --lens rectilinear
+	$(MAKE) build/peers/ball.onnx BUILD=build/peers PICTURES=data/peers
+	$(MAKE) build/peers/rectilinear/ball.onnx BUILD=build/peers/rectilinear PICTURES=build/peers/rectilinear/pictures
 	$(BIN)/python -m benchmarks.peers.score $(TEST) build/peers $(if $(wildcard ../shared/real),--shared ../shared)
+	$(BIN)/python -m benchmarks.peers.score $(TEST) build/peers --lens rectilinear
 	$(BIN)/python -m benchmarks.peers.times
 	$(BIN)/python -m benchmarks.peers.report
 

@@ -35,6 +35,26 @@ MIN_RADIUS = 1.5
 """A smaller ball gets no box [px]."""
 
 
+LENSES = ("rectilinear", "fisheye")
+"""Kinds of lenses."""
+
+
+def kind_of_lens(files: PictureFiles) -> str:
+    """`rectilinear` or `fisheye`."""
+    return LENSES[0] if "RECTILINEAR" in files.lens.read_text() else LENSES[1]
+
+
+def link_pictures(data: Path, out: Path, lens: str) -> None:
+    """Link the files of all pictures with a kind of lens into a folder; links that are there stay."""
+    out.mkdir(parents=True, exist_ok=True)
+    for files in find_pictures(data):
+        if kind_of_lens(files) == lens:
+            for path in (files.image, files.mask, files.lens, files.image.with_name(f"scene{files.number}.json")):
+                link = out / path.name
+                if not link.is_symlink():
+                    link.symlink_to(path.resolve())
+
+
 def read_truths(files: PictureFiles, classes: Classes) -> tuple[Picture, float, list[TrueObject]]:
     """A picture, the radius of its ball [m], and its balls. Raises PictureFault."""
     picture = read_picture(files, classes)

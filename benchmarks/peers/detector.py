@@ -58,19 +58,12 @@ class BoxDetector:
     def detect(self, image: Image) -> tuple[Floats, Floats]:
         """Left, top, right, bottom (n, 4) [px] and scores (n,) of the balls in a BGR image (h, w, 3), best first."""
         side, (height, width) = self._peer.side, image.shape[:2]
-        how = cv2.INTER_AREA if max(width, height) > side else cv2.INTER_LINEAR
         if self._peer.stretches:
             scale = np.array([width / side, height / side])
-            square = cv2.resize(image, (side, side), interpolation=how)
+            square = cv2.resize(image, (side, side), interpolation=_interpolation(image, side))
         else:
             scale = np.full(2, max(width, height) / side)
-            size = round(width / scale[0]), round(height / scale[0])
-            square = cv2.copyMakeBorder(
-                cv2.resize(image, size, interpolation=how),
-                *(0, side - size[1], 0, side - size[0]),
-                cv2.BORDER_CONSTANT,
-                value=GRAY,
-            )
+            square = boxed_in(image, side)
         outputs = self._session.run(None, {self._input: cv2.dnn.blobFromImage(square, 1.0 / 255.0, swapRB=True)})
         if len(outputs) == 2:
             boxes, scores = outputs
@@ -83,6 +76,20 @@ class BoxDetector:
         chosen = best[kept.ravel()]
         corners = np.concatenate([boxes[chosen, :2], boxes[chosen, :2] + boxes[chosen, 2:]], axis=1)
         return np.clip(corners * np.tile(scale, 2), 0, (width, height) * 2), scores[chosen].astype(np.float64)
+
+
+def boxed_in(image: Image, side: int) -> Image:
+    """A picture (side, side, 3) that shows an image (h, w, 3) in its upper left corner, and gray around it."""
+    height, width = image.shape[:2]
+    scale = max(width, height) / side
+    size = round(width / scale), round(height / scale)
+    small = cv2.resize(image, size, interpolation=_interpolation(image, side))
+    edges = (0, side - size[1], 0, side - size[0])
+    return np.asarray(cv2.copyMakeBorder(small, *edges, cv2.BORDER_CONSTANT, value=GRAY))
+
+
+def _interpolation(image: Image, side: int) -> int:
+    return cv2.INTER_AREA if max(image.shape[:2]) > side else cv2.INTER_LINEAR
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,10 +1,11 @@
 """Scores the trained peers and the networks of the package on the same pictures.
 
     python -m benchmarks.peers.score data/test build/peers
+    python -m benchmarks.peers.score data/test build/peers --lens rectilinear
 
 Thresholds and the tolerance of sizes are chosen on the validation pictures of the training, where F1 is best. Writes
-benchmarks/peer_scores.json. The paper compares average precision over distance, too (section "Discussion and
-Conclusion").
+benchmarks/peer_scores.json. With --lens, it scores on fields those that learned from one kind of lens only. The paper
+compares average precision over distance, too (section "Discussion and Conclusion").
 """
 
 from __future__ import annotations
@@ -32,8 +33,9 @@ from vm_train.data.pictures import Picture, find_pictures
 from vm_train.scores.object_scores import ObjectScores
 
 from ..shipped import CANDIDATES, METERS, RANGES, SETS, classes_of
-from .boxes import read_truths
+from .boxes import LENSES, kind_of_lens, read_truths
 from .detector import TRAINED, BoxDetector, FrameDetector, located, reported
+from .train import ALL_LENSES, folder_of
 
 RESULTS = Path(__file__).parents[1] / "peer_scores.json"
 SAME = "ball, same pictures"
@@ -42,6 +44,7 @@ SAME = "ball, same pictures"
 OURS = ("ball", "ball-small", SAME)
 
 FIELD = "field"
+ELSEWHERE = tuple(each for each in SETS if each != FIELD)
 TOLERANCES = (1.25, 1.5, 2.0, 3.0)
 FACTORS = (1.0, 0.5, 0.25)
 """Sizes of the test pictures of 1280 x 1024 px: twice, as large as, and half as large as those of the training."""
@@ -72,17 +75,12 @@ def resized(picture: Picture, factor: float) -> tuple[np.ndarray, LensFile]:
     return np.asarray(image), LensFile(lens, picture.lens.orientation)
 
 
-def projection(files: PictureFiles) -> str:
-    """`rectilinear` or `fisheye`."""
-    return "rectilinear" if "RECTILINEAR" in files.lens.read_text() else "fisheye"
-
-
 class Tally:
     """Scores of a detector on a test set: of all pictures, and by the kind of lens."""
 
     def __init__(self) -> None:
         self.all = ObjectScores(min_radius=2.0)
-        self.by_lens = {kind: ObjectScores(min_radius=2.0) for kind in ("rectilinear", "fisheye")}
+        self.by_lens = {kind: ObjectScores(min_radius=2.0) for kind in LENSES}
 
     def add(self, lens: str, truths: Sequence[Any], found: Sequence[Any]) -> None:
         self.all.add(truths, found)
@@ -104,7 +102,7 @@ def tally_peer(
         assert orientation is not None
         objects = located(boxes / factor, scores, size, picture.lens.lens, orientation, radius)
         for tolerance, tally in found.items():
-            tally.add(projection(files), truths, reported(objects, 0.0, tolerance))
+            tally.add(kind_of_lens(files), truths, reported(objects, 0.0, tolerance))
     return found
 
 
@@ -138,7 +136,7 @@ def tally_ours(file: Path, pictures: Iterable[PictureFiles], factor: float, sett
         large = [
             _Enlarged(each.confidence, enlarged(each.outline, factor), each.position, each.bearing) for each in objects
         ]
-        found.add(projection(files), truths, large)
+        found.add(kind_of_lens(files), truths, large)
     return found
 
 
@@ -185,64 +183,86 @@ def main() -> None:
     parser.add_argument("--shared", type=Path, help="folder with the real and reference frames")
     names = [*(each.name for each in TRAINED), *OURS]
     parser.add_argument("--only", choices=names, action="append", help="score only this detector; repeatable")
+    parser.add_argument("--lens", choices=LENSES, default=ALL_LENSES, help="those that learned from this kind only")
     options = parser.parse_args()
     chosen = options.only or names
-    found: dict[str, Any] = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
-    validation = _validation(options.trained / "boxes")
+    trained = folder_of(options.trained, options.lens)
+    validation = _validation(trained / "boxes")
     for peer in [each for each in TRAINED if each.name in chosen]:
-        detector = BoxDetector(peer, options.trained / f"{peer.stem}.onnx")
-        found[peer.name] = peer_row(detector, choose(detector, validation), options.test, options.shared)
-        _write(found, peer.name)
-    for name in [each for each in OURS if each in chosen]:
-        file = options.trained / "ball.onnx" if name == SAME else model_path(name)
-        found[name] = our_row(file, options.test, options.shared)
-        _write(found, name)
+        detector = BoxDetector(peer, trained / f"{peer.stem}.onnx")
+        choice = choose(detector, validation)
+        row = peer_on_fields(detector, choice, options.test)
+        if options.lens == ALL_LENSES:
+            row |= peer_elsewhere(detector, choice, options.test, options.shared)
+        _write(title(peer.name, options.lens), row)
+    for name in [each for each in (OURS if options.lens == ALL_LENSES else (SAME,)) if each in chosen]:
+        file = trained / "ball.onnx" if name == SAME else model_path(name)
+        row = ours_on_fields(file, options.test)
+        if options.lens == ALL_LENSES:
+            row |= ours_elsewhere(file, options.test, options.shared)
+        _write(title(name, options.lens), row)
 
 
-def peer_row(detector: BoxDetector, choice: Choice, test: Path, shared: Path | None) -> dict[str, Any]:
-    """All figures of a peer."""
-    row: dict[str, Any] = {"choice": vars(choice)}
-    for name in SETS:
+def title(name: str, lens: str) -> str:
+    """The name in the results of a detector that learned from a kind of lens."""
+    return name if lens == ALL_LENSES else f"{name}, only {lens}"
+
+
+def peer_on_fields(detector: BoxDetector, choice: Choice, test: Path) -> dict[str, Any]:
+    """Figures of a peer on fields, also by the kind of lens and the size of the pictures."""
+    fields, tolerances = find_pictures(test / FIELD), (None, choice.tolerance)
+    tallies = {factor: tally_peer(detector, fields, tolerances, factor) for factor in FACTORS}
+    row = {
+        "choice": vars(choice),
+        **_on_fields({each: tally[None] for each, tally in tallies.items()}, choice.threshold),
+    }
+    checked = tallies[1.0][choice.tolerance].all
+    return row | {f"{FIELD}, sizes checked": numbers(checked, choice.threshold_with_tolerance)}
+
+
+def ours_on_fields(file: Path, test: Path) -> dict[str, Any]:
+    """The same figures of a network of ours, with its default threshold."""
+    fields = find_pictures(test / FIELD)
+    tallies = {factor: tally_ours(file, fields, factor, CANDIDATES) for factor in FACTORS}
+    return _on_fields(tallies, Settings().min_confidence)
+
+
+def _on_fields(tallies: dict[float, Tally], threshold: float) -> dict[str, Any]:
+    """Figures from a tally for each size of the pictures."""
+    whole = tallies[1.0]
+    return {
+        FIELD: numbers(whole.all, threshold),
+        "lenses": {kind: numbers(scores, threshold)["all"] for kind, scores in whole.by_lens.items()},
+        "sizes": {f"{factor:g}": numbers(tally.all, threshold)["all"] for factor, tally in tallies.items()},
+        "curve": _curve(whole),
+    }
+
+
+def peer_elsewhere(detector: BoxDetector, choice: Choice, test: Path, shared: Path | None) -> dict[str, Any]:
+    """Figures of a peer on the other test sets and on frames of real cameras."""
+    row: dict[str, Any] = {}
+    for name in ELSEWHERE:
         tallies = tally_peer(detector, find_pictures(test / name), (None, choice.tolerance))
         row[name] = numbers(tallies[None].all, choice.threshold)
         row[f"{name}, sizes checked"] = numbers(tallies[choice.tolerance].all, choice.threshold_with_tolerance)
-        if name == FIELD:
-            row |= _details(tallies[None], choice.threshold)
-    row["sizes"] = {"1": row[FIELD]["all"]}
-    for factor in FACTORS[1:]:
-        tally = tally_peer(detector, find_pictures(test / FIELD), (None,), factor)[None]
-        row["sizes"][f"{factor:g}"] = numbers(tally.all, choice.threshold)["all"]
     used = choice.threshold_with_tolerance, choice.tolerance
-    row["frames"] = _frames(shared, lambda radius: FrameDetector(detector, radius, *used))
-    return row
+    return row | {"frames": _frames(shared, lambda radius: FrameDetector(detector, radius, *used))}
 
 
-def our_row(file: Path, test: Path, shared: Path | None) -> dict[str, Any]:
-    """The same figures of a network of ours, with its default threshold."""
+def ours_elsewhere(file: Path, test: Path, shared: Path | None) -> dict[str, Any]:
+    """The same figures of a network of ours."""
     row: dict[str, Any] = {}
-    threshold = Settings().min_confidence
-    for each in SETS:
-        tally = tally_ours(file, find_pictures(test / each), 1.0, CANDIDATES)
-        row[each] = numbers(tally.all, threshold)
-        if each == FIELD:
-            row |= _details(tally, threshold)
-    row["sizes"] = {"1": row[FIELD]["all"]}
-    for factor in FACTORS[1:]:
-        tally = tally_ours(file, find_pictures(test / FIELD), factor, CANDIDATES)
-        row["sizes"][f"{factor:g}"] = numbers(tally.all, threshold)["all"]
-    row["frames"] = _frames(shared, lambda radius: Detector.from_file(file, Settings(object_radius=radius)))
-    return row
+    for name in ELSEWHERE:
+        tally = tally_ours(file, find_pictures(test / name), 1.0, CANDIDATES)
+        row[name] = numbers(tally.all, Settings().min_confidence)
+    return row | {"frames": _frames(shared, lambda radius: Detector.from_file(file, Settings(object_radius=radius)))}
 
 
-def _details(tally: Tally, threshold: float) -> dict[str, Any]:
-    """Figures by the kind of lens, and precision over recall at the paper's overlap."""
-    lenses = {kind: numbers(scores, threshold)["all"] for kind, scores in tally.by_lens.items()}
+def _curve(tally: Tally) -> list[list[float]]:
+    """Recall and precision at the paper's overlap."""
     curve = tally.all.ranking(0.75).precision_recall
     chosen = np.unique(np.linspace(0, len(curve.recall) - 1, 150).astype(int)) if len(curve.recall) else []
-    return {
-        "lenses": lenses,
-        "curve": [[round(float(each[at]), 4) for each in (curve.recall, curve.precision)] for at in chosen],
-    }
+    return [[round(float(each[at]), 4) for each in (curve.recall, curve.precision)] for at in chosen]
 
 
 def _frames(shared: Path | None, detector: Callable[[float], Any]) -> dict[str, Any]:
@@ -258,10 +278,12 @@ def _validation(boxes: Path) -> list[PictureFiles]:
     return [each for each in find_pictures(links[0].resolve().parent) if each.number in numbers]
 
 
-def _write(found: dict[str, Any], name: str) -> None:
+def _write(name: str, row: dict[str, Any]) -> None:
+    """Add a row to the results. It reads them again, because another process may score other detectors."""
+    found: dict[str, Any] = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
     with atomic_write(RESULTS) as path:
-        path.write_text(json.dumps(found, indent=1) + "\n")
-    print(name, json.dumps(found[name].get("field", {}).get("all")), flush=True)
+        path.write_text(json.dumps(found | {name: row}, indent=1) + "\n")
+    print(name, json.dumps(row["sizes"]["1"]), flush=True)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from vm_embedded.files import atomic_write
 
 from . import cpu_torchvision  # noqa: F401  # before torchvision
 from .boxes import read_boxes
+from .precision import fast_convolutions
 
 SIDE = 320
 SMALLEST, LARGEST = 0.02, 0.8
@@ -96,8 +97,9 @@ def train(data: Path, out: Path, epochs: int) -> list[dict[str, float]]:
     data: folder of `write_boxes`. out: gets state.pt with the network, and as `log` the loss of training and validation
     pictures after each epoch. Returns this log.
     """
+    fast_convolutions()
     torch.manual_seed(0)
-    network = new_network()
+    network = new_network().to(memory_format=torch.channels_last)
     optimizer = torch.optim.AdamW(network.parameters(), RATE, weight_decay=DECAY)
     log: list[dict[str, float]] = []
     out.mkdir(parents=True, exist_ok=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from torch import nn
 
-from benchmarks.peers.boxes import box_of, read_boxes, read_truths, write_boxes
+from benchmarks.peers.boxes import LENSES as KINDS
+from benchmarks.peers.boxes import box_of, kind_of_lens, link_pictures, read_boxes, read_truths, write_boxes
+from benchmarks.peers.course import read_course
 from benchmarks.peers.detector import BoxDetector, TrainedPeer, located, reported
-from benchmarks.peers.score import _best, choose, enlarged, tally_ours, tally_peer
-from benchmarks.peers.train import still_improved
+from benchmarks.peers.score import _best, choose, enlarged, tally_ours, tally_peer, title
+from benchmarks.peers.train import ALL_LENSES, EPOCHS, folder_of, still_improved
 from benchmarks.shipped import CANDIDATES, classes_of
 from tests.vm_train.drawn import draw_set
 from vm_embedded import Orientation
@@ -41,6 +44,35 @@ def boxes(pictures, tmp_path_factory):
     out = tmp_path_factory.mktemp("boxes")
     write_boxes(pictures, out)
     return out
+
+
+def test_only_the_pictures_of_one_kind_of_lens_are_linked(pictures, tmp_path):
+    """The drawn pictures are rectilinear; some of these are declared to be fisheye pictures."""
+    mixed = tmp_path / "mixed"
+    shutil.copytree(pictures, mixed)
+    for files in find_pictures(mixed)[::3]:
+        files.lens.write_text(files.lens.read_text().replace("RECTILINEAR", "EQUISOLID"))
+    kinds = {each.number: kind_of_lens(each) for each in find_pictures(mixed)}
+    assert set(kinds.values()) == set(KINDS)
+    for kind in KINDS:
+        out = folder_of(tmp_path, kind) / "pictures"
+        for _ in range(2):  # links that are there stay
+            link_pictures(mixed, out, kind)
+        linked = find_pictures(out)
+        assert [each.number for each in linked] == [number for number, each in kinds.items() if each == kind]
+        classes, originals = classes_of(model_path("ball")), {each.number: each for each in find_pictures(mixed)}
+        for files in linked:
+            assert read_truths(files, classes)[1] == read_truths(originals[files.number], classes)[1]
+    write_boxes(tmp_path / "rectilinear" / "pictures", tmp_path / "boxes")
+    parts = [sorted((tmp_path / "boxes" / "labels" / part).iterdir()) for part in ("training", "validation")]
+    names = [path.stem for part in parts for path in part]
+    assert sorted(names) == [number for number, kind in kinds.items() if kind == "rectilinear"]
+
+
+def test_each_training_has_its_own_folder_and_its_own_row():
+    folders = {folder_of(Path("out"), lens) for lens in EPOCHS}
+    assert len(folders) == len({title("YOLO nano, 320", lens) for lens in EPOCHS}) == len(EPOCHS)
+    assert title("YOLO nano, 320", ALL_LENSES) == "YOLO nano, 320"
 
 
 def test_boxes_surround_the_balls_of_both_parts(pictures, boxes):
@@ -176,8 +208,18 @@ def test_nothing_found_has_no_threshold():
 
 
 def test_a_training_that_ends_with_its_best_epoch_still_improved():
-    rows = [{"ap50": each, "validation_loss": -each} for each in (0.1, 0.3, 0.2)]
+    rows = [{"ap50": 0.9, "ap50_95": each, "validation_loss": -each} for each in (0.1, 0.3, 0.2)]
     assert still_improved("yolo320", rows[:2])
     assert not still_improved("yolo320", rows)
     assert still_improved("ssdlite", rows[:2])
     assert not still_improved("ssdlite", rows)
+
+
+def test_the_seconds_of_an_epoch_after_an_interruption_count_from_the_new_start(tmp_path):
+    heads = "epoch,time,train/box_loss,train/cls_loss,train/dfl_loss,metrics/mAP50(B),metrics/mAP50-95(B)"
+    lines = [heads, "1,100.4,2,1,0.5,0.3,0.1", "2,210,1,1,0.5,0.4,0.2", "3,90,1,0.5,0.5,0.5,0.3"]
+    (tmp_path / "results.csv").write_text("\n".join(lines) + "\n")
+    course = read_course(tmp_path / "results.csv")
+    assert [each["seconds"] for each in course] == [100, 110, 90]
+    assert [each["loss"] for each in course] == [3.5, 2.5, 2.0]
+    assert course[-1]["ap50_95"] == 0.3
