@@ -76,6 +76,7 @@ lock: ## choose the robot's packages, and write their hashes to deploy/robot.txt
 
 bench: .venv/bench ## measure the speed, also of other detectors; write docs/performance.md (10 minutes)
 	$(BIN)/python -m benchmarks.run
+	$(BIN)/python -m benchmarks.instruction_sets
 	$(BIN)/python -m benchmarks.report
 
 bench-external: .venv/runtime ## compare with another program, see benchmarks/external.py: make bench-external PEER='./engine' [MODEL=ball]

@@ -13,6 +13,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 
 RESULTS = Path(__file__).with_name("results.json")
+PEER_TIMES = Path(__file__).with_name("peer_times.json")
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "performance.md"
 README = DOCS.parent / "README.md"
@@ -110,6 +111,15 @@ def peers(found: dict[str, Any]) -> str:
     return table(["detector", "whole call", "p99", "relative to 5x4", "first call (cold CPU cache)"], rows)
 
 
+def instruction_sets(found: dict[str, Any]) -> str:
+    sets = found["instruction_sets"]
+    first = next(iter(sets.values()))
+    rows = [
+        [name, kind, *(ms(each[name][kind]["p50"]) for each in sets.values())] for name in first for kind in first[name]
+    ]
+    return table(["network", "call", *sets], rows)
+
+
 def growth(found: dict[str, Any]) -> str:
     names = {"intersections": "k", "distance": "m", "resolution": "megapixels"}
     parts = []
@@ -155,6 +165,7 @@ TABLES = {
     "whole-calls": whole_calls,
     "shipped": shipped,
     "peers": peers,
+    "instruction-sets": instruction_sets,
     "growth": growth,
     "walks": walks,
     "soak": soak,
@@ -170,6 +181,36 @@ def plot_peers(found: dict[str, Any], path: Path) -> None:
     axes.set_xscale("log")
     axes.set_xlim(0.1, 200)
     axes.set_xlabel("whole call on one core [ms], log scale")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.tick_params(labelsize=8)
+    figure.savefig(path, dpi=130)
+    pyplot.close(figure)
+
+
+def plot_roofline(found: dict[str, Any], path: Path) -> None:
+    """Whole calls over the multiplications and additions of their networks, above the time that these need at least.
+
+    found: peer_times.json, in which all detectors took turns.
+    """
+    rate = found["sgemm_gflops"]
+    figure, axes = pyplot.subplots(figsize=(7.5, 4.0), layout="constrained")
+    ends = [1e-3, 200.0]
+    axes.plot(ends, [1e3 * each / rate for each in ends], color="#9aa5b1")
+    axes.annotate(
+        f"floor: {rate:g} GFLOP/s", (0.02, 1e3 * 0.02 / rate), (4, -12), textcoords="offset points", fontsize=8
+    )
+    for name, row in found["calls"].items():
+        ours = name.startswith(("Visual", "ball"))
+        x, y = row["operations"] / 1e9, row["p50"]
+        axes.plot(x, y, "o", color="#2a7f62" if ours else "#4f81bd")
+        left = name in ("YOLO v1, 448", "YOLO v3, 416", "YOLO nano, 640")
+        place = {"xytext": (-6 if left else 6, 0), "ha": "right" if left else "left"}
+        axes.annotate(name, (x, y), textcoords="offset points", fontsize=8, va="center", **place)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlim(1e-3, 2e3)
+    axes.set_xlabel("multiplications and additions of a call [billions], log scale")
+    axes.set_ylabel("whole call on one core [ms], log scale")
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(labelsize=8)
     figure.savefig(path, dpi=130)
@@ -207,6 +248,7 @@ def main() -> None:
     PAGE.write_text(text)
     fill(README, {"speed": speed(found)})
     plot_peers(found, DOCS / "performance-peers.png")
+    plot_roofline(json.loads(PEER_TIMES.read_text()), DOCS / "performance-roofline.png")
     plot_growth(found, DOCS / "performance-growth.png")
 
 

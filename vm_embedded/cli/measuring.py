@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats, Image
-from ..detection.cache import MeshCache
 from ..detection.detector import Detector
 from ..geometry.lens import Lens, Size
 from ..geometry.orientation import Orientation
@@ -75,7 +74,7 @@ def measure(
     for detector in detectors:
         for _ in range(_WARM_UP_CALLS):
             detector.detect(image, orientations[0], lens)
-        detector.cache = MeshCache(detector.manifest, detector.settings)
+        detector.cache = detector.new_cache()
     timings: list[list[dict[str, float]]] = [[] for _ in detectors]
     points: list[list[int]] = [[] for _ in detectors]
     for frame, orientation in enumerate(orientations, start=1):
@@ -103,7 +102,7 @@ def measure_cold(detector: Detector, lens: Lens, size: Size, orientations: Seque
     lens = lens.for_image(size)
     new_mesh, known_mesh = [], []
     for orientation in orientations:
-        cache = MeshCache(detector.manifest, detector.settings)
+        cache = detector.new_cache()
         beside = Orientation.from_roll_pitch(
             orientation.height, orientation.roll, orientation.pitch + 2.0 * detector.settings.pitch_step
         )

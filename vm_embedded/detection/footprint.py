@@ -31,10 +31,12 @@ class Levels:
     """Which picture of the pyramid colors each of n points. Each picture is half as large as the one before.
 
     order (p,): the points, those of the first picture first. The share of each picture is filled up to whole blocks:
-    its last point is repeated. ends: for each picture, the number of blocks up to the end of its share.
+    its last point is repeated. places (n,): where each point is in `order`. ends: for each picture, the number of
+    blocks up to the end of its share.
     """
 
     order: npt.NDArray[np.intp]
+    places: npt.NDArray[np.intp]
     ends: tuple[int, ...]
 
     @classmethod
@@ -43,7 +45,10 @@ class Levels:
         shares = [np.flatnonzero(level == each) for each in range(int(level.max(initial=0)) + 1)]
         filled = [np.pad(share, (0, -len(share) % BLOCK), mode="edge") if len(share) else share for share in shares]
         blocks = np.cumsum([len(each) // BLOCK for each in filled])
-        return cls(frozen(np.concatenate(filled)), tuple(blocks.tolist()))
+        order = np.concatenate(filled)
+        places = np.empty(len(level), dtype=np.intp)
+        places[order] = np.arange(len(order))
+        return cls(frozen(order), frozen(places), tuple(blocks.tolist()))
 
     def shares(self) -> Iterator[tuple[int, slice]]:
         """The pictures that color points: how often each was halved, and its blocks."""
@@ -56,7 +61,7 @@ class Levels:
     @property
     def nbytes(self) -> int:
         """Memory that it holds [bytes]."""
-        return self.order.nbytes
+        return self.order.nbytes + self.places.nbytes
 
 
 def levels_for(manifest: Manifest, rays: Floats, height: float, lens: Lens) -> Levels:

@@ -26,40 +26,49 @@ def sample(pyramid: Pyramid, pixels: Floats, levels: Levels, out: Singles) -> No
         places = _in_pictures(pyramid, pixels, levels)
         whole = np.floor(places)
         right, down = (places - whole).astype(np.float32)
-        corners = _corners(pyramid, levels, whole.astype(np.int16))
+        corners = _corners(pyramid, levels, whole.astype(np.int16).astype(np.int32))
     left = corners[..., 0, :]
-    rows = left + right[:, None] * (corners[..., 1, :] - left)
+    rows = corners[..., 1, :] - left
+    rows *= right[:, None]
+    rows += left
     upper = rows[:, :, 0]
-    values = (upper + down * (rows[:, :, 1] - upper)) * np.float32(1.0 / 255.0)
+    values = rows[:, :, 1] - upper
+    values *= down
+    values += upper
+    values *= np.float32(1.0 / 255.0)
     for column, channel in enumerate(pyramid.channels):
-        out[levels.order, column] = values[channel].reshape(-1)
+        np.take(values[channel], levels.places, out=out[:, column], mode="clip")
 
 
 def _in_pictures(pyramid: Pyramid, pixels: Floats, levels: Levels) -> Floats:
     """Pixels (2, blocks, BLOCK), x and y, of the points, each in its picture; clipped to the border of halved ones."""
-    places = np.stack([axis[levels.order] for axis in pixels.T]).reshape(2, -1, BLOCK)
-    for level, share in levels.shares():
-        if level:
-            height, width = pyramid.level(level).shape[:2]
-            for axis, last in zip(places[:, share], (width - 1.0, height - 1.0), strict=True):
-                axis += 0.5
-                axis *= 0.5**level
-                axis -= 0.5
-                np.clip(axis, 0.0, last, out=axis)
+    places = np.stack([np.take(axis, levels.order) for axis in pixels.T]).reshape(2, -1, BLOCK)
+    if len(levels.ends) > 1:
+        size = np.array(pyramid.level(0).shape[1::-1])
+        halvings = np.concatenate([np.full(share.stop - share.start, level) for level, share in levels.shares()])
+        factor, whole = 0.5**halvings, halvings == 0
+        places *= factor[:, None]
+        places += 0.5 * (factor - 1.0)[:, None]  # pixels count from the middle of the first one
+        last = np.maximum(size[:, None] >> halvings, 1) - 1.0
+        np.maximum(places, np.where(whole, -np.inf, 0.0)[:, None], out=places)
+        np.minimum(places, np.where(whole, np.inf, last)[:, :, None], out=places)
     return places
 
 
-def _corners(pyramid: Pyramid, levels: Levels, whole: npt.NDArray[np.int16]) -> Singles:
+def _corners(pyramid: Pyramid, levels: Levels, whole: npt.NDArray[np.int32]) -> Singles:
     """Values (channels, blocks, 2, 2, BLOCK), 0 to 255, of the upper and lower, left and right pixel around each place.
 
-    whole (2, blocks, BLOCK): x and y of the upper left one.
+    whole (2, blocks, BLOCK): x and y of the upper left one, from -2^15 to 2^15 - 1.
     """
     count = whole.shape[1]
-    places = np.empty((count, 2, 2, BLOCK, 2), dtype=np.int16)
-    for side in range(2):
-        np.add(whole[0, :, None], side, out=places[:, :, side, :, 0])
-        np.add(whole[1, :, None], side, out=places[:, side, :, :, 1])
-    table = places.reshape(count, 4 * BLOCK, 2)
+    # OpenCV takes x and y as two int16. Here they are the lower and the upper half of an int32, so that one addition
+    # moves a place.
+    places = np.empty((count, 2, 2, BLOCK), dtype=np.int32)
+    x, y = whole
+    np.bitwise_or(y << 16, x & 0xFFFF, out=places[:, 0, 0])
+    np.add(places[:, 0, 0], 1, out=places[:, 0, 1])
+    np.add(places[:, 0], 1 << 16, out=places[:, 1])
+    table = places.view(np.int16).reshape(count, 4 * BLOCK, 2)
     frame = pyramid.level(0)
     values = np.empty((count, 4 * BLOCK, *frame.shape[2:]), dtype=np.uint8)
     for level, share in levels.shares():

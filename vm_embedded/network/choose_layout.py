@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from ..mesh.mesh import Mesh
 from .lattice_layout import LatticeLayout
-from .layout import Layout
+from .layout import WholeLayout
 from .manifest import Manifest
 from .plain_layout import PlainLayout
 from .runs_layout import RunsLayout
 
 
-def choose_layout(mesh: Mesh, manifest: Manifest) -> Layout:
+def choose_layout(mesh: Mesh, manifest: Manifest) -> WholeLayout:
     """The mesh in the layout that the manifest's network takes."""
     if manifest.layout == "runs":
         return RunsLayout(mesh, manifest.model.groups)

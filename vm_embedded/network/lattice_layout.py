@@ -7,14 +7,14 @@ import numpy.typing as npt
 
 from ..arrays import Indices, Mask, Singles, frozen
 from ..mesh.mesh import Mesh
-from .layout import OFF_SCREEN, Feeds, Layout
+from .layout import OFF_SCREEN, Feeds, WholeLayout
 
 BELOW = 3
 """Rows of gaps before the first point. The second slot of the second row has only gaps around it, so in every layer it
 has the value of the off-screen point (vm_export/lattice_graph.py)."""
 
 
-class LatticeLayout(Layout):
+class LatticeLayout(WholeLayout):
     """The box around all cells of a lattice, row by row, with gaps around it.
 
     steps: columns and rows from a point to each of its neighbors. They replace the neighbor indices.

@@ -8,6 +8,7 @@ names the layout that a model file was written for.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,9 @@ from ..arrays import Floats, Indices, Mask, Singles
 
 Feeds = dict[str, npt.NDArray[np.generic]]
 """A network's inputs by name."""
+
+Run = Callable[[Feeds], Singles]
+"""A network: from its inputs to its output."""
 
 OFF_SCREEN = np.float32(-1.0)
 """Color of the off-screen point."""
@@ -57,12 +61,24 @@ class Layout(ABC):
         """View (m, 3) of the slots' colors in an array of `new_points`."""
 
     @abstractmethod
-    def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
-        """The network's inputs, from the colored array `points` and a mask (m,) of the slots on screen.
+    def answers(self, network: Run, points: Singles, on_screen: Mask) -> Singles:
+        """Probabilities (m, C) of the slots, valid only on screen.
 
-        Fills in the off-screen point's color, OFF_SCREEN, in place.
+        points: the colored array. on_screen: mask (m,) of the slots. Fills in the off-screen point's color, OFF_SCREEN,
+        in place.
         """
+
+
+class WholeLayout(Layout):
+    """A layout that the network takes in one call."""
+
+    def answers(self, network: Run, points: Singles, on_screen: Mask) -> Singles:
+        return self.probabilities(network(self.feeds(points, on_screen)))
+
+    @abstractmethod
+    def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
+        """The network's inputs; see `answers`."""
 
     @abstractmethod
     def probabilities(self, output: Singles) -> Singles:
-        """Probabilities (m, C) of the slots from the network's output; valid only on screen."""
+        """Probabilities (m, C) of the slots from the network's output."""

@@ -12,6 +12,7 @@ import binascii
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from ..errors import ModelError
@@ -43,6 +44,10 @@ SEAL_KEY = "visual_mesh_sha256"
 
 _METADATA_PROPS = 14
 _EXTERNAL_DATA, _DATA_LOCATION = 13, 14
+_OP_TYPE = 4
+_LOOK_UPS = (b"ArrayFeatureExtractor", b"Gather")
+"""Operators that look up neighbors, in the layouts plain and runs."""
+
 _MOST_FIELDS = 500_000
 """Most fields of a model file; the networks of the package have a few thousand."""
 
@@ -62,6 +67,14 @@ class ModelFile:
     look: bytes | None = None
     glance: bytes | None = None
     canary: Canary | None = None
+
+    @cached_property
+    def depth(self) -> int:
+        """How many links away a point may be on which an answer depends: the number of the network's convolutions.
+
+        Only for the layouts plain and runs.
+        """
+        return _look_ups(memoryview(self.content))
 
 
 def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
@@ -157,6 +170,19 @@ def _read_fields(content: bytes) -> tuple[dict[str, str], str]:
         raise ModelError("not an ONNX file")
     _refuse_parts("Model", memoryview(content), budget)
     return metadata, digest.hexdigest()
+
+
+def _look_ups(content: memoryview) -> int:
+    """The look-ups of neighbors in an ONNX file that `_read_fields` accepts: one for each convolution."""
+    budget: _Budget = iter(range(_MOST_FIELDS))
+    return sum(
+        node_field == _OP_TYPE and isinstance(kind, memoryview) and bytes(kind) in _LOOK_UPS
+        for number, graph in _fields(content, budget)
+        if number == 7 and isinstance(graph, memoryview)
+        for graph_field, node in _fields(graph, budget)
+        if graph_field == 1 and isinstance(node, memoryview)
+        for node_field, kind in _fields(node, budget)
+    )
 
 
 def _refuse_parts(message: str, data: memoryview, budget: _Budget) -> None:

@@ -43,6 +43,11 @@ _SELF_TEST_TOLERANCE = 1e-4
 """A hundred times the rounding of single precision, in which processors differ, and far below a change of an answer."""
 
 
+def usable_threads(threads: int) -> int:
+    """A number of threads, but at most the cores that this process may use."""
+    return min(threads, len(os.sched_getaffinity(0)))
+
+
 class OnnxModel:
     """A model with one output, loaded by ONNX Runtime on the CPU.
 
@@ -55,7 +60,7 @@ class OnnxModel:
         self, path: str | Path, content: bytes, interface: Interface, output: str, threads: int, spinning: bool
     ) -> None:
         self.path = path
-        self.threads = min(threads, len(os.sched_getaffinity(0)))
+        self.threads = usable_threads(threads)
         self._outputs = [output]
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = self.threads

@@ -42,7 +42,7 @@ import numpy.typing as npt
 
 from ..arrays import Indices, Mask, Singles, frozen
 from ..mesh.mesh import SELF, Groups, Mesh
-from .layout import OFF_SCREEN, Feeds, Layout
+from .layout import OFF_SCREEN, Feeds, WholeLayout
 
 _GAP = 1
 """The middle one of the three gaps that come first. All slots around it are gaps, as around the off-screen point."""
@@ -55,7 +55,7 @@ window."""
 _Positions = npt.NDArray[np.int64]
 
 
-class RunsLayout(Layout):
+class RunsLayout(WholeLayout):
     """The slots of a mesh in the layout `runs`, and the columns in which each slot finds the sums of its groups.
 
     columns: (G, m) positions in a layer's table of G (m - 1) sums.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -13,32 +14,51 @@ from .choose_layout import choose_layout
 from .layout import Layout
 from .manifest import Manifest
 from .model_file import ModelFile
-from .onnx_model import Interface, OnnxModel
+from .onnx_model import Interface, OnnxModel, usable_threads
 from .self_test import SelfTest
+from .split_layout import SplitLayout, sectors_of
+
+_WORTH_A_THREAD = 30e6
+"""Multiplications and additions for which another thread may pay: about a millisecond. Waking it takes 0.1 ms."""
+
+_LARGEST_SECTOR = 0.75
+"""Share of a mesh's points. In a small view, the surroundings of a sector are most of the other sectors."""
 
 
 class Session:
     """A loaded mesh network.
 
-    threads, spinning: see OnnxModel. Loading runs the model's self-test. Raises ModelError if the file does not load,
-    has other inputs and outputs than its manifest says, or fails its self-test.
+    threads, spinning: see OnnxModel. With several threads, a large network runs on sectors of the mesh at the same time
+    (split_layout.py); in the layout lattice, ONNX Runtime splits each operator instead. Loading runs the model's
+    self-test. Raises ModelError if the file does not load, has other inputs and outputs than its manifest says, or
+    fails its self-test.
     """
 
     def __init__(self, model: ModelFile, threads: int = 1, spinning: bool = False) -> None:
         self.model = model
+        self.threads = usable_threads(threads)
+        is_split = self.threads > 1 and model.manifest.layout != "lattice"
+        self._others = ThreadPoolExecutor(self.threads - 1, "network") if is_split else None
         interface = _interface(model.manifest)
-        self.onnx = OnnxModel(model.path, model.content, interface, "probabilities", threads, spinning)
+        inside = 1 if is_split else self.threads
+        self.onnx = OnnxModel(model.path, model.content, interface, "probabilities", inside, spinning)
         if model.manifest.self_test is not None:
             self._check(model.manifest.self_test)
 
-    @property
-    def threads(self) -> int:
-        """Threads that the network uses."""
-        return self.onnx.threads
+    def arrange(self, mesh: Mesh) -> Layout:
+        """A mesh in the order that the network takes it, in sectors if it has several threads and they pay."""
+        manifest = self.model.manifest
+        count = min(self.threads, int(manifest.operations * len(mesh) / _WORTH_A_THREAD))
+        if self._others is None or count < 2:
+            return choose_layout(mesh, manifest)
+        sectors = sectors_of(mesh, count, self.model.depth)
+        if max(len(each.members) for each in sectors) > _LARGEST_SECTOR * len(mesh):
+            return choose_layout(mesh, manifest)
+        return SplitLayout(mesh, sectors, lambda part: choose_layout(part, manifest), self._others)
 
     def run(self, layout: Layout, points: Singles, on_screen: Mask) -> Singles:
         """Probabilities (m, C) of a layout's slots, from its colored `points` and the slots (m,) on screen."""
-        return layout.probabilities(self.onnx.run(layout.feeds(points, on_screen)))
+        return layout.answers(self.onnx.run, points, on_screen)
 
     def answer(self, test: SelfTest) -> Singles:
         """Probabilities (n, C) of an example's points."""

@@ -31,7 +31,7 @@ from vm_embedded.field.features import FieldFeatures
 from vm_embedded.geometry.orientation import Orientation, rotation_z
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.close_look import CloseLook
-from vm_embedded.network.layout import Layout
+from vm_embedded.network.layout import Feeds, Layout
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import read_model
 from vm_embedded.network.session import Session
@@ -214,10 +214,12 @@ class TorchNetwork:
         """Probabilities (m, C) of the slots of a plain layout, from its colored `points`."""
         import torch
 
-        feeds = layout.feeds(points, on_screen)
-        with torch.inference_mode():
-            output = self._network(torch.from_numpy(feeds["points"]), torch.from_numpy(feeds["neighbors"]))
-        return layout.probabilities(output.numpy())
+        def network(feeds: Feeds) -> Singles:
+            with torch.inference_mode():
+                output = self._network(torch.from_numpy(feeds["points"]), torch.from_numpy(feeds["neighbors"]))
+            return np.asarray(output.numpy(), dtype=np.float32)
+
+        return layout.answers(network, points, on_screen)
 
 
 def _orientation(picture: Picture) -> Orientation:
