@@ -24,6 +24,7 @@ from vm_embedded import Detector, Orientation, Settings
 from vm_embedded.cli.machine import describe_machine, rss_mib, sgemm_rate
 from vm_embedded.cli.measuring import measure, measure_cold
 from vm_embedded.cli.workload import walk
+from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.projection import project
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
@@ -233,7 +234,7 @@ def walks(models: Models, work: list[Frame], seconds: float) -> dict[str, Any]:
         lens = frame.lens.for_image(frame.size)
         rows = []
         for height in (0.5, 0.8, 1.1):
-            cache, largest = detector.new_cache(), 0.0
+            cache, largest = MeshCache(detector.manifest, detector.settings, detector.session.arrange), 0.0
             middle = Orientation.from_roll_pitch(height, 0.0, 0.35)
             for number, orientation in enumerate(walk(middle, np.deg2rad(10.0), 0.03, int(30 * seconds))):
                 if number == 30:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats, Image
+from ..detection.cache import MeshCache
 from ..detection.detector import Detector
 from ..geometry.lens import Lens, Size
 from ..geometry.orientation import Orientation
@@ -74,7 +75,7 @@ def measure(
     for detector in detectors:
         for _ in range(_WARM_UP_CALLS):
             detector.detect(image, orientations[0], lens)
-        detector.cache = detector.new_cache()
+        detector.cache = MeshCache(detector.manifest, detector.settings, detector.session.arrange)
     timings: list[list[dict[str, float]]] = [[] for _ in detectors]
     points: list[list[int]] = [[] for _ in detectors]
     for frame, orientation in enumerate(orientations, start=1):
@@ -102,7 +103,7 @@ def measure_cold(detector: Detector, lens: Lens, size: Size, orientations: Seque
     lens = lens.for_image(size)
     new_mesh, known_mesh = [], []
     for orientation in orientations:
-        cache = detector.new_cache()
+        cache = MeshCache(detector.manifest, detector.settings, detector.session.arrange)
         beside = Orientation.from_roll_pitch(
             orientation.height, orientation.roll, orientation.pitch + 2.0 * detector.settings.pitch_step
         )

@@ -38,12 +38,8 @@ class Detector:
         self.manifest = model.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         self.session = Session(model, self.settings.threads, self.settings.spinning)
         self.look = CloseLook.of(model, self.settings.threads, self.settings.spinning)
-        self.cache = self.new_cache()
+        self.cache = MeshCache(self.manifest, self.settings, self.session.arrange)
         self.shape = self.manifest.object_shape
-
-    def new_cache(self) -> MeshCache:
-        """An empty cache for this network, its threads and these settings."""
-        return MeshCache(self.manifest, self.settings, self.session.arrange)
 
     @classmethod
     def from_file(cls, path: str | Path, settings: Settings | None = None) -> Detector:
