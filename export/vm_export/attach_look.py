@@ -11,7 +11,7 @@ import torch
 import vm_embedded
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.network.close_look import CloseLook
-from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY, LookContract
+from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY, LookContract, upright_key
 from vm_embedded.network.look_test import LookTest, made_patches
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
@@ -32,17 +32,24 @@ _MADE = 64
 def attached(content: bytes, manifest: Manifest, look: LookCheckpoint) -> tuple[bytes, float]:
     """A model file's bytes with a look network and its glance, and the largest difference of an answer to torch.
 
-    content, manifest: of the model file. A look network that it already has is replaced. The examples become the
-    self-tests. Raises ModelError if the look judges another class than the file's objects.
+    content, manifest: of the model file. The look network for the same object or upright is replaced. The examples
+    become the self-tests. Raises ModelError if the look judges another class than the file's objects and uprights.
     """
     contract, look_content, difference = _exported(look)
+    if contract.upright_radius:
+        others = tuple(each for each in manifest.upright_looks if each.object_class != contract.object_class)
+        entries = {
+            METADATA_KEY: replace(manifest, upright_looks=(*others, contract)).as_json(),
+            upright_key(contract.object_class): base64.b64encode(look_content).decode(),
+        }
+        return with_metadata(content, entries), difference
     files = {LOOK_KEY: look_content}
     if look.glance is not None:
         glance, files[GLANCE_KEY], glance_difference = _exported(look.glance)
         contract, difference = replace(contract, glance=glance), float(np.maximum(difference, glance_difference))
     described = {METADATA_KEY: replace(manifest, look=contract).as_json()}
-    entries = {key: base64.b64encode(file).decode() for key, file in files.items()}
-    return with_metadata(content, _WITHOUT | described | entries), difference
+    encoded = {key: base64.b64encode(file).decode() for key, file in files.items()}
+    return with_metadata(content, _WITHOUT | described | encoded), difference
 
 
 def _exported(look: LookCheckpoint) -> tuple[LookContract, bytes, float]:
@@ -66,8 +73,10 @@ def look_self_test(look: LookCheckpoint) -> LookTest:
 
 
 def detached(content: bytes, manifest: Manifest) -> bytes:
-    """A model file's bytes without its look network. content, manifest: of the model file."""
-    return with_metadata(content, _WITHOUT | {METADATA_KEY: replace(manifest, look=None).as_json()})
+    """A model file's bytes without its look networks. content, manifest: of the model file."""
+    uprights = {upright_key(each.object_class): None for each in manifest.upright_looks}
+    described = replace(manifest, look=None, upright_looks=()).as_json()
+    return with_metadata(content, _WITHOUT | uprights | {METADATA_KEY: described})
 
 
 def largest_look_difference(content: bytes, look: LookCheckpoint) -> float:

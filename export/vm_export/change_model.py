@@ -42,7 +42,7 @@ def change_look(model: str | Path, path: str | Path, look: LookCheckpoint | None
     if look is not None:
         content, difference = attached(read.content, read.manifest, look)
         check_difference(path, "answers of the close look", difference)
-    elif read.look is None:
+    elif read.look is None and not read.upright_looks:
         raise ModelError(f"{model} has no close look to remove")
     else:
         content = detached(read.content, read.manifest)

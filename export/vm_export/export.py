@@ -80,6 +80,7 @@ def export(
     manifest = replace(
         checkpoint.manifest,
         look=None,
+        upright_looks=(),
         layout=layout,
         operations=network.shape.operations,
         provenance=provenance,

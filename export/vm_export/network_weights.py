@@ -75,7 +75,7 @@ def network_of(model: ModelFile) -> Checkpoint:
         raise ModelError(f"{foreign}: {error}") from error
     if not difference <= LARGEST_DIFFERENCE:
         raise ModelError(f"{foreign}: its answers differ from those of the layers by {difference:.2g}")
-    bare = replace(manifest, layout="plain", operations=0, self_test=None, look=None)
+    bare = replace(manifest, layout="plain", operations=0, self_test=None, look=None, upright_looks=())
     return Checkpoint(network, bare)
 
 

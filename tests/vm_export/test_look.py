@@ -15,6 +15,8 @@ from tests.vm_export.checkpoints import checkpoint, manifest
 from tests.vm_export.looks import SHAPE, glancing_checkpoint, look_checkpoint, look_network
 from vm_embedded.errors import InputError, ModelError
 from vm_embedded.network.close_look import CloseLook
+from vm_embedded.network.look_contract import upright_key
+from vm_embedded.network.manifest import ObjectClass
 from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
 from vm_embedded.network.session import Session
 from vm_export import attach_look, export
@@ -23,6 +25,8 @@ from vm_export.checkpoint import Checkpoint
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_graph import look_model
 from vm_export.look_network import LookNetwork, LookShape, normalized
+from vm_export.metadata import with_metadata
+from vm_export.network_shape import NetworkShape
 
 from ..vm_embedded.strategies import seeds
 
@@ -362,3 +366,79 @@ def test_a_look_of_the_usual_size_fits_its_sizes():
     np.testing.assert_allclose(
         onnx_answers(look_model(made.network), made.examples), torch_answers(made.network, made.examples), atol=1e-5
     )
+
+
+CLASSES = (ObjectClass("ball", "object"), ObjectClass("goal", "upright"), ObjectClass("robot", "upright"))
+
+
+def upright(name, seed=0):
+    return look_checkpoint(seed, object_class=name, upright_radius=0.3)
+
+
+@pytest.fixture
+def field(tmp_path):
+    """A model file of a network with goals and robots."""
+    path = tmp_path / "field.onnx"
+    network = checkpoint(shape=NetworkShape.uniform(3, 4, 3)).network
+    export.export(Checkpoint(network, replace(manifest(), classes=CLASSES)), path)
+    return path
+
+
+def attach(path, *looks):
+    for each in looks:
+        assert change_look(path, path, each).difference < 1e-4
+    return read_model(path)
+
+
+def test_a_model_file_holds_a_look_for_each_upright_beside_that_of_the_object(field):
+    ball, goal, robot = look_checkpoint(), upright("goal", 1), upright("robot", 2)
+    read = attach(field, goal, ball, robot)
+    looks = CloseLook.of_uprights(read)
+    assert list(looks) == ["goal", "robot"]
+    patches = random_patches(9, seed=5)
+    for close, made in ((CloseLook.of(read), ball), (looks["goal"], goal), (looks["robot"], robot)):
+        np.testing.assert_allclose(close.run(patches), torch_answers(made.network, patches), atol=1e-5)
+        check_self_test(close.contract.self_test, made)
+        assert close.contract.upright_radius == made.contract.upright_radius
+
+
+def test_a_look_at_an_upright_replaces_the_one_before_and_no_other(field):
+    first = attach(field, upright("goal", 1), upright("robot", 2))
+    second = attach(field, upright("goal", 3))
+    assert first.upright_looks[1] in second.upright_looks
+    assert first.upright_looks[0] not in second.upright_looks
+    assert len(second.upright_looks) == 2
+
+
+def test_no_look_removes_all_of_them(field, tmp_path):
+    before = field.read_bytes()
+    attach(field, upright("goal"), look_checkpoint(), upright("robot"))
+    assert change_look(field, tmp_path / "bare.onnx", None).difference is None
+    assert (tmp_path / "bare.onnx").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("look", "message"),
+    [
+        (look_checkpoint(object_class="goal"), r"judges class 'goal', but the classes of kind object are \['ball'\]"),
+        (upright("ball"), r"looks at the uprights \['ball'\], but the classes of kind upright are \['goal', 'robot'\]"),
+        (upright("post"), "'post'"),
+    ],
+)
+def test_a_look_for_another_kind_of_class_is_refused(field, tmp_path, look, message):
+    with pytest.raises(ModelError, match=message):
+        change_look(field, tmp_path / "other.onnx", look)
+
+
+def test_a_file_whose_looks_are_not_those_of_its_manifest_is_refused(field, tmp_path):
+    read = attach(field, upright("goal"))
+    key = upright_key("goal")
+    (text,) = (each.value for each in onnx.load_from_string(read.content).metadata_props if each.key == key)
+    for entries, message in (
+        ({key: None}, f"manifest has an entry {key}"),
+        ({upright_key("robot"): text}, f"metadata has an entry {upright_key('robot')}"),
+        ({key: "?"}, f"{key} can't be read"),
+    ):
+        (tmp_path / "changed.onnx").write_bytes(with_metadata(read.content, entries))
+        with pytest.raises(ModelError, match=message):
+            read_model(tmp_path / "changed.onnx")

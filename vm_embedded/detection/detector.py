@@ -38,6 +38,7 @@ class Detector:
         self.manifest = model.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         self.session = Session(model, self.settings.threads, self.settings.spinning)
         self.look = CloseLook.of(model, self.settings.threads, self.settings.spinning)
+        self.upright_looks = CloseLook.of_uprights(model, self.settings.threads, self.settings.spinning)
         self.cache = MeshCache(self.manifest, self.settings, self.session.arrange)
         self.shape = self.manifest.object_shape
 
@@ -92,7 +93,8 @@ class Detector:
         """
         watch = Stopwatch()
         found, rejected = locate(observation, self.look, self.settings, watch, explain)
-        features = locate_features(observation) if self.settings.field_features else None
+        is_wanted = self.settings.field_features
+        features = locate_features(observation, self.upright_looks) if is_wanted else None
         if features is not None:
             watch.lap("field")
         timing = {**observation.timing_ms, **watch.stages}

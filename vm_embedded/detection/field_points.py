@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..arrays import Floats
 from ..field.features import FieldFeatures
 from ..field.find import find_features
 from ..field.ground_points import ROLES, GroundPoints
+from .looking import Look
 from .observation import Observation
 from .prepared_view import PreparedView
+from .upright_looks import find_bases
 
 _LOWEST = 1e-3
 """Rays less steep than this do not meet the plane near enough to matter."""
 
 
-def locate_features(observation: Observation) -> FieldFeatures | None:
-    """Goal posts, robots, lines and border; None if the network has no class for any of them."""
+def locate_features(observation: Observation, looks: Mapping[str, Look]) -> FieldFeatures | None:
+    """Goal posts, robots, lines and border; None if the network has no class for any of them.
+
+    looks: look networks for classes of uprights, by class; rules find the uprights of the others. Raises ModelError if
+    a look network does not run.
+    """
     names = [each.name for each in observation.manifest.classes]
     if not set(ROLES) & set(names):
         return None
     view = observation.view
-    return find_features(ground_points(observation), lambda places: _pixels(view, places))
+    bases = {name: find_bases(observation, look) for name, look in looks.items()}
+    return find_features(ground_points(observation), lambda places: _pixels(view, places), bases)
 
 
 def ground_points(observation: Observation) -> GroundPoints:

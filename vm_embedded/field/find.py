@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from .features import Border, CenterCircle, FieldFeatures, Segment, Upright
 from .goals import pair_posts
 from .ground_points import GroundPoints
 from .lines import LinePoints, Piece, find_pieces, line_points
-from .uprights import POST, ROBOT, Base, find_uprights
+from .uprights import POST, ROBOT, Base, UprightRules, find_uprights
 
 ToPixels = Callable[[Floats], Floats]
 """Pixels (n, 2) of places (n, 2) [m] on the plane; NaN outside of the picture."""
@@ -29,10 +29,15 @@ _CELL = 0.1
 """At most one line point is reported in each square of this size [m]."""
 
 
-def find_features(points: GroundPoints, to_pixels: ToPixels) -> FieldFeatures:
-    """All field features among the points of a frame."""
-    posts = find_uprights(points, points.classes["goal"], POST) if "goal" in points.classes else []
-    robots = find_uprights(points, points.classes["robot"], ROBOT) if "robot" in points.classes else []
+def find_features(points: GroundPoints, to_pixels: ToPixels, bases: Mapping[str, Sequence[Base]]) -> FieldFeatures:
+    """All field features among the points of a frame.
+
+    bases: of the classes that a close look has judged, by class. Rules find the uprights of the others.
+    """
+    posts, robots = (
+        list(bases[name]) if name in bases else _by_rules(points, name, rules)
+        for name, rules in (("goal", POST), ("robot", ROBOT))
+    )
     candidates = line_points(points)
     pieces, circle = _straight_and_round(candidates)
     border = find_border(points) if "field" in points.classes else np.empty((0, 2))
@@ -55,6 +60,10 @@ def find_features(points: GroundPoints, to_pixels: ToPixels) -> FieldFeatures:
         line_confidences=confidences,
         border=Border(border, next(pixels)) if len(border) else None,
     )
+
+
+def _by_rules(points: GroundPoints, name: str, rules: UprightRules) -> list[Base]:
+    return find_uprights(points, points.classes[name], rules) if name in points.classes else []
 
 
 def _upright(base: Base, name: str, height: float, pixel: Floats) -> Upright:

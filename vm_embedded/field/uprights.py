@@ -44,6 +44,9 @@ ROBOT = UprightRules(
     least=0.5, points=14, jump=0.35, beside=0.3, depth=0.3, taller=1.0, foot=0.4, filled=0.2, widest=2.0
 )
 
+KINDS = {"goal": "post", "robot": "robot"}
+"""What the uprights of a class are, by its name."""
+
 _COLUMN = 0.012
 """Width of a column of points [rad]."""
 

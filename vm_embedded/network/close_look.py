@@ -50,6 +50,14 @@ class CloseLook:
             glance = cls(f"{model.path}, glance", contract.glance, model.glance, None, threads, spinning)
         return cls(f"{model.path}, close look", contract, model.look, glance, threads, spinning)
 
+    @classmethod
+    def of_uprights(cls, model: ModelFile, threads: int = 1, spinning: bool = False) -> dict[str, CloseLook]:
+        """The look networks of a model file for classes of kind upright, by class. Raises ModelError."""
+        return {
+            each.object_class: cls(f"{model.path}, look at {each.object_class}", each, content, None, threads, spinning)
+            for each, content in zip(model.manifest.upright_looks, model.upright_looks, strict=True)
+        }
+
     def run(self, patches: Image) -> Singles:
         """Answers (n, 4) to patches (n, size, size, 3), RGB. Raises ModelError, also for answers that are not finite.
 

@@ -16,11 +16,19 @@ GLANCE_KEY = "visual_mesh_glance"
 """Key of its glance, in the same form."""
 
 
+def upright_key(class_name: str) -> str:
+    """Key of the look network for a class of kind upright, in the same form."""
+    return f"{LOOK_KEY}_{class_name}"
+
+
 @dataclass(frozen=True, kw_only=True)
 class LookContract:
     """What the runtime must know to cut patches for a look network, or for the glance before it.
 
     object_class: name of the class that it judges.
+    upright_radius: for a class of kind upright, the radius of the circle on the plane that takes the place of the
+        object [m]: it is around the base, and a patch shows a fixed multiple of it. 0 for a class of kind object, whose
+        radius the manifest has.
     size: samples along each side of a patch, 8 to 128.
     extent: half the side of a patch [expected radii], 0.5 to 8.
     above: probability above which a mesh point counts for a proposal, 0 to 0.99.
@@ -36,6 +44,7 @@ class LookContract:
     """
 
     object_class: str
+    upright_radius: float = 0.0
     size: int
     extent: float
     above: float
@@ -49,6 +58,7 @@ class LookContract:
         if not isinstance(self.object_class, str):
             raise ModelError(f"object_class of the close look must be a name, not {self.object_class!r}")
         for name, whole, low, high in (
+            ("upright_radius", False, 0.0, 100.0),
             ("size", True, 8, 128),
             ("extent", False, 0.5, 8.0),
             ("above", False, 0.0, 0.99),

@@ -21,7 +21,7 @@ from .look_contract import LookContract
 from .self_test import SelfTest
 
 METADATA_KEY = "visual_mesh"
-FORMAT_VERSION = 6
+FORMAT_VERSION = 7
 
 KINDS = ("object", "upright", "area", "background")
 """Kinds of classes. object: has the mesh's shape; the runtime locates it. upright, area: the runtime reports its points
@@ -87,6 +87,7 @@ class Manifest:
     sampling: one of POINT_SAMPLINGS.
     colors: one of POINT_COLORS.
     look: description of the look network, if the file has one; see close_look.py.
+    upright_looks: descriptions of the look networks for classes of kind upright.
     provenance: origin of the file; the runtime does not use it.
 
     Raises ModelError for unknown values.
@@ -110,6 +111,7 @@ class Manifest:
     sampling: str = "bilinear"
     colors: str = "absolute"
     look: LookContract | None = None
+    upright_looks: tuple[LookContract, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -164,6 +166,15 @@ class Manifest:
             raise ModelError(
                 f"the close look judges class {self.look.object_class!r}, but the classes of kind object are {objects}"
             )
+        uprights = [each.name for each in self.classes if each.kind == "upright"]
+        judged = [each.object_class for each in self.upright_looks]
+        if len(set(judged)) != len(judged) or not set(judged) <= set(uprights):
+            raise ModelError(
+                f"there are close looks at the uprights {judged}, but the classes of kind upright are {uprights}"
+            )
+        for each in self.upright_looks:
+            if not each.upright_radius or each.glance is not None:
+                raise ModelError(f"the close look of {each.object_class!r} must have an upright_radius and no glance")
 
     def _check_walls(self) -> None:
         """Mesh wall6 is for cylinders, its points have no footprints, and the runtime does not locate objects on it."""
@@ -224,8 +235,9 @@ class Manifest:
 
     def as_json(self) -> str:
         """The manifest as the model file holds it."""
-        data = asdict(replace(self, look=None)) | {"format_version": FORMAT_VERSION}
+        data = asdict(replace(self, look=None, upright_looks=())) | {"format_version": FORMAT_VERSION}
         data["look"] = self.look.as_dict() if self.look else None
+        data["upright_looks"] = [each.as_dict() for each in self.upright_looks]
         data["self_test"] = None if self.self_test is None else self.self_test.as_dict()
         return json.dumps(data, sort_keys=True, separators=(",", ":"))
 
@@ -258,6 +270,9 @@ class Manifest:
             raise ModelError(f"the model's manifest has malformed classes or provenance: {error}") from error
         if data["look"] is not None:
             data["look"] = LookContract.from_dict(data["look"])
+        if not isinstance(data["upright_looks"], list):
+            raise ModelError(f"upright_looks in the model's manifest must be a list, not {data['upright_looks']!r}")
+        data["upright_looks"] = tuple(map(LookContract.from_dict, data["upright_looks"]))
         if data["self_test"] is not None:
             data["self_test"] = SelfTest.from_dict(data["self_test"])
         return cls(**data)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from ..errors import ModelError
 from .canary import CANARY_KEY, Canary
-from .look_contract import GLANCE_KEY, LOOK_KEY, LookContract
+from .look_contract import GLANCE_KEY, LOOK_KEY, LookContract, upright_key
 from .manifest import METADATA_KEY, Manifest
 
 # Fields of a message that hold further messages, by the numbers of onnx.proto: every place that can hold a tensor.
@@ -58,7 +58,8 @@ _Budget = Iterator[int]
 @dataclass(frozen=True)
 class ModelFile:
     """A model file's bytes, its manifest, the SHA-256 of the bytes, and, if it has them, the ONNX files of its look
-    network and of the glance before it, and its canary."""
+    network and of the glance before it, its canary, and the ONNX files of its looks at uprights, in the manifest's
+    order."""
 
     path: Path
     content: bytes
@@ -67,6 +68,7 @@ class ModelFile:
     look: bytes | None = None
     glance: bytes | None = None
     canary: Canary | None = None
+    upright_looks: tuple[bytes, ...] = ()
 
     @cached_property
     def depth(self) -> int:
@@ -106,9 +108,9 @@ def parse_model(path: str | Path, content: bytes) -> ModelFile:
         if METADATA_KEY not in metadata:
             raise ModelError("no Visual Mesh manifest in its metadata; was it written by vm-export?")
         manifest = Manifest.from_json(metadata[METADATA_KEY])
-        contract = manifest.look
-        look = _inner_file(metadata, LOOK_KEY, "close look", contract)
-        glance = _inner_file(metadata, GLANCE_KEY, "glance", contract and contract.glance)
+        look = _inner_file(metadata, LOOK_KEY, "a close look", manifest.look)
+        glance = _inner_file(metadata, GLANCE_KEY, "a glance", manifest.look and manifest.look.glance)
+        upright_looks = _upright_looks(metadata, manifest)
         canary = Canary.from_json(metadata[CANARY_KEY]) if CANARY_KEY in metadata else None
         if SEAL_KEY not in metadata:
             raise ModelError("has no checksum: it was written by an older release; export it again with this release")
@@ -116,21 +118,30 @@ def parse_model(path: str | Path, content: bytes) -> ModelFile:
             raise ModelError("its checksum is wrong: it was damaged or changed; copy or export it again")
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from error
-    return ModelFile(Path(path), content, manifest, hashlib.sha256(content).hexdigest(), look, glance, canary)
+    sha256 = hashlib.sha256(content).hexdigest()
+    return ModelFile(Path(path), content, manifest, sha256, look, glance, canary, upright_looks)
+
+
+def _upright_looks(metadata: dict[str, str], manifest: Manifest) -> tuple[bytes, ...]:
+    """The ONNX files of the looks at uprights, in the manifest's order. Raises ModelError."""
+    contracts = {upright_key(each.object_class): each for each in manifest.upright_looks}
+    keys = [*contracts, *(key for key in metadata if key.startswith(upright_key("")) and key not in contracts)]
+    files = [_inner_file(metadata, key, f"an entry {key}", contracts.get(key)) for key in keys]
+    return tuple(each for each in files if each is not None)
 
 
 def _inner_file(metadata: dict[str, str], key: str, name: str, contract: LookContract | None) -> bytes | None:
     """The ONNX file under a key, if the manifest has a contract for it. name: for messages. Raises ModelError."""
     if (key in metadata) != (contract is not None):
         has, lacks = ("manifest", "metadata") if contract else ("metadata", "manifest")
-        raise ModelError(f"its {has} has a {name}, its {lacks} has none")
+        raise ModelError(f"its {has} has {name}, its {lacks} has none")
     if contract is None:
         return None
     try:
         content = base64.b64decode(metadata[key], validate=True)
         _read_fields(content)
     except (ModelError, binascii.Error, ValueError) as error:
-        raise ModelError(f"its {name} can't be read: {error}") from error
+        raise ModelError(f"{name} can't be read: {error}") from error
     return content
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -91,6 +91,7 @@ class ExactSubject:
     settings: Settings
     network: Network
     look: CloseLook | None = None
+    upright_looks: Mapping[str, CloseLook] = field(default_factory=dict)
 
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         observation = self.observe(picture, radius)
@@ -98,7 +99,8 @@ class ExactSubject:
         features = None
         if self.grid.is_visual:
             found, _ = locate(observation, self.look, self.settings, Stopwatch())
-            features = locate_features(observation) if self.settings.field_features else None
+            is_wanted = self.settings.field_features
+            features = locate_features(observation, self.upright_looks) if is_wanted else None
         return _answer(observation, found, features, self.look, self.settings)
 
     def observe(self, picture: Picture, radius: float | None = None) -> Observation:
@@ -188,7 +190,8 @@ def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subj
             return RobotSubject(Detector(model, settings), model.sha256)
         session = Session(model, settings.threads, settings.spinning)
         look = CloseLook.of(model, settings.threads, settings.spinning)
-        return ExactSubject(model.manifest, VISUAL, model.sha256, settings, session, look)
+        uprights = CloseLook.of_uprights(model, settings.threads, settings.spinning)
+        return ExactSubject(model.manifest, VISUAL, model.sha256, settings, session, look, uprights)
     if kind != ".pt":
         raise InputError(f"{path}: a model must be a checkpoint (.pt) or a model file (.onnx), not {path.suffix!r}")
     if as_robot:

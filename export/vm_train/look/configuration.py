@@ -36,7 +36,18 @@ class LookData:
 class PatchSettings:
     """Section [patches]: which patches the network learns from, and how it gets them on the robot."""
 
-    object_class: str = text_line("", 'class to judge; "": the first class of kind object that MODEL has')
+    object_class: str = text_line(
+        "",
+        "class to judge: of kind object, or goal or robot of kind upright; "
+        '"": the first class of kind object that MODEL has',
+    )
+    upright_radius: float = number(
+        0.3,
+        "for goal and robot, the radius of a circle around the base on the plane, which takes the place of the "
+        "object's radius",
+        "m",
+        (0.01, 10.0),
+    )
     size: int = number(32, "samples along each side of a patch", "px", (8, 128))
     extent: float = number(
         1.75,

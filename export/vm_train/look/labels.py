@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +12,11 @@ import numpy.typing as npt
 from vm_embedded.arrays import Floats, Mask, Singles
 from vm_embedded.detection.patches import Tangents
 from vm_embedded.detection.prepared_view import PreparedView
+from vm_embedded.errors import InputError
 from vm_embedded.network.manifest import Manifest
 
 from ..data.pictures import Picture
+from ..evaluation.field_truth import FieldScene, field_truth
 from ..evaluation.object_truth import SceneTruth, true_objects
 from ..scores.overlaps import TrueObject
 
@@ -34,11 +37,18 @@ VISIBLE = 0.25
 @dataclass(frozen=True, eq=False)
 class Truths:
     """True objects: centers (t, 3) relative to the camera in the mesh frame [m], radii (t,) [m], of tall objects half
-    their heights, and visible shares (t,) of their outlines."""
+    their heights, and visible shares (t,) of their outlines.
+
+    near, far: see NEAR and FAR. sizes (t,): logarithms of the sizes that the network learns over the expected one; None
+    for those of the radii.
+    """
 
     centers: Floats
     radii: Floats
     visible: Floats
+    near: float = NEAR
+    far: float = FAR
+    sizes: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.centers)
@@ -66,22 +76,28 @@ class PlaceLabels:
 def label_places(places: Tangents, truths: Truths) -> PlaceLabels:
     """Labels of places, whose `radius` is that of the object that is expected there."""
     right, down, off, size = _differences(places, truths)
-    return label_by_differences(right, down, off, size, truths.visible >= VISIBLE)
+    found = label_by_differences(right, down, off, size, truths.visible >= VISIBLE, truths.near, truths.far)
+    if truths.sizes is not None:
+        found.targets[:, 2] = np.where(found.of >= 0, np.append(truths.sizes, 0.0)[found.of], 0.0)
+    return found
 
 
-def label_by_differences(right: Floats, down: Floats, off: Floats, size: Floats, visible: Mask) -> PlaceLabels:
+def label_by_differences(
+    right: Floats, down: Floats, off: Floats, size: Floats, visible: Mask, near: float = NEAR, far: float = FAR
+) -> PlaceLabels:
     """Labels of n places from their differences (n, t) to t objects.
 
     right, down: shift of the object's center from the place, off: its length, all in expected radii. size: logarithm of
     the object's size over the expected one. visible (t,): whether enough of the object is visible to give a label.
+    near, far: see NEAR and FAR.
     """
     count, objects = off.shape
     if not objects:
         return PlaceLabels(
             np.zeros(count, np.int8), np.zeros((count, 3), np.float32), np.full(count, -1, dtype=np.int64)
         )
-    maybe = (off < FAR) & (np.abs(size) < UNLIKE)
-    surely = (off <= NEAR) & (np.abs(size) <= ALIKE) & visible
+    maybe = (off < far) & (np.abs(size) < UNLIKE)
+    surely = (off <= near) & (np.abs(size) <= ALIKE) & visible
     nearest = np.where(surely, off, np.inf).argmin(axis=1)
     has_object = np.asarray(surely.any(axis=1))
     labels = np.where(has_object, OBJECT, np.where(maybe.any(axis=1), UNLABELED, NOTHING)).astype(np.int8)
@@ -123,6 +139,39 @@ def find_truths(
         return Truths(centers, radii, np.array([each.visible for each in scene.objects]))
     shares = np.array([_visible_share(view, center, each) for center, each in zip(centers, known, strict=True)])
     return Truths(centers, np.full(len(known), view.shape.half_size), shares)
+
+
+BASE_NEAR, BASE_FAR = 0.9, 1.3
+"""As NEAR and FAR, for bases of uprights, which are proposed less exactly."""
+
+_NARROWEST, _WIDEST = 0.02, 3.0
+"""Limits of the width of an upright [m]."""
+
+
+def true_bases(
+    picture: Picture, scene: FieldScene | None, names: Sequence[str], view: PreparedView, kind: str
+) -> Truths:
+    """The true bases of the uprights of a kind in a picture.
+
+    names: of the classes, in the order of the labels. view: of circles around bases. Raises InputError if the scene
+    does not tell what stands on the plane.
+    """
+    uprights = field_truth(picture, scene, names).uprights
+    if uprights is None:
+        raise InputError("its scene file does not tell what stands on the plane: render it with vm-synth again")
+    found = uprights[kind]
+    if not found:
+        return Truths.none()
+    places = np.stack([np.append(each.position, -view.height) for each in found])
+    widths = np.clip([each.width for each in found], _NARROWEST, _WIDEST)
+    return Truths(
+        centers=places @ view.heading,
+        radii=np.full(len(found), view.shape.half_size),
+        visible=np.array([float(each.visible) for each in found]),
+        near=BASE_NEAR,
+        far=BASE_FAR,
+        sizes=np.log(widths / (2.0 * view.shape.half_size)),
+    )
 
 
 def _visible_share(view: PreparedView, center: Floats, shown: TrueObject) -> float:

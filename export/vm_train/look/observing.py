@@ -9,7 +9,9 @@ from typing import Any, TypeVar
 
 from vm_embedded.arrays import Singles
 from vm_embedded.detection.observation import Observation
+from vm_embedded.detection.upright_looks import around_bases, nearest_points
 from vm_embedded.errors import InputError
+from vm_embedded.field.uprights import KINDS
 from vm_embedded.network.manifest import Manifest
 from vm_workstation.worker_process import interrupts_blocked, start_worker, worker_pool
 
@@ -17,8 +19,10 @@ from ..data.classes import Classes
 from ..data.picture_files import PictureFiles
 from ..data.pictures import find_pictures, read_picture
 from ..evaluation.answers import ExactSubject
+from ..evaluation.field_truth import read_field
 from ..evaluation.object_truth import SceneTruth, read_scene
-from .labels import Truths, find_truths
+from .configuration import PatchSettings
+from .labels import Truths, find_truths, true_bases
 from .run_folder import LookRun
 
 _TASK = 5
@@ -61,19 +65,28 @@ class Observed:
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """The mesh network of a run. classes: colors in masks. in_masks: a manifest with the classes of the masks."""
+    """The mesh network of a run.
+
+    classes: colors in masks. in_masks: a manifest with the classes of the masks. patches: says around what patches of a
+    class of kind upright are cut, and which points propose a place. kind: of uprights, None for objects.
+    """
 
     subject: ExactSubject
     classes: Classes
     in_masks: Manifest
     object_class: str
+    patches: PatchSettings
+    kind: str | None
 
     @classmethod
     def of(cls, run: LookRun) -> Observer:
         """Read the mesh network. Raises InputError or ModelError."""
         subject, table = run.subject(), run.configuration.classes
-        in_masks = replace(subject.manifest, classes=table.outputs, look=None, self_test=None)
-        return cls(subject, table.mask_classes(), in_masks, run.object_class)
+        in_masks = replace(subject.manifest, classes=table.outputs, look=None, upright_looks=(), self_test=None)
+        name = run.object_class
+        kinds = {each.name: each.kind for each in subject.manifest.classes}
+        kind = KINDS[name] if kinds[name] == "upright" else None
+        return cls(subject, table.mask_classes(), in_masks, name, run.configuration.patches, kind)
 
     def observe(self, files: PictureFiles) -> Observed:
         """Raises InputError or GeometryError for a picture that can't be used."""
@@ -81,9 +94,18 @@ class Observer:
         scene = read_scene(files.image.with_name(f"scene{files.number}.json"))
         observation = self.subject.observe(picture, self._radius(scene))
         manifest = observation.manifest
+        probabilities = observation.slot_probabilities[:, manifest.column(self.object_class)]
+        if self.kind is not None:
+            probabilities = nearest_points(observation, probabilities, self.patches.above)
+            circles = around_bases(observation, self.patches.upright_radius)
+            field = read_field(files.image.with_name(f"scene{files.number}.json"))
+            return Observed(
+                circles, probabilities, true_bases(picture, field, self.classes.names, circles.view, self.kind)
+            )
         in_masks = replace(self.in_masks, radius=manifest.radius, object_radius=manifest.object_radius)
-        truths = find_truths(picture, scene, in_masks, observation.view, self.object_class)
-        return Observed(observation, observation.slot_probabilities[:, manifest.column(self.object_class)], truths)
+        return Observed(
+            observation, probabilities, find_truths(picture, scene, in_masks, observation.view, self.object_class)
+        )
 
     def _radius(self, scene: SceneTruth | None) -> float | None:
         """Radius of the objects to look for [m]: that of the scene, if the mesh network is for any radius."""

@@ -19,6 +19,7 @@ from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError, unknown
+from vm_embedded.field.uprights import KINDS
 from vm_embedded.files import atomic_write
 from vm_export.look_checkpoint import LookCheckpoint
 
@@ -122,19 +123,26 @@ def load_glance(path: Path, object_class: str) -> LookCheckpoint:
     return glance
 
 
+def uprights_of(subject: ExactSubject) -> list[str]:
+    """The classes of uprights that a look network can judge."""
+    return [each.name for each in subject.manifest.classes if each.kind == "upright" and each.name in KINDS]
+
+
 def judged_class(configuration: LookConfiguration, subject: ExactSubject, model: str) -> str:
-    """The class that the look network judges. Raises InputError if model or masks do not have it as an object."""
-    objects = [each.name for each in subject.manifest.classes if each.kind == "object"]
-    if not objects:
+    """The class that the look network judges. Raises InputError if model or masks do not have it."""
+    kinds = {each.name: each.kind for each in subject.manifest.classes}
+    objects = [name for name, kind in kinds.items() if kind == "object"]
+    uprights = uprights_of(subject)
+    if not objects + uprights:
         raise InputError(f"{model} has no class of the kind object, so there is nothing to look at")
-    name = configuration.patches.object_class or objects[0]
-    if name not in objects:
-        raise InputError(f"[patches] object_class: {unknown(f'object of {model}', name, objects)}")
-    in_masks = [each for each, kind in configuration.classes.kinds.items() if kind == "object"]
+    name = configuration.patches.object_class or (objects + uprights)[0]
+    if name not in objects + uprights:
+        raise InputError(f"[patches] object_class: {unknown(f'object of {model}', name, objects + uprights)}")
+    in_masks = [each for each, kind in configuration.classes.kinds.items() if kind == kinds[name]]
     if name not in in_masks:
         raise InputError(
-            f"{model} has class {name!r}, but the objects of [classes] are {', '.join(in_masks) or 'none'}: give the "
-            "class and its colors in masks there"
+            f"{model} has class {name!r}, but those of the kind {kinds[name]} in [classes] are "
+            f"{', '.join(in_masks) or 'none'}: give the class and its colors in masks there"
         )
     return name
 
@@ -161,6 +169,8 @@ def begin_look_run(
     object_class = judged_class(configuration, subject, name)
     glance_sha256 = None
     if glance is not None:
+        if object_class in uprights_of(subject):
+            raise InputError(f"--glance goes with objects; {object_class} is of the kind upright: leave it out")
         load_glance(glance, object_class)
         glance_sha256 = _sha256(glance)
     try:

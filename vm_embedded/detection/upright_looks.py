@@ -1,0 +1,69 @@
+"""The close look at things that stand on the plane: goal posts and robots.
+
+The look at objects serves here, too. The object is a circle on the plane, around the base of the upright. So a patch
+shows the base in its middle, the ground around it, and the lower part of the upright.
+
+A point of an upright is seen against the plane behind the base. So only the nearest points of the class in each
+direction propose a place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Singles
+from ..field.uprights import Base
+from ..geometry.circle import Circle
+from .looking import Look, look_closely
+from .observation import Observation
+from .settings import Settings
+from .stopwatch import Stopwatch
+
+PROPOSALS = 24
+"""Largest number of proposals for a class."""
+
+_CONFIDENT = Settings(max_proposals=PROPOSALS, min_confidence=0.5)
+
+_COLUMN = 0.012
+"""Width of a direction [rad]."""
+
+_JUMP = 0.12
+"""Points farther than the nearest one of their direction by more than this share are above the base."""
+
+
+def around_bases(observation: Observation, radius: float) -> Observation:
+    """The same points, where circles on the plane with this radius [m] are sought: one around each base."""
+    return replace(observation, view=observation.view._replace(shape=Circle(radius)))
+
+
+def nearest_points(observation: Observation, probabilities: Singles, above: float) -> Singles:
+    """Probabilities (m,) of the slots that may be at a base, 0 for the others.
+
+    probabilities (m,): of a class. above: smaller ones do not count.
+    """
+    rays, found = observation.layout.rays, np.zeros_like(probabilities)
+    likely = np.flatnonzero(observation.projected.on_screen & (probabilities > above) & (rays[:, 2] < 0.0))
+    if not len(likely):
+        return found
+    x, y, z = rays[likely].T
+    columns = np.floor(np.arctan2(y, x) / _COLUMN).astype(np.intp)
+    columns -= columns.min()
+    ranges = np.hypot(x, y) / -z
+    nearest = np.full(columns.max() + 1, np.inf)
+    np.minimum.at(nearest, columns, ranges)
+    low = likely[ranges <= (1.0 + _JUMP) * nearest[columns]]
+    found[low] = probabilities[low]
+    return found
+
+
+def find_bases(observation: Observation, look: Look) -> list[Base]:
+    """The uprights of a look's class, most probable first. Raises ModelError if the look network does not run."""
+    contract = look.contract
+    probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
+    nearest = nearest_points(observation, probabilities, contract.above)
+    circles = around_bases(observation, contract.upright_radius)
+    judged = look_closely(circles, look, nearest, _CONFIDENT, Stopwatch())
+    heading = observation.view.heading[:2]
+    return [Base(heading @ each.center, 2.0 * contract.upright_radius * each.scale, each.confidence) for each in judged]
