@@ -14,6 +14,7 @@ from benchmarks.field import figures
 from benchmarks.report import fill, table
 from benchmarks.shipped import METERS, NETWORKS, RANGES, RECIPES, RESULTS, SETS
 from vm_embedded.network.bundled import DEFAULT, model_path
+from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import read_model
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -180,6 +181,18 @@ def plot(found: dict[str, Any]) -> None:
         figure.savefig(DOCS / "networks.svg", metadata={"Date": None})
 
 
+def _upright_data(manifest: Manifest) -> str:
+    """The training data of the looks at uprights, for a card."""
+    lines = [
+        f"- **Training data of the close look at class {each.object_class}:** {each.provenance['training_pictures']} "
+        f"other pictures of the\n  same kind. {each.size} x {each.size} samples, convolutions of "
+        f"{', '.join(map(str, each.channels))} channels. Seed {each.provenance['seed']},\n  configuration "
+        f"`export/networks/{each.object_class}-look.toml`.\n"
+        for each in manifest.upright_looks
+    ]
+    return "".join(lines)
+
+
 def card(found: dict[str, Any], name: str) -> str:
     """A network's model card: contents, training data, accuracy and limits."""
     model = read_model(model_path(name))
@@ -225,7 +238,7 @@ default {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: {", ".join(e
 - **Training data of the glance and the close look:** {look.provenance["training_pictures"]} pictures of the same kind,
   under 55 panoramas. Seed {look.provenance["seed"]}, configurations `{glance_recipe}` and
   `{look_recipe}`.
-- **To train it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
+{_upright_data(manifest)}- **To train it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
   {model.sha256}.
 
 The test has {scores["pictures"]} rendered pictures of fields under six panoramas that no training uses, {size} px, with

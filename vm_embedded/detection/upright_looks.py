@@ -59,11 +59,13 @@ def nearest_points(observation: Observation, probabilities: Singles, above: floa
 
 
 def find_bases(observation: Observation, look: Look) -> list[Base]:
-    """The uprights of a look's class, most probable first. Raises ModelError if the look network does not run."""
+    """The uprights of a look's class, nearest first. Raises ModelError if the look network does not run."""
     contract = look.contract
     probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
     nearest = nearest_points(observation, probabilities, contract.above)
     circles = around_bases(observation, contract.upright_radius)
     judged = look_closely(circles, look, nearest, _CONFIDENT, Stopwatch())
     heading = observation.view.heading[:2]
-    return [Base(heading @ each.center, 2.0 * contract.upright_radius * each.scale, each.confidence) for each in judged]
+    width = 2.0 * contract.upright_radius
+    found = [Base(heading @ each.center, width * each.scale, each.confidence) for each in judged]
+    return sorted(found, key=lambda each: float(np.hypot(*each.position)))

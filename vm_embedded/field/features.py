@@ -17,7 +17,8 @@ class Upright:
 
     class_name: post or robot. position (2,) [m]: its base, the middle of what touches the plane. distance [m]: from the
     camera to the base. bearing (3,): unit vector from the camera to the base. pixel (2,) [px]: of the base; NaN outside
-    of the picture. width [m]: as seen from the camera. confidence: mean probability of its points, 0 to 1.
+    of the picture. width [m]: as seen from the camera. confidence: calibrated probability of a close look or, if the
+    class has none, mean probability of its points; 0 to 1.
     """
 
     class_name: str

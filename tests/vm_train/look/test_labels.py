@@ -83,7 +83,8 @@ def test_near_a_hidden_ball_nothing_is_labeled(pixel, visible):
 
 def test_the_nearest_of_two_balls_counts():
     near, far = ball((320.0, 300.0)), ball((335.0, 300.0))
-    both = Truths(*(np.concatenate(each) for each in zip(vars(far).values(), vars(near).values(), strict=True)))
+    names = ("centers", "radii", "visible")
+    both = Truths(*(np.concatenate([getattr(each, name) for each in (far, near)]) for name in names))
     found = label_places(place_beside(near, 0.05, 0.0), both)
     assert (found.labels[0], found.of[0]) == (OBJECT, 1)
 

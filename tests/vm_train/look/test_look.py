@@ -228,7 +228,7 @@ def test_what_cannot_work_ends_in_one_line(arguments, said, complaint):
 def test_a_class_that_the_masks_do_not_have_ends_in_one_line(complaint, tmp_path):
     path = tmp_path / "look.toml"
     path.write_text(CLASSES.replace("ball =", "puck ="))
-    assert "has class 'ball', but the objects of [classes] are puck" in complaint("--config", path)
+    assert "has class 'ball', but those of the kind object in [classes] are puck" in complaint("--config", path)
 
 
 def test_a_network_on_another_grid_ends_in_one_line(complaint, tmp_path):
