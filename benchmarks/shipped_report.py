@@ -185,7 +185,7 @@ def _upright_data(manifest: Manifest) -> str:
     """The training data of the looks at uprights, for a card."""
     lines = [
         f"- **Training data of the close look at class {each.object_class}:** {each.provenance['training_pictures']} "
-        f"other pictures of the\n  same kind. {each.size} x {each.size} samples, convolutions of "
+        f"pictures of the\n  same kind. {each.size} x {each.size} samples, convolutions of "
         f"{', '.join(map(str, each.channels))} channels. Seed {each.provenance['seed']},\n  configuration "
         f"`export/networks/{each.object_class}-look.toml`.\n"
         for each in manifest.upright_looks

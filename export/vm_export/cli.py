@@ -47,9 +47,12 @@ def parser() -> argparse.ArgumentParser:
     )
     looks = parser.add_mutually_exclusive_group()
     looks.add_argument(
-        "--look", type=Path, metavar="LOOK", help="checkpoint (.pt) of a close look to write into the model file"
+        "--look",
+        type=Path,
+        metavar="LOOK",
+        help="checkpoint (.pt) of a close look to write into the model file, instead of the one for the same class",
     )
-    looks.add_argument("--no-look", action="store_true", help="copy a model file (.onnx) without its close look")
+    looks.add_argument("--no-look", action="store_true", help="copy a model file (.onnx) without its close looks")
     parser.add_argument(
         "--look-above",
         type=float,

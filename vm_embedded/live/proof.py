@@ -30,6 +30,7 @@ def prove(model: ModelFile) -> str:
     manifest = model.manifest
     look = manifest.look
     parts = {"mesh network": manifest, "close look": look, "glance": look and look.glance}
+    parts |= {f"close look at {each.object_class}": each for each in manifest.upright_looks}
     for name, part in parts.items():
         if part is not None and not part.self_test:
             raise ModelError(f"{model.path}: its {name} has no self-test; export it again")

@@ -48,6 +48,16 @@ def test_a_model_without_a_self_test_is_refused(ball, part, empty):
         prove(replace(ball, manifest=without[part]))
 
 
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_model_without_a_self_test_of_a_look_at_uprights_is_refused(number):
+    soccer = read_model(model_path("soccer"))
+    looks = list(soccer.manifest.upright_looks)
+    looks[number] = replace(looks[number], self_test=None)
+    untested = replace(soccer, manifest=replace(soccer.manifest, upright_looks=tuple(looks)))
+    with pytest.raises(ModelError, match=f"its close look at {looks[number].object_class} has no self-test"):
+        prove(untested)
+
+
 def wrong(canary, **changes):
     """The canary with another first object."""
     first, *rest = canary.objects

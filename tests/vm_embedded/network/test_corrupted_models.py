@@ -20,7 +20,7 @@ from vm_embedded.errors import ModelError
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.live.proof import prove
 from vm_embedded.network.bundled import SHIPPED, model_path
-from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY
+from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY, upright_key
 from vm_embedded.network.model_file import SEAL_KEY, parse_model, sealed
 
 pytest.importorskip("onnxruntime")
@@ -30,10 +30,13 @@ LARGEST_CHANGE = 1e-3
 
 
 def networks_of(content):
-    """A model file, and its three networks by the key of their metadata; None is the mesh network."""
+    """A model file, and all its networks by the key of their metadata; None is the mesh network."""
     model = onnx.load_from_string(content)
-    entries = {each.key: each.value for each in model.metadata_props}
-    inner = {key: onnx.load_from_string(base64.b64decode(entries[key])) for key in (LOOK_KEY, GLANCE_KEY)}
+    inner = {
+        each.key: onnx.load_from_string(base64.b64decode(each.value))
+        for each in model.metadata_props
+        if each.key in (LOOK_KEY, GLANCE_KEY) or each.key.startswith(upright_key(""))
+    }
     return model, {None: model, **inner}
 
 
@@ -124,7 +127,7 @@ def test_the_self_tests_have_clear_positives_and_negatives_of_every_class(name):
     probabilities = manifest.self_test.probabilities[:-1]
     assert (probabilities.max(axis=0) > 0.7).all()
     assert (probabilities.min(axis=0) < 0.05).all()
-    for look in (manifest.look, manifest.look.glance):
+    for look in (manifest.look, manifest.look.glance, *manifest.upright_looks):
         found = look.self_test.answers[:, 0]
         assert found.max() > 0.65
         assert found.min() < 0.05
