@@ -111,23 +111,26 @@ def look_closely(
     settings: Settings,
     watch: Stopwatch,
     explain: bool = False,
+    worth: float = WORTH,
 ) -> list[Judgment]:
     """The objects of the look's class, most probable first, from the slots' probabilities (m,).
 
-    explain: also the rejected proposals, with their reasons. watch: gets the stages propose and look. Raises ModelError
-    if the network does not run.
+    explain: also the rejected proposals, with their reasons. watch: gets the stages propose and look. worth: probability
+    above which a proposal is worth another look. Raises ModelError if the network does not run.
     """
     centers = propose_places(observation, probabilities, look.contract.above, settings.max_proposals)
     watch.lap("propose")
     places = PlanePlaces(observation, centers)
-    answers = look_at(places, look)
+    answers = look_at(places, look, worth)
     judged = _judged(observation, places.centers, answers, settings, explain)
     watch.lap("look")
     return judged
 
 
-def look_at(places: Places, look: Look) -> Singles:
+def look_at(places: Places, look: Look, least: float = WORTH) -> Singles:
     """Look at n places, as often as the contracts of look and glance say, and move them to where an object was seen.
+
+    least: probability above which a place is worth another look.
 
     From the second pass on, the answers to a patch and to its mirror image are averaged. Returns the last answers
     (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError if a network does not run.
@@ -140,7 +143,7 @@ def look_at(places: Places, look: Look) -> Singles:
         patches = places.cut(worth, network.contract)
         answers[worth] = found = _mean_of_mirrored(network, patches) if number else network.run(patches)
         possible = places.move(found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
-        worth = worth[(found[:, 0] > WORTH) & possible]
+        worth = worth[(found[:, 0] > least) & possible]
         if not len(worth):
             break
     return answers

@@ -24,13 +24,19 @@ from .stopwatch import Stopwatch
 PROPOSALS = 24
 """Largest number of proposals for a class."""
 
-_CONFIDENT = Settings(max_proposals=PROPOSALS, min_confidence=0.5)
+_CONFIDENT = Settings(max_proposals=PROPOSALS, min_confidence=0.4)
 
 _COLUMN = 0.012
 """Width of a direction [rad]."""
 
 _JUMP = 0.12
 """Points farther than the nearest one of their direction by more than this share are above the base."""
+
+_MOST_POINTS = 64
+"""Largest number of points that propose places; more only cost time."""
+
+_WORTH = 0.2
+"""Probability above which a place is worth a second look."""
 
 
 def around_bases(observation: Observation, radius: float) -> Observation:
@@ -39,7 +45,7 @@ def around_bases(observation: Observation, radius: float) -> Observation:
 
 
 def nearest_points(observation: Observation, probabilities: Singles, above: float) -> Singles:
-    """Probabilities (m,) of the slots that may be at a base, 0 for the others.
+    """Probabilities (m,) of the most probable slots that may be at a base, 0 for the others.
 
     probabilities (m,): of a class. above: smaller ones do not count.
     """
@@ -54,6 +60,8 @@ def nearest_points(observation: Observation, probabilities: Singles, above: floa
     nearest = np.full(columns.max() + 1, np.inf)
     np.minimum.at(nearest, columns, ranges)
     low = likely[ranges <= (1.0 + _JUMP) * nearest[columns]]
+    if len(low) > _MOST_POINTS:
+        low = low[np.argpartition(probabilities[low], -_MOST_POINTS)[-_MOST_POINTS:]]
     found[low] = probabilities[low]
     return found
 
@@ -64,7 +72,7 @@ def find_bases(observation: Observation, look: Look) -> list[Base]:
     probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
     nearest = nearest_points(observation, probabilities, contract.above)
     circles = around_bases(observation, contract.upright_radius)
-    judged = look_closely(circles, look, nearest, _CONFIDENT, Stopwatch())
+    judged = look_closely(circles, look, nearest, _CONFIDENT, Stopwatch(), worth=_WORTH)
     heading = observation.view.heading[:2]
     width = 2.0 * contract.upright_radius
     found = [Base(heading @ each.center, width * each.scale, each.confidence) for each in judged]
