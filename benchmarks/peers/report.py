@@ -6,6 +6,8 @@ It reads peer_times.json, peer_training.json and peer_scores.json of this folder
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from matplotlib import pyplot
 
 from ..report import DOCS, fill, machine, ms, table
 from . import score, train
+from .boxes import LENSES
 from .detector import TRAINED
 from .times import RESULTS, TWO_STAGE
 
@@ -67,16 +70,17 @@ def proposals(found: dict[str, Any]) -> str:
 
 
 def trainings(found: dict[str, Any]) -> str:
-    pictures = round(found["pictures"] * (1.0 - found["validation"]))
     rows = []
-    for peer in TRAINED:
-        part = found[peer.stem]
-        epochs, improved = part["epochs"], "yes" if part["still_improved"] else "no"
-        ap50 = f"{epochs[-1]['ap50']:.3f}" if "ap50" in epochs[-1] else "-"
-        seen, loss = f"{pictures * len(epochs):,}", f"{epochs[-1]['loss']:.2f}"
-        rows.append([peer.name, str(len(epochs)), seen, loss, ap50, improved])
-    heads = ["detector", "epochs", "pictures seen", "last loss", "validation AP50", "still improved"]
-    return table(heads, rows)
+    for lens in train.EPOCHS:
+        for peer in TRAINED:
+            part = found[lens][peer.stem]
+            epochs, improved = part["epochs"], "yes" if part["still_improved"] else "no"
+            last = [_number(epochs[-1].get(each)) for each in ("ap50", "ap50_95")]
+            seen, loss = f"{found[lens]['training pictures'] * len(epochs):,}", f"{epochs[-1]['loss']:.2f}"
+            done = str(len(epochs)) if len(epochs) == part["planned"] else f"{len(epochs)} of {part['planned']}"
+            rows.append([peer.name, lens, done, seen, loss, *last, improved])
+    heads = ["detector", "learned from", "epochs", "pictures seen", "last loss", "validation AP50", "AP50 to AP95"]
+    return table([*heads, "still improved"], rows)
 
 
 def _number(value: float | None, factor: float = 1.0, digits: int = 3) -> str:
@@ -120,14 +124,19 @@ def frames(found: dict[str, Any]) -> str:
 
 
 def lenses(found: dict[str, Any]) -> str:
+    """AP50 by the kind of lens and by the size, of the scored detectors, also of those that learned from one kind."""
     rows = []
-    for name in (*score.OURS, *(peer.name for peer in TRAINED)):
-        part = found[name]
-        values = [part["lenses"][kind]["ap50"] for kind in ("rectilinear", "fisheye")]
-        values += [part["sizes"][f"{factor:g}"]["ap50"] for factor in reversed(score.FACTORS)]
-        rows.append([name, *map(_number, values)])
+    for lens in train.EPOCHS:
+        for name in (*(score.OURS if lens == train.ALL_LENSES else (score.SAME,)), *(peer.name for peer in TRAINED)):
+            part = found.get(score.title(name, lens))
+            if part is None:
+                continue
+            values = [part["lenses"][kind]["ap50"] for kind in LENSES]
+            drop = None if None in values else values[0] - values[1]
+            values += [drop, *(part["sizes"][f"{factor:g}"]["ap50"] for factor in reversed(score.FACTORS))]
+            rows.append([name, lens, *map(_number, values)])
     sizes = [f"{1280 * factor:.0f} x {1024 * factor:.0f} px" for factor in reversed(score.FACTORS)]
-    return table(["detector", "rectilinear", "fisheye", *sizes], rows)
+    return table(["detector", "learned from", *LENSES, "difference", *sizes], rows)
 
 
 def _style(name: str) -> dict[str, Any]:
@@ -136,6 +145,12 @@ def _style(name: str) -> dict[str, Any]:
         return {"color": "#2a7f62", "linestyle": lines[name], "label": name}
     color = {"ssdlite": "#c0504d", "yolo320": "#8064a2", "yolo640": "#4f81bd"}
     return {"color": color[next(each.stem for each in TRAINED if each.name == name)], "label": name}
+
+
+def _save(figure: Any, path: Path) -> None:
+    with matplotlib.rc_context({"svg.hashsalt": path.stem}):
+        figure.savefig(path, metadata={"Date": None})
+    pyplot.close(figure)
 
 
 def plot_accuracy(found: dict[str, Any], path: Path) -> None:
@@ -157,8 +172,7 @@ def plot_accuracy(found: dict[str, Any], path: Path) -> None:
         axes.set_ylim(0.0, 1.02)
         axes.spines[["top", "right"]].set_visible(False)
     figure.legend(*ap50.get_legend_handles_labels(), frameon=False, fontsize=8, loc="outside lower center", ncols=5)
-    figure.savefig(path, metadata={"Date": None})
-    pyplot.close(figure)
+    _save(figure, path)
 
 
 def plot_times(found: dict[str, Any], calls: dict[str, Any], path: Path) -> None:
@@ -180,23 +194,38 @@ def plot_times(found: dict[str, Any], calls: dict[str, Any], path: Path) -> None
     axes.set_xlabel("whole call on one core [ms], log scale")
     axes.set_ylabel("AP50 on fields")
     axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path, metadata={"Date": None})
-    pyplot.close(figure)
+    _save(figure, path)
 
 
-TABLES = {"machine of the times": machine, "paper's table": times, "per proposal": proposals}
-"""The tables from peer_times.json, by the marks of the page."""
+Tables = dict[str, Callable[[dict[str, Any]], str]]
+"""Functions that make tables from results, by the marks of the page."""
+
+TABLES: Tables = {"machine of the times": machine, "paper's table": times, "per proposal": proposals}
+"""The tables from peer_times.json."""
+
+TRAININGS: Tables = {"peers' trainings": trainings}
+"""The tables from peer_training.json."""
+
+SCORES: Tables = {
+    "peers on fields": partial(accuracy, which="field"),
+    "peers in clutter": partial(accuracy, which="clutter"),
+    "peers on frames": frames,
+    "peers by lens": lenses,
+}
+"""The tables from peer_scores.json."""
+
+
+def tables() -> dict[str, str]:
+    """All tables of the page by their marks."""
+    parts = ((RESULTS, TABLES), (train.LOG, TRAININGS), (score.RESULTS, SCORES))
+    return {name: make(json.loads(path.read_text())) for path, made in parts for name, make in made.items()}
 
 
 def main() -> None:
-    found = json.loads(RESULTS.read_text())
-    fill(PAGE, {name: made(found) for name, made in TABLES.items()})
+    fill(PAGE, tables())
     scores = json.loads(score.RESULTS.read_text())
-    made = {"peers' trainings": trainings(json.loads(train.LOG.read_text()))}
-    made |= {"peers on fields": accuracy(scores, "field"), "peers in clutter": accuracy(scores, "clutter")}
-    fill(PAGE, made | {"peers on frames": frames(scores), "peers by lens": lenses(scores)})
     plot_accuracy(scores, DOCS / "peers-accuracy.svg")
-    plot_times(scores, found["calls"], DOCS / "peers-time.svg")
+    plot_times(scores, json.loads(RESULTS.read_text())["calls"], DOCS / "peers-time.svg")
 
 
 if __name__ == "__main__":

@@ -17,9 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.files import atomic_write
-from vm_train.data.pictures import find_pictures
 
-from .boxes import LENSES, SEED, VALIDATION, link_pictures, write_boxes
+from .boxes import LENSES, PARTS, SEED, VALIDATION, link_pictures, write_boxes
 from .course import read_course
 from .detector import TRAINED
 
@@ -56,10 +55,13 @@ def train(stem: str, boxes: Path, out: Path, epochs: int) -> list[dict[str, floa
     return read_course(folder / "results.csv")
 
 
-def still_improved(stem: str, log: list[dict[str, float]]) -> bool:
-    """Whether the last epoch was the best one, by the value that this training is judged by."""
+def still_improved(stem: str, log: list[dict[str, float]], planned: int) -> bool:
+    """Whether the last epoch was the best one, by the value that judges this training, or some epochs are missing.
+
+    planned: number of epochs; an interrupted training has fewer.
+    """
     value, best = JUDGED_BY[stem]
-    return log[-1][value] == best(row[value] for row in log)
+    return len(log) < planned or log[-1][value] == best(row[value] for row in log)
 
 
 def main() -> None:
@@ -68,6 +70,7 @@ def main() -> None:
     parser.add_argument("out", type=Path, help="folder for the trainings")
     parser.add_argument("--only", choices=[each.stem for each in TRAINED], action="append", help="train only this peer")
     parser.add_argument("--lens", choices=LENSES, default=ALL_LENSES, help="learn only from pictures of this kind")
+    parser.add_argument("--as-is", action="store_true", help="take interrupted trainings after their last whole epoch")
     options = parser.parse_args()
     out, data = folder_of(options.out, options.lens), options.data
     if options.lens != ALL_LENSES:
@@ -75,12 +78,14 @@ def main() -> None:
         link_pictures(options.data, data, options.lens)
     write_boxes(data, out / "boxes")
     for stem in options.only or EPOCHS[options.lens]:
-        log = train(stem, out / "boxes", out, EPOCHS[options.lens][stem])
+        planned = EPOCHS[options.lens][stem]
+        log = train(stem, out / "boxes", out, 0 if options.as_is else planned)
         found: dict[str, Any] = json.loads(LOG.read_text()) if LOG.exists() else {}
         found |= {"validation": VALIDATION, "split_seed": SEED}
         part = found.setdefault(options.lens, {})
-        part["pictures"] = len(find_pictures(data))
-        part[stem] = {"seed": 0, "still_improved": still_improved(stem, log), "epochs": log}
+        part |= {f"{each} pictures": len(list((out / "boxes" / "labels" / each).glob("*.txt"))) for each in PARTS}
+        row = {"seed": 0, "planned": planned, "still_improved": still_improved(stem, log, planned), "epochs": log}
+        part[stem] = row
         with atomic_write(LOG) as path:
             path.write_text(json.dumps(found, indent=1) + "\n")
 
