@@ -17,7 +17,7 @@ from vm_embedded.network.look_contract import LookContract
 from .look_network import LookNetwork, LookShape
 from .torch_files import load_values, save_values
 
-_FORMAT = "vm-embedded look 2"
+_FORMAT = "vm-embedded look 3"
 
 
 @dataclass(frozen=True, eq=False)

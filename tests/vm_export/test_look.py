@@ -188,7 +188,7 @@ def test_a_broken_checkpoint_is_refused(tmp_path, content):
 
 def test_a_checkpoint_of_another_kind_is_refused(tmp_path):
     checkpoint().save(tmp_path / "model.pt")
-    with pytest.raises(InputError, match=r"model\.pt is not .* 'vm-embedded look 2'.* 'vm-embedded checkpoint"):
+    with pytest.raises(InputError, match=r"model\.pt is not .* 'vm-embedded look 3'.* 'vm-embedded checkpoint"):
         LookCheckpoint.load(tmp_path / "model.pt")
     look_checkpoint().save(tmp_path / "look.pt")
     with pytest.raises(InputError, match=r"look\.pt is not a checkpoint of format 'vm-embedded checkpoint"):
@@ -435,9 +435,9 @@ def test_a_file_whose_looks_are_not_those_of_its_manifest_is_refused(field, tmp_
     key = upright_key("goal")
     (text,) = (each.value for each in onnx.load_from_string(read.content).metadata_props if each.key == key)
     for entries, message in (
-        ({key: None}, f"manifest has an entry {key}"),
-        ({upright_key("robot"): text}, f"metadata has an entry {upright_key('robot')}"),
-        ({key: "?"}, f"{key} can't be read"),
+        ({key: None}, "manifest has a close look at goal, its metadata has none"),
+        ({upright_key("robot"): text}, "metadata has a close look at robot, its manifest has none"),
+        ({key: "?"}, "a close look at goal can't be read"),
     ):
         (tmp_path / "changed.onnx").write_bytes(with_metadata(read.content, entries))
         with pytest.raises(ModelError, match=message):

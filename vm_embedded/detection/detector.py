@@ -94,7 +94,7 @@ class Detector:
         watch = Stopwatch()
         found, rejected = locate(observation, self.look, self.settings, watch, explain)
         is_wanted = self.settings.field_features
-        features = locate_features(observation, self.upright_looks) if is_wanted else None
+        features = locate_features(observation, self.upright_looks, self.settings) if is_wanted else None
         if features is not None:
             watch.lap("field")
         timing = {**observation.timing_ms, **watch.stages}

@@ -13,13 +13,14 @@ from ..field.ground_points import ROLES, GroundPoints
 from .looking import Look
 from .observation import Observation
 from .prepared_view import PreparedView
+from .settings import Settings
 from .upright_looks import find_bases
 
 _LOWEST = 1e-3
 """Rays less steep than this do not meet the plane near enough to matter."""
 
 
-def locate_features(observation: Observation, looks: Mapping[str, Look]) -> FieldFeatures | None:
+def locate_features(observation: Observation, looks: Mapping[str, Look], settings: Settings) -> FieldFeatures | None:
     """Goal posts, robots, lines and border; None if the network has no class for any of them.
 
     looks: look networks for classes of uprights, by class; rules find the uprights of the others. Raises ModelError if
@@ -29,7 +30,7 @@ def locate_features(observation: Observation, looks: Mapping[str, Look]) -> Fiel
     if not set(ROLES) & set(names):
         return None
     view = observation.view
-    bases = {name: find_bases(observation, look) for name, look in looks.items()}
+    bases = {name: find_bases(observation, look, settings) for name, look in looks.items()}
     return find_features(ground_points(observation), lambda places: _pixels(view, places), bases)
 
 

@@ -16,7 +16,7 @@ class Settings:
     """
 
     threads: int = number(1, "threads of the network, at most the cores that the process may use", "", (1, 256))
-    spinning: bool = switch(False, "let idle threads spin: saves microseconds, occupies whole cores")
+    spinning: bool = switch(False, "let idle threads of ONNX Runtime spin: saves microseconds, occupies whole cores")
     format: str = one_of(FORMATS, "bgr", "pixel format of the frames")
     height_tolerance: float = number(
         0.5,

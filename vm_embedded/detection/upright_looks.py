@@ -24,8 +24,6 @@ from .stopwatch import Stopwatch
 PROPOSALS = 24
 """Largest number of proposals for a class."""
 
-_CONFIDENT = Settings(max_proposals=PROPOSALS, min_confidence=0.4)
-
 _COLUMN = 0.012
 """Width of a direction [rad]."""
 
@@ -35,7 +33,7 @@ _JUMP = 0.12
 _MOST_POINTS = 64
 """Largest number of points that propose places; more only cost time."""
 
-_WORTH = 0.2
+WORTH = 0.2
 """Probability above which a place is worth a second look."""
 
 
@@ -66,13 +64,17 @@ def nearest_points(observation: Observation, probabilities: Singles, above: floa
     return found
 
 
-def find_bases(observation: Observation, look: Look) -> list[Base]:
-    """The uprights of a look's class, nearest first. Raises ModelError if the look network does not run."""
+def find_bases(observation: Observation, look: Look, settings: Settings) -> list[Base]:
+    """The uprights of a look's class, nearest first. Raises ModelError if the look network does not run.
+
+    settings: `min_confidence` counts, and at most PROPOSALS of `max_proposals`.
+    """
     contract = look.contract
     probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
     nearest = nearest_points(observation, probabilities, contract.above)
     circles = around_bases(observation, contract.upright_radius)
-    judged = look_closely(circles, look, nearest, _CONFIDENT, Stopwatch(), worth=_WORTH)
+    limited = replace(settings, max_proposals=min(settings.max_proposals, PROPOSALS))
+    judged = look_closely(circles, look, nearest, limited, Stopwatch(), worth=WORTH)
     heading = observation.view.heading[:2]
     width = 2.0 * contract.upright_radius
     found = [Base(heading @ each.center, width * each.scale, each.confidence) for each in judged]

@@ -64,8 +64,7 @@ class Layout(ABC):
     def answers(self, network: Run, points: Singles, on_screen: Mask) -> Singles:
         """Probabilities (m, C) of the slots, valid only on screen.
 
-        points: the colored array. on_screen: mask (m,) of the slots. Fills in the off-screen point's color, OFF_SCREEN,
-        in place.
+        points: the colored array; it may be changed. on_screen: mask (m,) of the slots.
         """
 
 
@@ -77,7 +76,7 @@ class WholeLayout(Layout):
 
     @abstractmethod
     def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
-        """The network's inputs; see `answers`."""
+        """The network's inputs; see `answers`. Fills in the off-screen point's color, OFF_SCREEN, in place."""
 
     @abstractmethod
     def probabilities(self, output: Singles) -> Singles:

@@ -43,7 +43,10 @@ POINT_COLORS = ("absolute", "relative")
 picture's points; see detection/color_normalization.py."""
 
 _LARGEST = 1e9
-"""Limit of every radius, distance and number of rings."""
+"""Limit of every radius, distance, number of rings and number of operations."""
+
+_SMALLEST_CIRCLE = 0.01
+"""Smallest `upright_radius` of a look at uprights [m]."""
 
 
 def _is_number(value: object, kind: type | UnionType = int | float) -> bool:
@@ -138,10 +141,10 @@ class Manifest:
             if not _is_number(value) or not 0 < value <= _LARGEST:
                 raise ModelError(f"{name} in the model's manifest must be a number above 0, not {value!r}")
         self._check_object_height()
-        self._check_look()
+        self._check_looks()
         if self.mesh == "wall6":
             self._check_walls()
-        if not _is_number(self.operations, int) or self.operations < 0:
+        if not _is_number(self.operations, int) or not 0 <= self.operations <= _LARGEST:
             raise ModelError(f"operations in the model's manifest must be a whole number, not {self.operations!r}")
         if not isinstance(self.any_radius, bool):
             raise ModelError(f"any_radius in the model's manifest must be true or false, not {self.any_radius!r}")
@@ -160,12 +163,16 @@ class Manifest:
                 f"object_height must be above 0 for a cylinder and 0 for other shapes; {self.shape} has {tall:g} m"
             )
 
-    def _check_look(self) -> None:
+    def _check_looks(self) -> None:
         objects = [each.name for each in self.classes if each.kind == "object"]
         if self.look is not None and self.look.object_class not in objects:
             raise ModelError(
                 f"the close look judges class {self.look.object_class!r}, but the classes of kind object are {objects}"
             )
+        if self.look is not None and (
+            self.look.upright_radius or (self.look.glance and self.look.glance.upright_radius)
+        ):
+            raise ModelError("the close look at an object, or its glance, has an upright_radius; it must be 0")
         uprights = [each.name for each in self.classes if each.kind == "upright"]
         judged = [each.object_class for each in self.upright_looks]
         if len(set(judged)) != len(judged) or not set(judged) <= set(uprights):
@@ -173,8 +180,11 @@ class Manifest:
                 f"there are close looks at the uprights {judged}, but the classes of kind upright are {uprights}"
             )
         for each in self.upright_looks:
-            if not each.upright_radius or each.glance is not None:
-                raise ModelError(f"the close look of {each.object_class!r} must have an upright_radius and no glance")
+            if each.upright_radius < _SMALLEST_CIRCLE or each.glance is not None:
+                raise ModelError(
+                    f"the close look at {each.object_class!r} must have an upright_radius of at least "
+                    f"{_SMALLEST_CIRCLE} m and no glance"
+                )
 
     def _check_walls(self) -> None:
         """Mesh wall6 is for cylinders, its points have no footprints, and the runtime does not locate objects on it."""

@@ -126,7 +126,8 @@ def _upright_looks(metadata: dict[str, str], manifest: Manifest) -> tuple[bytes,
     """The ONNX files of the looks at uprights, in the manifest's order. Raises ModelError."""
     contracts = {upright_key(each.object_class): each for each in manifest.upright_looks}
     keys = [*contracts, *(key for key in metadata if key.startswith(upright_key("")) and key not in contracts)]
-    files = [_inner_file(metadata, key, f"an entry {key}", contracts.get(key)) for key in keys]
+    names = [f"a close look at {key.removeprefix(upright_key(''))}" for key in keys]
+    files = [_inner_file(metadata, key, name, contracts.get(key)) for key, name in zip(keys, names, strict=True)]
     return tuple(each for each in files if each is not None)
 
 

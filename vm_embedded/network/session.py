@@ -28,8 +28,9 @@ _LARGEST_SECTOR = 0.75
 class Session:
     """A loaded mesh network.
 
-    threads, spinning: see OnnxModel. With several threads, a large network runs on sectors of the mesh at the same time
-    (split_layout.py); in the layout lattice, ONNX Runtime splits each operator instead. Loading runs the model's
+    threads: never more than this process may use. With several, a large network runs on sectors of the mesh at the same
+    time (split_layout.py), each in one thread of ONNX Runtime; in the layout lattice, ONNX Runtime splits each operator
+    instead. spinning: see OnnxModel; it only matters in the layout lattice. Loading runs the model's
     self-test. Raises ModelError if the file does not load, has other inputs and outputs than its manifest says, or
     fails its self-test.
     """
@@ -48,8 +49,10 @@ class Session:
     def arrange(self, mesh: Mesh) -> Layout:
         """A mesh in the order that the network takes it, in sectors if it has several threads and they pay."""
         manifest = self.model.manifest
+        if self._others is None:
+            return choose_layout(mesh, manifest)
         count = min(self.threads, int(manifest.operations * len(mesh) / _WORTH_A_THREAD))
-        if self._others is None or count < 2:
+        if count < 2:
             return choose_layout(mesh, manifest)
         sectors = sectors_of(mesh, count, self.model.depth)
         if max(len(each.members) for each in sectors) > _LARGEST_SECTOR * len(mesh):
@@ -57,8 +60,14 @@ class Session:
         return SplitLayout(mesh, sectors, lambda part: choose_layout(part, manifest), self._others)
 
     def run(self, layout: Layout, points: Singles, on_screen: Mask) -> Singles:
-        """Probabilities (m, C) of a layout's slots, from its colored `points` and the slots (m,) on screen."""
-        return layout.answers(self.onnx.run, points, on_screen)
+        """Probabilities (m, C) of a layout's slots, from its colored `points` and the slots (m,) on screen.
+
+        Raises ModelError, also if the system has no thread left.
+        """
+        try:
+            return layout.answers(self.onnx.run, points, on_screen)
+        except RuntimeError as error:
+            raise ModelError(f"{self.model.path}: can't run it in {self.threads} threads: {error}") from error
 
     def answer(self, test: SelfTest) -> Singles:
         """Probabilities (n, C) of an example's points."""

@@ -1,8 +1,8 @@
-"""A mesh in sectors, which a network computes at the same time, each on a core of its own.
+"""Computes sectors of a mesh at the same time, one on each core.
 
 A network of L convolutions gives a point an answer that depends on points at most L links away (the paper's section
-"Network Architecture"). So a sector also gets the points that are at most L links outside of it. They are copies: their
-answers are wrong, and nobody reads them. Then no sector needs an answer of another one.
+"Network Architecture"). So a sector also gets the points that are at most L links outside of it. The answers of
+these copies are wrong, and the runtime ignores them. So no sector needs an answer of another one.
 
 Threads inside of ONNX Runtime gain less: it splits each operator, waits for all threads after each one, and does not
 split the look-ups.
@@ -107,5 +107,7 @@ def with_surroundings(mesh: Mesh, own: Points, depth: int) -> Points:
         beyond[mesh.neighbors[edge]] = True
         beyond[-1] = False
         edge = np.flatnonzero(beyond & ~reached)
+        if not len(edge):
+            break
         reached[edge] = True
     return np.flatnonzero(reached[:-1])

@@ -131,6 +131,11 @@ def _about(options: argparse.Namespace, settings: Settings, subject: Subject, co
             "grid": grid.kind + (f", equal at {grid.equal_at:g} m" if grid.equal_at else ""),
             **{f"provenance {key}": value for key, value in manifest.provenance.items()},
             **_about_look(manifest.look),
+            **{
+                f"{key} at {each.object_class}": value
+                for each in manifest.upright_looks
+                for key, value in _about_look(each).items()
+            },
         },
         "data": {
             "folders": [str(each) for each in options.data],

@@ -100,7 +100,7 @@ class ExactSubject:
         if self.grid.is_visual:
             found, _ = locate(observation, self.look, self.settings, Stopwatch())
             is_wanted = self.settings.field_features
-            features = locate_features(observation, self.upright_looks) if is_wanted else None
+            features = locate_features(observation, self.upright_looks, self.settings) if is_wanted else None
         return _answer(observation, found, features, self.look, self.settings)
 
     def observe(self, picture: Picture, radius: float | None = None) -> Observation:

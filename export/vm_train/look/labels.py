@@ -39,8 +39,8 @@ class Truths:
     """True objects: centers (t, 3) relative to the camera in the mesh frame [m], radii (t,) [m], of tall objects half
     their heights, and visible shares (t,) of their outlines.
 
-    near, far: see NEAR and FAR. sizes (t,): logarithms of the sizes that the network learns over the expected one; None
-    for those of the radii.
+    near, far: see NEAR and FAR. sizes (t,): logarithms of the sizes that the network learns over the radii; None for
+    the radii themselves.
     """
 
     centers: Floats
@@ -78,7 +78,9 @@ def label_places(places: Tangents, truths: Truths) -> PlaceLabels:
     right, down, off, size = _differences(places, truths)
     found = label_by_differences(right, down, off, size, truths.visible >= VISIBLE, truths.near, truths.far)
     if truths.sizes is not None:
-        found.targets[:, 2] = np.where(found.of >= 0, np.append(truths.sizes, 0.0)[found.of], 0.0)
+        found.targets[:, 2] += np.append(truths.sizes, 0.0)[
+            found.of
+        ]  # to that of the radii, which the patch may change
     return found
 
 

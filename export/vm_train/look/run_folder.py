@@ -29,7 +29,7 @@ from ..learning.folder_access import check_unused
 from .configuration import LookConfiguration
 
 KIND = "look"
-_FORMAT = 2
+_FORMAT = 3
 _GLANCE = "glance.pt"
 _FILES = (
     "look.toml",
@@ -134,7 +134,7 @@ def judged_class(configuration: LookConfiguration, subject: ExactSubject, model:
     objects = [name for name, kind in kinds.items() if kind == "object"]
     uprights = uprights_of(subject)
     if not objects + uprights:
-        raise InputError(f"{model} has no class of the kind object, so there is nothing to look at")
+        raise InputError(f"{model} has no class of the kind object, and neither goal nor robot of the kind upright")
     name = configuration.patches.object_class or (objects + uprights)[0]
     if name not in objects + uprights:
         raise InputError(f"[patches] object_class: {unknown(f'object of {model}', name, objects + uprights)}")

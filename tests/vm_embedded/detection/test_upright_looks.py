@@ -12,6 +12,7 @@ from tests.looks import look_contract
 from vm_embedded import Detector, Orientation, read_lens_file
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.field_points import locate_features
+from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.upright_looks import around_bases, find_bases, nearest_points
 from vm_embedded.network.manifest import ObjectClass
 
@@ -24,6 +25,7 @@ CLASSES = tuple(
     for name, kind in (("ball", "object"), ("goal", "upright"), ("field", "area"), ("environment", "background"))
 )
 RADIUS = 0.3
+SETTINGS = Settings()
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +56,7 @@ class Sure:
     """A look that finds an upright with these answers in every patch."""
 
     glance = None
+    calls = 0
 
     def __init__(self, right=0.0, down=0.0, probability=0.9, width=0.1):
         self.contract = look_contract(
@@ -63,6 +66,7 @@ class Sure:
 
     def run(self, patches):
         assert patches.shape[1:] == (16, 16, 3)
+        self.calls += 1
         return np.tile(self._answer, (len(patches), 1))
 
 
@@ -71,39 +75,67 @@ bases = st.tuples(st.floats(1.5, 4.0), st.floats(-0.5, 0.5))
 
 @given(base=bases)
 def test_the_nearest_points_of_a_post_propose_its_base(detector, base):
-    found = find_bases(post_at(detector, base), Sure())
-    assert len(found) >= 1
-    errors = [np.hypot(*(each.position - base)) for each in found]
-    assert min(errors) < 0.15 * np.hypot(*base)
+    seen = post_at(detector, base)
+    found = find_bases(seen, Sure(), SETTINGS)
+    ranges = [np.hypot(*each.position) for each in found]
+    assert ranges == sorted(ranges)
+    rays = np.array([[*place, -seen.view.height] for place in (found[0].position, base)])
+    distance = np.linalg.norm(rays[1])
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    assert np.linalg.norm(rays[0] - rays[1]) < 0.6 * RADIUS / distance, "the look reaches the base"
     assert {round(each.width, 4) for each in found} == {0.1}
     assert {round(each.confidence, 3) for each in found} == {0.9}
-    assert len(found) < 5, "the points higher up propose nothing"
+    assert len(found) < 5, "few directions have only points higher up"
+
+
+def test_each_of_two_posts_is_found_and_the_nearest_comes_first(detector):
+    near, far = post_at(detector, (2.0, -0.4)), post_at(detector, (3.0, 0.5))
+    both = replace(near, slot_probabilities=np.maximum(near.slot_probabilities, far.slot_probabilities))
+    found = [each.position for each in find_bases(both, Sure(), SETTINGS)]
+    assert found[0] == pytest.approx((2.0, -0.4), abs=0.3)
+    assert min(np.hypot(*(each - (3.0, 0.5))) for each in found[1:]) < 0.4
+
+
+def test_a_place_that_the_first_look_doubts_gets_no_second_one(detector):
+    doubting, trusting = (Sure(probability=each) for each in (0.15, 0.6))
+    for look in (doubting, trusting):
+        look.contract = replace(look.contract, passes=2)
+        find_bases(post_at(detector, (2.5, 0.3)), look, SETTINGS)
+    assert (doubting.calls, trusting.calls) == (1, 2)
+
+
+def test_the_least_confidence_of_the_settings_counts(detector):
+    seen, look = post_at(detector, (2.5, 0.3)), Sure(probability=0.6)
+    assert find_bases(seen, look, Settings(min_confidence=0.55))
+    assert find_bases(seen, look, Settings(min_confidence=0.65)) == []
 
 
 @pytest.mark.parametrize("yaw", [1.0, -2.5])
 def test_a_turn_of_the_camera_turns_the_bases(detector, yaw):
-    straight, turned = (find_bases(post_at(detector, (2.5, 0.3), yaw=each), Sure())[0].position for each in (0.0, yaw))
+    straight, turned = (
+        find_bases(post_at(detector, (2.5, 0.3), yaw=each), Sure(), SETTINGS)[0].position for each in (0.0, yaw)
+    )
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
     assert turned == pytest.approx(turn @ straight, abs=1e-6)
 
 
 def test_a_base_is_where_the_look_sees_it(detector):
     seen = post_at(detector, (2.5, 0.3))
-    still = find_bases(seen, Sure())[0].position
-    right = find_bases(seen, Sure(right=0.5))[0].position - still
-    down = find_bases(seen, Sure(down=0.2))[0].position - still
+    still = find_bases(seen, Sure(), SETTINGS)[0].position
+    right = find_bases(seen, Sure(right=0.5), SETTINGS)[0].position - still
+    down = find_bases(seen, Sure(down=0.2), SETTINGS)[0].position - still
     assert right[1] == pytest.approx(-0.5 * RADIUS, abs=0.03)  # y is to the left
     assert np.hypot(*(still + down)) < np.hypot(*still) - 0.05  # lower in the picture is nearer
 
 
 def test_a_doubtful_look_reports_nothing(detector):
-    assert find_bases(post_at(detector, (2.5, 0.3)), Sure(probability=0.35)) == []
+    assert find_bases(post_at(detector, (2.5, 0.3)), Sure(probability=0.35), SETTINGS) == []
 
 
 def test_without_points_of_the_class_there_is_nothing_to_look_at(detector):
     seen = post_at(detector, (2.5, 0.3))
     nothing = replace(seen, slot_probabilities=np.zeros_like(seen.slot_probabilities))
-    assert find_bases(nothing, Sure()) == []
+    assert find_bases(nothing, Sure(), SETTINGS) == []
 
 
 @given(seeds, st.floats(0.0, 0.9))
@@ -128,10 +160,10 @@ def test_the_nearest_points_are_the_nearest_in_their_direction(detector, seed, a
 
 def test_a_class_with_a_look_needs_no_rules(detector):
     seen = post_at(detector, (2.5, 0.3))
-    looked = locate_features(seen, {"goal": Sure(width=0.12)})
+    looked = locate_features(seen, {"goal": Sure(width=0.12)}, SETTINGS)
     assert {round(each.width, 4) for each in looked.posts} == {0.12}
     assert {each.class_name for each in looked.posts} == {"post"}
-    ruled = locate_features(seen, {})
+    ruled = locate_features(seen, {}, SETTINGS)
     assert 0.12 not in {round(each.width, 4) for each in ruled.posts}
 
 

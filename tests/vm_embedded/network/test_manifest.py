@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.looks import look_contract
 from tests.manifests import ball_manifest
 from vm_embedded.errors import GeometryError, InputError, ModelError
 from vm_embedded.geometry.circle import Circle
@@ -322,3 +323,44 @@ def test_a_manifest_checks_itself_wherever_it_comes_from():
 def test_a_manifest_for_a_camera_below_the_ball_has_no_spacing():
     with pytest.raises(GeometryError):
         BALL.mesh_shape.spacing(0.15)
+
+
+FIELD = tuple(ObjectClass(name, kind) for name, kind in (("ball", "object"), ("goal", "upright"), ("line", "area")))
+
+
+def upright_look(name="goal", **changes):
+    return look_contract(**{"object_class": name, "upright_radius": 0.3} | changes)
+
+
+def test_looks_at_uprights_round_trip():
+    manifest = replace(BALL, classes=FIELD, upright_looks=(upright_look(),))
+    assert Manifest.from_json(manifest.as_json()) == manifest
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"upright_looks": (upright_look("ball"),)}, r"\['ball'\], but the classes of kind upright are \['goal'\]"),
+        ({"upright_looks": (upright_look("pole"),)}, r"\['pole'\]"),
+        ({"upright_looks": (upright_look(), upright_look())}, r"\['goal', 'goal'\]"),
+        ({"upright_looks": (upright_look(upright_radius=0.0),)}, "upright_radius of at least 0.01 m and no glance"),
+        ({"upright_looks": (upright_look(upright_radius=1e-300),)}, "upright_radius of at least 0.01 m"),
+        ({"upright_looks": (upright_look(glance=upright_look()),)}, "no glance"),
+        ({"look": look_contract(upright_radius=0.3)}, "it must be 0"),
+        ({"look": look_contract(glance=look_contract(upright_radius=0.3))}, "it must be 0"),
+    ],
+)
+def test_looks_at_uprights_that_make_no_sense_are_refused(changes, message):
+    with pytest.raises(ModelError, match=message):
+        replace(BALL, classes=FIELD, **changes)
+
+
+@pytest.mark.parametrize("wrong", [None, {}, 3, "goal"])
+def test_looks_at_uprights_that_are_no_list_are_refused(wrong):
+    with pytest.raises(ModelError, match="upright_looks"):
+        Manifest.from_json(changed(upright_looks=wrong))
+
+
+def test_operations_beyond_all_networks_are_refused():
+    with pytest.raises(ModelError, match="operations"):
+        Manifest.from_json(changed(operations=10**400))

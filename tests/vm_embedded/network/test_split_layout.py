@@ -3,11 +3,14 @@
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.drawn_scenes import FOLDER
+from vm_embedded import Detector, Settings, read_lens_file
 from vm_embedded.errors import ModelError
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
@@ -30,6 +33,8 @@ from .test_layout import (
     ring_meshes,
     session_of,
 )
+
+DEMO = FOLDER.parent / "demo"
 
 counts = st.integers(2, 4)
 
@@ -126,6 +131,46 @@ def test_a_large_view_is_split_and_a_small_one_is_not(monkeypatch):
     deep = session_of(network_of(NetworkShape.uniform(40, 2, 2), 0), "ring6", "runs", operations=50_000)
     around = Session(deep.model, threads=2).arrange(mesh)
     assert isinstance(around, WholeLayout), "each sector would be nearly the whole mesh"
+
+
+def test_surroundings_of_any_depth_end_where_the_mesh_ends():
+    mesh = WHOLE["ring6"]
+    everything = with_surroundings(mesh, np.arange(3), 10**9)
+    assert everything.tolist() == list(range(len(mesh)))
+
+
+def test_without_a_thread_the_call_ends_in_one_line(monkeypatch):
+    network = network_of(NetworkShape.uniform(2, 4, 2), 0)
+    session = session_of(network, "ring6", "runs")
+
+    class Full:
+        def submit(self, *_):
+            raise RuntimeError("can't start new thread")
+
+    parts = split(session, WHOLE["ring6"], 2, Full())
+    points = parts.new_points()
+    points[:] = 0.5
+    with pytest.raises(ModelError, match="can't run it in 1 threads: can't start new thread"):
+        session.run(parts, points, parts.slots < len(WHOLE["ring6"]))
+
+
+def test_a_detector_finds_the_same_with_two_threads(monkeypatch):
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 1})
+    camera = read_lens_file(DEMO / "lens0000002.yaml")
+    image = cv2.imread(str(DEMO / "image0000002.jpg"))
+    one, two = (Detector.from_file("soccer", Settings(threads=count)) for count in (1, 2))
+    for each in (one, two, two):  # the second time from the cache
+        found = each.detect(image, camera.orientation, camera.lens)
+        if each is one:
+            expected = found
+    assert isinstance(found.observation.layout, SplitLayout)
+    assert two.cache.hits == 1
+    assert len(found.objects) == len(expected.objects) > 0
+    np.testing.assert_array_equal(found.pixels, expected.pixels)
+    np.testing.assert_allclose(found.observation.probabilities, expected.observation.probabilities, atol=1e-6)
+    assert [each.distance for each in found.objects] == pytest.approx([each.distance for each in expected.objects])
+    size = (image.shape[1], image.shape[0])
+    assert two.prepare_nearby(camera.orientation, camera.lens, size)
 
 
 @pytest.mark.parametrize("fails", [0, 1])

@@ -57,7 +57,14 @@ def test_places_beside_a_base_learn_its_shift_and_its_width(view, posts):
     assert found.labels.tolist() == [OBJECT]
     assert found.of.tolist() == [1]
     assert found.targets[0, 0] == pytest.approx(0.2 / RADIUS, abs=0.1)  # to the right, back to the base
-    assert found.targets[0, 2] == pytest.approx(posts.sizes[1])
+    assert found.targets[0, 2] == pytest.approx(posts.sizes[1], abs=0.02)
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.0, 1.25])
+def test_in_a_patch_that_is_cut_larger_an_upright_is_narrower(view, posts, factor):
+    places = Places.of(JITTERED, posts.centers[1:2], np.array([factor]))
+    target = label_places(places.tangents(view), posts).targets[0, 2]
+    assert target == pytest.approx(posts.sizes[1] - np.log(factor), abs=1e-4)
 
 
 def test_places_far_from_bases_show_nothing_and_those_at_hidden_ones_are_left_out(view, posts):
