@@ -26,15 +26,15 @@ import numpy as np
 import onnxruntime
 
 from vm_embedded import Detector
+from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
 
 from .frames import frames
 from .run import RESULTS, Models, mesh_on_screen, session_call
 from .timing import summary
 
-SETS = {"AVX-512": 0xFF, "AVX2": 0x1F, "SSE": 0x01}
-"""Names of instruction sets, and the bits of the answer that a processor with these instructions has. The first one is
-what this machine has."""
+SETS = {"this processor": 0xFF, "AVX2": 0x1F, "SSE": 0x01}
+"""Names of instruction sets, and the bits of the answer that a processor with these instructions has."""
 
 NETWORKS = ("5x4", "9x4", "13x16")
 PACKAGED = ("ball", "soccer")
@@ -46,7 +46,10 @@ first pair's second instruction only repeats what xgetbv has done."""
 
 
 def copy_runtime(folder: Path, bits: int) -> None:
-    """Copy ONNX Runtime into a folder, with only these bits of the answer. Ends the program if it asks otherwise."""
+    """Copy ONNX Runtime into a folder, with only these bits of the answer.
+
+    Raises InputError for a build that asks the processor in another way, as those for ARM do.
+    """
     shutil.copytree(Path(onnxruntime.__file__).parent, folder / "onnxruntime")
     changed = 0
     for library in (folder / "onnxruntime" / "capi").glob("onnxruntime_pybind11_state*.so"):
@@ -54,7 +57,7 @@ def copy_runtime(folder: Path, bits: int) -> None:
         changed += content.count(_ASKED)
         library.write_bytes(content.replace(_ASKED, _CLEARED + bytes([bits])))
     if not changed:
-        raise SystemExit(f"this build of ONNX Runtime ({onnxruntime.__version__}) asks the processor in another way")
+        raise InputError(f"this build of ONNX Runtime ({onnxruntime.__version__}) asks the processor in another way")
 
 
 @contextmanager
@@ -139,7 +142,11 @@ def main() -> None:
         work(options.worker)
         return
     found = json.loads(RESULTS.read_text())
-    found["instruction_sets"] = compare(options.rounds)
+    try:
+        found["instruction_sets"] = compare(options.rounds)
+    except InputError as error:
+        print(f"not measured: {error}", file=sys.stderr)
+        return
     RESULTS.write_text(json.dumps(found, indent=1) + "\n")
     print(json.dumps(found["instruction_sets"], indent=1))
 
