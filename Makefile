@@ -10,6 +10,7 @@ SCENES ?= export/vm_synth/polyhaven.toml
 NETWORKS := ball ball-small soccer
 BUILD ?= build/networks
 PICTURES ?= data/soccer
+UPRIGHTS := $(BUILD)/goal-look/look.pt $(BUILD)/robot-look/look.pt
 CANARY := --canary vm_embedded/models/canary.jpg export/networks/canary.yaml
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
@@ -113,8 +114,13 @@ $(BUILD)/ball.onnx: $(BUILD)/ball-look/look.pt
 vm_embedded/models/%.onnx: $(BUILD)/%-look/look.pt
 	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs $(CANARY) -o $@
 
-vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx
+$(UPRIGHTS): $(BUILD)/%/look.pt: export/networks/%.toml $(BUILD)/soccer/model.pt
+	if test -e $(BUILD)/$*/run.json; then $(BIN)/vm-train resume $(BUILD)/$*; \
+		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/soccer/model.pt -o $(BUILD)/$* --config $<; fi
+
+vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx $(UPRIGHTS)
 	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $@
+	for look in $(UPRIGHTS); do $(BIN)/vm-export $@ --look $$look -o $@ || exit; done
 
 test-data: .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
 	$(BIN)/python -m benchmarks.test_data $(HDRI) $(TEST)
