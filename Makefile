@@ -119,8 +119,9 @@ $(UPRIGHTS): $(BUILD)/%/look.pt: export/networks/%.toml $(BUILD)/soccer/model.pt
 		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/soccer/model.pt -o $(BUILD)/$* --config $<; fi
 
 vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx $(UPRIGHTS)
-	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $@
-	for look in $(UPRIGHTS); do $(BIN)/vm-export $@ --look $$look -o $@ || exit; done
+	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $(BUILD)/balls.onnx
+	$(BIN)/vm-export $(BUILD)/balls.onnx --look $(BUILD)/goal-look/look.pt -o $(BUILD)/balls-and-posts.onnx
+	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-look/look.pt -o $@
 
 test-data: .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
 	$(BIN)/python -m benchmarks.test_data $(HDRI) $(TEST)

@@ -147,6 +147,7 @@ class _Training:
     def _finish(self, stop_requested: Callable[[], bool]) -> bool:
         """Calibrate the network on what it finds in the validation pictures, and write look.pt. False after a stop."""
         run, network, patches = self._run, self._trainer.network.eval(), self._run.configuration.patches
+        round_weights(network)
         glance = run.glance()
         contract = LookContract(
             object_class=run.object_class,
@@ -211,6 +212,17 @@ class _Training:
             "calibration_error": f"{result.calibration_error:.4f}",
             "torch": str(torch.__version__),
         }
+
+
+def round_weights(network: LookNetwork) -> None:
+    """Round the weights to half precision, in place.
+
+    Answers change in the third digit. A model file holds look networks as text. In a wheel, they then need two thirds
+    of the room.
+    """
+    with torch.no_grad():
+        for each in network.parameters():
+            each.copy_(each.half().float())
 
 
 def _description(score: LookScore) -> str:

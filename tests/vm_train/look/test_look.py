@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from tests.drawn_scenes import CHECKPOINT
 from tests.vm_train.commands import COMMAND, environment, run, run_module
@@ -77,6 +78,8 @@ def test_its_network_knows_its_contract_and_where_it_comes_from(whole, drawn):
     assert made.examples.shape == (4, 16, 16, 3)
     assert contract.provenance["data"] == drawn.name
     assert contract.provenance["mesh_sha256"] == json.loads((folder / "run.json").read_text())["mesh_sha256"]
+    for weights in made.network.parameters():
+        assert torch.equal(weights, weights.half().float())
     scale, offset = made.network.calibration.tolist()
     calibration = json.loads((folder / "result.json").read_text())["calibration"]
     assert (scale, offset) == pytest.approx((calibration["scale"], calibration["offset"]))
