@@ -23,8 +23,8 @@ README = DOCS.parent / "README.md"
 COLORS = {"ball": "#d95f02", "ball-small": "#7570b3", "soccer": "#1b9e77"}
 
 
-WEAK = """ Posts and robots are unreliable: docs/results.md has the figures of all features of the
-field."""
+WEAK = """ Half of the robots are missed, and line points beyond 6 m are rare: docs/results.md has
+the figures of all features of the field."""
 
 
 def number(value: float | None, digits: int = 2, unit: float = 1.0) -> str:
