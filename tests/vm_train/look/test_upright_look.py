@@ -102,14 +102,15 @@ def field(tmp_path_factory):
 @pytest.mark.parametrize("name", ["goal", "robot"])
 def test_a_trained_look_goes_into_a_model_file_and_runs_there(field, tiny, tmp_path, name):
     given = ["--from", "soccer", "--config", tiny, "--set", f"patches.object_class={name}", "--workers", 1]
-    given += ["--set", "patches.proposals=24", "--set", "patches.upright_radius=0.4"]
+    given += ["--set", "patches.proposals=24", "--set", "patches.upright_radius=0.5"]
     lines = run("look", field, "-o", tmp_path / "run", *given).stdout.splitlines()
     assert re.fullmatch(rf"training: \d+ patches, \d+ of them show the object {name}", lines[1])
     contract = LookCheckpoint.load(tmp_path / "run" / "look.pt").contract
-    assert (contract.object_class, contract.upright_radius) == (name, 0.4)
+    assert (contract.object_class, contract.upright_radius) == (name, 0.5)
     run_module("vm_export.cli", *lines[-1].removeprefix("next: vm-export ").split())
     detector = Detector.from_file(tmp_path / "run" / "model.onnx")
-    assert list(detector.upright_looks) == [name]
+    radii = {key: look.contract.upright_radius for key, look in detector.upright_looks.items()}
+    assert radii == {"goal": 0.3, "robot": 0.4} | {name: 0.5}  # the other one is that of soccer
     lens = read_lens_file(field / "lens0.yaml")
     found = detector.detect(cv2.imread(str(field / "image0.jpg")), lens.orientation, lens.lens)
     assert found.field is not None
