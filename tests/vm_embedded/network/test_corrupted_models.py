@@ -29,14 +29,14 @@ DEMO = Path(__file__).parents[2] / "fixtures/demo"
 LARGEST_CHANGE = 1e-3
 
 
-def networks_of(content):
-    """A model file, and all its networks by the key of their metadata; None is the mesh network."""
+UPRIGHTS = (upright_key("goal"), upright_key("robot"))
+
+
+def networks_of(content, keys=(LOOK_KEY, GLANCE_KEY)):
+    """A model file, and its networks by the key of their metadata; None is the mesh network."""
     model = onnx.load_from_string(content)
-    inner = {
-        each.key: onnx.load_from_string(base64.b64decode(each.value))
-        for each in model.metadata_props
-        if each.key in (LOOK_KEY, GLANCE_KEY) or each.key.startswith(upright_key(""))
-    }
+    entries = {each.key: each.value for each in model.metadata_props}
+    inner = {key: onnx.load_from_string(base64.b64decode(entries[key])) for key in keys}
     return model, {None: model, **inner}
 
 
@@ -48,10 +48,10 @@ def sealed_again(model, networks):
     return sealed(model.SerializeToString())
 
 
-def corrupted(content, chance):
-    """A model file with wrong weights, and what is wrong with them."""
-    model, networks = networks_of(content)
-    key = chance.choice(list(networks))
+def corrupted(content, chance, keys=(None, LOOK_KEY, GLANCE_KEY)):
+    """A model file with wrong weights in one of the networks with these keys, and what is wrong with them."""
+    model, networks = networks_of(content, keys=[each for each in keys if each])
+    key = chance.choice(list(keys))
     weights = [
         each
         for each in networks[key].graph.initializer
@@ -119,6 +119,23 @@ def test_attack_1_wrong_weights_under_a_right_checksum_are_refused(name, count):
         else:
             assert not changes_an_answer(model, before), what
     assert refused > 0.9 * count  # the others change no answer
+
+
+@pytest.mark.parametrize("count", [6, pytest.param(60, marks=pytest.mark.long)])
+def test_attack_1_wrong_weights_of_a_look_at_uprights_are_refused(count):
+    whole, chance = model_path("soccer").read_bytes(), random.Random(3)
+    before = list(answers(parse_model("model.onnx", whole)))
+    refused = 0
+    for _ in range(count):
+        content, what = corrupted(whole, chance, UPRIGHTS)
+        model = parse_model("model.onnx", content)
+        try:
+            prove(model)
+        except ModelError:
+            refused += 1
+        else:
+            assert not changes_an_answer(model, before), what
+    assert refused > 0.7 * count  # the others change no answer
 
 
 @pytest.mark.parametrize("name", SHIPPED)
