@@ -97,10 +97,15 @@ class OnnxModel:
             raise ModelError(f"{self.path}: ONNX Runtime can't run it: {one_line(error)}") from error
         return np.asarray(outputs[0])
 
-    def check_answer(self, answer: Singles, expected: npt.NDArray[np.floating]) -> None:
-        """Compare the answer to a self-test with the one that the exporter saw. Raises ModelError if they differ."""
+    def check_answer(
+        self, answer: Singles, expected: npt.NDArray[np.floating], tolerance: float = _SELF_TEST_TOLERANCE
+    ) -> None:
+        """Compare the answer to a self-test with the one that the exporter saw.
+
+        Raises ModelError if they differ by more than `tolerance`.
+        """
         if answer.shape != expected.shape:
             raise ModelError(f"{self.path}: self-test answered in shape {answer.shape}, not {expected.shape}")
         error = float(np.abs(answer - expected).max(initial=0.0))
-        if not error <= _SELF_TEST_TOLERANCE:
+        if not error <= tolerance:
             raise ModelError(f"{self.path}: self-test failed, answers are off by {error:.2g}")
