@@ -78,9 +78,8 @@ def label_places(places: Tangents, truths: Truths) -> PlaceLabels:
     right, down, off, size = _differences(places, truths)
     found = label_by_differences(right, down, off, size, truths.visible >= VISIBLE, truths.near, truths.far)
     if truths.sizes is not None:
-        found.targets[:, 2] += np.append(truths.sizes, 0.0)[
-            found.of
-        ]  # to that of the radii, which the patch may change
+        # Added to the size of the radius, which depends on how large the patch is cut; 0 for places without an object.
+        found.targets[:, 2] += np.append(truths.sizes, 0.0)[found.of]
     return found
 
 
