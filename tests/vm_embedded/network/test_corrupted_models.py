@@ -133,7 +133,7 @@ def test_attack_1_wrong_weights_under_a_right_checksum_are_refused(name, count):
 
 @pytest.mark.parametrize("count", [6, pytest.param(60, marks=pytest.mark.long)])
 def test_attack_1_wrong_weights_of_a_look_at_uprights_are_refused(count):
-    assert refused("soccer", UPRIGHTS, 3, count) > 0.9 * count
+    assert refused("soccer", UPRIGHTS, 3, count) > 0.8 * count
 
 
 @pytest.mark.parametrize("name", SHIPPED)
