@@ -14,7 +14,7 @@ import os
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.config.sections import read_sections
+from vm_embedded.files import atomic_write
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_train.data.split import Split
 from vm_train.learning.configuration import TrainConfiguration
@@ -51,6 +52,12 @@ POSE = {"height": 0, "tilt": 0, "focal_length": 0, "center": 0}
 COLOR = {"brightness": 0, "contrast": 0, "saturation": 0, "hue": 0, "gamma": 0, "noise": 0}
 SOFT = {"blur_share": 0, "jpeg_share": 0}
 HEXAGONAL = {"grid": "hexagonal", "equal_at": 2.5}
+SHIPPED: Changes = {
+    "network": {"width": 8, "activation": "elu"},
+    "mesh": {"intersections": 3},
+    "training": {"optimizer": "muon", "rate": 0.007, "mirrored": 0.5, "views": 2},
+}
+"""What the mesh network of `ball` has instead of the base: export/networks/mesh.toml."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +78,8 @@ VARIANTS: dict[str, Variant] = {
     "hexagonal, 3 layers": Variant({"network": {"depth": 3}, "mesh": HEXAGONAL}, seeds=2),
     "hexagonal, 5 layers": Variant({"mesh": HEXAGONAL}, seeds=3),
     "hexagonal, 9 layers": Variant({"network": {"depth": 9}, "mesh": HEXAGONAL}, seeds=3),
+    "as ball": Variant(SHIPPED, seeds=2),
+    "hexagonal, as ball": Variant(SHIPPED | {"mesh": SHIPPED["mesh"] | HEXAGONAL}, seeds=2),
     "elu": Variant({"network": {"activation": "elu"}}, seeds=2),
     "relu": Variant({"network": {"activation": "relu"}}, seeds=2),
     "width 2": Variant({"network": {"width": 2}}),
@@ -198,11 +207,11 @@ def _curve(path: Path) -> list[tuple[float, float]]:
     return [(round(float(recall[at]), 4), round(float(precision[at]), 4)) for at in chosen]
 
 
-def tasks() -> Iterator[tuple[str, int]]:
-    """Every variant with every seed, ordered by seed."""
+def tasks(names: Collection[str]) -> Iterator[tuple[str, int]]:
+    """The variants with these names, each with every seed, ordered by seed."""
     for seed in range(1, 4):
         for name, variant in VARIANTS.items():
-            if seed <= variant.seeds:
+            if name in names and seed <= variant.seeds:
                 yield name, seed
 
 
@@ -222,18 +231,22 @@ def main() -> None:
     parser.add_argument("data", type=Path, help="set of vm-synth with 2200 pictures or more")
     parser.add_argument("held_out", type=Path, help="set of vm-synth with other maps")
     parser.add_argument("out", type=Path, help="folder of the trainings")
+    parser.add_argument("--only", choices=VARIANTS, action="append", help="measure only this variant; repeatable")
     options = parser.parse_args()
     os.environ["OMP_NUM_THREADS"] = "1"
-    found: dict[str, Any] = {}
+    names = options.only or list(VARIANTS)
+    found: dict[str, Any] = json.loads(RESULTS.read_text()) if options.only else {}
+    found |= {name: {} for name in names}
     with ProcessPoolExecutor(len(os.sched_getaffinity(0)), mp_context=get_context("spawn")) as pool:
-        todo = list(tasks())
+        todo = list(tasks(names))
         for folder in pool.map(trained, [(*each, options.data, options.out) for each in todo]):
             print(folder, flush=True)
         scores = pool.map(evaluated, [(*each, options.held_out, options.out) for each in todo])
         for (name, seed), score in zip(todo, scores, strict=True):
-            found.setdefault(name, {})[str(seed)] = score
+            found[name][str(seed)] = score
             print(name, seed, flush=True)
-    RESULTS.write_text(json.dumps(found) + "\n")
+    with atomic_write(RESULTS) as path:
+        path.write_text(json.dumps(found) + "\n")
 
 
 if __name__ == "__main__":

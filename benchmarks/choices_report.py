@@ -16,7 +16,8 @@ PAGE = DOCS / "results.md"
 
 GROUPS = {
     "layers and mesh": (
-        "3 layers", "base", "9 layers", "hexagonal, 3 layers", "hexagonal, 5 layers", "hexagonal, 9 layers",
+        "3 layers", "base", "9 layers", "as ball",
+        "hexagonal, 3 layers", "hexagonal, 5 layers", "hexagonal, 9 layers", "hexagonal, as ball",
     ),
     "activation": ("base", "elu", "relu"),
     "width": ("width 2", "base", "width 8", "width 16"),
@@ -42,7 +43,7 @@ BASE = {
 }
 """Name of the base network in each group."""
 
-COLORS = {"3": "#7570b3", "5": "#1b9e77", "9": "#d95f02"}
+COLORS = {"3 layers": "#7570b3", "5 layers": "#1b9e77", "9 layers": "#d95f02", "as ball": "#444444"}
 
 
 def values(scores: dict[str, Any], *path: str, test: str = "all") -> np.ndarray:
@@ -97,25 +98,27 @@ def transfer(results: dict[str, Any], kinds: tuple[str, ...]) -> str:
 def plot(results: dict[str, Any]) -> None:
     """Precision over recall of ball points, and their average precision over distance.
 
-    Both are for both meshes and three depths, as in the paper's fig:pr_curve and fig:pr_map (section "Precision").
+    Both are for both meshes and three depths, as in the paper's fig:pr_curve and fig:pr_map (section "Precision"), and
+    for the mesh network of `ball`.
     """
     import matplotlib
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 4.4), layout="constrained")
     curves, distances = figure.subplots(1, 2)
-    for depth, variant in (("3", "3 layers"), ("5", "base"), ("9", "9 layers")):
-        for style, name, grid in (("-", variant, "Visual Mesh"), ("--", f"hexagonal, {depth} layers", "hexagonal")):
-            label = f"{grid}, {depth} layers"
+    for network, color in COLORS.items():
+        visual = "base" if network == BASE["layers and mesh"] else network
+        for style, name, grid in (("-", visual, "Visual Mesh"), ("--", f"hexagonal, {network}", "hexagonal")):
+            label = f"{grid}, {network}"
             recall, precision = np.array(next(iter(results[name].values()))["all"]["curve"]).T
-            curves.plot(recall, precision, style, color=COLORS[depth], label=label)
+            curves.plot(recall, precision, style, color=color, label=label)
             bins = sorted(
                 (each for each in next(iter(results[name].values()))["all"]["points"] if each != "all"),
                 key=lambda each: float(each.split("-")[0]),
             )
             found = np.array([values(results[name], "points", each, "average_precision").mean() for each in bins])
             middles = [np.mean([float(end) for end in each.split("-")]) for each in bins]
-            distances.plot(middles, found, style, color=COLORS[depth], label=label)
+            distances.plot(middles, found, style, color=color, label=label)
     curves.set_xlabel("recall of ball points")
     curves.set_ylabel("precision")
     distances.set_xlabel("distance of the point on the plane [m]")
