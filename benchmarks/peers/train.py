@@ -25,7 +25,7 @@ from .detector import TRAINED
 LOG = Path(__file__).parents[1] / "peer_training.json"
 ALL_LENSES = "all lenses"
 EPOCHS = {
-    ALL_LENSES: {"ssdlite": 6, "yolo320": 4, "yolo640": 2},
+    ALL_LENSES: {"ssdlite": 6, "yolo320": 10, "yolo640": 4},
     "rectilinear": {"ssdlite": 6, "yolo320": 6, "yolo640": 3},
 }
 JUDGED_BY = {"ssdlite": ("validation_loss", min), "yolo320": ("ap50_95", max), "yolo640": ("ap50_95", max)}

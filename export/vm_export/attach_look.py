@@ -11,7 +11,7 @@ import torch
 import vm_embedded
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.network.close_look import CloseLook
-from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY, LookContract, upright_key
+from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.look_test import LookTest, made_patches
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
@@ -21,9 +21,6 @@ from .look_network import LookNetwork
 from .metadata import with_metadata
 
 _CHECKED_PATCHES = (0, 1, 2, 7, 40)
-
-_WITHOUT: dict[str, str | None] = {LOOK_KEY: None, GLANCE_KEY: None}
-"""Removes a look network and its glance from the metadata."""
 
 _MADE = 64
 """Patches that are made for a self-test."""
@@ -35,21 +32,23 @@ def attached(content: bytes, manifest: Manifest, look: LookCheckpoint) -> tuple[
     content, manifest: of the model file. The look network for the same object or upright is replaced. The examples
     become the self-tests. Raises ModelError if the look judges another class than the file's objects and uprights.
     """
-    contract, look_content, difference = _exported(look)
+    contract, file, difference = _exported(look)
+    look_key, glance_key = contract.keys
+    entries: dict[str, str | None] = {look_key: _as_text(file), glance_key: None}
+    if look.glance is not None:
+        glance, file, glance_difference = _exported(look.glance)
+        entries[glance_key] = _as_text(file)
+        contract, difference = replace(contract, glance=glance), float(np.maximum(difference, glance_difference))
     if contract.upright_radius:
         others = tuple(each for each in manifest.upright_looks if each.object_class != contract.object_class)
-        entries = {
-            METADATA_KEY: replace(manifest, upright_looks=(*others, contract)).as_json(),
-            upright_key(contract.object_class): base64.b64encode(look_content).decode(),
-        }
-        return with_metadata(content, entries), difference
-    files = {LOOK_KEY: look_content}
-    if look.glance is not None:
-        glance, files[GLANCE_KEY], glance_difference = _exported(look.glance)
-        contract, difference = replace(contract, glance=glance), float(np.maximum(difference, glance_difference))
-    described = {METADATA_KEY: replace(manifest, look=contract).as_json()}
-    encoded = {key: base64.b64encode(file).decode() for key, file in files.items()}
-    return with_metadata(content, _WITHOUT | described | encoded), difference
+        changed = replace(manifest, upright_looks=(*others, contract))
+    else:
+        changed = replace(manifest, look=contract)
+    return with_metadata(content, {**entries, METADATA_KEY: changed.as_json()}), difference
+
+
+def _as_text(file: bytes) -> str:
+    return base64.b64encode(file).decode()
 
 
 def _exported(look: LookCheckpoint) -> tuple[LookContract, bytes, float]:
@@ -58,13 +57,19 @@ def _exported(look: LookCheckpoint) -> tuple[LookContract, bytes, float]:
     content = look_model(network)
     contract = replace(
         look.contract,
-        self_test=look_self_test(look),
+        self_test=_self_test(look),
         provenance={**look.contract.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"},
     )
     return contract, content, largest_look_difference(content, look)
 
 
-def look_self_test(look: LookCheckpoint) -> LookTest:
+def tested_contract(look: LookCheckpoint) -> LookContract:
+    """The contract of a look network with its self-test, and with that of its glance."""
+    glance = None if look.glance is None else tested_contract(look.glance)
+    return replace(look.contract, self_test=_self_test(look), glance=glance)
+
+
+def _self_test(look: LookCheckpoint) -> LookTest:
     """The most and the least likely example of a look network, with its answers to them and to patches made of them."""
     probabilities = _answers(look.network.eval(), look.examples)[:, 0]
     chosen = look.examples[np.unique([probabilities.argmax(), probabilities.argmin()])]
@@ -74,9 +79,9 @@ def look_self_test(look: LookCheckpoint) -> LookTest:
 
 def detached(content: bytes, manifest: Manifest) -> bytes:
     """A model file's bytes without its look networks. content, manifest: of the model file."""
-    uprights = {upright_key(each.object_class): None for each in manifest.upright_looks}
+    contracts = [each for each in (manifest.look, *manifest.upright_looks) if each is not None]
     described = replace(manifest, look=None, upright_looks=()).as_json()
-    return with_metadata(content, _WITHOUT | uprights | {METADATA_KEY: described})
+    return with_metadata(content, {**{key: None for each in contracts for key in each.keys}, METADATA_KEY: described})
 
 
 def largest_look_difference(content: bytes, look: LookCheckpoint) -> float:

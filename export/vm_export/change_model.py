@@ -11,10 +11,10 @@ from vm_embedded.network.manifest import METADATA_KEY
 from vm_embedded.network.model_file import read_model
 
 from .attach_canary import CanaryPicture, NotFoundError, with_canary
-from .attach_look import attached, detached, look_self_test
+from .attach_look import attached, detached, tested_contract
 from .export import check_difference, write_model
 from .look_checkpoint import LookCheckpoint
-from .look_weights import look_of
+from .look_weights import look_of, upright_looks_of
 from .metadata import with_metadata
 from .network_weights import network_of
 from .strong_self_test import strong_self_test
@@ -62,11 +62,10 @@ def change_canary(model: str | Path, path: str | Path, canary: CanaryPicture) ->
     file can't be written.
     """
     read = read_model(model)
-    manifest = replace(read.manifest, self_test=strong_self_test(network_of(read).network, read.manifest))
-    if manifest.look is not None:
-        checkpoint = look_of(read)
-        contract = replace(manifest.look, self_test=look_self_test(checkpoint))
-        if contract.glance is not None and checkpoint.glance is not None:
-            contract = replace(contract, glance=replace(contract.glance, self_test=look_self_test(checkpoint.glance)))
-        manifest = replace(manifest, look=contract)
+    manifest = replace(
+        read.manifest,
+        self_test=strong_self_test(network_of(read).network, read.manifest),
+        look=None if read.look is None else tested_contract(look_of(read)),
+        upright_looks=tuple(tested_contract(each) for each in upright_looks_of(read)),
+    )
     write_model(path, with_canary(with_metadata(read.content, {METADATA_KEY: manifest.as_json()}), canary))

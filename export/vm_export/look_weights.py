@@ -13,26 +13,35 @@ from onnx import numpy_helper
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.errors import ModelError
 from vm_embedded.network.look_contract import LookContract
-from vm_embedded.network.model_file import ModelFile
+from vm_embedded.network.model_file import LookFiles, ModelFile
 
 from .look_checkpoint import LookCheckpoint
 from .look_network import LookNetwork, LookShape
 
 
 def look_of(model: ModelFile) -> LookCheckpoint:
-    """The look network of a model file, with its glance: the inverse of attach_look.attached.
+    """The look network of a model file at objects, with its glance: the inverse of attach_look.attached.
 
     Its calibration is part of the last layer's weights, so its own is 1 and 0. Raises ModelError if the file has no
     look network, or one that vm-export did not write.
     """
-    contract = model.manifest.look
-    if contract is None or model.look is None:
+    if model.manifest.look is None or model.look is None:
         raise ModelError(f"{model.path} has no close look; vm-export --look attaches one")
+    return _with_glance(model, model.manifest.look, model.look)
+
+
+def upright_looks_of(model: ModelFile) -> list[LookCheckpoint]:
+    """The same for the looks at uprights, in the manifest's order."""
+    pairs = zip(model.manifest.upright_looks, model.upright_looks, strict=True)
+    return [_with_glance(model, contract, files) for contract, files in pairs]
+
+
+def _with_glance(model: ModelFile, contract: LookContract, files: LookFiles) -> LookCheckpoint:
     try:
         glance = None
-        if contract.glance is not None and model.glance is not None:
-            glance = _checkpoint(contract.glance, model.glance, None)
-        return _checkpoint(contract, model.look, glance)
+        if contract.glance is not None and files.glance is not None:
+            glance = _checkpoint(contract.glance, files.glance, None)
+        return _checkpoint(contract, files.look, glance)
     except (KeyError, ValueError, RuntimeError) as error:
         raise ModelError(f"{model.path}: its close look has other layers than vm-export writes: {error}") from error
 

@@ -29,7 +29,8 @@ def look_checkpoint(seed=0, shape=SHAPE, **changes):
     return LookCheckpoint(look_network(seed, shape), contract, random_patches(3, shape.size, seed))
 
 
-def glancing_checkpoint(seed=0):
-    """A checkpoint with a glance of other weights and of 9 x 9 samples."""
-    glance, look = look_checkpoint(seed + 1, LookShape(size=9, channels=(4, 5, 6))), look_checkpoint(seed)
+def glancing_checkpoint(seed=0, **changes):
+    """A checkpoint with a glance of other weights and of 9 x 9 samples; changes: other entries of both contracts."""
+    glance = look_checkpoint(seed + 1, LookShape(size=9, channels=(4, 5, 6)), **changes)
+    look = look_checkpoint(seed, **changes)
     return replace(look, contract=replace(look.contract, glance=glance.contract), glance=glance)

@@ -15,7 +15,6 @@ from tests.vm_export.checkpoints import checkpoint, manifest
 from tests.vm_export.looks import SHAPE, glancing_checkpoint, look_checkpoint, look_network
 from vm_embedded.errors import InputError, ModelError
 from vm_embedded.network.close_look import CloseLook
-from vm_embedded.network.look_contract import upright_key
 from vm_embedded.network.manifest import ObjectClass
 from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
 from vm_embedded.network.session import Session
@@ -25,6 +24,7 @@ from vm_export.checkpoint import Checkpoint
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_graph import look_model
 from vm_export.look_network import LookNetwork, LookShape, normalized
+from vm_export.look_weights import look_of, upright_looks_of
 from vm_export.metadata import with_metadata
 from vm_export.network_shape import NetworkShape
 
@@ -402,6 +402,21 @@ def test_a_model_file_holds_a_look_for_each_upright_beside_that_of_the_object(fi
         assert close.contract.upright_radius == made.contract.upright_radius
 
 
+def test_a_look_at_an_upright_brings_its_glance(field):
+    looks = [glancing_checkpoint(), glancing_checkpoint(4, object_class="goal", upright_radius=0.3)]
+    read = attach(field, *looks)
+    loaded = [CloseLook.of(read), CloseLook.of_uprights(read)["goal"]]
+    for close, made in zip(loaded, looks, strict=True):
+        patches = random_patches(5, size=9)
+        np.testing.assert_allclose(close.glance.run(patches), torch_answers(made.glance.network, patches), atol=1e-5)
+        check_self_test(close.glance.contract.self_test, made.glance)
+    for again, made in zip([look_of(read), *upright_looks_of(read)], looks, strict=True):
+        assert again.glance.contract.keys == made.glance.contract.keys
+    without = attach(field, upright("goal"))
+    assert without.upright_looks[0].glance is None
+    assert without.look == read.look
+
+
 def test_a_look_at_an_upright_replaces_the_one_before_and_no_other(field):
     first = attach(field, upright("goal", 1), upright("robot", 2))
     second = attach(field, upright("goal", 3))
@@ -432,11 +447,12 @@ def test_a_look_for_another_kind_of_class_is_refused(field, tmp_path, look, mess
 
 def test_a_file_whose_looks_are_not_those_of_its_manifest_is_refused(field, tmp_path):
     read = attach(field, upright("goal"))
-    key = upright_key("goal")
+    key, glance_key = upright("goal").contract.keys
     (text,) = (each.value for each in onnx.load_from_string(read.content).metadata_props if each.key == key)
     for entries, message in (
         ({key: None}, "manifest has a close look at goal, its metadata has none"),
-        ({upright_key("robot"): text}, "metadata has a close look at robot, its manifest has none"),
+        ({"visual_mesh_look_robot": text}, "metadata has a close look at robot, its manifest has none"),
+        ({glance_key: text}, "metadata has a glance at goal, its manifest has none"),
         ({key: "?"}, "a close look at goal can't be read"),
     ):
         (tmp_path / "changed.onnx").write_bytes(with_metadata(read.content, entries))

@@ -21,20 +21,14 @@ from .observation import Observation
 from .settings import Settings
 from .stopwatch import Stopwatch
 
-PROPOSALS = 24
-"""Largest number of proposals for a class."""
-
 _COLUMN = 0.012
 """Width of a direction [rad]."""
 
 _JUMP = 0.12
 """Points farther than the nearest one of their direction by more than this share are above the base."""
 
-_MOST_POINTS = 64
+_MOST_POINTS = 128
 """Largest number of points that propose places; more only cost time."""
-
-WORTH = 0.2
-"""Probability above which a place is worth a second look."""
 
 
 def around_bases(observation: Observation, radius: float) -> Observation:
@@ -67,14 +61,13 @@ def nearest_points(observation: Observation, probabilities: Singles, above: floa
 def find_bases(observation: Observation, look: Look, settings: Settings) -> list[Base]:
     """The uprights of a look's class, nearest first. Raises ModelError if the look network does not run.
 
-    settings: `min_confidence` counts, and at most PROPOSALS of `max_proposals`.
+    settings: `min_confidence` and `max_proposals` count.
     """
     contract = look.contract
     probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
     nearest = nearest_points(observation, probabilities, contract.above)
     circles = around_bases(observation, contract.upright_radius)
-    limited = replace(settings, max_proposals=min(settings.max_proposals, PROPOSALS))
-    judged = look_closely(circles, look, nearest, limited, Stopwatch(), worth=WORTH)
+    judged = look_closely(circles, look, nearest, settings, Stopwatch())
     heading = observation.view.heading[:2]
     width = 2.0 * contract.upright_radius
     found = [Base(heading @ each.center, width * each.scale, each.confidence) for each in judged]

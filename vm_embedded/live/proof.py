@@ -10,6 +10,8 @@ from ..detection.settings import Settings
 from ..errors import ModelError, VisualMeshError
 from ..geometry.lens_files import LensFile, format_lens_file, parse_lens_yaml
 from ..network.canary import Canary, CanaryObject
+from ..network.look_contract import LookContract
+from ..network.manifest import Manifest
 from ..network.model_file import ModelFile
 
 _MOST_MEGAPIXELS = 2.0
@@ -28,11 +30,14 @@ def prove(model: ModelFile) -> str:
     Raises ModelError if a self-test or an object of the canary is missing, or has another answer than the exporter saw.
     """
     manifest = model.manifest
-    look = manifest.look
-    parts = {"mesh network": manifest, "close look": look, "glance": look and look.glance}
-    parts |= {f"close look at {each.object_class}": each for each in manifest.upright_looks}
+    parts: dict[str, Manifest | LookContract] = {"mesh network": manifest}
+    for each in (manifest.look, *manifest.upright_looks):
+        if each is not None:
+            parts[f"close look at {each.object_class}"] = each
+        if each is not None and each.glance is not None:
+            parts[f"glance at {each.object_class}"] = each.glance
     for name, part in parts.items():
-        if part is not None and not part.self_test:
+        if not part.self_test:
             raise ModelError(f"{model.path}: its {name} has no self-test; export it again")
     detector = Detector(model, Settings())  # which runs the self-tests
     if model.canary is None:

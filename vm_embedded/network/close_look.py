@@ -12,7 +12,7 @@ from ..arrays import Image, Singles
 from ..errors import ModelError
 from .look_contract import LookContract
 from .look_test import ANSWERS
-from .model_file import ModelFile
+from .model_file import LookFiles, ModelFile
 from .onnx_model import OnnxModel
 
 _TOLERANCE = 2e-5
@@ -45,21 +45,29 @@ class CloseLook:
 
     @classmethod
     def of(cls, model: ModelFile, threads: int = 1, spinning: bool = False) -> CloseLook | None:
-        """The look network of a model file, None if it has none. Raises ModelError."""
-        contract, glance = model.manifest.look, None
-        if contract is None or model.look is None:
+        """The look network of a model file at objects, None if it has none. Raises ModelError."""
+        contract, files = model.manifest.look, model.look
+        if contract is None or files is None:
             return None
-        if contract.glance is not None and model.glance is not None:
-            glance = cls(f"{model.path}, glance", contract.glance, model.glance, None, threads, spinning)
-        return cls(f"{model.path}, close look", contract, model.look, glance, threads, spinning)
+        return cls._with_glance(f"{model.path}, ", contract, files, threads, spinning)
 
     @classmethod
     def of_uprights(cls, model: ModelFile, threads: int = 1, spinning: bool = False) -> dict[str, CloseLook]:
         """The look networks of a model file for classes of kind upright, by class. Raises ModelError."""
         return {
-            each.object_class: cls(f"{model.path}, look at {each.object_class}", each, content, None, threads, spinning)
-            for each, content in zip(model.manifest.upright_looks, model.upright_looks, strict=True)
+            each.object_class: cls._with_glance(f"{model.path}, {each.object_class}: ", each, files, threads, spinning)
+            for each, files in zip(model.manifest.upright_looks, model.upright_looks, strict=True)
         }
+
+    @classmethod
+    def _with_glance(
+        cls, prefix: str, contract: LookContract, files: LookFiles, threads: int, spinning: bool
+    ) -> CloseLook:
+        """A look network and its glance. prefix: of their names."""
+        glance = None
+        if contract.glance is not None and files.glance is not None:
+            glance = cls(f"{prefix}glance", contract.glance, files.glance, None, threads, spinning)
+        return cls(f"{prefix}close look", contract, files.look, glance, threads, spinning)
 
     def run(self, patches: Image) -> Singles:
         """Answers (n, 4) to patches (n, size, size, 3), RGB. Raises ModelError, also for answers that are not finite.

@@ -10,15 +10,11 @@ from ..errors import ModelError
 from .look_test import LookTest
 
 LOOK_KEY = "visual_mesh_look"
-"""Key of the look network, an ONNX file as base64, in the metadata of a model file."""
+"""Key of the look network, an ONNX file as base64, in the metadata of a model file. The key for a class of kind upright
+ends with the class: visual_mesh_look_goal."""
 
 GLANCE_KEY = "visual_mesh_glance"
 """Key of its glance, in the same form."""
-
-
-def upright_key(class_name: str) -> str:
-    """Key of the look network for a class of kind upright, in the same form."""
-    return f"{LOOK_KEY}_{class_name}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,8 +72,19 @@ class LookContract:
                 f"the close look judges class {self.object_class!r}, its glance class {self.glance.object_class!r}; "
                 "both must judge the same one"
             )
+        if self.glance.upright_radius != self.upright_radius:
+            raise ModelError(
+                f"the close look has the upright_radius {self.upright_radius:g} m, its glance "
+                f"{self.glance.upright_radius:g} m; both must be the same"
+            )
         if self.glance.glance is not None:
             raise ModelError("the glance of the close look has a glance, too; only a close look can have one")
+
+    @property
+    def keys(self) -> tuple[str, str]:
+        """Keys of the network and of its glance in the metadata of a model file."""
+        end = f"_{self.object_class}" if self.upright_radius else ""
+        return LOOK_KEY + end, GLANCE_KEY + end
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""

@@ -169,10 +169,10 @@ class Manifest:
             raise ModelError(
                 f"the close look judges class {self.look.object_class!r}, but the classes of kind object are {objects}"
             )
-        if self.look is not None and (
-            self.look.upright_radius or (self.look.glance and self.look.glance.upright_radius)
-        ):
-            raise ModelError("the close look at an object, or its glance, has an upright_radius; it must be 0")
+        if self.look is not None and self.look.upright_radius:
+            raise ModelError(
+                f"the close look at objects has an upright_radius of {self.look.upright_radius:g} m; it must be 0"
+            )
         uprights = [each.name for each in self.classes if each.kind == "upright"]
         judged = [each.object_class for each in self.upright_looks]
         if len(set(judged)) != len(judged) or not set(judged) <= set(uprights):
@@ -180,10 +180,10 @@ class Manifest:
                 f"there are close looks at the uprights {judged}, but the classes of kind upright are {uprights}"
             )
         for each in self.upright_looks:
-            if each.upright_radius < _SMALLEST_CIRCLE or each.glance is not None:
+            if each.upright_radius < _SMALLEST_CIRCLE:
                 raise ModelError(
                     f"the close look at {each.object_class!r} must have an upright_radius of at least "
-                    f"{_SMALLEST_CIRCLE} m and no glance"
+                    f"{_SMALLEST_CIRCLE} m, not {each.upright_radius:g} m"
                 )
 
     def _check_walls(self) -> None:

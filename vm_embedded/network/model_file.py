@@ -17,7 +17,7 @@ from pathlib import Path
 
 from ..errors import ModelError
 from .canary import CANARY_KEY, Canary
-from .look_contract import GLANCE_KEY, LOOK_KEY, LookContract, upright_key
+from .look_contract import GLANCE_KEY, LOOK_KEY, LookContract
 from .manifest import METADATA_KEY, Manifest
 
 # Fields of a message that hold further messages, by the numbers of onnx.proto: every place that can hold a tensor.
@@ -56,19 +56,25 @@ _Budget = Iterator[int]
 
 
 @dataclass(frozen=True)
+class LookFiles:
+    """The ONNX files of a look network and of its glance, if it has one."""
+
+    look: bytes
+    glance: bytes | None = None
+
+
+@dataclass(frozen=True)
 class ModelFile:
-    """A model file's bytes, its manifest, the SHA-256 of the bytes, and, if it has them, the ONNX files of its look
-    network and of the glance before it, its canary, and the ONNX files of its looks at uprights, in the manifest's
-    order."""
+    """A model file's bytes, its manifest, and the SHA-256 of the bytes. If it has them: the files of its close look at
+    objects and of those at uprights, in the manifest's order, and its canary."""
 
     path: Path
     content: bytes
     manifest: Manifest
     sha256: str
-    look: bytes | None = None
-    glance: bytes | None = None
+    look: LookFiles | None = None
+    upright_looks: tuple[LookFiles, ...] = ()
     canary: Canary | None = None
-    upright_looks: tuple[bytes, ...] = ()
 
     @cached_property
     def depth(self) -> int:
@@ -108,9 +114,9 @@ def parse_model(path: str | Path, content: bytes) -> ModelFile:
         if METADATA_KEY not in metadata:
             raise ModelError("no Visual Mesh manifest in its metadata; was it written by vm-export?")
         manifest = Manifest.from_json(metadata[METADATA_KEY])
-        look = _inner_file(metadata, LOOK_KEY, "a close look", manifest.look)
-        glance = _inner_file(metadata, GLANCE_KEY, "a glance", manifest.look and manifest.look.glance)
-        upright_looks = _upright_looks(metadata, manifest)
+        look = None if manifest.look is None else _look_files(metadata, manifest.look)
+        upright_looks = tuple(_look_files(metadata, each) for each in manifest.upright_looks)
+        _refuse_unknown_looks(metadata, manifest)
         canary = Canary.from_json(metadata[CANARY_KEY]) if CANARY_KEY in metadata else None
         if SEAL_KEY not in metadata:
             raise ModelError("has no checksum: it was written by an older release; export it again with this release")
@@ -119,31 +125,43 @@ def parse_model(path: str | Path, content: bytes) -> ModelFile:
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from error
     sha256 = hashlib.sha256(content).hexdigest()
-    return ModelFile(Path(path), content, manifest, sha256, look, glance, canary, upright_looks)
+    return ModelFile(Path(path), content, manifest, sha256, look, upright_looks, canary)
 
 
-def _upright_looks(metadata: dict[str, str], manifest: Manifest) -> tuple[bytes, ...]:
-    """The ONNX files of the looks at uprights, in the manifest's order. Raises ModelError."""
-    contracts = {upright_key(each.object_class): each for each in manifest.upright_looks}
-    keys = [*contracts, *(key for key in metadata if key.startswith(upright_key("")) and key not in contracts)]
-    names = [f"a close look at {key.removeprefix(upright_key(''))}" for key in keys]
-    files = [_inner_file(metadata, key, name, contracts.get(key)) for key, name in zip(keys, names, strict=True)]
-    return tuple(each for each in files if each is not None)
+def _look_files(metadata: dict[str, str], contract: LookContract) -> LookFiles:
+    """The files of a look network with this contract. Raises ModelError."""
+    look, glance = contract.keys
+    return LookFiles(_inner_file(metadata, look), None if contract.glance is None else _inner_file(metadata, glance))
 
 
-def _inner_file(metadata: dict[str, str], key: str, name: str, contract: LookContract | None) -> bytes | None:
-    """The ONNX file under a key, if the manifest has a contract for it. name: for messages. Raises ModelError."""
-    if (key in metadata) != (contract is not None):
-        has, lacks = ("manifest", "metadata") if contract else ("metadata", "manifest")
-        raise ModelError(f"its {has} has {name}, its {lacks} has none")
-    if contract is None:
-        return None
+def _inner_file(metadata: dict[str, str], key: str) -> bytes:
+    """The ONNX file under a key. Raises ModelError."""
+    if key not in metadata:
+        raise ModelError(f"its manifest has {_in_words(key)}, its metadata has none")
     try:
         content = base64.b64decode(metadata[key], validate=True)
         _read_fields(content)
     except (ModelError, binascii.Error, ValueError) as error:
-        raise ModelError(f"{name} can't be read: {error}") from error
+        raise ModelError(f"{_in_words(key)} can't be read: {error}") from error
     return content
+
+
+def _refuse_unknown_looks(metadata: dict[str, str], manifest: Manifest) -> None:
+    """Raises ModelError if there are files of looks that the manifest does not describe."""
+    contracts = [each for each in (manifest.look, *manifest.upright_looks) if each is not None]
+    known = {key for each in contracts for key in each.keys[: 1 if each.glance is None else 2]}
+    for key in metadata:
+        if key.startswith((LOOK_KEY, GLANCE_KEY)) and key not in known:
+            raise ModelError(f"its metadata has {_in_words(key)}, its manifest has none")
+
+
+def _in_words(key: str) -> str:
+    """What is under a key of a look's file."""
+    for start, name in ((LOOK_KEY, "a close look"), (GLANCE_KEY, "a glance")):
+        if key.startswith(start):
+            what = key.removeprefix(start).lstrip("_")
+            return f"{name} at {what}" if what else name
+    return key
 
 
 def sealed(content: bytes) -> bytes:

@@ -10,8 +10,7 @@ from functools import partial
 import numpy as np
 
 from vm_embedded.arrays import Floats, Mask
-from vm_embedded.detection import upright_looks
-from vm_embedded.detection.looking import WORTH, look_closely
+from vm_embedded.detection.looking import look_closely
 from vm_embedded.detection.patches import Tangents
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
@@ -59,11 +58,8 @@ class Judge:
     @classmethod
     def of(cls, run: LookRun, network: LookNetwork, contract: LookContract) -> Judge:
         """The judge of a run. network: not calibrated yet. Raises InputError or ModelError."""
-        observer, most = Observer.of(run), run.configuration.patches.proposals
-        settings = Settings(
-            max_proposals=most if observer.kind is None else min(most, upright_looks.PROPOSALS), min_confidence=0.0
-        )
-        return cls(observer, TorchLook(network, contract, TorchLook.of(run.glance())), settings)
+        settings = Settings(max_proposals=run.configuration.patches.proposals, min_confidence=0.0)
+        return cls(Observer.of(run), TorchLook(network, contract, TorchLook.of(run.glance())), settings)
 
     def __call__(self, item: Item) -> Found:
         """The objects in a picture; none if it can't be used."""
@@ -71,8 +67,7 @@ class Judge:
             seen = self.observer.observe(item.files)
         except (InputError, GeometryError):  # was reported when the patches were collected
             return Found(np.empty(0), np.empty(0, dtype=np.bool_), 0, 0)
-        worth = WORTH if self.observer.kind is None else upright_looks.WORTH
-        judged = look_closely(seen.observation, self.look, seen.probabilities, self.settings, Stopwatch(), worth=worth)
+        judged = look_closely(seen.observation, self.look, seen.probabilities, self.settings, Stopwatch())
         kept = [each for each in judged if each.reason is None]
         centers = np.array([each.center for each in kept]).reshape(-1, 3)
         labels = label_places(Tangents.at(seen.observation.view, centers), seen.truths).labels

@@ -99,7 +99,14 @@ class LookRun:
 
     def glance(self) -> LookCheckpoint | None:
         """The network that judges the proposals first, if there is one. Raises InputError or ModelError."""
-        return None if self.glance_sha256 is None else load_glance(self.folder / _GLANCE, self.object_class)
+        if self.glance_sha256 is None:
+            return None
+        return load_glance(self.folder / _GLANCE, self.object_class, self.upright_radius)
+
+    @property
+    def upright_radius(self) -> float:
+        """Radius of the circles around bases [m]; 0 for a class of kind object."""
+        return _upright_radius(self.configuration, self.object_class)
 
 
 def load_mesh(path: Path) -> ExactSubject:
@@ -111,8 +118,16 @@ def load_mesh(path: Path) -> ExactSubject:
     return subject
 
 
-def load_glance(path: Path, object_class: str) -> LookCheckpoint:
-    """A look network for this class that can go before another one. Raises InputError or ModelError."""
+def _upright_radius(configuration: LookConfiguration, object_class: str) -> float:
+    is_upright = configuration.classes.kinds[object_class] == "upright"
+    return configuration.patches.upright_radius if is_upright else 0.0
+
+
+def load_glance(path: Path, object_class: str, upright_radius: float) -> LookCheckpoint:
+    """A look network for this class, and circles of this radius [m], that can go before another one.
+
+    Raises InputError or ModelError.
+    """
     glance = LookCheckpoint.load(path)
     if glance.contract.object_class != object_class:
         raise InputError(
@@ -120,19 +135,19 @@ def load_glance(path: Path, object_class: str) -> LookCheckpoint:
         )
     if glance.glance is not None:
         raise InputError(f"{path} has a glance itself; a glance must be a single look network")
+    if glance.contract.upright_radius != upright_radius:
+        raise InputError(
+            f"{path} has an upright_radius of {glance.contract.upright_radius:g} m, patches.upright_radius is "
+            f"{upright_radius:g} m: give both the same one"
+        )
     return glance
-
-
-def uprights_of(subject: ExactSubject) -> list[str]:
-    """The classes of uprights that a look network can judge."""
-    return [each.name for each in subject.manifest.classes if each.kind == "upright" and each.name in KINDS]
 
 
 def judged_class(configuration: LookConfiguration, subject: ExactSubject, model: str) -> str:
     """The class that the look network judges. Raises InputError if model or masks do not have it."""
     kinds = {each.name: each.kind for each in subject.manifest.classes}
     objects = [name for name, kind in kinds.items() if kind == "object"]
-    uprights = uprights_of(subject)
+    uprights = [name for name, kind in kinds.items() if kind == "upright" and name in KINDS]
     if not objects + uprights:
         raise InputError(f"{model} has no class of the kind object, and neither goal nor robot of the kind upright")
     name = configuration.patches.object_class or (objects + uprights)[0]
@@ -169,9 +184,7 @@ def begin_look_run(
     object_class = judged_class(configuration, subject, name)
     glance_sha256 = None
     if glance is not None:
-        if object_class in uprights_of(subject):
-            raise InputError(f"--glance goes with objects; {object_class} is of the kind upright: leave it out")
-        load_glance(glance, object_class)
+        load_glance(glance, object_class, _upright_radius(configuration, object_class))
         glance_sha256 = _sha256(glance)
     try:
         (folder / "patches").mkdir(parents=True, exist_ok=True)

@@ -27,7 +27,7 @@ from .collected import Collected
 from .judging import Found, judge_validation
 from .labels import OBJECT
 from .patch_set import PatchSet
-from .run_folder import LookRun, uprights_of
+from .run_folder import LookRun
 from .scores import Calibration, LookResult, LookScore, logits_of
 from .trainer import LookTrainer
 
@@ -151,7 +151,7 @@ class _Training:
         glance = run.glance()
         contract = LookContract(
             object_class=run.object_class,
-            upright_radius=patches.upright_radius if run.object_class in uprights_of(run.subject()) else 0.0,
+            upright_radius=run.upright_radius,
             size=patches.size,
             extent=patches.extent,
             above=patches.above,

@@ -97,7 +97,7 @@ def test_each_of_two_posts_is_found_and_the_nearest_comes_first(detector):
 
 
 def test_a_place_that_the_first_look_doubts_gets_no_second_one(detector):
-    doubting, trusting = (Sure(probability=each) for each in (0.15, 0.6))
+    doubting, trusting = (Sure(probability=each) for each in (0.015, 0.6))
     for look in (doubting, trusting):
         look.contract = replace(look.contract, passes=2)
         find_bases(post_at(detector, (2.5, 0.3)), look, SETTINGS)
@@ -154,7 +154,7 @@ def test_the_nearest_points_are_the_nearest_in_their_direction(detector, seed, a
     for column in np.unique(columns[may]):
         inside = may[columns[may] == column]
         low[inside] = ranges[inside] <= 1.12 * ranges[inside].min()
-    most_probable = np.flatnonzero(low)[np.argsort(-probabilities[low], kind="stable")][:64]
+    most_probable = np.flatnonzero(low)[np.argsort(-probabilities[low], kind="stable")][:128]
     assert sorted(kept.tolist()) == sorted(most_probable.tolist())
 
 

@@ -30,7 +30,7 @@ def test_without_a_canary_the_self_tests_are_the_proof(ball):
 
 
 @pytest.mark.parametrize("empty", [False, True], ids=["none", "empty"])
-@pytest.mark.parametrize("part", ["mesh network", "close look", "glance"])
+@pytest.mark.parametrize("part", ["mesh network", "close look at ball", "glance at ball"])
 def test_a_model_without_a_self_test_is_refused(ball, part, empty):
     manifest = ball.manifest
     look, glance = manifest.look, manifest.look.glance
@@ -39,8 +39,8 @@ def test_a_model_without_a_self_test_is_refused(ball, part, empty):
     no_patches = [LookTest(each.self_test.patches[:0], each.self_test.answers[:0]) for each in (look, glance)]
     without = {
         "mesh network": replace(manifest, self_test=no_points if empty else None),
-        "close look": replace(manifest, look=replace(look, self_test=no_patches[0] if empty else None)),
-        "glance": replace(
+        "close look at ball": replace(manifest, look=replace(look, self_test=no_patches[0] if empty else None)),
+        "glance at ball": replace(
             manifest, look=replace(look, glance=replace(glance, self_test=no_patches[1] if empty else None))
         ),
     }

@@ -100,7 +100,9 @@ def test_a_glance_that_does_not_fit_is_refused(load, manifest, glance, message):
     assert message in refusal(load, LOOK, manifest, glance)
 
 
-def test_a_glance_must_judge_the_same_class_and_have_no_glance():
+def test_a_glance_must_judge_the_same_thing_and_have_no_glance():
+    with pytest.raises(ModelError, match=r"upright_radius 0.3 m, its glance 0 m; both must be the same"):
+        look_contract(upright_radius=0.3, glance=look_contract())
     with pytest.raises(ModelError, match="class 'ball', its glance class 'goal'"):
         look_contract(glance=look_contract(object_class="goal"))
     with pytest.raises(ModelError, match="has a glance, too"):

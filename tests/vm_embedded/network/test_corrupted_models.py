@@ -20,7 +20,6 @@ from vm_embedded.errors import ModelError
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.live.proof import prove
 from vm_embedded.network.bundled import SHIPPED, model_path
-from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY, upright_key
 from vm_embedded.network.model_file import SEAL_KEY, parse_model, sealed
 
 pytest.importorskip("onnxruntime")
@@ -29,14 +28,20 @@ DEMO = Path(__file__).parents[2] / "fixtures/demo"
 LARGEST_CHANGE = 1e-3
 
 
-UPRIGHTS = (upright_key("goal"), upright_key("robot"))
+def looks_of(content):
+    """The contracts of a model file's looks and glances, by the key of their network."""
+    manifest = parse_model("model.onnx", content).manifest
+    found = {}
+    for each in (manifest.look, *manifest.upright_looks):
+        found |= zip(each.keys, (each, each.glance), strict=True)
+    return {key: each for key, each in found.items() if each is not None}
 
 
-def networks_of(content, keys=(LOOK_KEY, GLANCE_KEY)):
+def networks_of(content):
     """A model file, and its networks by the key of their metadata; None is the mesh network."""
     model = onnx.load_from_string(content)
     entries = {each.key: each.value for each in model.metadata_props}
-    inner = {key: onnx.load_from_string(base64.b64decode(entries[key])) for key in keys}
+    inner = {key: onnx.load_from_string(base64.b64decode(entries[key])) for key in looks_of(content)}
     return model, {None: model, **inner}
 
 
@@ -48,15 +53,10 @@ def sealed_again(model, networks):
     return sealed(model.SerializeToString())
 
 
-def keys_of(name):
-    """The keys of all networks of a shipped model."""
-    return (None, LOOK_KEY, GLANCE_KEY, *(UPRIGHTS if name == "soccer" else ()))
-
-
-def corrupted(content, chance, keys):
-    """A model file with wrong weights in one of the networks with these keys, and what is wrong with them."""
-    model, networks = networks_of(content, keys=[each for each in keys if each])
-    key = chance.choice(list(keys))
+def corrupted(content, chance, keys=None):
+    """A model file with wrong weights in one of its networks, or of those with these keys, and what is wrong."""
+    model, networks = networks_of(content)
+    key = chance.choice(list(networks if keys is None else keys))
     weights = [
         each
         for each in networks[key].graph.initializer
@@ -107,7 +107,7 @@ def test_attack_1_every_changed_bit_is_refused(name, count):
     assert parse_model("model.onnx", whole).content == whole
 
 
-def refused(name, keys, seed, count):
+def refused(name, seed, count, keys=None):
     """How many of `count` models with wrong weights are refused. The others must change no answer."""
     whole, chance, found = model_path(name).read_bytes(), random.Random(seed), 0
     before = list(answers(parse_model("model.onnx", whole)))
@@ -128,21 +128,22 @@ def refused(name, keys, seed, count):
 def test_attack_1_wrong_weights_under_a_right_checksum_are_refused(name, count):
     whole = model_path(name).read_bytes()
     prove(parse_model("model.onnx", sealed_again(*networks_of(whole))))  # with the right weights it is accepted
-    assert refused(name, keys_of(name), 2, count) > 0.9 * count
+    assert refused(name, 2, count) > 0.9 * count
 
 
 @pytest.mark.parametrize("count", [6, pytest.param(60, marks=pytest.mark.long)])
 def test_attack_1_wrong_weights_of_a_look_at_uprights_are_refused(count):
-    assert refused("soccer", UPRIGHTS, 3, count) > 0.8 * count
+    keys = [key for key, look in looks_of(model_path("soccer").read_bytes()).items() if look.upright_radius]
+    assert refused("soccer", 3, count, keys) > 0.8 * count
 
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_self_tests_have_clear_positives_and_negatives_of_every_class(name):
-    manifest = parse_model("model.onnx", model_path(name).read_bytes()).manifest
-    probabilities = manifest.self_test.probabilities[:-1]
+    whole = model_path(name).read_bytes()
+    probabilities = parse_model("model.onnx", whole).manifest.self_test.probabilities[:-1]
     assert (probabilities.max(axis=0) > 0.7).all()
     assert (probabilities.min(axis=0) < 0.05).all()
-    for look in (manifest.look, manifest.look.glance, *manifest.upright_looks):
+    for look in looks_of(whole).values():
         found = look.self_test.answers[:, 0]
         assert found.max() > 0.65
         assert found.min() < 0.05

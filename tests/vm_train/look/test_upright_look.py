@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.vm_export.looks import look_checkpoint
 from tests.vm_train.commands import run, run_module
 from tests.vm_train.fields import CLASSES, STANDING, picture, write_pictures
 from vm_embedded import Detector, read_lens_file
@@ -117,10 +118,15 @@ def test_a_trained_look_goes_into_a_model_file_and_runs_there(field, tiny, tmp_p
     assert all(np.isfinite(each.position).all() for each in (*found.field.posts, *found.field.robots))
 
 
-def test_a_glance_is_for_objects_only(field, tiny, tmp_path):
-    given = ["--from", "soccer", "--config", tiny, "--set", "patches.object_class=goal"]
-    done = run("look", field, "-o", tmp_path / "run", *given, "--glance", tmp_path / "look.pt", code=1)
-    assert "--glance goes with objects" in done.stderr
+def test_a_glance_has_the_same_class_and_radius_as_its_look(field, tiny, tmp_path):
+    glance = tmp_path / "glance.pt"
+    for object_class, radius, complaint in (
+        ("robot", 0.3, "a glance for class 'goal' is needed"),
+        ("goal", 0.5, "give both the same one"),
+    ):
+        look_checkpoint(object_class=object_class, upright_radius=radius).save(glance)
+        given = ["--from", "soccer", "--config", tiny, "--set", "patches.object_class=goal", "--glance", glance]
+        assert complaint in run("look", field, "-o", tmp_path / "run", *given, code=1).stderr
     assert not (tmp_path / "run" / "look.toml").exists()
 
 
