@@ -10,7 +10,7 @@ SCENES ?= export/vm_synth/polyhaven.toml
 NETWORKS := ball ball-small soccer
 BUILD ?= build/networks
 PICTURES ?= data/soccer
-UPRIGHTS := $(BUILD)/goal-look/look.pt $(BUILD)/robot-look/look.pt
+UPRIGHTS := goal robot
 CANARY := --canary vm_embedded/models/canary.jpg export/networks/canary.yaml
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
@@ -114,11 +114,17 @@ $(BUILD)/ball.onnx: $(BUILD)/ball-look/look.pt
 vm_embedded/models/%.onnx: $(BUILD)/%-look/look.pt
 	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs $(CANARY) -o $@
 
-$(UPRIGHTS): $(BUILD)/%/look.pt: export/networks/%.toml $(BUILD)/soccer/model.pt
-	if test -e $(BUILD)/$*/run.json; then $(BIN)/vm-train resume $(BUILD)/$*; \
-		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/soccer/model.pt -o $(BUILD)/$* --config $<; fi
+$(UPRIGHTS:%=$(BUILD)/%-glance/look.pt): $(BUILD)/%-glance/look.pt: export/networks/upright-glance.toml $(BUILD)/soccer/model.pt
+	if test -e $(BUILD)/$*-glance/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-glance; \
+		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/soccer/model.pt -o $(BUILD)/$*-glance --config $< \
+			--set patches.object_class=$*; fi
 
-vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx $(UPRIGHTS)
+$(UPRIGHTS:%=$(BUILD)/%-look/look.pt): $(BUILD)/%-look/look.pt: export/networks/upright-look.toml $(BUILD)/%-glance/look.pt
+	if test -e $(BUILD)/$*-look/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-look; \
+		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/soccer/model.pt --glance $(BUILD)/$*-glance/look.pt \
+			-o $(BUILD)/$*-look --config $< --set patches.object_class=$*; fi
+
+vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx $(UPRIGHTS:%=$(BUILD)/%-look/look.pt)
 	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $(BUILD)/balls.onnx
 	$(BIN)/vm-export $(BUILD)/balls.onnx --look $(BUILD)/goal-look/look.pt -o $(BUILD)/balls-and-posts.onnx
 	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-look/look.pt -o $@
