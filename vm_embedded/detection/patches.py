@@ -72,11 +72,17 @@ def patch_nodes(view: PreparedView, tangents: Tangents, extent: float) -> Single
     extent: half the side of a patch, in expected radii. The grid goes from border to border, row by row from the upper
     left. A ray outside of the lens's view is moved to the edge of the view.
     """
-    steps = np.linspace(-extent, extent, _NODES)
-    down, right = (each.reshape(-1, 1) for each in np.meshgrid(steps, steps, indexing="ij"))
-    rays = tangents.turned(view.rotation).rays(right, down)  # (N * N, c, 3)
+    rays = tangents.turned(view.rotation).rays(*_node_places(extent))  # (N * N, c, 3)
     pixels = view.lens.project(_in_view(rays.reshape(-1, 3), view.lens.limit), view.size)
     return pixels.astype(np.float32).reshape(_NODES, _NODES, -1, 2).transpose(3, 2, 0, 1)
+
+
+@lru_cache(maxsize=32)
+def _node_places(extent: float) -> tuple[Floats, Floats]:
+    """How far to the right and down (N * N, 1) the nodes of a patch are [expected radii]."""
+    steps = np.linspace(-extent, extent, _NODES)
+    down, right = np.meshgrid(steps, steps, indexing="ij")
+    return right.reshape(-1, 1), down.reshape(-1, 1)
 
 
 def samples(nodes: Singles, size: int) -> Singles:
@@ -112,7 +118,7 @@ def cut_patches(pyramid: Pyramid, nodes: Singles, size: int) -> Image:
     shrunk = (nodes[:, order] + np.float32(0.5)) * np.exp2(-levels, dtype=np.float32)[:, None, None] - np.float32(0.5)
     x, y = samples(shrunk, size).reshape(2, count, size, size)
     patches = np.empty((count, size, size, 3), dtype=np.uint8)
-    for level in np.unique(levels):
+    for level in np.flatnonzero(np.bincount(levels)).tolist():
         part = slice(*np.searchsorted(levels, (level, level + 1)))
         tables = x[part].reshape(-1, size), y[part].reshape(-1, size)
         colors = cv2.remap(pyramid.level(level), *tables, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..arrays import Floats, Number
+from ..arrays import Floats, Mask, Number
 from ..errors import GeometryError
 from .shape import Shape, all_between
 
@@ -42,9 +42,19 @@ class Circle(Shape):
         return self._theta(n, height * np.tan(self.phi(n, height)))
 
     def offset(self, rays: Floats, centers: Floats, height: float) -> Floats:
-        hits = self.center_along(rays, height)[:, :2]
-        away = np.linalg.norm(hits[None] - centers[:, None, :2], axis=2) / self.radius
+        away = np.sqrt(self._squares(rays, centers, height)) / self.radius
         return np.where(rays[:, 2] < 0, away, np.inf)
+
+    def covers(self, rays: Floats, centers: Floats, height: float, share: float = 1.0) -> Mask:
+        # As `offset`, without a root for each pair.
+        near = self._squares(rays, centers, height) < (share * self.radius) ** 2
+        return np.asarray(near & (rays[:, 2] < 0))
+
+    def _squares(self, rays: Floats, centers: Floats, height: float) -> Floats:
+        """Squares (m, n) of the distances [m] of centers from where rays meet the plane."""
+        hits = self.center_along(rays, height)
+        right, ahead = (hits[:, axis] - centers[:, axis, None] for axis in (0, 1))
+        return right * right + ahead * ahead
 
     def outline(self, center: Floats, height: float, count: int = 48) -> Floats:
         around = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
