@@ -9,6 +9,7 @@ direction propose a place.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +30,10 @@ _JUMP = 0.12
 
 _MOST_POINTS = 128
 """Largest number of points that propose places; more only cost time."""
+
+_SAME = 0.12
+"""Two bases nearer to each other than this share of their distance are those of one upright: far away, a small error in
+the picture is a large one on the plane."""
 
 
 def around_bases(observation: Observation, radius: float) -> Observation:
@@ -71,4 +76,19 @@ def find_bases(observation: Observation, look: Look, settings: Settings) -> list
     heading = observation.view.heading[:2]
     width = 2.0 * contract.upright_radius
     found = [Base(heading @ each.center, width * each.scale, each.confidence) for each in judged]
-    return sorted(found, key=lambda each: float(np.hypot(*each.position)))
+    return sorted(_apart(found), key=lambda each: float(np.hypot(*each.position)))
+
+
+def _apart(bases: Sequence[Base]) -> list[Base]:
+    """Bases without those of an upright whose base is there already. bases: most probable first."""
+    kept: list[Base] = []
+    for each in bases:
+        if not any(_is_same(each, other) for other in kept):
+            kept.append(each)
+    return kept
+
+
+def _is_same(base: Base, better: Base) -> bool:
+    """Whether a base is that of the same upright as a more probable one."""
+    apart = float(np.hypot(*(base.position - better.position)))
+    return apart < max(_SAME * float(np.hypot(*better.position)), better.width / 2.0)

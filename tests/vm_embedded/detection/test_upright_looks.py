@@ -96,6 +96,16 @@ def test_each_of_two_posts_is_found_and_the_nearest_comes_first(detector):
     assert min(np.hypot(*(each - (3.0, 0.5))) for each in found[1:]) < 0.4
 
 
+@pytest.mark.parametrize("width", [0.1, 2.4])
+def test_bases_of_one_upright_are_reported_once(detector, width):
+    here = post_at(detector, (6.0, 0.0))
+    for beside, is_same in ((0.5, True), (1.0, width > 1.0), (2.0, False)):
+        there = post_at(detector, (6.0, beside))
+        both = replace(here, slot_probabilities=np.maximum(here.slot_probabilities, there.slot_probabilities))
+        found = [each.position for each in find_bases(both, Sure(width=width), SETTINGS)]
+        assert (min([9.0, *(np.hypot(*(each - found[0])) for each in found[1:])]) > beside + 0.3) == is_same
+
+
 def test_a_place_that_the_first_look_doubts_gets_no_second_one(detector):
     doubting, trusting = (Sure(probability=each) for each in (0.015, 0.6))
     for look in (doubting, trusting):
