@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from vm_embedded.arrays import Floats
 from vm_embedded.network.look_test import ANSWERS
 
@@ -66,5 +68,14 @@ def _write_layer(
     graph: OnnxGraph, operator: str, name: str, x: str, kernel: Floats, bias: Floats, **attributes: Any
 ) -> str:
     """Write a linear layer of the input x; return the name of its result."""
-    constants = [graph.constant(f"{name}.kernel", kernel), graph.constant(f"{name}.bias", bias)]
+    constants = [_write_weights(graph, f"{name}.kernel", kernel), _write_weights(graph, f"{name}.bias", bias)]
     return graph.node(operator, [x, *constants], f"{name}.linear", **attributes)
+
+
+def _write_weights(graph: OnnxGraph, name: str, values: Floats) -> str:
+    """Write weights; return the name of them as float32. The file holds them as float16 if that changes none: a look
+    network is text in a model file, and half as long then. ONNX Runtime converts them once, when it loads the file."""
+    half = values.astype(np.float16)
+    if np.array_equal(half, values):
+        return graph.node("Cast", [graph.constant(name, half)], f"{name}.single", to=FLOAT)
+    return graph.constant(name, values)

@@ -30,9 +30,10 @@ class OnnxGraph:
         self._constants: dict[str, onnx.TensorProto] = {}
 
     def constant(self, name: str, value: npt.ArrayLike) -> str:
-        """Add a constant, integers as int64, truths as bool and other numbers as float32; return its name."""
+        """Add a constant, integers as int64, other numbers as float32, and truths and float16 as they are; return its
+        name."""
         array = np.asarray(value)
-        if array.dtype != bool:
+        if array.dtype not in (np.bool_, np.float16):
             array = array.astype(np.int64 if np.issubdtype(array.dtype, np.integer) else np.float32)
         self._constants[name] = numpy_helper.from_array(np.ascontiguousarray(array), name)
         return name

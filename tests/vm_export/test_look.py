@@ -27,6 +27,7 @@ from vm_export.look_network import LookNetwork, LookShape, normalized
 from vm_export.look_weights import look_of, upright_looks_of
 from vm_export.metadata import with_metadata
 from vm_export.network_shape import NetworkShape
+from vm_train.look.training import round_weights
 
 from ..vm_embedded.strategies import seeds
 
@@ -73,14 +74,28 @@ def test_the_graph_has_standard_operators_only_and_is_the_same_each_time():
     assert look_model(look_network()) == content
 
 
-def test_onnx_runtime_joins_convolutions_and_activations(tmp_path):
+@pytest.mark.parametrize("rounded", [False, True])
+def test_onnx_runtime_joins_convolutions_and_activations(tmp_path, rounded):
     options = onnxruntime.SessionOptions()
     options.optimized_model_filepath = str(tmp_path / "optimized.onnx")
     options.log_severity_level = 4
-    onnxruntime.InferenceSession(look_model(look_network(shape=LookShape())), options)
+    network = look_network(shape=LookShape())
+    if rounded:
+        round_weights(network)
+    onnxruntime.InferenceSession(look_model(network), options)
     operators = [node.op_type for node in onnx.load(tmp_path / "optimized.onnx").graph.node]
     assert "Relu" not in operators
     assert sum("Conv" in each for each in operators) == 4
+    assert operators.count("Cast") == 1  # of the patch's colors; the weights are converted already
+
+
+def test_rounded_weights_need_half_of_the_room_and_give_the_same_answers():
+    network = look_network(shape=LookShape())
+    whole = look_model(network)
+    round_weights(network)
+    half, patches = look_model(network), random_patches(9, size=LookShape().size)
+    assert len(half) < 0.55 * len(whole)
+    np.testing.assert_allclose(onnx_answers(half, patches), torch_answers(network, patches), atol=1e-5)
 
 
 @given(seeds, st.integers(-100, 100))

@@ -217,8 +217,7 @@ class _Training:
 def round_weights(network: LookNetwork) -> None:
     """Round the weights to half precision, in place.
 
-    Answers change in the third digit. A model file holds look networks as text. In a wheel, they then need two thirds
-    of the room.
+    Answers change in the third digit, and a model file needs half of the room for the network.
     """
     with torch.no_grad():
         for each in network.parameters():

@@ -60,7 +60,7 @@ def corrupted(content, chance, keys=None):
     weights = [
         each
         for each in networks[key].graph.initializer
-        if each.data_type == TensorProto.FLOAT and each.name.endswith((".kernel", ".bias"))
+        if each.data_type in (TensorProto.FLOAT, TensorProto.FLOAT16) and each.name.endswith((".kernel", ".bias"))
     ]
     chosen = weights if chance.random() < 0.25 else [chance.choice(weights)]
     share, kind = chance.choice([1.0, 0.5, 0.1, 0.0]), chance.choice(["zero", "NaN", "random"])
@@ -70,7 +70,7 @@ def corrupted(content, chance, keys=None):
         wrong = generator.random(values.shape) < share
         wrong.flat[generator.integers(values.size)] = True  # at least one of them
         replaced = {"zero": 0.0, "NaN": math.nan, "random": generator.normal(0, values.std() + 0.01, values.shape)}
-        each.CopyFrom(numpy_helper.from_array(np.where(wrong, replaced[kind], values).astype(np.float32), each.name))
+        each.CopyFrom(numpy_helper.from_array(np.where(wrong, replaced[kind], values).astype(values.dtype), each.name))
     return sealed_again(model, networks), f"{key}: {len(chosen)} tensors, share {share}, {kind}"
 
 
