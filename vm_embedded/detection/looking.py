@@ -111,16 +111,17 @@ def look_closely(
     settings: Settings,
     watch: Stopwatch,
     explain: bool = False,
+    worth: float = WORTH,
 ) -> list[Judgment]:
     """The objects of the look's class, most probable first, from the slots' probabilities (m,).
 
-    explain: also the rejected proposals, with their reasons. watch: gets the stages propose and look. Raises ModelError
-    if the network does not run.
+    explain: also the rejected proposals, with their reasons. watch: gets the stages propose and look. worth:
+    probability above which a proposal is worth another look. Raises ModelError if the network does not run.
     """
     centers = propose_places(observation, probabilities, look.contract.above, settings.max_proposals)
     watch.lap("propose")
     places = PlanePlaces(observation, centers)
-    answers = look_at(places, look)
+    answers = look_at(places, look, worth)
     judged = _judged(observation, places.centers, answers, settings, explain)
     watch.lap("look")
     return judged

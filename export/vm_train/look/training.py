@@ -232,11 +232,11 @@ def _description(score: LookScore) -> str:
 
 
 def _examples(validation: PatchSet, presence: Singles) -> Image:
-    """Patches with and without an object, whose logits are those in the middle of each kind."""
+    """Patches that clearly show an object or clearly none: the network is surer of a twentieth of each kind."""
     chosen: list[int] = []
     for shows in (True, False):
         rows = np.flatnonzero((validation.labels == OBJECT) == shows)
-        ranked = rows[np.argsort(presence[rows], kind="stable")]
-        middle = max((len(ranked) - _EXAMPLES) // 2, 0)
-        chosen += ranked[middle : middle + _EXAMPLES].tolist()
+        surest = rows[np.argsort(-presence[rows] if shows else presence[rows], kind="stable")]
+        start = min(len(surest) // 20, max(len(surest) - _EXAMPLES, 0))
+        chosen += surest[start : start + _EXAMPLES].tolist()
     return validation.patches[chosen]
