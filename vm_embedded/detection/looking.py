@@ -132,8 +132,9 @@ def look_at(places: Places, look: Look, least: float = WORTH) -> Singles:
 
     least: probability above which a place is worth another look.
 
-    From the second pass on, the answers to a patch and to its mirror image are averaged. Returns the last answers
-    (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError if a network does not run.
+    From the second pass on, the answers to a patch and to its mirror image are averaged, unless the patch is not worth
+    another look. Returns the last answers (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError if a
+    network does not run.
     """
     # Each pass has its network: first those of the glance, then those of the look.
     networks = [each for each in (look.glance, look) if each for _ in range(each.contract.passes)]
@@ -141,7 +142,11 @@ def look_at(places: Places, look: Look, least: float = WORTH) -> Singles:
     worth = np.arange(len(places))
     for number, network in enumerate(networks):
         patches = places.cut(worth, network.contract)
-        answers[worth] = found = _mean_of_mirrored(network, patches) if number else network.run(patches)
+        found = network.run(patches)
+        if number:
+            likely = np.flatnonzero(found[:, 0] > least)
+            found[likely] = _mean_with_mirrored(network, patches[likely], found[likely])
+        answers[worth] = found
         possible = places.move(found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
         worth = worth[(found[:, 0] > least) & possible]
         if not len(worth):
@@ -149,13 +154,13 @@ def look_at(places: Places, look: Look, least: float = WORTH) -> Singles:
     return answers
 
 
-def _mean_of_mirrored(look: Look, patches: Image) -> Singles:
-    """Mean answers (n, 4) to patches and to their mirror images, which show the same objects.
+def _mean_with_mirrored(look: Look, patches: Image, answers: Singles) -> Singles:
+    """Mean answers (n, 4) to patches and to their mirror images, which show the same objects. answers: to the patches.
 
     Their errors differ: on validation pictures the mean halved the false objects. Probabilities are averaged as
     log-odds.
     """
-    answers, mirrored = look.run(np.concatenate([patches, patches[:, :, ::-1]])).reshape(2, len(patches), -1)
+    mirrored = look.run(np.ascontiguousarray(patches[:, :, ::-1]))
     mirrored[:, 1] *= -1
     mean = 0.5 * answers + 0.5 * mirrored
     yes = np.sqrt(answers[:, 0] * mirrored[:, 0])

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
-from vm_embedded.arrays import Singles
+from vm_embedded.arrays import Floats, Singles
 
 from ..bodies.catalog import PEOPLE
 from ..bodies.solids import LABELS
@@ -23,8 +25,9 @@ _GROUND = 0.01
 class Standing:
     """A goal post, robot or person in the world frame.
 
-    kind: post, robot or person. base: x and y of the middle of its foot [m]. width: horizontal, across the direction
-    from the camera [m]. height: of its highest point above the plane [m].
+    kind: post, robot or person. base: x and y [m] of the middle of a post's foot; of a robot or person, the point where
+    its foot begins in the direction of its middle. width: horizontal, across the direction from the camera [m]. height:
+    of its highest point above the plane [m].
     """
 
     kind: str
@@ -47,10 +50,11 @@ def standing_objects(scene: Scene) -> list[Standing]:
         vertices = mesh.vertices[part]
         label = LABELS[label_of[part].max(initial=0)]
         if label == "goal":
-            found += [_standing("post", foot, float(vertices[:, 2].max())) for foot in _post_feet(vertices)]
+            found += [_standing("post", foot, _middle(foot), float(vertices[:, 2].max())) for foot in _post_feet(vertices)]
         elif label == "robot" or name in PEOPLE:
             top = float(vertices[:, 2].max())
-            found.append(_standing("robot" if label == "robot" else "person", vertices, top))
+            foot = vertices[vertices[:, 2] <= _FOOT * top]
+            found.append(_standing("robot" if label == "robot" else "person", vertices, _front(foot), top))
     return found
 
 
@@ -63,10 +67,28 @@ def _post_feet(vertices: Singles) -> tuple[Singles, Singles]:
     return ground[left], ground[~left]
 
 
-def _standing(kind: str, vertices: Singles, top: float) -> Standing:
-    """The description of an object with these vertices (n, 3) [m], whose highest point is at the height `top` [m]."""
-    foot = vertices[vertices[:, 2] <= _FOOT * top][:, :2]
-    base = 0.5 * (foot.min(axis=0) + foot.max(axis=0)).astype(np.float64)
+def _standing(kind: str, vertices: Singles, base: Floats, top: float) -> Standing:
+    """The description of an object with these vertices (n, 3) and base (2,) [m], with its highest point at `top` [m]."""
     across = np.array([-base[1], base[0]]) / max(float(np.hypot(*base)), 1e-9)
     width = float(np.ptp(vertices[:, :2] @ across))
     return Standing(kind, (float(base[0]), float(base[1])), width, top)
+
+
+def _middle(foot: Singles) -> Floats:
+    """The middle (2,) [m] of a foot (n, 3) [m]."""
+    return 0.5 * (foot[:, :2].min(axis=0) + foot[:, :2].max(axis=0)).astype(np.float64)
+
+
+def _front(foot: Singles) -> Floats:
+    """The point (2,) [m] where the convex hull of a foot (n, 3) [m] begins, seen from the camera toward its middle."""
+    hull = cv2.convexHull(np.ascontiguousarray(foot[:, :2], dtype=np.float32))[:, 0].astype(np.float64)
+    heading = math.atan2(*hull.mean(axis=0)[::-1])
+    beside = (np.arctan2(hull[:, 1], hull[:, 0]) - heading + math.pi) % (2.0 * math.pi) - math.pi
+    heading += 0.5 * float(beside.min() + beside.max())
+    ahead = np.array([math.cos(heading), math.sin(heading)])
+    along, across = hull @ ahead, hull @ np.array([-ahead[1], ahead[0]])
+    following = np.roll(across, -1)
+    crossing = np.flatnonzero((across < 0.0) != (following < 0.0))  # edges of the hull that the ray meets
+    share = across[crossing] / (across[crossing] - following[crossing])
+    meets = along[crossing] + share * (np.roll(along, -1)[crossing] - along[crossing])
+    return np.asarray(max(float(meets.min(initial=along.max())), 0.0) * ahead)

@@ -117,7 +117,7 @@ def test_a_look_sees_only_what_its_glance_passes_on_where_it_saw_it(scene):
     nothing = center_at(scene.view, (560.0, 400.0))
     beside = ball + np.array([0.0, 0.03, 0.0])
     moved, answers = looked_at(scene, look, np.stack([nothing, beside]))
-    assert (glance.seen, look.seen) == ([2], [2])  # the look sees one patch and its mirror image
+    assert (glance.seen, look.seen) == ([2], [1, 1])  # the look sees one patch, then its mirror image
     assert answers[:, 0] == pytest.approx([0.0, 0.9])
     assert np.linalg.norm(moved[1] - ball) < 0.2 * np.linalg.norm(beside - ball)
     found, rejected = found_in(scene, BrightDisk(passes=1, glance=Strict(passes=1)))
@@ -129,7 +129,7 @@ def test_only_proposals_with_a_chance_are_looked_at_again(scene):
     look = BrightDisk()
     bare = replace(scene, slot_probabilities=np.full_like(scene.slot_probabilities, 0.5))
     found_in(bare, look, max_proposals=30)
-    assert look.seen == [30, 60]  # 0.05 is a chance; each second pass also sees the mirror image
+    assert look.seen == [30, 30, 30]  # 0.05 is a chance; each second pass also sees the mirror image
 
     class Sure(BrightDisk):
         def run(self, patches):
@@ -141,6 +141,29 @@ def test_only_proposals_with_a_chance_are_looked_at_again(scene):
     found_in(bare, look, max_proposals=30)
     assert look.seen[0] == 30
     assert len(look.seen) == 1 or look.seen[1] < 30
+
+
+def test_only_mirror_images_of_likely_patches_are_looked_at(scene):
+    class Hopeful(BrightDisk):
+        """A glance that passes everything on."""
+
+        def run(self, patches):
+            answers = super().run(patches)
+            answers[:, 0] = 0.9
+            return answers
+
+    class Strict(BrightDisk):
+        def run(self, patches):
+            answers = super().run(patches)
+            answers[answers[:, 0] < 0.5, 0] = 0.01
+            return answers
+
+    look = Strict(passes=1, glance=Hopeful(passes=1))
+    balls = true_centers(scene)
+    nothing = [center_at(scene.view, (560.0, 400.0)), center_at(scene.view, (100.0, 420.0))]
+    _, answers = looked_at(scene, look, np.stack([*nothing, *balls]))
+    assert look.seen == [4, len(balls)]
+    assert answers[:, 0] == pytest.approx([0.01, 0.01] + [0.9] * len(balls), abs=1e-3)
 
 
 def test_what_is_too_improbable_has_a_reason(scene):

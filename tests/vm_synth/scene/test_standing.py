@@ -51,6 +51,22 @@ def test_robots_and_people_are_described_where_their_bodies_are(scene):
         assert 0.0 < each.width <= np.hypot(*(high - low)) + 1e-5
 
 
+def test_the_base_of_a_robot_is_the_front_of_its_foot(scene):
+    drawn = [vertices for name, vertices, _ in bodies(scene) if name in PEOPLE + ROBOTS]
+    found = [each for each in standing_objects(scene) if each.kind != "post"]
+    for body, each in zip(drawn, found, strict=True):
+        foot = body[body[:, 2] <= 0.2 * body[:, 2].max()][:, :2]
+        ahead = np.array(each.base) / np.hypot(*each.base)
+        along = foot @ ahead
+        assert along.min() - 1e-4 <= np.hypot(*each.base) <= along.max()
+        sides = np.arctan2(foot @ (-ahead[1], ahead[0]), along)
+        assert sides.max() == pytest.approx(-sides.min(), abs=1e-4)
+        # All of the foot that is as near lies to one side: the base is on the edge of its convex hull.
+        nearer = foot - each.base
+        turns = np.arctan2(nearer @ (-ahead[1], ahead[0]), nearer @ ahead)
+        assert np.ptp(turns) <= np.pi + 1e-3
+
+
 def test_the_carrier_of_the_camera_does_not_count(scene):
     assert any(name.startswith("own ") for name in scene.names)
     assert all(np.hypot(*each.base) > 0.1 for each in standing_objects(scene))
