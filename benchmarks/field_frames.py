@@ -6,10 +6,11 @@ The folder holds two sets. `real`: `images/imageX.jpg` with `images/lensX.yaml`,
 frame: class and edges `x0`, `y0`, `x1`, `y1` [px]. `reference`: images and `golden/goldenX.npz` with rays and
 probabilities of the authors' network. The network under test never learned from either.
 
-The ray through the middle of a box's lower edge meets the plane at the front of the robot or post. Its base is half its
-width behind: the width between the rays through the ends of the lower edge. A report is right if it is within 15 % of
-the distance of a base, or if its pixel is inside the box's foot: the lowest fifth of the box, widened by a quarter of
-the box's width on each side and, because the edges are only good to some pixels, by 4 px in all directions.
+The ray through the middle of a box's lower edge meets the plane at the front of the robot or post. That is the base of
+a robot. The base of a post is half its width behind: the width between the rays through the ends of the lower edge. A
+report is right if it is within 15 % of the distance of a base, or if its pixel is inside the box's foot: the lowest
+fifth of the box, widened by a quarter of the box's width on each side and, because the edges are only good to some
+pixels, by 4 px in all directions.
 
 The place of a base is not known if it is in the lowest 2 % of the picture's rows, where the picture cuts it off, or if
 another box covers it that reaches further down. Such a base can't be missed, and a report in its direction is neither
@@ -128,7 +129,8 @@ def marked(boxes: Sequence[Mapping[str, Any]], kind: str, lens: LensFile, size: 
             continue
         edges = (float(each["x0"]), float(each["y0"]), float(each["x1"]), float(each["y1"]))
         hidden = edges[3] >= _CUT * size[1] or any(_hides(other, edges) for other in boxes)
-        found.append(Marked(edges, None if hidden else _base(edges, lens, size), hidden))
+        depth = 0.5 if kind == KINDS["posts"] else 0.0
+        found.append(Marked(edges, None if hidden else _base(edges, lens, size, depth), hidden))
     return found
 
 
@@ -139,8 +141,13 @@ def _hides(other: Mapping[str, Any], edges: tuple[float, float, float, float]) -
     return bool(other["class"] not in NOT_IN_FRONT and covers and other["y1"] > y + _MARGIN)
 
 
-def _base(edges: tuple[float, float, float, float], lens: LensFile, size: tuple[int, int]) -> Floats | None:
-    """Place (2,) [m] of the base of what fills a box; None above the horizon."""
+def _base(
+    edges: tuple[float, float, float, float], lens: LensFile, size: tuple[int, int], depth: float
+) -> Floats | None:
+    """Place (2,) [m] of the base of what fills a box; None above the horizon.
+
+    depth: from the front of the foot to the base, as a share of the width.
+    """
     assert lens.orientation is not None
     x0, _, x1, y1 = edges
     pixels = np.array([(x0, y1), ((x0 + x1) / 2.0, y1), (x1, y1)])
@@ -149,7 +156,7 @@ def _base(edges: tuple[float, float, float, float], lens: LensFile, size: tuple[
         return None
     left, front, right = rays[:, :2] * (-lens.orientation.height / rays[:, 2:])
     distance, width = math.hypot(*front), math.hypot(*(right - left))
-    return np.asarray(front * (1.0 + width / 2.0 / max(distance, 1e-6)))
+    return np.asarray(front * (1.0 + depth * width / max(distance, 1e-6)))
 
 
 def count_uprights(

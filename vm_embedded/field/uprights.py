@@ -20,10 +20,10 @@ class UprightRules:
 
     least: points with a smaller probability are ignored. points: fewest points of a thing. jump: a thing ends in the
     direction where the base would be farther by more than this share. beside [m]: everything of the class that is so
-    near beside a base belongs to it. depth: from its front to the middle of its base, as a share of its width. taller:
-    height of a thing, as a share of its width, at least. foot: share of its height whose middle is its base. filled:
-    share of the points between its sides, its base and its top that are of its class, at least. widest [m]: wider
-    things are something else.
+    near beside a base belongs to it. depth: from its front to its base, as a share of its width. taller: height of a
+    thing, as a share of its width, at least. foot: the base is in the direction of the middle of this share of its
+    height. filled: share of the points between its sides, its base and its top that are of its class, at least. widest
+    [m]: wider things are something else.
     """
 
     least: float
@@ -41,7 +41,7 @@ POST = UprightRules(
     least=0.45, points=10, jump=0.2, beside=0.2, depth=0.3, taller=1.5, foot=0.5, filled=0.2, widest=0.5
 )
 ROBOT = UprightRules(
-    least=0.5, points=14, jump=0.35, beside=0.3, depth=0.3, taller=1.0, foot=0.4, filled=0.2, widest=2.0
+    least=0.5, points=14, jump=0.35, beside=0.3, depth=0.0, taller=1.0, foot=0.4, filled=0.2, widest=2.0
 )
 
 KINDS = {"goal": "post", "robot": "robot"}
@@ -56,8 +56,8 @@ _MOST = 20
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """A thing on the plane: the middle of its base (2,) [m], its width across the ray [m], and its confidence: the mean
-    probability of its points, or that of a close look."""
+    """A thing on the plane: its base (2,) [m], its width across the ray [m], and its confidence: the mean probability of
+    its points, or that of a close look."""
 
     position: Floats
     width: float
