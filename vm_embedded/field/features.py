@@ -16,9 +16,10 @@ class Upright:
     """Something that stands on the plane: a goal post, or a robot or another obstacle.
 
     class_name: post or robot. position (2,) [m]: its base, which is the middle of a post's foot, or the front of a
-    robot's foot, in the direction of its middle. distance [m]: from the camera to the base. bearing (3,): unit vector from the camera to the base. pixel (2,) [px]: of the base; NaN outside
-    of the picture. width [m]: as seen from the camera. confidence: calibrated probability of a close look or, if the
-    class has none, mean probability of its points; 0 to 1.
+    robot's foot, in the direction of its middle. distance [m]: from the camera to the base. bearing (3,): unit vector
+    from the camera to the base. pixel (2,) [px]: of the base; NaN outside of the picture. width [m]: as seen from the
+    camera. confidence: calibrated probability of a close look or, if the class has none, mean probability of its
+    points; 0 to 1.
     """
 
     class_name: str

@@ -56,8 +56,8 @@ _MOST = 20
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """A thing on the plane: its base (2,) [m], its width across the ray [m], and its confidence: the mean probability of
-    its points, or that of a close look."""
+    """A thing on the plane: its base (2,) [m], its width across the ray [m], and its confidence: the mean probability
+    of its points, or that of a close look."""
 
     position: Floats
     width: float

@@ -50,7 +50,8 @@ def standing_objects(scene: Scene) -> list[Standing]:
         vertices = mesh.vertices[part]
         label = LABELS[label_of[part].max(initial=0)]
         if label == "goal":
-            found += [_standing("post", foot, _middle(foot), float(vertices[:, 2].max())) for foot in _post_feet(vertices)]
+            top = float(vertices[:, 2].max())
+            found += [_standing("post", foot, _middle(foot), top) for foot in _post_feet(vertices)]
         elif label == "robot" or name in PEOPLE:
             top = float(vertices[:, 2].max())
             foot = vertices[vertices[:, 2] <= _FOOT * top]
@@ -68,7 +69,7 @@ def _post_feet(vertices: Singles) -> tuple[Singles, Singles]:
 
 
 def _standing(kind: str, vertices: Singles, base: Floats, top: float) -> Standing:
-    """The description of an object with these vertices (n, 3) and base (2,) [m], with its highest point at `top` [m]."""
+    """The description of an object with these vertices (n, 3), this base (2,) [m] and a highest point at `top` [m]."""
     across = np.array([-base[1], base[0]]) / max(float(np.hypot(*base)), 1e-9)
     width = float(np.ptp(vertices[:, :2] @ across))
     return Standing(kind, (float(base[0]), float(base[1])), width, top)
@@ -76,7 +77,7 @@ def _standing(kind: str, vertices: Singles, base: Floats, top: float) -> Standin
 
 def _middle(foot: Singles) -> Floats:
     """The middle (2,) [m] of a foot (n, 3) [m]."""
-    return 0.5 * (foot[:, :2].min(axis=0) + foot[:, :2].max(axis=0)).astype(np.float64)
+    return np.asarray(0.5 * (foot[:, :2].min(axis=0) + foot[:, :2].max(axis=0)), dtype=np.float64)
 
 
 def _front(foot: Singles) -> Floats:
