@@ -13,6 +13,7 @@ from ..field.ground_points import ROLES, GroundPoints
 from .looking import Look
 from .observation import Observation
 from .prepared_view import PreparedView
+from .profiles import brightness_along
 from .settings import Settings
 from .upright_looks import find_bases
 
@@ -29,9 +30,14 @@ def locate_features(observation: Observation, looks: Mapping[str, Look], setting
     names = [each.name for each in observation.manifest.classes]
     if not set(ROLES) & set(names):
         return None
-    view = observation.view
+    view, pyramid = observation.view, observation.pyramid
     bases = {name: find_bases(observation, look, settings) for name, look in looks.items()}
-    return find_features(ground_points(observation), lambda places: _pixels(view, places), bases)
+    return find_features(
+        ground_points(observation),
+        lambda places: _pixels(view, places),
+        lambda stretches, count: brightness_along(view, pyramid, stretches, count),
+        bases,
+    )
 
 
 def ground_points(observation: Observation) -> GroundPoints:

@@ -28,7 +28,7 @@ _FEWEST = 12
 _SECTORS = 24
 """Equal parts of a circle, to tell how much of it is seen."""
 
-_LEAST_ARC = 0.42
+_LEAST_ARC = 0.3
 """Share of the circle's sectors that have points on it, at least."""
 
 _AROUND = 0.4
@@ -37,7 +37,7 @@ _AROUND = 0.4
 _LEAST_OWN = 0.4
 """Share of the circle's points that are on no long line, at least."""
 
-_LEAST_PURE = 0.75
+_LEAST_PURE = 0.65
 """Share of the probability in this band that is on the circle, at least: a disk of points is no circle."""
 
 

@@ -13,13 +13,14 @@ from .crossings import find_crossings
 from .features import Border, CenterCircle, FieldFeatures, Segment, Upright
 from .goals import pair_posts
 from .ground_points import GroundPoints
-from .lines import LinePoints, Piece, find_pieces, line_points
+from .lines import LEAST, LinePoints, Piece, find_pieces, line_points
+from .ridges import Profiles, pieces_on_ridges
 from .uprights import POST, ROBOT, Base, UprightRules, find_uprights
 
 ToPixels = Callable[[Floats], Floats]
 """Pixels (n, 2) of places (n, 2) [m] on the plane; NaN outside of the picture."""
 
-_LONG = 1.6
+_LONG = 2.0
 """Straight pieces from this length [m] are lines, also if they touch the center circle."""
 
 _LIKELY = 0.2
@@ -29,17 +30,22 @@ _CELL = 0.1
 """At most one line point is reported in each square of this size [m]."""
 
 
-def find_features(points: GroundPoints, to_pixels: ToPixels, bases: Mapping[str, Sequence[Base]]) -> FieldFeatures:
+def find_features(
+    points: GroundPoints, to_pixels: ToPixels, profiles: Profiles, bases: Mapping[str, Sequence[Base]]
+) -> FieldFeatures:
     """All field features among the points of a frame.
 
-    bases: of the classes that a close look has judged, by class. Rules find the uprights of the others.
+    profiles: brightness of the frame across lines. bases: of the classes that a close look has judged, by class. Rules
+    find the uprights of the others.
     """
     posts, robots = (
         list(bases[name]) if name in bases else _by_rules(points, name, rules)
         for name, rules in (("goal", POST), ("robot", ROBOT))
     )
-    candidates = line_points(points)
-    pieces, circle = _straight_and_round(candidates)
+    near = line_points(points)
+    likely = near.part(near.weights > LEAST)
+    pieces, circle = _straight_and_round(near, likely)
+    pieces = pieces_on_ridges(pieces, points, profiles)
     border = find_border(points) if "field" in points.classes else np.empty((0, 2))
     places = [each.position[None] for each in posts + robots] + [each.ends for each in pieces] + [border]
     pixels = iter(np.split(to_pixels(np.concatenate(places)), np.cumsum([len(each) for each in places])[:-1]))
@@ -47,14 +53,14 @@ def find_features(points: GroundPoints, to_pixels: ToPixels, bases: Mapping[str,
         _upright(each, "post" if number < len(posts) else "robot", points.height, next(pixels)[0])
         for number, each in enumerate(posts + robots)
     ]
-    lines = tuple(Segment(each.ends, next(pixels), float(candidates.weights[each.members].mean())) for each in pieces)
-    thinned, confidences = _thinned(candidates)
+    lines = tuple(Segment(each.ends, next(pixels), float(likely.weights[each.members].mean())) for each in pieces)
+    thinned, confidences = _thinned(likely)
     return FieldFeatures(
         posts=tuple(uprights[: len(posts)]),
         goals=pair_posts(uprights[: len(posts)]),
         robots=tuple(uprights[len(posts) :]),
         lines=lines,
-        circle=None if circle is None else _circle(circle, candidates),
+        circle=None if circle is None else _circle(circle, likely),
         crossings=find_crossings(lines, lambda places: np.asarray(np.isfinite(to_pixels(places)).all(axis=1))),
         line_points=thinned,
         line_confidences=confidences,
@@ -72,16 +78,16 @@ def _upright(base: Base, name: str, height: float, pixel: Floats) -> Upright:
     return Upright(name, base.position, distance, toward / distance, pixel, base.width, base.confidence)
 
 
-def _straight_and_round(points: LinePoints) -> tuple[list[Piece], CirclePoints | None]:
+def _straight_and_round(points: LinePoints, likely: LinePoints) -> tuple[list[Piece], CirclePoints | None]:
     """Straight pieces and the center circle. A short piece that shares most points with the circle is part of it."""
-    pieces = find_pieces(points)
-    free = points.weights > _LIKELY
+    pieces = find_pieces(points, likely)
+    free = likely.weights > _LIKELY
     for each in pieces:
         if each.length >= _LONG:
             free[each.members] = False
-    circle = find_circle(points, np.flatnonzero(free))
+    circle = find_circle(likely, np.flatnonzero(free))
     if circle is not None:
-        on = np.zeros(len(points), dtype=bool)
+        on = np.zeros(len(likely), dtype=bool)
         on[circle.members] = True
         pieces = [each for each in pieces if each.length >= 2.0 * circle.radius or on[each.members].mean() < 0.5]
     return pieces, circle

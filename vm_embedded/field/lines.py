@@ -2,6 +2,7 @@
 
 All lines of a field are parallel or at right angles, except for its circle. A Hough transform of the line points finds
 the two directions. Lines in these directions are taken one after the other, best first, and fitted to their points.
+Each fitted line makes the two directions more certain.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ import numpy as np
 from ..arrays import Chosen, Floats, Mask, Singles
 from .ground_points import GroundPoints
 
-_LEAST = 0.1
-"""Points with a smaller probability of the class line are ignored."""
+LEAST = 0.1
+"""Points with a smaller probability of the class line suggest no line."""
 
 _FARTHEST = 10.0
 """Farther points [m] are ignored: a line there is narrower than a pixel of most cameras."""
@@ -32,25 +33,52 @@ _BIN = 0.06
 _MOST_ROUNDS = 14
 """Largest number of searches for a line, which may have several pieces."""
 
-_LEAST_MEAN = 0.25
-"""The points of a line have at least this mean probability."""
-
 _SHORTEST = 0.2
 """Shorter pieces [m] are no lines."""
 
 _FEWEST = 4
 """A line has at least so many points."""
 
-_GAP = 1.0
-"""Wider gaps [m] divide a line into pieces, unless the mesh is even coarser there."""
+_LEAST_VOTES = 1.4
+"""Sum of the probabilities of the points that suggest a line, at least."""
+
+_EXPECTED = 0.1
+"""Probability from which a point speaks for a line that it is on; one with less speaks against it."""
+
+_LEAST_SUPPORT = 0.6
+"""Sum of what a piece's points have above that probability, at least."""
+
+_MOST_AGAINST = 2.0
+"""Points in a row that speak against a line divide it, if the sum of what they have below that probability is more."""
 
 _TURN = 0.15
-"""A fitted line turns by less than this [rad] from the direction that the Hough transform found."""
+"""A fitted line turns by less than this [rad] from the expected direction."""
+
+_FIRST_ERROR = 0.015
+"""Standard deviation [rad] of the direction that the Hough transform finds."""
+
+_SKEW = 0.01
+"""Standard deviation [rad] of the direction of one line: fields are painted, and poses are measured, with errors."""
+
+_NOISE = 0.5
+"""Standard deviation of a point's distance from its line, as a share of its tolerance."""
+
+_SAME_DIRECTION = 0.004
+"""A turn of the two directions [rad] that does not yet need new bins."""
+
+
+def tolerance(outward: Floats, blur: Floats, across: float) -> Floats:
+    """How far (...) [m] a point may be from a line's middle.
+
+    outward (...): how much the line's normal points away from the camera, 0 to 1. blur (...), across [m]: as those of
+    LinePoints.
+    """
+    return np.asarray(outward * (0.7 * (blur - across)) + (0.04 + 0.7 * across))
 
 
 @dataclass(frozen=True, eq=False)
 class LinePoints:
-    """The n points that may be on lines. positions (n, 2) [m]. weights (n,): their probabilities. radial (n, 2): unit
+    """n points near enough for lines. positions (n, 2) [m]. weights (n,): their probabilities. radial (n, 2): unit
     vectors away from the camera. blur (n,) [m]: half the distance between rings of the mesh there. across [m]: half
     the distance between points of a ring."""
 
@@ -65,13 +93,8 @@ class LinePoints:
 
     def tolerance(self, normals: Floats) -> Floats:
         """How far (n,) [m] a point may be from a line's middle, across unit vectors (2,) or (n, 2)."""
-        outward = np.abs((self.radial * normals).sum(axis=1))
-        return np.asarray(0.04 + 0.7 * (outward * self.blur + (1.0 - outward) * self.across))
-
-    def spacing(self, chosen: Chosen, direction: Floats) -> Floats:
-        """Distance (m,) [m] to the next point along a direction (2,), at chosen points (m,)."""
-        outward = np.abs(self.radial[chosen] @ direction)
-        return np.asarray(2.0 * (outward * self.blur[chosen] + (1.0 - outward) * self.across))
+        outward = self.radial @ normals if normals.ndim == 1 else np.einsum("ij,ij->i", self.radial, normals)
+        return tolerance(np.abs(outward), self.blur, self.across)
 
     def part(self, chosen: Mask | Chosen) -> LinePoints:
         """Some of the points."""
@@ -82,10 +105,12 @@ class LinePoints:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A straight piece of a line: its ends (2, 2) [m], and the numbers of its points."""
+    """A straight piece of a line: its ends (2, 2) [m], the numbers of its likely points, and its support: the sum of
+    what all points on it have above the probability from which a point speaks for a line."""
 
     ends: Floats
     members: Chosen
+    support: float
 
     @property
     def length(self) -> float:
@@ -94,42 +119,59 @@ class Piece:
 
 
 def line_points(points: GroundPoints) -> LinePoints:
-    """The points that may be on lines; none if the network has no class line."""
-    probabilities = points.classes.get("line", np.zeros(len(points.ranges), np.float32))
-    chosen = np.flatnonzero((probabilities > _LEAST) & (points.ranges < _FARTHEST) & (points.ranges > 1e-3))
+    """All points near enough for lines; none if the network has no class line."""
+    if "line" not in points.classes:
+        return LinePoints(np.empty((0, 2)), np.empty(0, np.float32), np.empty((0, 2)), np.empty(0), 0.5 * points.across)
+    chosen = np.flatnonzero((points.ranges < _FARTHEST) & (points.ranges > 1e-3))
     ranges, positions = points.ranges[chosen], points.positions[chosen]
     return LinePoints(
         positions,
-        probabilities[chosen],
+        points.classes["line"][chosen],
         positions / ranges[:, None],
         0.5 * points.along(ranges),
         0.5 * points.across,
     )
 
 
-def find_pieces(points: LinePoints) -> list[Piece]:
-    """Straight pieces of lines, longest first."""
-    if len(points) < _FEWEST:
+def find_pieces(points: LinePoints, likely: LinePoints) -> list[Piece]:
+    """Straight pieces of lines, longest first.
+
+    points: all points near enough for lines. likely: those of them with a probability above LEAST.
+    """
+    if len(likely) < _FEWEST:
         return []
-    angle = _main_direction(points)
-    normals = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    bins = _bins(points.positions @ normals.T)  # (n, 2): of lines across both directions
-    free = np.ones(len(points), dtype=bool)
+    angle, certainty = _main_direction(likely), 1.0 / _FIRST_ERROR**2
+    normals = _normals(angle)
+    bins = _bins(likely.positions @ normals.T)  # (n, 2): of lines across both directions
+    free = np.ones(len(likely), dtype=bool)
     pieces: list[Piece] = []
     for _ in range(_MOST_ROUNDS):
-        votes = [np.bincount(each[free], points.weights[free], minlength=_COUNT) for each in bins.T]
+        votes = [np.bincount(each[free], likely.weights[free], minlength=_COUNT) for each in bins.T]
         sums = [each[:-1] + each[1:] for each in votes]  # a line may fall between two bins
         axis = int(sums[1].max() > sums[0].max())
         peak = int(np.argmax(sums[axis]))
-        if sums[axis][peak] < 0.7 * _FEWEST:
+        if sums[axis][peak] < _LEAST_VOTES:
             break
         near = free & ((bins[:, axis] == peak) | (bins[:, axis] == peak + 1))
-        members, middle, direction = _fit(points, near, free, normals[axis])
-        found = _cut(points, members, middle, direction)
+        line = _fit(likely, near, free, _normals(angle)[axis], _SKEW**2 + 1.0 / certainty)
+        found = _cut(points, likely, line)
         pieces += found
-        free[members] = False
+        free[line.members] = False
         free[near] = False
+        if found:
+            weight = 1.0 / (_SKEW**2 + 1.0 / max(line.certainty, 1e-9))
+            certainty += weight
+            angle += line.turn * weight / certainty
+            if abs(math.remainder(angle - math.atan2(normals[0, 1], normals[0, 0]), math.tau)) > _SAME_DIRECTION:
+                normals = _normals(angle)
+                bins = _bins(likely.positions @ normals.T)
     return sorted(pieces, key=lambda each: -each.length)
+
+
+def _normals(angle: float) -> Floats:
+    """Normals (2, 2) of lines in both directions of a field, the first one at this angle [rad]."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, s], [-s, c]])
 
 
 _REACH = np.arcsinh(_FARTHEST)
@@ -152,43 +194,91 @@ def _main_direction(points: LinePoints) -> float:
     return float(angles[np.argmax((votes**2).sum(axis=(0, 2)))])
 
 
-def _fit(points: LinePoints, near: Mask, free: Mask, normal: Floats) -> tuple[Chosen, Floats, Floats]:
-    """Numbers of the free points on a line, a point of the line (2,) [m], and its direction (2,).
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """A fitted line: a point of it (2,) [m], its direction (2,), and the numbers of its likely points. turn [rad]: from
+    the expected direction to the one of the points alone. certainty: one over the variance of this direction."""
 
-    near: the points to begin with. normal (2,): the line's normal; the fit does not turn it by more than a little.
+    middle: Floats
+    direction: Floats
+    members: Chosen
+    turn: float
+    certainty: float
+
+
+def _fit(likely: LinePoints, near: Mask, free: Mask, normal: Floats, variance: float) -> _Line:
+    """A line through free points.
+
+    near: the points to begin with. normal (2,): the expected normal, whose direction has this variance [rad^2].
     """
-    first, members = normal, np.flatnonzero(near)
-    tolerance = points.tolerance(normal)
-    weights = points.weights / tolerance**2
+    expected = np.array([-normal[1], normal[0]])
+    members = np.flatnonzero(near)
+    tolerance = likely.tolerance(normal)
+    weights = likely.weights / tolerance**2
     for _ in range(3):
         own = weights[members]
-        middle = own @ points.positions[members] / own.sum()
-        away = points.positions[members] - middle
+        middle = own @ likely.positions[members] / own.sum()
+        away = likely.positions[members] - middle
         (xx, xy), (_, yy) = (away * own[:, None]).T @ away
         angle = 0.5 * math.atan2(2.0 * xy, xx - yy)  # of the longer axis
-        turned = np.array([-math.sin(angle), math.cos(angle)])
-        if abs(turned @ first) > math.cos(_TURN):
-            normal = turned
-        members = np.flatnonzero((np.abs((points.positions - middle) @ normal) < tolerance) & free)
+        turn = math.remainder(angle - math.atan2(expected[1], expected[0]), math.pi)
+        if abs(turn) > _TURN:
+            turn = 0.0
+        certainty = float(own @ (away @ expected) ** 2) / _NOISE**2
+        kept = turn * certainty / (certainty + 1.0 / variance)
+        c, s = math.cos(kept), math.sin(kept)
+        direction = np.array([c * expected[0] - s * expected[1], s * expected[0] + c * expected[1]])
+        turned = np.array([direction[1], -direction[0]])
+        off = np.abs(likely.positions @ turned - middle @ turned)
+        members = np.flatnonzero((off < tolerance) & free)
         if len(members) < 2:
             break
-    return members, middle, np.array([-normal[1], normal[0]])
+    return _Line(middle, direction, members, turn, certainty)
 
 
-def _cut(points: LinePoints, members: Chosen, middle: Floats, direction: Floats) -> list[Piece]:
-    """The pieces of a line between its gaps."""
-    if len(members) < _FEWEST:
+def _cut(points: LinePoints, likely: LinePoints, line: _Line) -> list[Piece]:
+    """The pieces of a line that its points speak for."""
+    if len(line.members) < _FEWEST:
         return []
-    t = (points.positions[members] - middle) @ direction
+    normal = np.array([line.direction[1], -line.direction[0]])
+    off = np.abs(points.positions @ normal - line.middle @ normal)
+    on = np.flatnonzero(off < points.tolerance(normal))
+    t = (points.positions[on] - line.middle) @ line.direction
     order = np.argsort(t)
-    t, members = t[order], members[order]
-    widest = np.maximum(_GAP, 2.0 * points.spacing(members, direction))
-    ends = np.append(np.flatnonzero(np.diff(t) > np.minimum(widest[1:], widest[:-1])), len(t) - 1)
-    starts = np.append(0, ends[:-1] + 1)
-    return [
-        Piece(middle + np.outer([t[a], t[b]], direction), members[a : b + 1])
-        for a, b in zip(starts, ends, strict=True)
-        if b - a + 1 >= _FEWEST
-        and t[b] - t[a] >= _SHORTEST
-        and points.weights[members[a : b + 1]].mean() >= _LEAST_MEAN
-    ]
+    t, values = t[order], points.weights[on[order]].astype(np.float64) - _EXPECTED
+    along = (likely.positions[line.members] - line.middle) @ line.direction
+    pieces = []
+    for first, last, support in _best_stretches(values, _LEAST_SUPPORT, _MOST_AGAINST):
+        members = line.members[(along >= t[first]) & (along <= t[last])]
+        if t[last] - t[first] >= _SHORTEST and len(members) > 1:
+            ends = line.middle + np.outer([t[first], t[last]], line.direction)
+            pieces.append(Piece(ends, members, support))
+    return pieces
+
+
+def _best_stretches(values: Floats, least: float, lost: float) -> list[tuple[int, int, float]]:
+    """First and last position and sum of stretches of the values (n,): the stretch with the largest sum, and those of
+    what is left on its two sides, as long as a sum is at least `least`.
+
+    lost: negative values in a row with a sum below -lost are in no stretch.
+    """
+    found = []
+    starts = np.flatnonzero(np.diff(values < 0.0, prepend=values[:1] >= 0.0))  # of runs with the same sign
+    ends = np.append(starts[1:], len(values))
+    gaps = np.add.reduceat(values, starts) < -lost if len(starts) else starts > 0
+    rest = list(zip(np.append(0, ends[gaps]).tolist(), np.append(starts[gaps], len(values)).tolist(), strict=True))
+    gains = np.concatenate([[0.0], np.cumsum(np.maximum(values, 0.0))])
+    while rest:
+        start, end = rest.pop()
+        if gains[end] - gains[start] < least:
+            continue
+        sums = np.concatenate([[0.0], np.cumsum(values[start:end])])
+        lowest = np.minimum.accumulate(sums)
+        last = int(np.argmax(sums - lowest))
+        best = float(sums[last] - lowest[last])
+        if best < least:
+            continue
+        first = int(np.flatnonzero(sums[: last + 1] == lowest[last])[-1])
+        found.append((start + first, start + last - 1, best))
+        rest += [(start, start + first), (start + last, end)]
+    return found

@@ -1,6 +1,7 @@
 """Field features of a frame: places and pixels agree, a turn of the camera turns them, and they can be switched off."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -27,11 +28,25 @@ def detector():
     return Detector.from_file(MODEL)
 
 
+@cache
+def rays_of_pixels():
+    """Rays (n, 3) in the camera frame through all pixels of the picture, row by row."""
+    height, width = IMAGE.shape[:2]
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    return LENS.for_image((width, height)).unproject(np.stack([x.ravel(), y.ravel()], axis=1), (width, height))
+
+
+def ahead_of(rays, height):
+    """How far ahead [m] rays (n, 3) of a level camera meet the plane; negative or huge without such a place."""
+    return rays[:, 0] * height / np.maximum(-rays[:, 2], 1e-6)
+
+
 def painted(detector: Detector, orientation: Orientation) -> Observation:
-    """An observation of a field to 4 m ahead with a line across at 2 m, whatever the frame shows."""
-    seen = detector.observe(IMAGE, orientation, LENS)
-    rays = seen.layout.rays
-    ahead = rays[:, 0] * seen.view.height / np.maximum(-rays[:, 2], 1e-6)
+    """An observation of a field to 4 m ahead with a line across at 2 m, and a picture of this line."""
+    ahead = ahead_of(rays_of_pixels() @ orientation.level.T, orientation.height).reshape(IMAGE.shape[:2])
+    picture = np.where(np.abs(ahead - 2.0) < 0.03, 220, 90).astype(np.uint8)
+    seen = detector.observe(np.repeat(picture[:, :, None], 3, axis=2), orientation, LENS)
+    ahead = ahead_of(seen.layout.rays, seen.view.height)
     label = np.where(ahead < 4.0, 2, 3)
     label[np.abs(ahead - 2.0) < 0.06] = 1
     probabilities = np.eye(4, dtype=np.float32)[label] * 0.9 + 0.025

@@ -6,15 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.field.circle import find_circle
-from vm_embedded.field.lines import find_pieces, line_points
+from vm_embedded.field.lines import LEAST, find_pieces, line_points
 
 from .ground import ground, mesh, near_segment, turned
 
 ANGLES = st.floats(-3.1, 3.1)
 
 
-def drawn(lines=(), circle=None, angle=0.0, seed=None):
-    """Line points of a field with straight lines (start, end) and a circle (center, radius), 8 cm wide."""
+def near(lines=(), circle=None, angle=0.0, seed=None):
+    """All points near enough for lines of a field with straight lines (start, end) and a circle (center, radius), 8 cm
+    wide."""
     places = mesh()
     off = np.full(len(places), np.inf)
     for start, end in lines:
@@ -29,10 +30,20 @@ def drawn(lines=(), circle=None, angle=0.0, seed=None):
     return line_points(ground(places @ turned(angle), labels))
 
 
+def drawn(*args, **keywords):
+    """Those of these points that are on lines."""
+    points = near(*args, **keywords)
+    return points.part(points.weights > LEAST)
+
+
+def pieces_of(*args, **keywords):
+    return find_pieces(near(*args, **keywords), drawn(*args, **keywords))
+
+
 @given(angle=ANGLES, seed=st.integers(0, 100))
 def test_lines_at_right_angles_are_found_among_scattered_points(angle, seed):
     lines = [((1.0, -2.0), (1.0, 2.0)), ((1.0, 1.0), (5.0, 1.0))]
-    pieces = find_pieces(drawn(lines, angle=angle, seed=seed))
+    pieces = pieces_of(lines, angle=angle, seed=seed)
     for start, end in lines:
         a, b = np.array([start, end]) @ turned(angle)
         longer = 0.75 * (b - a) / np.hypot(*(b - a))  # two rings: a scattered point there prolongs it
@@ -42,19 +53,35 @@ def test_lines_at_right_angles_are_found_among_scattered_points(angle, seed):
 
 
 def test_a_gap_divides_a_line():
-    pieces = find_pieces(drawn([((1.5, -2.3), (1.5, -0.8)), ((1.5, 0.8), (1.5, 2.3))]))
+    pieces = pieces_of([((1.5, -2.3), (1.5, -0.8)), ((1.5, 0.8), (1.5, 2.3))])
     assert sorted(round(each.length, 1) for each in pieces[:2]) == pytest.approx([1.5, 1.5], abs=0.2)
 
 
 def test_every_point_belongs_to_one_piece_at_most():
-    pieces = find_pieces(drawn([((1.0, -2.0), (1.0, 2.0)), ((1.0, 1.0), (5.0, 1.0))], seed=1))
+    pieces = pieces_of([((1.0, -2.0), (1.0, 2.0)), ((1.0, 1.0), (5.0, 1.0))], seed=1)
     members = np.concatenate([each.members for each in pieces])
     assert len(np.unique(members)) == len(members)
 
 
 def test_a_field_without_lines_has_none():
-    assert find_pieces(drawn()) == []
+    assert pieces_of() == []
     assert find_circle(drawn(), np.arange(0)) is None
+
+
+def test_points_that_see_no_line_end_a_piece():
+    """Its support is what its points have above 0.1, and the longest stretches of points with a line are kept."""
+    (piece,) = pieces_of([((1.5, -1.0), (1.5, 1.0))])
+    assert piece.length == pytest.approx(2.0, abs=0.2)
+    assert piece.support == pytest.approx(0.85 * len(piece.members), rel=0.2)
+
+
+def test_all_lines_share_two_directions():
+    """A short line alone would be fitted to few points; the long ones tell its direction."""
+    long = [((1.0, -3.0), (1.0, 3.0)), ((2.0, -3.0), (2.0, 3.0))]
+    pieces = pieces_of([*long, ((3.0, -0.4), (3.0, 0.4))], angle=0.3)
+    short = min(pieces, key=lambda each: each.length)
+    x, y = (short.ends[1] - short.ends[0]) @ turned(-0.3)
+    assert abs(x / y) < 0.02
 
 
 @given(angle=ANGLES, x=st.floats(1.5, 3.5), y=st.floats(-0.5, 0.5), radius=st.floats(0.5, 1.2))

@@ -1,0 +1,39 @@
+"""Brightness of the picture along short stretches of the plane."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import cv2
+import numpy as np
+
+from ..arrays import Floats, Singles
+from .prepared_view import PreparedView
+from .pyramid import Pyramid
+
+_MEAN = np.array([[1.0, 1.0, 1.0, 0.0]]) / 3.0
+"""Shares of the channels in the brightness; the last one is alpha, if there is one."""
+
+
+def brightness_along(view: PreparedView, pyramid: Pyramid, stretches: Floats, count: int) -> tuple[Singles, Floats]:
+    """Brightness (n, count), 0 to 255, at evenly spaced places from one end to the other of stretches (n, 2, 2) [m] on
+    the plane, NaN outside of the picture, and the pixels (n,) between two of these places in the middle.
+
+    The lens projects both ends and the middle of each stretch; a parabola through them gives the other places.
+    """
+    nodes = np.stack([stretches[:, 0], stretches.mean(axis=1), stretches[:, 1]], axis=1)  # (n, 3, 2)
+    known = view.plane_pixels(nodes.reshape(-1, 2)).reshape(-1, 3, 2)
+    pixels = np.matmul(_shares(count), known)  # (n, count, 2)
+    seen = view.in_picture(pixels.reshape(-1, 2)).reshape(pixels.shape[:2])
+    x, y = np.where(seen[:, :, None], pixels, -1.0).astype(np.float32).transpose(2, 0, 1)
+    colors = cv2.remap(pyramid.level(0), x, y, cv2.INTER_LINEAR)
+    gray = colors if colors.ndim == 2 else cv2.transform(colors, _MEAN[:, : colors.shape[2]])
+    steps = np.hypot(*(known[:, 2] - known[:, 0]).T) / (count - 1)
+    return np.where(seen, gray, np.nan).astype(np.float32), np.nan_to_num(steps)
+
+
+@lru_cache(maxsize=4)
+def _shares(count: int) -> Floats:
+    """Shares (count, 3) of the two ends and the middle between them in evenly spaced places."""
+    at = np.linspace(0.0, 1.0, count)
+    return np.stack([(1.0 - at) * (1.0 - 2.0 * at), 4.0 * at * (1.0 - at), at * (2.0 * at - 1.0)], axis=1)
