@@ -119,10 +119,10 @@ $(UPRIGHTS:%=$(BUILD)/%-glance/look.pt): $(BUILD)/%-glance/look.pt: export/netwo
 		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/soccer/model.pt -o $(BUILD)/$*-glance --config $< \
 			--set patches.object_class=$*; fi
 
-$(UPRIGHTS:%=$(BUILD)/%-look/look.pt): $(BUILD)/%-look/look.pt: export/networks/upright-look.toml $(BUILD)/%-glance/look.pt
+$(UPRIGHTS:%=$(BUILD)/%-look/look.pt): $(BUILD)/%-look/look.pt: export/networks/%-look.toml $(BUILD)/%-glance/look.pt
 	if test -e $(BUILD)/$*-look/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-look; \
 		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/soccer/model.pt --glance $(BUILD)/$*-glance/look.pt \
-			-o $(BUILD)/$*-look --config $< --set patches.object_class=$*; fi
+			-o $(BUILD)/$*-look --config $<; fi
 
 vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx $(UPRIGHTS:%=$(BUILD)/%-look/look.pt)
 	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $(BUILD)/balls.onnx

@@ -187,7 +187,7 @@ def _upright_data(manifest: Manifest) -> str:
         f"- **Training data of the close look at class {each.object_class}:** {each.provenance['training_pictures']} "
         f"pictures of the\n  same kind. {each.size} x {each.size} samples, convolutions of "
         f"{', '.join(map(str, each.channels))} channels. Seed {each.provenance['seed']},\n  configurations "
-        "`export/networks/upright-glance.toml` and `upright-look.toml`.\n"
+        f"`export/networks/upright-glance.toml` and `{each.object_class}-look.toml`.\n"
         for each in manifest.upright_looks
     ]
     return "".join(lines)
