@@ -1,12 +1,14 @@
 """Straight lines, the circle and crossings of drawn fields are found where they are drawn."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.field.circle import find_circle
-from vm_embedded.field.lines import LEAST, find_pieces, line_points
+from vm_embedded.field.lines import LEAST, _best_stretches, find_pieces, line_points
 
 from .ground import ground, mesh, near_segment, turned
 
@@ -73,6 +75,25 @@ def test_points_that_see_no_line_end_a_piece():
     (piece,) = pieces_of([((1.5, -1.0), (1.5, 1.0))])
     assert piece.length == pytest.approx(2.0, abs=0.2)
     assert piece.support == pytest.approx(0.85 * len(piece.members), rel=0.2)
+
+
+@given(st.lists(st.integers(-9, 9), max_size=30), st.floats(0.5, 20.0))
+def test_the_best_stretch_has_the_largest_sum_and_the_others_are_beside_it(numbers, least):
+    values = np.array(numbers, dtype=np.float64)
+    found = _best_stretches(values, least, np.inf)
+    sums = [values[first : last + 1].sum() for first, last, _ in found]
+    assert sums == pytest.approx([each for _, _, each in found])
+    assert all(each >= least for each in sums)
+    ends = sorted((first, last) for first, last, _ in found)
+    assert all(one[1] < other[0] for one, other in pairwise(ends))
+    largest = max((values[i:j].sum() for i in range(len(values)) for j in range(i + 1, len(values) + 1)), default=0.0)
+    assert max(sums, default=0.0) == (pytest.approx(largest) if largest >= least else 0.0)
+
+
+def test_a_long_row_of_values_below_zero_is_in_no_stretch():
+    values = np.array([5.0, -1.0, 5.0, -2.0, -2.0, 5.0])
+    assert [each[:2] for each in _best_stretches(values, 1.0, 5.0)] == [(0, 5)]
+    assert sorted(each[:2] for each in _best_stretches(values, 1.0, 3.0)) == [(0, 2), (5, 5)]
 
 
 def test_all_lines_share_two_directions():
