@@ -132,9 +132,9 @@ def look_at(places: Places, look: Look, least: float = WORTH) -> Singles:
 
     least: probability above which a place is worth another look.
 
-    From the second pass on, the answers to a patch and to its mirror image are averaged, unless the patch is not worth
-    another look. Returns the last answers (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError if a
-    network does not run.
+    In the last of several passes, the answers to a patch and to its mirror image are averaged, unless the patch is not
+    worth another look. Returns the last answers (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError
+    if a network does not run.
     """
     # Each pass has its network: first those of the glance, then those of the look.
     networks = [each for each in (look.glance, look) if each for _ in range(each.contract.passes)]
@@ -143,7 +143,7 @@ def look_at(places: Places, look: Look, least: float = WORTH) -> Singles:
     for number, network in enumerate(networks):
         patches = places.cut(worth, network.contract)
         found = network.run(patches)
-        if number:
+        if number and number == len(networks) - 1:
             likely = np.flatnonzero(found[:, 0] > least)
             found[likely] = _mean_with_mirrored(network, patches[likely], found[likely])
         answers[worth] = found

@@ -142,29 +142,31 @@ def find_pieces(points: LinePoints, likely: LinePoints) -> list[Piece]:
         return []
     angle, certainty = _main_direction(likely), 1.0 / _FIRST_ERROR**2
     normals = _normals(angle)
-    bins = _bins(likely.positions @ normals.T)  # (n, 2): of lines across both directions
+    bins = _bins(normals @ likely.positions.T)  # (2, n): of lines across both directions
     free = np.ones(len(likely), dtype=bool)
+    weights = likely.weights.astype(np.float64)  # 0 where not free
     pieces: list[Piece] = []
     for _ in range(_MOST_ROUNDS):
-        votes = [np.bincount(each[free], likely.weights[free], minlength=_COUNT) for each in bins.T]
+        votes = [np.bincount(each, weights, minlength=_COUNT) for each in bins]
         sums = [each[:-1] + each[1:] for each in votes]  # a line may fall between two bins
         axis = int(sums[1].max() > sums[0].max())
         peak = int(np.argmax(sums[axis]))
         if sums[axis][peak] < _LEAST_VOTES:
             break
-        near = free & ((bins[:, axis] == peak) | (bins[:, axis] == peak + 1))
+        near = free & ((bins[axis] == peak) | (bins[axis] == peak + 1))
         line = _fit(likely, near, free, _normals(angle)[axis], _SKEW**2 + 1.0 / certainty)
         found = _cut(points, likely, line)
         pieces += found
         free[line.members] = False
         free[near] = False
+        weights[~free] = 0.0
         if found:
             weight = 1.0 / (_SKEW**2 + 1.0 / max(line.certainty, 1e-9))
             certainty += weight
             angle += line.turn * weight / certainty
             if abs(math.remainder(angle - math.atan2(normals[0, 1], normals[0, 0]), math.tau)) > _SAME_DIRECTION:
                 normals = _normals(angle)
-                bins = _bins(likely.positions @ normals.T)
+                bins = _bins(normals @ likely.positions.T)
     return sorted(pieces, key=lambda each: -each.length)
 
 

@@ -129,7 +129,7 @@ def test_only_proposals_with_a_chance_are_looked_at_again(scene):
     look = BrightDisk()
     bare = replace(scene, slot_probabilities=np.full_like(scene.slot_probabilities, 0.5))
     found_in(bare, look, max_proposals=30)
-    assert look.seen == [30, 30, 30]  # 0.05 is a chance; each second pass also sees the mirror image
+    assert look.seen == [30, 30, 30]  # 0.05 is a chance; the second pass also sees the mirror images
 
     class Sure(BrightDisk):
         def run(self, patches):
@@ -141,6 +141,12 @@ def test_only_proposals_with_a_chance_are_looked_at_again(scene):
     found_in(bare, look, max_proposals=30)
     assert look.seen[0] == 30
     assert len(look.seen) == 1 or look.seen[1] < 30
+
+
+def test_only_the_last_pass_sees_mirror_images(scene):
+    look = BrightDisk(passes=3)
+    looked_at(scene, look, np.stack(true_centers(scene)))
+    assert look.seen == [2, 2, 2, 2]  # two balls in each pass, then their mirror images
 
 
 def test_only_mirror_images_of_likely_patches_are_looked_at(scene):
