@@ -18,8 +18,8 @@ from .rendered_patches import RENDERED, write_rendered
 _CLASS = "ball"
 """The object in the patches of the package."""
 
-_COUNTS = {OBJECT: 2560, NOTHING: 3840}
-"""Patches with and without an object in a sample."""
+_COUNTS = {OBJECT: 2400, NOTHING: 3600}
+"""Patches with and without an object in a sample; about as many as in six pictures of patches."""
 
 
 def check_rendered(contract: LookContract, run: Path | None) -> None:
