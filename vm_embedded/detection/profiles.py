@@ -17,9 +17,10 @@ _MEAN = np.array([[1.0, 1.0, 1.0, 0.0]]) / 3.0
 
 def brightness_along(view: PreparedView, pyramid: Pyramid, stretches: Floats, count: int) -> tuple[Singles, Floats]:
     """Brightness (n, count), 0 to 255, at evenly spaced places from one end to the other of stretches (n, 2, 2) [m] on
-    the plane, NaN outside of the picture, and the pixels (n,) between two of these places in the middle.
+    the plane, from below the camera, NaN outside of the picture, and the pixels (n,) between two of these places.
 
-    The lens projects both ends and the middle of each stretch; a parabola through them gives the other places.
+    view: of the frame. pyramid: the frame; only its first level is read. The lens projects both ends and the middle of
+    each stretch; a parabola through them gives the other places.
     """
     nodes = np.stack([stretches[:, 0], stretches.mean(axis=1), stretches[:, 1]], axis=1)  # (n, 3, 2)
     known = view.plane_pixels(nodes.reshape(-1, 2)).reshape(-1, 3, 2)

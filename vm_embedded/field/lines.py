@@ -119,14 +119,13 @@ class Piece:
 
 
 def line_points(points: GroundPoints) -> LinePoints:
-    """All points near enough for lines; none if the network has no class line."""
-    if "line" not in points.classes:
-        return LinePoints(np.empty((0, 2)), np.empty(0, np.float32), np.empty((0, 2)), np.empty(0), 0.5 * points.across)
+    """All points near enough for lines, with the probability 0 if the network has no class line."""
+    probabilities = points.classes.get("line", np.zeros(len(points.ranges), np.float32))
     chosen = np.flatnonzero((points.ranges < _FARTHEST) & (points.ranges > 1e-3))
     ranges, positions = points.ranges[chosen], points.positions[chosen]
     return LinePoints(
         positions,
-        points.classes["line"][chosen],
+        probabilities[chosen],
         positions / ranges[:, None],
         0.5 * points.along(ranges),
         0.5 * points.across,
@@ -141,8 +140,7 @@ def find_pieces(points: LinePoints, likely: LinePoints) -> list[Piece]:
     if len(likely) < _FEWEST:
         return []
     angle, certainty = _main_direction(likely), 1.0 / _FIRST_ERROR**2
-    normals = _normals(angle)
-    bins = _bins(normals @ likely.positions.T)  # (2, n): of lines across both directions
+    binned, bins = angle, _bins(likely, angle)
     free = np.ones(len(likely), dtype=bool)
     weights = likely.weights.astype(np.float64)  # 0 where not free
     pieces: list[Piece] = []
@@ -164,9 +162,8 @@ def find_pieces(points: LinePoints, likely: LinePoints) -> list[Piece]:
             weight = 1.0 / (_SKEW**2 + 1.0 / max(line.certainty, 1e-9))
             certainty += weight
             angle += line.turn * weight / certainty
-            if abs(math.remainder(angle - math.atan2(normals[0, 1], normals[0, 0]), math.tau)) > _SAME_DIRECTION:
-                normals = _normals(angle)
-                bins = _bins(normals @ likely.positions.T)
+            if abs(angle - binned) > _SAME_DIRECTION:
+                binned, bins = angle, _bins(likely, angle)
     return sorted(pieces, key=lambda each: -each.length)
 
 
@@ -180,7 +177,13 @@ _REACH = np.arcsinh(_FARTHEST)
 _COUNT = 2 * int(np.ceil(_REACH / _BIN)) + 2
 
 
-def _bins(offsets: Floats) -> Chosen:
+def _bins(points: LinePoints, angle: float) -> Chosen:
+    """Bins (2, n) of the lines through n points in both directions of a field, whose first normal is at an angle
+    [rad]."""
+    return _bins_at(_normals(angle) @ points.positions.T)
+
+
+def _bins_at(offsets: Floats) -> Chosen:
     """Bins of lines at these distances [m] from the camera: finer for near lines."""
     return np.asarray(np.floor((np.arcsinh(offsets) + _REACH) / _BIN), dtype=np.intp)
 
@@ -190,7 +193,7 @@ def _main_direction(points: LinePoints) -> float:
     some = points.part(np.arange(0, len(points), -(-len(points) // _MOST_VOTERS)))
     angles = np.arange(_ANGLES) * (0.5 * np.pi / _ANGLES)
     normals = np.concatenate([[np.cos(angles), np.sin(angles)], [-np.sin(angles), np.cos(angles)]], axis=1)  # (2, 2A)
-    bins = _bins(some.positions @ normals) + _COUNT * np.arange(2 * _ANGLES)
+    bins = _bins_at(some.positions @ normals) + _COUNT * np.arange(2 * _ANGLES)
     weights = np.broadcast_to(some.weights[:, None], bins.shape)
     votes = np.bincount(bins.ravel(), weights.ravel(), minlength=2 * _ANGLES * _COUNT).reshape(2, _ANGLES, _COUNT)
     return float(angles[np.argmax((votes**2).sum(axis=(0, 2)))])
@@ -225,13 +228,13 @@ def _fit(likely: LinePoints, near: Mask, free: Mask, normal: Floats, variance: f
         angle = 0.5 * math.atan2(2.0 * xy, xx - yy)  # of the longer axis
         turn = math.remainder(angle - math.atan2(expected[1], expected[0]), math.pi)
         if abs(turn) > _TURN:
-            turn = 0.0
+            turn = 0.0  # its points are a blob, or belong to a line at a right angle
         certainty = float(own @ (away @ expected) ** 2) / _NOISE**2
         kept = turn * certainty / (certainty + 1.0 / variance)
         c, s = math.cos(kept), math.sin(kept)
         direction = np.array([c * expected[0] - s * expected[1], s * expected[0] + c * expected[1]])
-        turned = np.array([direction[1], -direction[0]])
-        off = np.abs(likely.positions @ turned - middle @ turned)
+        across = np.array([direction[1], -direction[0]])
+        off = np.abs(likely.positions @ across - middle @ across)
         members = np.flatnonzero((off < tolerance) & free)
         if len(members) < 2:
             break
@@ -264,10 +267,12 @@ def _best_stretches(values: Floats, least: float, lost: float) -> list[tuple[int
 
     lost: negative values in a row with a sum below -lost are in no stretch.
     """
+    if not len(values):
+        return []
     found = []
-    starts = np.flatnonzero(np.diff(values < 0.0, prepend=values[:1] >= 0.0))  # of runs with the same sign
+    starts = np.flatnonzero(np.diff(values < 0.0, prepend=values[0] >= 0.0))  # of runs with the same sign
     ends = np.append(starts[1:], len(values))
-    gaps = np.add.reduceat(values, starts) < -lost if len(starts) else starts > 0
+    gaps = np.add.reduceat(values, starts) < -lost
     rest = list(zip(np.append(0, ends[gaps]).tolist(), np.append(starts[gaps], len(values)).tolist(), strict=True))
     gains = np.concatenate([[0.0], np.cumsum(np.maximum(values, 0.0))])
     while rest:

@@ -61,7 +61,10 @@ _MOST_SUPPORT = 6.0
 
 
 def pieces_on_ridges(pieces: Sequence[Piece], points: GroundPoints, profiles: Profiles) -> list[Piece]:
-    """The pieces that points and picture speak for, moved to their ridges."""
+    """The pieces that points and picture speak for, moved to their ridges, in the same order.
+
+    points: of the frame; their spacing says how far a ridge may be. profiles: brightness of the frame.
+    """
     if not pieces:
         return []
     ends = np.stack([each.ends for each in pieces])  # (p, 2, 2)
@@ -73,13 +76,14 @@ def pieces_on_ridges(pieces: Sequence[Piece], points: GroundPoints, profiles: Pr
     at = (np.arange(_STATIONS) + 0.5) / _STATIONS
     weights = np.stack([1.0 - at, at])  # (2, T): of the two ends
     middles = np.einsum("et,pex->ptx", weights, ends)
-    aside = (reach @ weights)[:, :, None] * normals[:, None]  # (p, T, 2)
+    spans = reach @ weights  # (p, T): half the lengths of the profiles
+    aside = spans[:, :, None] * normals[:, None]  # (p, T, 2)
     stretches = np.stack([middles - aside, middles + aside], axis=2).reshape(-1, 2, 2)
     brightness, pixels = profiles(stretches, 2 * _HALF + 1)
-    steps = (reach @ weights).mean(axis=1) / _HALF  # (p,) [m]
+    steps = spans.mean(axis=1) / _HALF  # (p,) [m]
     widths = np.maximum(_WIDTH / steps, _BLUR / np.maximum(np.median(pixels.reshape(-1, _STATIONS), axis=1), 1e-6))
     contrasts = _contrasts(brightness.reshape(len(pieces), _STATIONS, -1), widths)
-    shifts, shares = _best_shifts(contrasts, free, reach, weights, lengths)
+    shifts, shares = _best_shifts(contrasts, free, spans, weights, lengths)
     return [
         replace(piece, ends=piece.ends + np.outer(shift, normal))
         for piece, shift, normal, share in zip(pieces, shifts, normals, shares, strict=True)
@@ -116,23 +120,23 @@ def _contrasts(brightness: Singles, widths: Floats) -> Floats:
     ridge = means(-half, half) - np.maximum(left, right)
     inside = (samples >= width + half) & (samples < count - width - half)
     seen: Mask = ~np.isnan(brightness) & inside[:, None]
-    surroundings = np.maximum(known.mean(axis=(1, 2)), 1.0) + _DARK
+    surroundings = known.mean(axis=(1, 2)) + _DARK
     return np.where(seen, np.clip(ridge / surroundings[:, None, None], *_LIMITS), 0.0)
 
 
 def _best_shifts(
-    contrasts: Floats, free: Floats, reach: Floats, weights: Floats, lengths: Floats
+    contrasts: Floats, free: Floats, spans: Floats, weights: Floats, lengths: Floats
 ) -> tuple[Floats, Floats]:
     """Shifts (p, 2) [m] of the ends of pieces that have the highest mean contrast, and the share of stations (p,) with
     a ridge there.
 
-    free, reach (p, 2) [m]: at the ends, how far the ridge may be, and how far the profiles reach. weights (2, T): of
-    the ends at each station.
+    contrasts (p, T, N): see _contrasts. free (p, 2) [m]: how far the ridge may be from the ends. spans (p, T) [m]: half
+    the lengths of the profiles. weights (2, T): of the ends at each station. lengths (p,) [m]: of the pieces.
     """
     tried = np.linspace(-1.0, 1.0, _SHIFTS)
     pairs = np.stack(np.meshgrid(tried, tried, indexing="ij"), axis=-1).reshape(-1, 2)  # (S, 2)
     shifts = pairs * free[:, None]  # (p, S, 2)
-    offsets = (shifts @ weights) / (reach @ weights)[:, None]  # (p, S, T)
+    offsets = (shifts @ weights) / spans[:, None]  # (p, S, T)
     samples = np.rint(offsets * _HALF).astype(np.intp) + _HALF
     rows = np.arange(len(contrasts))
     means = contrasts[rows[:, None, None], np.arange(_STATIONS), samples].mean(axis=2)

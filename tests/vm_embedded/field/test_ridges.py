@@ -44,7 +44,7 @@ def test_each_piece_moves_to_its_own_ridge():
     lines = [((2.0, -1.5), (2.0, 1.5)), ((0.5, 1.0), (4.0, 1.0))]
     off = [piece((2.05, -1.5), (2.05, 1.5)), piece((0.5, 0.97), (4.0, 0.97))]
     moved = pieces_on_ridges(off, FIELD, picture(*lines))
-    assert [np.abs(near_segment(each.ends, *line)).max() < 0.03 for each, line in zip(moved, lines, strict=True)]
+    assert all(near_segment(each.ends, *line).max() < 0.03 for each, line in zip(moved, lines, strict=True))
     alone = [pieces_on_ridges([each], FIELD, picture(*lines))[0] for each in off]
     for one, together in zip(alone, moved, strict=True):
         assert one.ends == pytest.approx(together.ends)
