@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 from vm_embedded.cli.program import Parser
@@ -17,7 +16,7 @@ from vm_embedded.network.bundled import model_path
 
 from ..tuning.configuration import TUNING_HEADER, TuningConfiguration
 from .box_options import parse_names
-from .training import EXIT_INTERRUPTED, EXIT_OK, stop_requests
+from .training import EXIT_OK, stop_requests
 
 _NAMED = 20
 """Faults to name."""
@@ -38,33 +37,13 @@ def print_tune_config(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-def begin_fine_tuning(options: argparse.Namespace) -> int:
-    """Begin a fine-tuning, train, and return the exit status. Raises VisualMeshError."""
-    with _telling_how_to_continue(options.output):
-        return _begin(options)
-
-
 def resume_fine_tuning(options: argparse.Namespace) -> int:
     """Resume a fine-tuning and return the exit status. Raises VisualMeshError."""
-    with _telling_how_to_continue(options.run):
-        return _fine_tune(options.run, options.data, options)
+    return _fine_tune(options.run, options.data, options)
 
 
-@contextmanager
-def _telling_how_to_continue(folder: Path) -> Iterator[None]:
-    """Give a KeyboardInterrupt a text with the command, if the folder holds a fine-tuning by then."""
-    from ..tuning.run_folder import is_tuning
-
-    try:
-        yield
-    except KeyboardInterrupt:
-        if is_tuning(folder):
-            raise KeyboardInterrupt(f"continue with vm-train resume {folder}") from None
-        raise
-
-
-def _begin(options: argparse.Namespace) -> int:
-    """Write the folder of a fine-tuning, train, and return the exit status."""
+def begin_fine_tuning(options: argparse.Namespace) -> int:
+    """Write the folder of a fine-tuning, train, and return the exit status. Raises VisualMeshError."""
     from ..tuning.run_folder import BoxSource, begin_tuning
 
     if options.data is not None or options.glance is not None:
@@ -112,7 +91,10 @@ def _complain(faults: Sequence[str], folder: Path) -> None:
 
 
 def _fine_tune(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> int:
-    """Train from the last state of a folder on. moved_to: where the frames are now. Returns the exit status."""
+    """Train from the last state of a folder on. moved_to: where the frames are now. Returns the exit status.
+
+    Raises KeyboardInterrupt after the step in which Ctrl-C or SIGTERM asked for a stop.
+    """
     from ..learning.folder_access import locked
     from ..learning.hardware import set_up_hardware
     from ..tuning.fine_tuning import fine_tune
@@ -126,8 +108,7 @@ def _fine_tune(folder: Path, moved_to: Path | None, options: argparse.Namespace)
         with stop_requests() as stop_requested:
             finished = fine_tune(run, workers, stop_requested)
     if not finished:
-        print(f"vm-train: stopped; continue with vm-train resume {folder}", file=sys.stderr)
-        return EXIT_INTERRUPTED
+        raise KeyboardInterrupt
     print(f"report: {folder / 'report.html'}")
     print(f"next: vm-detect --model {run.model_path}")
     return EXIT_OK

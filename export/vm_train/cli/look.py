@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from ..learning.configuration import TrainConfiguration
 from ..look.configuration import LOOK_HEADER, LookConfiguration
 from .box_options import add_box_options
 from .fine_tuning import begin_fine_tuning
-from .training import EXIT_INTERRUPTED, EXIT_OK, stop_requests
+from .training import EXIT_OK, stop_requests
 
 
 def look_parser() -> argparse.ArgumentParser:
@@ -150,20 +149,8 @@ def resume_look(options: argparse.Namespace) -> int:
 def _train(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> int:
     """Train from the last state of a folder on; moved_to: where the pictures are now. Returns the exit status.
 
-    Raises KeyboardInterrupt that tells how to continue.
+    Raises KeyboardInterrupt after the step in which Ctrl-C or SIGTERM asked for a stop.
     """
-    try:
-        finished = _train_on(folder, moved_to, options)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"continue with vm-train resume {folder}") from None
-    if not finished:
-        print(f"vm-train: stopped; continue with vm-train resume {folder}", file=sys.stderr)
-        return EXIT_INTERRUPTED
-    return EXIT_OK
-
-
-def _train_on(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> bool:
-    """Train until the end, or until Ctrl-C or SIGTERM between two steps. Returns whether it is finished."""
     from ..learning.folder_access import locked
     from ..learning.hardware import set_up_hardware
     from ..look.collected import collect
@@ -183,6 +170,6 @@ def _train_on(folder: Path, moved_to: Path | None, options: argparse.Namespace) 
             collected = collect(run, workers)
             with stop_requests() as stop_requested:
                 if not train_look(run, collected, workers, stop_requested):
-                    return False
+                    raise KeyboardInterrupt
     print(f"next: vm-export {run.mesh} --look {run.look_path} -o {folder / 'model.onnx'}")
-    return True
+    return EXIT_OK

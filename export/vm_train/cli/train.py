@@ -67,17 +67,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         discard_output()
         if _is_leader() and command in _TRAININGS:
-            folder = options.run if command == "resume" else options.output
-            begun = folder is not None and (folder / "run.json").exists()
-            remedy = f"; continue with vm-train resume {folder}" if begun else ""
+            remedy = _how_to_continue(command, options)
             print(f"vm-train: stopped, because nothing reads its output{remedy}", file=sys.stderr)
             os._exit(EXIT_INTERRUPTED)  # as below
         return EXIT_OK
-    except KeyboardInterrupt as error:
+    except KeyboardInterrupt:
         if _is_leader():
-            print(f"vm-train: {'; '.join(['stopped', *map(str, error.args)])}", file=sys.stderr)
+            print(f"vm-train: stopped{_how_to_continue(command, options)}", file=sys.stderr)
         sys.stdout.flush()
         os._exit(EXIT_INTERRUPTED)  # ends the workers, too; a normal exit might wait for them forever
+
+
+def _how_to_continue(command: str | None, options: argparse.Namespace) -> str:
+    """The end of a message about a stop: the command that continues a training, once its folder holds one."""
+    if command not in _TRAININGS:
+        return ""
+    folder = options.run if command == "resume" else options.output
+    begun = folder is not None and (folder / "run.json").exists()
+    return f"; continue with vm-train resume {folder}" if begun else ""
 
 
 def _is_leader() -> bool:
