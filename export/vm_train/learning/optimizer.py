@@ -1,12 +1,13 @@
 """The optimizer of a network's weights, with a learning rate that changes from step to step.
 
 muon: the update of a weight matrix has the same size in every direction of its gradient (K. Jordan and others, 2024),
-so all of the few channels of a small network learn. Biases use adamw.
+so all of the few channels of a small network learn. A kernel of a convolution is a matrix with a row for each output
+channel. Biases use adamw.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
@@ -66,13 +67,31 @@ class ScheduledOptimizer:
             schedule.load_state_dict(saved)
 
 
+class _Muon(torch.optim.Muon):
+    """Muon for matrices and kernels: torch's own takes matrices only, so it gets views of the kernels."""
+
+    def __init__(self, weights: Sequence[nn.Parameter], rate: float, decay: float) -> None:
+        matrices = [each if each.ndim == 2 else nn.Parameter(each.detach().flatten(1)) for each in weights]
+        self._kernels = [pair for pair in zip(weights, matrices, strict=True) if pair[0] is not pair[1]]
+        super().__init__(matrices, lr=rate, weight_decay=decay)
+
+    def zero_grad(self, set_to_none: bool = True) -> None:
+        super().zero_grad(set_to_none)
+        for kernel, _ in self._kernels:
+            kernel.grad = None
+
+    def step(self, closure: Any = None) -> Any:
+        for kernel, matrix in self._kernels:
+            matrix.grad = None if kernel.grad is None else kernel.grad.flatten(1)
+        return super().step(closure)  # type: ignore[no-untyped-call]
+
+
 def _optimizers(network: nn.Module, recipe: Recipe) -> list[torch.optim.Optimizer]:
     weights, rate, decay = list(network.parameters()), recipe.rate, recipe.decay
     if recipe.optimizer == "muon":
-        matrices = [each for each in weights if each.ndim == 2]
-        others = [each for each in weights if each.ndim != 2]
-        muon = torch.optim.Muon(matrices, lr=rate, weight_decay=decay)
-        return [muon, torch.optim.AdamW(others, lr=rate, weight_decay=decay)]
+        biases = [each for each in weights if each.ndim < 2]
+        muon = _Muon([each for each in weights if each.ndim >= 2], rate, decay)
+        return [muon, torch.optim.AdamW(biases, lr=rate, weight_decay=decay)]
     if recipe.optimizer == "sgd":
         return [torch.optim.SGD(weights, lr=rate, momentum=_MOMENTUM, weight_decay=decay)]
     if recipe.optimizer == "adam":

@@ -6,11 +6,12 @@ import dataclasses
 from dataclasses import Field, dataclass
 from typing import TYPE_CHECKING, Any
 
-from vm_embedded.config.entries import check_entries, entry, number, share, text_line
+from vm_embedded.config.entries import check_entries, entry, number, one_of, share, text_line
 from vm_embedded.errors import InputError
 from vm_workstation.ranges import range_of
 
 from ..learning.class_table import ClassTable
+from ..learning.recipe import OPTIMIZERS
 
 if TYPE_CHECKING:
     from vm_export.look_network import LookShape
@@ -132,7 +133,10 @@ class LookRecipe:
     )
     batch: int = number(256, "patches in a step", "", (2, 1e5))
     positives: float = number(0.33, "share of each batch that shows an object", "", (0.01, 0.99))
-    rate: float = number(3e-3, "highest learning rate; it rises once, then falls (one cycle)", "", (1e-9, 1e3))
+    optimizer: str = one_of(
+        OPTIMIZERS, "muon", "optimizer; adamw needs a lower rate, such as 0.003, and more epochs; sgd has momentum"
+    )
+    rate: float = number(0.01, "highest learning rate; it rises once, then falls (one cycle)", "", (1e-9, 1e3))
     decay: float = number(0.02, "weight decay", "", (0.0, 1.0))
     seed: int = number(0, "seed of weights, batches and augmentation", "", (0, 2**31))
 

@@ -76,7 +76,9 @@ class LookTrainer:
         self._shown_chances, self._chances = (
             None if weights is None else np.cumsum(weights[rows]) for rows in (self._with, self._without)
         )
-        self._optimizer = ScheduledOptimizer(network, Recipe(rate=recipe.rate, decay=recipe.decay), total)
+        self._optimizer = ScheduledOptimizer(
+            network, Recipe(optimizer=recipe.optimizer, rate=recipe.rate, decay=recipe.decay), total
+        )
 
     def grade(self) -> float:
         """Draw patches without an object by the network's errors from now on. Returns the mean error, 0 to 1."""

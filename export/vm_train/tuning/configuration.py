@@ -82,6 +82,7 @@ class TuningRecipe:
             rounds=1,
             batch=self.batch,
             positives=self.positives,
+            optimizer="adamw",
             rate=rate,
             decay=self.decay,
             seed=self.seed,

@@ -40,6 +40,25 @@ def test_with_muon_weak_and_strong_channels_learn_alike():
     assert (singular > 0.5).sum() >= 3
 
 
+def test_muon_sees_a_kernel_as_a_matrix_with_a_row_for_each_output_channel():
+    torch.manual_seed(0)
+    convolution, matrix = nn.Conv2d(3, 4, 3), nn.Linear(27, 4)
+    with torch.no_grad():
+        matrix.weight.copy_(convolution.weight.flatten(1))
+        matrix.bias.copy_(convolution.bias)
+    descents = [descent(each, "muon") for each in (convolution, matrix)]
+    patches = torch.randn(6, 3, 3, 3)
+    for _ in range(3):
+        for each in descents:
+            each.zero_grad()
+        convolution(patches).flatten(1).square().sum().backward()
+        matrix(patches.flatten(1)).square().sum().backward()
+        for each in descents:
+            each.step()
+    torch.testing.assert_close(convolution.weight.flatten(1), matrix.weight)
+    torch.testing.assert_close(convolution.bias, matrix.bias)
+
+
 @pytest.mark.parametrize("optimizer", OPTIMIZERS)
 def test_a_rate_of_zero_moves_nothing(optimizer):
     made = layer()
@@ -67,9 +86,10 @@ def test_one_cycle_goes_up_to_the_rate_and_down(optimizer):
     assert rates[-1] < 0.001 * RATE
 
 
-def test_forgotten_gradients_are_none():
-    made = layer()
+@pytest.mark.parametrize("made", [layer(), nn.Conv2d(3, 4, 3)])
+def test_forgotten_gradients_are_none(made):
     following = descent(made, "muon")
+    made.weight.grad, made.bias.grad = torch.ones_like(made.weight), torch.ones_like(made.bias)
     following.zero_grad()
     assert made.weight.grad is None
     assert made.bias.grad is None
