@@ -22,9 +22,9 @@ from .proposals import propose_places
 from .settings import Settings
 from .stopwatch import Stopwatch
 
-WORTH = 0.02
-"""Probability above which a proposal is worth another look."""
-
+_WORTH, _WORTH_UPRIGHT = 0.005, 0.03
+"""Probability above which a place is worth another look: of an object, and of an upright. A glance is less sure about
+uprights: at 0.005, it would pass on nearly all proposals."""
 
 _LARGEST_SIZE = 3.0
 """Limit of the logarithm of a size: with a bad network, math.exp would overflow, and JSON has no infinity."""
@@ -111,31 +111,34 @@ def look_closely(
     settings: Settings,
     watch: Stopwatch,
     explain: bool = False,
-    worth: float = WORTH,
 ) -> list[Judgment]:
     """The objects of the look's class, most probable first, from the slots' probabilities (m,).
 
-    explain: also the rejected proposals, with their reasons. watch: gets the stages propose and look. worth:
-    probability above which a proposal is worth another look. Raises ModelError if the network does not run.
+    explain: also the rejected proposals, with their reasons. watch: gets the stages propose and look. Raises
+    ModelError if the network does not run.
     """
     centers = propose_places(observation, probabilities, look.contract.above, settings.max_proposals)
     watch.lap("propose")
     places = PlanePlaces(observation, centers)
-    answers = look_at(places, look, worth)
+    answers = look_at(places, look)
     judged = _judged(observation, places.centers, answers, settings, explain)
     watch.lap("look")
     return judged
 
 
-def look_at(places: Places, look: Look, least: float = WORTH) -> Singles:
-    """Look at n places, as often as the contracts of look and glance say, and move them to where an object was seen.
+def worth_of(contract: LookContract) -> float:
+    """Probability above which a place is worth another look."""
+    return _WORTH_UPRIGHT if contract.upright_radius else _WORTH
 
-    least: probability above which a place is worth another look.
+
+def look_at(places: Places, look: Look) -> Singles:
+    """Look at n places, as often as the contracts of look and glance say, and move them to where an object was seen.
 
     In the last of several passes, the answers to a patch and to its mirror image are averaged, unless the patch is not
     worth another look. Returns the last answers (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError
     if a network does not run.
     """
+    least = worth_of(look.contract)
     # Each pass has its network: first those of the glance, then those of the look.
     networks = [each for each in (look.glance, look) if each for _ in range(each.contract.passes)]
     answers = np.zeros((len(places), 4), dtype=np.float32)

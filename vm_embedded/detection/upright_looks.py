@@ -31,10 +31,6 @@ _JUMP = 0.12
 _MOST_POINTS = 128
 """Largest number of points that propose places; more only cost time."""
 
-WORTH = 0.05
-"""Probability above which a place is worth another look. It is higher than for objects, because a glance is less sure
-about uprights, and passes on half of the proposals at 0.02. A training judges with that of objects."""
-
 _SAME = 0.12
 """Two bases nearer to each other than this share of their distance are those of one upright: far away, a small error in
 the picture is a large one on the plane."""
@@ -76,7 +72,7 @@ def find_bases(observation: Observation, look: Look, settings: Settings) -> list
     probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
     nearest = nearest_points(observation, probabilities, contract.above)
     circles = around_bases(observation, contract.upright_radius)
-    judged = look_closely(circles, look, nearest, settings, Stopwatch(), worth=WORTH)
+    judged = look_closely(circles, look, nearest, settings, Stopwatch())
     heading = observation.view.heading[:2]
     width = 2.0 * contract.upright_radius
     found = [Base(heading @ each.center, width * each.scale, each.confidence) for each in judged]

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from vm_embedded.detection.looking import WORTH
 from vm_embedded.errors import GeometryError, InputError
 
 from .configuration import PatchSettings
@@ -28,8 +27,9 @@ from .torch_look import TorchLook
 CHUNK = 100
 """Pictures in a file of patches."""
 
-_NEARLY_WORTH = 0.1 * WORTH
-"""The glance passes on less in the pictures that it was trained on; with this limit, about as much as in others."""
+_SURER = 0.1
+"""Share of the usual limit. The glance passes on less in the pictures that it was trained on; with this limit, about as
+much as in others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +56,8 @@ class Collector:
     def _collect(self, item: Item) -> PatchChunk:
         seen = self.observer.observe(item.files)
         observation, truths, view = seen.observation, seen.truths, seen.observation.view
-        above = WORTH if item.validates else _NEARLY_WORTH
-        places = proposed_places(observation, seen.probabilities, self.settings, self.glance, above)
+        share = 1.0 if item.validates else _SURER
+        places = proposed_places(observation, seen.probabilities, self.settings, self.glance, share)
         if not item.validates:
             random = random_of(self.settings.seed, item.files.number)
             places += jittered_places(view, truths, self.settings, random)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Image, Singles
-from vm_embedded.detection.looking import Look, PlanePlaces, look_at
+from vm_embedded.detection.looking import Look, PlanePlaces, look_at, worth_of
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.patches import Tangents, cut_patches, patch_nodes
 from vm_embedded.detection.prepared_view import PreparedView
@@ -68,17 +68,17 @@ class Places:
 
 
 def proposed_places(
-    observation: Observation, probabilities: Singles, settings: PatchSettings, glance: Look | None, above: float
+    observation: Observation, probabilities: Singles, settings: PatchSettings, glance: Look | None, share: float
 ) -> Places:
     """The proposals of a class from the slots' probabilities (m,), best first.
 
-    above: probability above which the glance passes a proposal on. Raises ModelError if the glance does not run.
+    share: of the probability above which the glance passes a proposal on. Raises ModelError if the glance does not run.
     """
     centers = propose_places(observation, probabilities, settings.above, settings.proposals)
     if glance is not None:
         places = PlanePlaces(observation, centers)
         answers, centers = look_at(places, glance), places.centers
-        centers = centers[(answers[:, 0] > above) & (centers[:, 2] < 0.0)]
+        centers = centers[(answers[:, 0] > share * worth_of(glance.contract)) & (centers[:, 2] < 0.0)]
     return Places.of(PROPOSED, centers)
 
 

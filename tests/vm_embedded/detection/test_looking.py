@@ -161,7 +161,7 @@ def test_only_mirror_images_of_likely_patches_are_looked_at(scene):
     class Strict(BrightDisk):
         def run(self, patches):
             answers = super().run(patches)
-            answers[answers[:, 0] < 0.5, 0] = 0.01
+            answers[answers[:, 0] < 0.5, 0] = 0.001
             return answers
 
     look = Strict(passes=1, glance=Hopeful(passes=1))
@@ -169,7 +169,23 @@ def test_only_mirror_images_of_likely_patches_are_looked_at(scene):
     nothing = [center_at(scene.view, (560.0, 400.0)), center_at(scene.view, (100.0, 420.0))]
     _, answers = looked_at(scene, look, np.stack([*nothing, *balls]))
     assert look.seen == [4, len(balls)]
-    assert answers[:, 0] == pytest.approx([0.01, 0.01] + [0.9] * len(balls), abs=1e-3)
+    assert answers[:, 0] == pytest.approx([0.001, 0.001] + [0.9] * len(balls), abs=1e-3)
+
+
+@pytest.mark.parametrize(("radius", "least"), [(0.0, 0.005), (0.4, 0.03)])
+def test_a_place_is_looked_at_again_above_a_limit_which_is_higher_for_uprights(scene, radius, least):
+    class Unsure(BrightDisk):
+        def run(self, patches):
+            answers = super().run(patches)
+            answers[:, 0] = least * np.array([1.1, 0.9], dtype=np.float32)
+            return answers
+
+    look, glance = BrightDisk(passes=1), Unsure(passes=1)
+    look.contract = replace(look.contract, upright_radius=radius)
+    look.glance = glance
+    _, answers = looked_at(scene, look, np.stack(true_centers(scene)))
+    assert look.seen == [1, 1]  # the first place, then its mirror image
+    assert answers[:, 0] == pytest.approx([0.9, 0.9 * least], abs=1e-3)
 
 
 def test_what_is_too_improbable_has_a_reason(scene):

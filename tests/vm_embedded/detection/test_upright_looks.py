@@ -107,7 +107,7 @@ def test_bases_of_one_upright_are_reported_once(detector, width):
 
 
 def test_a_place_that_the_first_look_doubts_gets_no_second_one(detector):
-    doubting, trusting = (Sure(probability=each) for each in (0.04, 0.6))
+    doubting, trusting = (Sure(probability=each) for each in (0.02, 0.6))
     for look in (doubting, trusting):
         look.contract = replace(look.contract, passes=2)
         find_bases(post_at(detector, (2.5, 0.3)), look, SETTINGS)
