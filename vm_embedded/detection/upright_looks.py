@@ -28,8 +28,8 @@ _COLUMN = 0.012
 _JUMP = 0.12
 """Points farther than the nearest one of their direction by more than this share are above the base."""
 
-_MOST_POINTS = 128
-"""Largest number of points that propose places; more only cost time."""
+_LEVELS = (0.1, 0.3, 0.6, 0.9)
+"""Probabilities at which points are sought again, so that a less probable point in front does not hide a base."""
 
 _SAME = 0.12
 """Two bases nearer to each other than this share of their distance are those of one upright: far away, a small error in
@@ -42,9 +42,10 @@ def around_bases(observation: Observation, radius: float) -> Observation:
 
 
 def nearest_points(observation: Observation, probabilities: Singles, above: float) -> Singles:
-    """Probabilities (m,) of the most probable slots that may be at a base, 0 for the others.
+    """Probabilities (m,) of the slots that may be at a base, 0 for the others.
 
-    probabilities (m,): of a class. above: smaller ones do not count.
+    In each direction, these are the nearest points whose probability is above a limit, for each of several limits.
+    probabilities (m,): of a class. above: the lowest limit.
     """
     rays, found = observation.layout.rays, np.zeros_like(probabilities)
     likely = np.flatnonzero(observation.projected.on_screen & (probabilities > above) & (rays[:, 2] < 0.0))
@@ -53,13 +54,14 @@ def nearest_points(observation: Observation, probabilities: Singles, above: floa
     x, y, z = rays[likely].T
     columns = np.floor(np.arctan2(y, x) / _COLUMN).astype(np.intp)
     columns -= columns.min()
-    ranges = np.hypot(x, y) / -z
-    nearest = np.full(columns.max() + 1, np.inf)
-    np.minimum.at(nearest, columns, ranges)
-    low = likely[ranges <= (1.0 + _JUMP) * nearest[columns]]
-    if len(low) > _MOST_POINTS:
-        low = low[np.argpartition(probabilities[low], -_MOST_POINTS)[-_MOST_POINTS:]]
-    found[low] = probabilities[low]
+    ranges, p = np.hypot(x, y) / -z, probabilities[likely]
+    is_low = np.zeros(len(likely), dtype=np.bool_)
+    for level in (above, *_LEVELS):
+        reaches = p > level
+        nearest = np.full(columns.max() + 1, np.inf)
+        np.minimum.at(nearest, columns[reaches], ranges[reaches])
+        is_low |= reaches & (ranges <= (1.0 + _JUMP) * nearest[columns])
+    found[likely[is_low]] = p[is_low]
     return found
 
 

@@ -136,7 +136,7 @@ class LookRecipe:
     optimizer: str = one_of(
         OPTIMIZERS, "muon", "optimizer; adamw needs a lower rate, such as 0.003, and more epochs; sgd has momentum"
     )
-    rate: float = number(0.01, "highest learning rate; it rises once, then falls (one cycle)", "", (1e-9, 1e3))
+    rate: float = number(0.02, "highest learning rate; it rises once, then falls (one cycle)", "", (1e-9, 1e3))
     decay: float = number(0.02, "weight decay", "", (0.0, 1.0))
     seed: int = number(0, "seed of weights, batches and augmentation", "", (0, 2**31))
 

@@ -149,7 +149,7 @@ def test_without_points_of_the_class_there_is_nothing_to_look_at(detector):
 
 
 @given(seeds, st.floats(0.0, 0.9))
-def test_the_nearest_points_are_the_nearest_in_their_direction(detector, seed, above):
+def test_the_nearest_points_are_the_nearest_of_their_probability_in_their_direction(detector, seed, above):
     seen = post_at(detector, (2.5, 0.3))
     probabilities = np.random.default_rng(seed).random(len(seen.layout)).astype(np.float32)
     found = nearest_points(seen, probabilities, above)
@@ -162,10 +162,20 @@ def test_the_nearest_points_are_the_nearest_in_their_direction(detector, seed, a
     columns = np.floor(np.arctan2(rays[:, 1], rays[:, 0]) / 0.012)
     low = np.zeros(len(rays), dtype=bool)
     for column in np.unique(columns[may]):
-        inside = may[columns[may] == column]
-        low[inside] = ranges[inside] <= 1.12 * ranges[inside].min()
-    most_probable = np.flatnonzero(low)[np.argsort(-probabilities[low], kind="stable")][:128]
-    assert sorted(kept.tolist()) == sorted(most_probable.tolist())
+        for level in (above, 0.1, 0.3, 0.6, 0.9):
+            inside = may[(columns[may] == column) & (probabilities[may] > level)]
+            low[inside] |= ranges[inside] <= 1.12 * ranges[inside].min(initial=np.inf)
+    np.testing.assert_array_equal(kept, np.flatnonzero(low))
+
+
+def test_a_doubtful_point_in_front_does_not_hide_a_base(detector):
+    seen = post_at(detector, (2.5, 0.3))
+    post = seen.slot_probabilities[:, 1]
+    bases = np.flatnonzero(nearest_points(seen, post, 0.03))
+    distances = np.hypot(*(seen.layout.rays[:, :2] / -seen.layout.rays[:, 2:]).T)
+    in_front = seen.projected.on_screen & (distances < 0.6 * distances[bases].min())
+    doubtful = np.where(in_front, np.float32(0.05), post)
+    assert np.isin(bases, np.flatnonzero(nearest_points(seen, doubtful, 0.03))).all()
 
 
 def test_a_class_with_a_look_needs_no_rules(detector):
