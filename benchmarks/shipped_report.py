@@ -23,7 +23,7 @@ README = DOCS.parent / "README.md"
 COLORS = {"ball": "#d95f02", "ball-small": "#7570b3", "soccer": "#1b9e77"}
 
 
-WEAK = """ Half of the robots are missed, and line points beyond 6 m are rare: docs/results.md has
+WEAK = """ A quarter of the robots is missed, and line points beyond 6 m are rare: docs/results.md has
 the figures of all features of the field."""
 
 
