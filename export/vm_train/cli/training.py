@@ -147,7 +147,10 @@ def _split(options: argparse.Namespace, configuration: TrainConfiguration, good:
 
 
 def _train(folder: Path, hardware: Hardware, moved_to: Path | None = None) -> int:
-    """Train from the last state of a folder on; moved_to: where the pictures are now. Returns the exit status."""
+    """Train from the last state of a folder on; moved_to: where the pictures are now. Returns the exit status.
+
+    Raises KeyboardInterrupt after the step in which Ctrl-C or SIGTERM asked for a stop.
+    """
     from ..learning.folder_access import locked
     from ..learning.rounds import train
     from ..learning.run_folder import read_run
@@ -162,16 +165,15 @@ def _train(folder: Path, hardware: Hardware, moved_to: Path | None = None) -> in
             print(f"vm-train: {hardware.workers} workers read the stream, as run.json says", file=sys.stderr)
     with locked(folder) if hardware.is_leader else nullcontext(), stop_requests() as stop_requested:
         outcome = train(run, hardware, stop_requested)
+    if not outcome.finished:
+        raise KeyboardInterrupt
     if hardware.is_leader:
         _report(run, outcome)
-    return EXIT_OK if outcome.finished else EXIT_INTERRUPTED
+    return EXIT_OK
 
 
 def _report(run: TrainingRun, outcome: TrainingOutcome) -> None:
     """Print the result of a training and the commands to use next; remove the cache that it made for itself."""
-    if not outcome.finished:
-        print(f"vm-train: stopped; continue with vm-train resume {run.folder}", file=sys.stderr)
-        return
     data, model = run.data, run.model_path
     if data.unpacked is not None and data.unpacked.parent.resolve() == run.folder.resolve():
         shutil.rmtree(data.unpacked, ignore_errors=True)
