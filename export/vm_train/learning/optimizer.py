@@ -82,7 +82,8 @@ class _Muon(torch.optim.Muon):
 
     def step(self, closure: Any = None) -> Any:
         for kernel, matrix in self._kernels:
-            matrix.grad = None if kernel.grad is None else kernel.grad.flatten(1)
+            if kernel.grad is not None:
+                matrix.grad = kernel.grad.flatten(1)
         return super().step(closure)  # type: ignore[no-untyped-call]
 
 
