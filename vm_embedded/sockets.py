@@ -156,16 +156,22 @@ class Connections:
 
 
 def checked_address(entry: Field[Any], value: object) -> str:
-    """Check of an entry: ADDRESS:PORT or unix:PATH, several separated by commas, or empty. Raises InputError.
+    """Check of an entry: ADDRESS:PORT or unix:PATH, or empty. Raises InputError.
 
     The entry's metadata holds an example of an address for the error message.
     """
     if not isinstance(value, str):
         raise InputError(f"{entry.name} must be a string, not {value!r}")
-    for each in filter(None, value.split(",")):
-        if not (each.startswith("unix:") and len(each) > len("unix:")):
-            parse_address(each, entry.name, entry.metadata["example"])
+    if value and not (value.startswith("unix:") and len(value) > len("unix:")):
+        parse_address(value, entry.name, entry.metadata["example"])
     return value
+
+
+def checked_addresses(entry: Field[Any], value: object) -> str:
+    """Check of an entry: as `checked_address`, also several separated by commas. Raises InputError."""
+    for each in value.split(",") if isinstance(value, str) else (value,):
+        checked_address(entry, each)
+    return str(value)
 
 
 def parse_address(text: str, name: str, example: str) -> tuple[str, int]:
@@ -212,4 +218,6 @@ def datagram_socket(
             raise
     except OSError as error:
         raise InputError(f"{failure} {host}:{port}: {error.strerror or error}") from error
+    except UnicodeError as error:
+        raise InputError(f"{failure} {host}:{port}: this can't be the name of a host") from error
     return opened, resolved

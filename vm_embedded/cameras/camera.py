@@ -101,4 +101,4 @@ class CameraSettings:
 
 def without_password(source: str) -> str:
     """The source to show in messages: user and password are removed from an address."""
-    return re.sub(r"//[^/@]*@", "//", source)
+    return re.sub(r"//[^/]*@", "//", source)

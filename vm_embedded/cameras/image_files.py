@@ -47,13 +47,15 @@ def check_file_format(format: str) -> None:
 class Frame:
     """One frame of a source.
 
-    index: its number, from 0. source: its name in messages. read: returns the image, BGR, or in the file's own channels
-    if the pixel format is another; raises InputError. path: its image file; None for a frame of a video. stamp: time
-    within its video or recording [s], or None. lens, orientation: of the camera, if the source knows them.
+    index: its number, from 0. source: its name in messages. stem: name of the file that it is from, without suffix.
+    read: returns the image, BGR, or in the file's own channels if the pixel format is another; raises InputError. path:
+    its image file; None for a frame of a video. stamp: time within its video or recording [s], or None. lens,
+    orientation: of the camera, if the source knows them.
     """
 
     index: int
     source: str
+    stem: str
     read: Callable[[], Image]
     path: Path | None = None
     stamp: float | None = None
@@ -77,7 +79,8 @@ def open_sources(names: Sequence[str], raw: bool = False, max_megapixels: float 
     `open_source` does.
     """
     paths = _without_companions([Path(each) for each in names])
-    names = [each for each in names if Path(each) in paths]
+    kept = set(paths)
+    names = [each for each in names if Path(each) in kept]
     if len(names) > 1 and all(each.is_file() and each.suffix.lower() in IMAGE_SUFFIXES for each in paths):
         return _images(paths, partial(read_image, raw=raw, max_megapixels=max_megapixels))
     return joined([open_source(each, raw, max_megapixels) for each in names])
@@ -138,7 +141,8 @@ def _images(paths: list[Path], read: Callable[[Path], Image], times: Mapping[str
     """The frames of image files. times: of some of them, by the names of the files without suffix [s]."""
     paths, times = sorted(paths, key=_natural), times or {}
     frames = (
-        Frame(index, path.name, partial(read, path), path, times.get(path.stem)) for index, path in enumerate(paths)
+        Frame(index, path.name, path.stem, partial(read, path), path, times.get(path.stem))
+        for index, path in enumerate(paths)
     )
     return Source(frames, len(paths))
 
@@ -157,7 +161,7 @@ def _recorded_times(messages: Path) -> dict[str, float]:
 
 def _natural(path: Path) -> list[tuple[int, str]]:
     """A sort key that puts frame9 before frame10."""
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
 def read_image(path: str | Path, raw: bool = False, max_megapixels: float = MAX_MEGAPIXELS) -> Image:
@@ -198,18 +202,18 @@ def _video(name: str) -> Source:
         raise InputError(f"{'camera' if live else 'video'} {name} contains no frames that can be read")
     rate = capture.get(cv2.CAP_PROP_FPS)
     return Source(
-        _frames(capture, first, Path(name).name),
+        _frames(capture, first, Path(name)),
         None if live or count <= 0 else count,
         rate if 0.0 < rate < 1e4 else None,
     )
 
 
-def _frames(capture: cv2.VideoCapture, first: Image, name: str) -> Iterator[Frame]:
+def _frames(capture: cv2.VideoCapture, first: Image, path: Path) -> Iterator[Frame]:
     image: Image | None = first
     index = 0
     while image is not None:
         stamp = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
-        yield Frame(index, name, partial(np.asarray, image), None, stamp)
+        yield Frame(index, path.name, path.stem, partial(np.asarray, image), None, stamp)
         image = _next_image(capture)
         index += 1
     capture.release()

@@ -160,8 +160,10 @@ def parse_url(source: str) -> SplitResult:
         url = urlsplit(source)
         valid = bool(url.hostname) and (url.port is None or url.port > 0)
     except ValueError as error:
-        raise InputError(f"{source!r} is not a valid address: {error}") from error
+        raise InputError(f"{without_password(source)!r} is not a valid address: {error}") from error
     if not valid:
-        raise InputError(f"{source!r} is not a valid address; write it like http://192.168.0.20:8080/stream")
+        raise InputError(
+            f"{without_password(source)!r} is not a valid address; write it like http://192.168.0.20:8080/stream"
+        )
 
     return url

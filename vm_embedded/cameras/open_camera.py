@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import InputError
-from .camera import Camera, CameraSettings
+from .camera import Camera, CameraSettings, without_password
 from .fault import FaultCamera, Faults, FaultScript
 from .files import FileCamera
 from .mjpeg import MjpegCamera, NotMotionJpegError, parse_url
@@ -65,8 +65,8 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
         return lambda: OpenCvCamera(settings, raw)
     if not Path(source).exists():
         raise InputError(
-            f"no such camera: {source!r}; give a device, an address, an existing file or folder, synthetic, "
-            "fault:SCRIPT or gstreamer:PIPELINE"
+            f"no such camera: {without_password(source)!r}; give a device, an address, an existing file or folder, "
+            "synthetic, fault:SCRIPT or gstreamer:PIPELINE"
         )
     return lambda: FileCamera(settings, raw)
 

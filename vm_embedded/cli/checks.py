@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from ..cameras.camera import without_password
 from ..cameras.open_camera import brings_lens_and_pose, camera_opener
 from ..cameras.opencv import device_path
 from ..errors import InputError, VisualMeshError, one_line
@@ -70,13 +71,14 @@ def check_processor(cpuinfo: Path) -> Finding:
         return Finding("processor", WARNING, f"{cpuinfo} can't be read: {error.strerror}")
     fields = dict(line.split(":", 1) for line in lines if ":" in line)
     named = {name.strip(): value.strip() for name, value in fields.items()}
-    flags = set(named.get("flags", "").split())
-    model = named.get("model name", "unknown")
-    missing = [name for name in ("avx2", "fma") if name not in flags]
+    is_arm = "Features" in named  # there, x86 has "flags"
+    flags = set(named.get("Features" if is_arm else "flags", "").split())
+    model = named.get("model name", "ARM" if is_arm else "unknown")
+    needed = ("asimd",) if is_arm else ("avx2", "fma")
+    missing = [name for name in needed if name not in flags]
     if missing:
         return Finding("processor", WARNING, f"{model} has no {' and no '.join(missing)}; detection will be slow")
-    extra = ", avx512" if "avx512f" in flags else ""
-    return Finding("processor", GOOD, f"{model}: avx2, fma{extra}")
+    return Finding("processor", GOOD, f"{model}: {', '.join(needed)}{', avx512' if 'avx512f' in flags else ''}")
 
 
 def check_threads(threads: int, allowed: int, cores: int) -> Finding:
@@ -93,7 +95,10 @@ def check_threads(threads: int, allowed: int, cores: int) -> Finding:
 
 def check_governor(cpus: Path) -> Finding:
     """Whether the frequency governor slows cores down between frames."""
-    found = {each.read_text().strip() for each in sorted(cpus.glob("cpu[0-9]*/cpufreq/scaling_governor"))}
+    try:
+        found = {each.read_text().strip() for each in sorted(cpus.glob("cpu[0-9]*/cpufreq/scaling_governor"))}
+    except OSError as error:
+        return Finding("governor", WARNING, f"can't be read: {one_line(error)}")
     if not found:
         return Finding("governor", GOOD, "this machine has no frequency governor to set")
     if found <= {"performance", "schedutil"}:
@@ -155,10 +160,11 @@ def check_cameras(configuration: Configuration, root: Path) -> Iterator[Finding]
         yield Finding("camera", BAD, str(error), "vm-detect --help lists the allowed cameras")
         return
     may_change = device is not None and "by-" not in str(device)
+    shown = without_password(source)
     yield Finding(
         "camera",
         WARNING if may_change else GOOD,
-        f"{source}{': the number may change when cameras are plugged in again' if may_change else ''}",
+        f"{shown}: the number may change when cameras are plugged in again" if may_change else shown,
         "ls -l /dev/v4l/by-id/ and use one of these paths" if may_change else "",
     )
 

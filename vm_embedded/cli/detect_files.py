@@ -21,7 +21,7 @@ from ..geometry.orientation import Orientation
 from ..live.configuration import Configuration
 from ..output.box_files import BoxWriter
 from ..output.messages import file_message
-from ..output.result_files import make_folder, save_overlay, save_points
+from ..output.result_files import FrameNames, make_folder, save_overlay, save_points
 from ..output.ros.mcap_file import McapFile
 from ..output.video_file import VideoFile
 from .progress import ProgressBar
@@ -59,11 +59,12 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
         video = None
         if options.save_video is not None:
             video = stack.enter_context(VideoFile(options.save_video, source.rate or _IMAGES_RATE))
+        work = _Pass(detector, pose, follow, options, emit_points, FrameNames(), boxes, mcap, video)
         for frame in source.frames:
             if follow is not None and frame.index == 0:
                 follow.time(frame)  # without times, no frame can be processed
             try:
-                line = _process(frame, detector, pose, follow, options, emit_points, boxes, mcap, video)
+                line = work.process(frame)
             except VisualMeshError as error:
                 bar.clear()
                 complain(str(error))
@@ -86,7 +87,7 @@ def _open(names: Sequence[str], given: Configuration) -> Source:
     reading = BagReading(
         ros=given.ros,
         pose=given.pose,
-        lens=given.lens.lens if given.lens else None,
+        own_lens=given.lens is not None or given.fov is not None,
         orientation=given.fixed_orientation(),
         raw=raw,
         max_megapixels=largest,
@@ -106,7 +107,7 @@ class _DefaultPose:
         without one."""
         if frame.lens is not None and frame.orientation is not None:
             return frame.lens, frame.orientation
-        lens, orientation = self.given.lens_for(size), self.orientation
+        lens, orientation = frame.lens or self.given.lens_for(size), frame.orientation or self.orientation
         beside = lens_beside(frame.path)
         if beside is not None:
             file = read_lens_file(beside)
@@ -136,57 +137,51 @@ def _object_classes(detector: Detector) -> tuple[str, ...]:
     return tuple(each.name for each in detector.manifest.classes if each.kind == "object")
 
 
-def _process(
-    frame: Frame,
-    detector: Detector,
-    pose: _DefaultPose,
-    follow: _Follow | None,
-    options: argparse.Namespace,
-    emit_points: Sequence[str],
-    boxes: BoxWriter | None,
-    mcap: McapFile | None,
-    video: VideoFile | None,
-) -> str:
-    """Detect in a frame, save the files that the options ask for, and return its line of JSON.
+@dataclass(frozen=True, eq=False)
+class _Pass:
+    """All that a pass over the frames needs. boxes, mcap, video: the files that the options ask for."""
 
-    Raises InputError that names the frame.
-    """
-    image = frame.read()  # its errors name the file
-    try:
-        return _detect(image, frame, detector, pose, follow, options, emit_points, boxes, mcap, video)
-    except VisualMeshError as error:
-        raise InputError(f"{frame.source}: {error}") from error
+    detector: Detector
+    pose: _DefaultPose
+    follow: _Follow | None
+    options: argparse.Namespace
+    emit_points: Sequence[str]
+    names: FrameNames
+    boxes: BoxWriter | None
+    mcap: McapFile | None
+    video: VideoFile | None
 
+    def process(self, frame: Frame) -> str:
+        """Detect in a frame, save the files that the options ask for, and return its line of JSON.
 
-def _detect(
-    image: Image,
-    frame: Frame,
-    detector: Detector,
-    pose: _DefaultPose,
-    follow: _Follow | None,
-    options: argparse.Namespace,
-    emit_points: Sequence[str],
-    boxes: BoxWriter | None,
-    mcap: McapFile | None,
-    video: VideoFile | None,
-) -> str:
-    lens, orientation = pose.of(frame, (image.shape[1], image.shape[0]))
-    detections = detector.detect(image, orientation, lens, explain=options.explain or boxes is not None)
-    if follow is not None:
-        detections = follow.tracker.update(detections, follow.time(frame))
-    if boxes is not None:
-        boxes.write(frame, image, lens, orientation, detections)
-        if not options.explain:
-            detections = replace(detections, rejected=())
-    if options.save_points is not None:
-        save_points(options.save_points, frame, detections)
-    if options.save_overlay is not None:
-        save_overlay(options.save_overlay, frame, detections)
-    if mcap is not None:
-        mcap.write(frame, image, lens, orientation, detections)
-    if video is not None:
-        video.write(detections.draw())
-    return json.dumps(file_message(frame, detections, emit_points, options.explain), allow_nan=False)
+        Raises InputError that names the frame.
+        """
+        image = frame.read()  # its errors name the file
+        try:
+            return self._detect(image, frame)
+        except VisualMeshError as error:
+            raise InputError(f"{frame.source}: {error}") from error
+
+    def _detect(self, image: Image, frame: Frame) -> str:
+        options, name = self.options, self.names.of(frame)
+        lens, orientation = self.pose.of(frame, (image.shape[1], image.shape[0]))
+        explain = options.explain or self.boxes is not None
+        detections = self.detector.detect(image, orientation, lens, explain=explain)
+        if self.follow is not None:
+            detections = self.follow.tracker.update(detections, self.follow.time(frame))
+        if self.boxes is not None:
+            self.boxes.write(frame, image, lens, orientation, detections)
+            if not options.explain:
+                detections = replace(detections, rejected=())
+        if options.save_points is not None:
+            save_points(options.save_points / f"{name}.npz", detections)
+        if options.save_overlay is not None:
+            save_overlay(options.save_overlay / f"{name}.jpg", frame, detections)
+        if self.mcap is not None:
+            self.mcap.write(frame, image, lens, orientation, detections)
+        if self.video is not None:
+            self.video.write(detections.draw())
+        return json.dumps(file_message(frame, detections, self.emit_points, options.explain), allow_nan=False)
 
 
 def complain(message: str) -> None:

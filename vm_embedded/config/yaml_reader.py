@@ -21,7 +21,7 @@ from typing import Any
 from ..errors import InputError
 
 _KEY = re.compile(r"""("[^"]*"|'[^']*'|[^\s"'\[\]{}#&*!|>%@`,-][^:#{}\[\],]*?|-?\d+)\s*:(?:\s+(.*))?$""")
-_TAG = re.compile(r"!\S*\s*")
+_TAG = re.compile(r"^!\S*\s*")
 _INTEGER = re.compile(r"[-+]?\d+")
 _REAL = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 _PLAIN_IN_FLOW = re.compile(r"[^,\[\]{}:]+(:[^\s,\[\]{}][^,\[\]{}:]*)*")

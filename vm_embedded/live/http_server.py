@@ -47,18 +47,21 @@ Stream = Callable[[Write], Awaitable[None]]
 class HttpServer:
     """Serves pages, and streams that last as long as the browser is connected.
 
-    where: ADDRESS:PORT or unix:PATH. actions: what POST carries out, by path, if the header X-Token holds the token.
+    where: ADDRESS:PORT or unix:PATH. option: with that address, for error messages. actions: what POST carries out, by
+    path, if the header X-Token holds the token.
     """
 
     def __init__(
         self,
         where: str,
+        option: str,
         pages: Mapping[str, Page],
         streams: Mapping[str, Stream] | None = None,
         actions: Mapping[str, Page] | None = None,
         token: str = "",
     ) -> None:
-        self._where, self._pages, self._streams, self._actions = where, pages, streams or {}, actions or {}
+        self._where, self._option, self._pages = where, option, pages
+        self._streams, self._actions = streams or {}, actions or {}
         self._token = token
         self._file: UnixListener | None = None
         self._server: asyncio.Server | None = None
@@ -69,18 +72,20 @@ class HttpServer:
     async def open(self) -> None:
         """Listen. Raises InputError."""
         if self._where.startswith("unix:"):
-            self._file = UnixListener(self._where.removeprefix("unix:"), "--status-metrics")
+            self._file = UnixListener(self._where.removeprefix("unix:"), self._option)
             self._server = await asyncio.start_unix_server(
                 self._serve, sock=self._file.socket, limit=8192, backlog=BACKLOG
             )
             return
-        host, port = parse_address(self._where, "[status] page or metrics", "127.0.0.1:8080")
+        host, port = parse_address(self._where, self._option, "127.0.0.1:8080")
         try:
             self._server = await asyncio.start_server(self._serve, host, port, limit=8192)
         except OSError as error:
             # asyncio's own text repeats the address. An unknown host name has a negative errno.
             reason = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror or error
             raise InputError(f"can't listen at {self._where}: {reason}") from error
+        except UnicodeError as error:
+            raise InputError(f"can't listen at {self._where}: {host!r} can't be the name of a host") from error
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if not self._connections.admit(writer):

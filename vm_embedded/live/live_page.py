@@ -47,9 +47,11 @@ class LivePage:
         if status.page:
             pages: dict[str, Page] = {"/": page.page, "/state": page.state, "/map": page.map, "/preview": page.preview}
             actions: dict[str, Page] = {"/record": self._start_recording, "/threshold": self._change_threshold}
-            yield HttpServer(status.page, pages | metrics, {"/stream": page.stream}, actions, self.token)
+            yield HttpServer(
+                status.page, "--status-page", pages | metrics, {"/stream": page.stream}, actions, self.token
+            )
         if status.metrics:
-            yield HttpServer(status.metrics, metrics)
+            yield HttpServer(status.metrics, "--status-metrics", metrics)
 
     def show(self, answer: Answer) -> None:
         """Show an answer."""

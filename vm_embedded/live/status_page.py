@@ -96,17 +96,19 @@ class StatusPage:
         )
         while True:
             picture = await self._picture()
+            sent = None if self._shown is None else self._shown[0]
             if picture is not None:
                 head = b"\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(picture)
                 await write(_BOUNDARY + head + picture + b"\r\n")
             await asyncio.sleep(self._period)
-            self._changed.clear()
-            with suppress(asyncio.TimeoutError):  # then send the same image: only a write notices a closed connection
-                await asyncio.wait_for(self._changed.wait(), _REPEAT)
+            if self._latest is sent:
+                self._changed.clear()
+                # After that time, send the same image: only a write notices a closed connection.
+                with suppress(asyncio.TimeoutError):
+                    await asyncio.wait_for(self._changed.wait(), _REPEAT)
 
     async def _picture(self) -> bytes | None:
         """The latest image as a JPEG."""
-
         async with self._drawing:
             if self._latest is not None and (self._shown is None or self._shown[0] is not self._latest):
                 detections = self._latest

@@ -25,7 +25,7 @@ from ..geometry.lens import Lens
 from ..geometry.lens_files import format_lens_file
 from ..geometry.orientation import Orientation
 from .recorder import encode_png
-from .result_files import frame_name, make_folder
+from .result_files import FrameNames, make_folder
 
 CLASSES, CANDIDATES = "classes.txt", "candidates.jsonl"
 
@@ -63,7 +63,7 @@ class BoxWriter:
         if any(make_folder(folder).iterdir()):
             raise InputError(f"--save-boxes {folder}: the folder is not empty; give a new one, to keep its labels")
         self._folder, self._classes = folder, classes
-        self._names: set[str] = set()
+        self._names = FrameNames("image")  # so that the lens file belongs to the image
         _write(folder / CLASSES, "".join(f"{name}\n" for name in classes).encode())
         _write(folder / CANDIDATES, b"")
 
@@ -73,7 +73,7 @@ class BoxWriter:
         image: uint8 (height, width[, channels]), written as PNG if the frame has no file. detections: with the rejected
         candidates. Raises InputError.
         """
-        name, boxes = self._unique_name(frame), candidate_boxes(detections, (image.shape[1], image.shape[0]))
+        name, boxes = self._names.of(frame), candidate_boxes(detections, (image.shape[1], image.shape[0]))
         path = self._folder / f"{name}{'.png' if frame.path is None else frame.path.suffix}"
         _write(path, encode_png(image) if frame.path is None else frame.path.read_bytes())
         lens_file = format_lens_file(lens, orientation)
@@ -90,17 +90,6 @@ class BoxWriter:
                 file.write(lines)
         except OSError as error:
             raise InputError(f"can't write {path}: {error.strerror or error}") from error
-
-    def _unique_name(self, frame: Frame) -> str:
-        """A name that no frame had before. It begins with image, so that the lens file belongs to it."""
-        base = frame_name(frame)
-        base = name = base if base.startswith("image") else f"image-{base}"
-        number = 1
-        while name in self._names:
-            number += 1
-            name = f"{base}-{number}"
-        self._names.add(name)
-        return name
 
     def _yolo_line(self, box: CandidateBox) -> str:
         return f"{self._classes.index(box.class_name)} {' '.join(f'{each:.6f}' for each in box.shares)}\n"

@@ -17,7 +17,7 @@ from typing import Protocol
 
 from ..config.entries import check_entries, entry, number, one_of, switch, text_line
 from ..errors import InputError
-from ..sockets import BACKLOG, MOST_CONNECTIONS, UnixListener, checked_address, datagram_socket, parse_address
+from ..sockets import BACKLOG, MOST_CONNECTIONS, UnixListener, checked_addresses, datagram_socket, parse_address
 from .binary_form import to_binary
 from .messages import Message, to_json_line, to_ros
 
@@ -35,7 +35,7 @@ class OutputSettings:
     stdout: bool = switch(True, "write lines to standard output")
     file: str = text_line("", "file to append lines to")
     udp: str = entry(
-        checked_address,
+        checked_addresses,
         "",
         "UDP receivers, one datagram per line: ADDRESS:PORT, separated by commas",
         example=_UDP_EXAMPLE,

@@ -241,7 +241,7 @@ _PARTS: dict[str, Schema] = {
         "a goal post or a robot",
         {
             "class": _text("post or robot"),
-            **_CONFIDENCE,
+            "confidence": _share("probability of the close look at its base; without one, mean of its points"),
             "position": _vector(2, "its base on the plane [m]"),
             "distance": _size("from the camera to its base [m]"),
             "bearing": _vector(3, "unit vector from the camera to its base"),

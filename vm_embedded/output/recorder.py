@@ -102,9 +102,9 @@ class Recorder:
         if trigger and any(each["class"] == trigger for each in moment.message["detections"]):
             now = time.monotonic()
             if now - self._last_trigger >= self.settings.pause:
-                self._last_trigger = now
                 with suppress(InputError):
                     self.record(files)
+                    self._last_trigger = now
 
     def record(self, files: Mapping[str, bytes]) -> str:
         """Start to write the kept moments, and return a line that says so. Raises InputError if it can't start.

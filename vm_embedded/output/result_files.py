@@ -12,24 +12,40 @@ from ..errors import InputError
 from ..files import atomic_write
 
 
-def save_points(folder: Path, frame: Frame, detections: Detections) -> Path:
-    """Write NAME.npz with pixels (n, 2), rays (n, 3) in the frame's observation plane, probabilities (n, C)."""
-    path = folder / f"{frame_name(frame)}.npz"
+def save_points(path: Path, detections: Detections) -> None:
+    """Write an .npz with pixels (n, 2), rays (n, 3) in the frame's observation plane, probabilities (n, C)."""
     with atomic_write(path) as part, part.open("wb") as file:
         np.savez(file, pixels=detections.pixels, rays=detections.rays, probabilities=detections.probabilities)
-    return path
 
 
-def save_overlay(folder: Path, frame: Frame, detections: Detections) -> Path:
-    """Write NAME.jpg: the image with mesh points and detections drawn in."""
-    path = folder / f"{frame_name(frame)}.jpg"
+def save_overlay(path: Path, frame: Frame, detections: Detections) -> None:
+    """Write a .jpg: the image with mesh points and detections drawn in.
+
+    Raises InputError instead of replacing a file in the folder of the frame's own image.
+    """
+    if frame.path is not None and path.exists() and path.resolve().parent == frame.path.resolve().parent:
+        raise InputError(f"--save-overlay would replace {path}: give another folder")
     detections.save(path)
-    return path
 
 
-def frame_name(frame: Frame) -> str:
-    """The name, without suffix, of the files of a frame."""
-    return frame.path.stem if frame.path else f"{Path(frame.source).stem}-{frame.index:06d}"
+class FrameNames:
+    """Names, without suffix, for the files of frames, all different. prefix: of names that do not begin with it."""
+
+    def __init__(self, prefix: str = "") -> None:
+        self._prefix = prefix
+        self._given: set[str] = set()
+
+    def of(self, frame: Frame) -> str:
+        """A name that no frame had before: that of its file; with a number for frames of a video."""
+        base = frame.stem if frame.path else f"{frame.stem}-{frame.index:06d}"
+        if self._prefix and not base.startswith(self._prefix):
+            base = f"{self._prefix}-{base}"
+        name, number = base, 1
+        while name in self._given:
+            number += 1
+            name = f"{base}-{number}"
+        self._given.add(name)
+        return name
 
 
 def make_folder(path: Path) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter, defaultdict
 from collections.abc import Mapping
 from pathlib import Path
@@ -75,7 +76,7 @@ class _Reader:
         """Image file and stated size [px] by id."""
         found: dict[Id, tuple[Path, Size | None]] = {}
         keys: dict[Path, Id] = {}
-        uses = Counter(shown(entry.get("id")) for entry in self._content.images)
+        uses = Counter(json.dumps(entry.get("id")) for entry in self._content.images)
         for entry in self._content.images:
             key = entry.get("id")
             place = f"{self._label} image {shown(key)}"
@@ -91,7 +92,7 @@ class _Reader:
                 continue
             image = self._index.labels([path])
             try:
-                if not is_id(key) or uses[shown(key)] > 1:
+                if not is_id(key) or uses[json.dumps(key)] > 1:
                     raise InputError("its id must be a number or a text that no other image has")
                 if path in keys:
                     raise InputError(f"image {keys[path]} has the same name: two images with one name")

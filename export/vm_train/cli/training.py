@@ -98,10 +98,9 @@ def find_good_pictures(
         found = inspect_pictures(pictures, configuration.classes.mask_classes(), hardware.workers + 1, bar.advance)
     finally:
         bar.clear()
-    lines = list(complaints(found))
-    for line in lines:
+    for line in complaints(found):
         print(f"vm-train: {line}", file=sys.stderr)
-    if strict and lines:
+    if strict and found.faults:
         raise InputError("some pictures are damaged, see above: repair them, or leave out --strict to skip them")
     if not found.good:
         raise InputError(f"no picture of {data} can be used: vm-train check {data} tells why")

@@ -12,8 +12,8 @@ import numpy as np
 
 from vm_embedded.arrays import Image
 from vm_embedded.cameras.decoding import decode_as
-from vm_embedded.errors import InputError
-from vm_embedded.geometry.lens_files import LensFile, read_lens_file
+from vm_embedded.errors import GeometryError, InputError
+from vm_embedded.geometry.lens_files import LensFile, parse_lens_yaml
 
 from .classes import Classes, Labels
 from .picture_files import IMAGES, PARTS, PictureFault, PictureFiles, RawPicture
@@ -122,12 +122,7 @@ def parse_lens(text: str, name: str) -> LensFile:
 
 @lru_cache(_LENSES_KEPT)
 def _lens(text: str) -> LensFile:
-    # read_lens_file needs a path; this file is in memory, because the disk may be full.
-    with os.fdopen(os.memfd_create("lens"), "w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        path = f"/proc/self/fd/{file.fileno()}"
-        try:
-            return read_lens_file(path)
-        except InputError as error:
-            raise InputError(str(error).replace(f"lens file {path}: ", "")) from error
+    try:
+        return parse_lens_yaml(text)
+    except GeometryError as error:
+        raise InputError(str(error)) from error

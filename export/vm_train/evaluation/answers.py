@@ -52,6 +52,7 @@ class PictureAnswer:
 
     proposals: for the close look's class, the centers (c, 3) [m] of its proposals, relative to the camera, in the frame
     of `Detection.bearing`. Empty without a close look. features: of the field, or None if the network has none.
+    manifest: with the radius of the objects that were looked for.
     """
 
     pixels: Floats
@@ -59,6 +60,7 @@ class PictureAnswer:
     probabilities: Singles
     found: tuple[Detection, ...]
     proposals: Mapping[str, Floats]
+    manifest: Manifest
     features: FieldFeatures | None = None
 
 
@@ -150,7 +152,9 @@ def _answer(
 ) -> PictureAnswer:
     distances = plane_distances(observation.rays, observation.view.height)
     proposals = {} if look is None else _proposals(observation, look, settings)
-    return PictureAnswer(observation.pixels, distances, observation.probabilities, found, proposals, features)
+    return PictureAnswer(
+        observation.pixels, distances, observation.probabilities, found, proposals, observation.manifest, features
+    )
 
 
 def _proposals(observation: Observation, look: CloseLook, settings: Settings) -> dict[str, Floats]:

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from vm_embedded.errors import GeometryError, InputError
-from vm_embedded.network.manifest import Manifest
 
 from ..data.classes import Classes
 from ..data.picture_files import PictureFault, PictureFiles
@@ -100,7 +99,6 @@ class Evaluation:
         picture: Picture,
         scene: SceneTruth | None,
         answer: PictureAnswer,
-        manifest: Manifest,
         stage: FieldScene | None = None,
     ) -> None:
         """Add a network's answer on a picture. stage: what its scene file tells about the field.
@@ -109,7 +107,7 @@ class Evaluation:
         """
         x, y = np.rint(answer.pixels).astype(np.intp).T
         self.points.add(answer.probabilities, picture.labels[y, x], answer.distances)
-        for name, truths in true_objects(picture, scene, manifest).items():
+        for name, truths in true_objects(picture, scene, answer.manifest).items():
             if name in self.objects:
                 found = [each for each in answer.found if each.class_name == name]
                 mistakes = self.objects[name].add(truths, found)
@@ -117,7 +115,7 @@ class Evaluation:
             if name in self.proposals:
                 self.proposals[name].add(truths, answer.proposals[name])
         if self.features is not None and answer.features is not None:
-            truth = field_truth(picture, stage, [each.name for each in manifest.classes])
+            truth = field_truth(picture, stage, [each.name for each in answer.manifest.classes])
             self.features.add(truth, answer.features)
         if scene is not None:
             self.radii.append(scene.radius)
@@ -146,7 +144,7 @@ def evaluate_pictures(subject: Subject, pictures: Sequence[PictureFiles], classe
                 raise InputError(f"{files.image}: {error}") from error
             result.faults[str(files.image)] = str(error)
         else:
-            result.count(files, picture, scene, answer, subject.manifest, stage)
+            result.count(files, picture, scene, answer, stage)
     return result
 
 

@@ -57,6 +57,10 @@ class SceneTruth:
     class_name: str = BALL
     in_mask: bool = False
 
+    def tells(self, class_name: str) -> bool:
+        """Whether `objects` holds the objects of a class."""
+        return class_name == self.class_name and not self.in_mask
+
 
 def read_scene(path: Path) -> SceneTruth | None:
     """The truth in a sceneX.json; None if the file is missing. Raises InputError naming file and fault."""
@@ -108,7 +112,7 @@ def true_objects(picture: Picture, scene: SceneTruth | None, manifest: Manifest)
     for number, each in enumerate(manifest.classes):
         if each.kind != "object":
             continue
-        if scene is not None and each.name == scene.class_name and not scene.in_mask:
+        if scene is not None and scene.tells(each.name):
             found[each.name] = [_of_scene(picture, one) for one in scene.objects]
         else:
             found[each.name] = _of_mask(picture, picture.labels == number, shape)

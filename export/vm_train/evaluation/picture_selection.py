@@ -35,4 +35,5 @@ def select_pictures(folders: Sequence[Path], chosen: Path | None, part: str | No
         wanted = read_list(chosen, known)
     if not wanted:
         raise InputError(f"{chosen} names no picture" + (f" of part {part}" if is_split else ""))
-    return [files for files in found if files.number in set(wanted)]
+    chosen_numbers = set(wanted)
+    return [files for files in found if files.number in chosen_numbers]

@@ -72,8 +72,8 @@ class Tone:
     noise: float = 0.0
 
 
-# Each of the next three functions always draws the same amount of random numbers, used or not. So changing one entry
-# leaves the draws of the others as they were.
+# Each of the next three functions always draws the same amount of random numbers, used or not, except for noise. So
+# changing another entry leaves the draws of the others as they were.
 
 
 def perturb_camera(picture: Picture, augmentation: Augmentation, random: np.random.Generator) -> Picture:

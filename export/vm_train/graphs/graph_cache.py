@@ -75,18 +75,12 @@ class GraphCache:
         return graph if read.place == len(content) else None
 
     def put(self, files: PictureFiles, view: int, graph: LabeledGraph) -> None:
-        """Store a view. Without effect if it can't be written."""
+        """Store a view, as `rounded` returns it. Without effect if it can't be written."""
         try:
             if shutil.disk_usage(self._folder).free < KEPT_FREE:
                 return
             header = _HEADER.pack(_MAGIC, fingerprint(files, self._classes), len(graph), graph.neighbors.shape[1])
-            parts = (
-                graph.neighbors.astype(np.int32),
-                graph.points.astype(np.float16),
-                graph.pixels.astype(np.float32),
-                graph.distances.astype(np.float32),
-                graph.labels,
-            )
+            parts = (graph.neighbors, graph.points.astype(np.float16), graph.pixels, graph.distances, graph.labels)
             # Mode x: if two processes store the same view, neither writes into the other's file.
             with atomic_write(self._path(files, view)) as part, part.open("xb") as file:
                 for each in (header, *(array.tobytes() for array in parts)):
@@ -96,6 +90,17 @@ class GraphCache:
 
     def _path(self, files: PictureFiles, view: int) -> Path:
         return self._folder / f"{quote(files.number, safe='')}-{view}.raw"
+
+
+def rounded(graph: LabeledGraph) -> LabeledGraph:
+    """The graph with the digits that the cache keeps, so that a training does not depend on what the cache holds."""
+    return LabeledGraph(
+        neighbors=graph.neighbors.astype(np.int32),
+        points=graph.points.astype(np.float16).astype(np.float32),
+        pixels=graph.pixels.astype(np.float32),
+        distances=graph.distances.astype(np.float32),
+        labels=graph.labels,
+    )
 
 
 class _Reader:

@@ -13,7 +13,7 @@ from vm_workstation.worker_process import interrupts_blocked, start_worker
 from ..data.decoded_cache import DecodedCache, read_through_cache
 from ..data.picture_files import PictureFiles
 from ..data.pictures import Picture
-from .graph_cache import GraphCache
+from .graph_cache import GraphCache, rounded
 from .graph_recipe import GraphRecipe
 from .labeled_graph import LabeledGraph
 from .schedule import Batch, Item
@@ -51,7 +51,7 @@ class PictureGraphs(Dataset[LabeledGraph]):
         graph = views.get(files, view)
         if graph is None:
             manifest = self.recipe.manifest_for(files)
-            graph = self.recipe.draw_view(self._picture(files), manifest, views.random(files, view))
+            graph = rounded(self.recipe.draw_view(self._picture(files), manifest, views.random(files, view)))
             views.put(files, view, graph)
         return graph
 

@@ -10,7 +10,8 @@ import numpy as np
 _VALIDATED = 8  # pictures in a batch of the validation
 
 _ORDER, _AUGMENTATION = 1, 3
-"""Keep random numbers of different uses apart that begin with the same seed; 2 is `_DRAWS` of learning/trainer.py."""
+"""Keep random numbers of different uses apart that begin with the same seed; 2 is `_DRAWS` of learning/trainer.py, and
+4 is `_STREAM` of streamed.py."""
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,9 @@ from .labeled_graph import LabeledGraph, empty_graph
 from .loading import PictureGraphs
 from .schedule import Batch, Item
 
+_STREAM = 4
+"""Keeps the random numbers of the order of shards apart from others with the same seed; see schedule.py."""
+
 
 @dataclass(frozen=True)
 class StreamSource:
@@ -74,7 +77,7 @@ def assign_lanes(batches: Iterable[Batch], seed: tuple[int, ...], source: Stream
             # The loader deals batches to its workers in turn, and Batch.part deals items to the processes.
             lane = index % max(source.workers, 1) * source.processes + position % source.processes
             place = places[batch.epoch, lane]
-            items.append(StreamedItem(item.position, item.seed, (*seed, 4, batch.epoch), lane, place))
+            items.append(StreamedItem(item.position, item.seed, (*seed, _STREAM, batch.epoch), lane, place))
             places[batch.epoch, lane] += 1
         yield replace(batch, items=tuple(items))
 

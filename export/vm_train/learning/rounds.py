@@ -31,7 +31,7 @@ from ..scores.point_scores import PointScores
 from .hardware import Hardware
 from .log import TrainingLog
 from .run_folder import TrainingRun
-from .trainer import Trainer, read_state, sum_over_processes
+from .trainer import DivergedError, Trainer, read_state, sum_over_processes
 
 _SAVE_INTERVAL = 30.0  # [s] between states
 
@@ -274,9 +274,14 @@ def _remaining_batches(run: TrainingRun, training_round: int, done: int, validat
 
 @contextmanager
 def _saved_on_error(folder: Path, save: Callable[[], None]) -> Iterator[None]:
-    """Save the state when a picture or shard ends the training, and tell how to resume."""
+    """Save the state when a picture or shard ends the training, and tell how to resume.
+
+    A training that diverged would do so again, so it is not saved.
+    """
     try:
         yield
+    except DivergedError:
+        raise
     except InputError as error:
         save()
         raise InputError(f"{error}; continue with vm-train resume {folder}") from error

@@ -36,6 +36,10 @@ _DRAWS = 2
 """Keeps the random numbers of the selection apart from others with the seed of the same item."""
 
 
+class DivergedError(InputError):
+    """The loss became NaN or infinite: to repeat the same steps would not help."""
+
+
 @dataclass(frozen=True)
 class StepResult:
     """A step's number, from 1, the mean loss of its selected points, their number, and the learning rate."""
@@ -96,13 +100,13 @@ class Trainer:
         self._optimizer.rate = rate
 
     def step(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> StepResult:
-        """Learn from this process's part of a batch. Raises InputError if the loss is NaN or infinite."""
+        """Learn from this process's part of a batch. Raises DivergedError if the loss is NaN or infinite."""
         rate = self._optimizer.rate
         part = self._batch_loss(items, graphs)
         weight = float(sum_over_processes(torch.tensor(part.weight))) or 1.0
         mean = float(sum_over_processes(part.loss.detach().cpu())) / weight
         if not math.isfinite(mean):
-            raise InputError(
+            raise DivergedError(
                 f"the loss of step {self.done + 1} is NaN or infinite: begin again with a lower training.rate"
             )
         self._optimizer.zero_grad()

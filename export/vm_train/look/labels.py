@@ -135,7 +135,7 @@ def find_truths(
         return Truths.none()
     positions = np.stack([each.position for each in known])
     centers = (positions - (0.0, 0.0, view.height)) @ view.heading
-    if scene is not None and object_class == scene.class_name:
+    if scene is not None and scene.tells(object_class):
         radii = np.array([each.shape.half_size for each in scene.objects])
         return Truths(centers, radii, np.array([each.visible for each in scene.objects]))
     shares = np.array([_visible_share(view, center, each) for center, each in zip(centers, known, strict=True)])

@@ -25,6 +25,7 @@ from vm_export.look_checkpoint import LookCheckpoint
 
 from ..data.split import Split, read_split, write_split
 from ..evaluation.answers import ExactSubject, load_subject
+from ..evaluation.field_truth import CLASSES
 from ..learning.folder_access import check_unused
 from .configuration import LookConfiguration
 
@@ -159,6 +160,9 @@ def judged_class(configuration: LookConfiguration, subject: ExactSubject, model:
             f"{model} has class {name!r}, but those of the kind {kinds[name]} in [classes] are "
             f"{', '.join(in_masks) or 'none'}: give the class and its colors in masks there"
         )
+    missing = [each for each in CLASSES if each not in configuration.classes.kinds]
+    if name in uprights and missing:
+        raise InputError(f"the truth about a {name} needs the classes {', '.join(missing)}: add them to [classes]")
     return name
 
 

@@ -80,13 +80,12 @@ class LookTrainer:
             network, Recipe(optimizer=recipe.optimizer, rate=recipe.rate, decay=recipe.decay), total
         )
 
-    def grade(self) -> float:
-        """Draw patches without an object by the network's errors from now on. Returns the mean error, 0 to 1."""
+    def grade(self) -> None:
+        """Draw patches without an object by the network's errors from now on."""
         self.network.eval()
         logits = logits_of(self.network, self._patches.patches[self._without])[:, 0]
         self.network.train()
         self._set_errors(0.5 + 0.5 * np.tanh(0.5 * logits))
-        return float(np.mean(0.5 + 0.5 * np.tanh(0.5 * logits)))
 
     def _set_errors(self, errors: npt.NDArray[np.float32]) -> None:
         self._errors = errors

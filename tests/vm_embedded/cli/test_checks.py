@@ -50,6 +50,19 @@ def test_a_slow_processor_a_slow_governor_and_a_slow_clock_are_seen(root):
     assert "scaling_governor" in seen["governor"].mend
 
 
+def test_the_processor_of_a_jetson_or_a_raspberry_pi_is_known(root):
+    (root / "proc/cpuinfo").write_text("processor : 0\nFeatures : fp asimd evtstrm\nCPU part : 0xd0b\n")
+    assert (found(HEALTHY, root)["processor"].state, found(HEALTHY, root)["processor"].seen) == (GOOD, "ARM: asimd")
+    (root / "proc/cpuinfo").write_text("processor : 0\nFeatures : fp\n")
+    assert "no asimd" in found(HEALTHY, root)["processor"].seen
+
+
+def test_the_password_of_a_camera_is_not_shown(root):
+    for source in ("rtsp://user:s@cret@10.0.0.7/1", "http://user:s@cret@:0/"):
+        camera = replace(HEALTHY.camera, source=source)
+        assert "cret" not in found(replace(HEALTHY, camera=camera), root)["camera"].seen
+
+
 def test_more_threads_than_cores_are_seen():
     assert check_threads(4, 2, 8).state == WARNING
     assert "--threads 2" in check_threads(4, 2, 8).mend

@@ -161,6 +161,23 @@ def test_overlays_are_pictures_of_the_frame_s_size(tmp_path):
     assert (np.abs(drawn.astype(int) - frame).max(axis=2) > 60).sum() > 500
 
 
+def test_an_overlay_never_replaces_an_image(folder, tmp_path):
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    done = detect(folder, "--save-overlay", folder, code=1)
+    assert done.stderr.count("would replace") == len(list(folder.glob("image*.jpg")))
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_overlays_and_points_of_images_with_one_name_stay_apart(folder, lens, tmp_path):
+    twin = shutil.copytree(folder, tmp_path / "twin")
+    out = ("--save-overlay", tmp_path / "out", "--save-points", tmp_path / "out")
+    run(folder, twin, "--model", MODEL, "--lens", lens, *out)
+    names = [path.stem for path in sorted(folder.glob("image*.jpg"))]
+    for suffix in ("jpg", "npz"):
+        expected = sorted(f"{name}{number}.{suffix}" for name in names for number in ("", "-2"))
+        assert sorted(path.name for path in (tmp_path / "out").glob(f"*.{suffix}")) == expected
+
+
 @pytest.mark.parametrize("suffix", [".mp4", ".avi", ".webm"])
 def test_a_video_has_every_frame_with_what_was_found(suffix, folder, tmp_path):
     path = tmp_path / f"found{suffix}"

@@ -195,6 +195,7 @@ def test_an_empty_file_is_nothing(text):
         ("a: []\nb: {}\n", {"a": [], "b": {}}),
         ("a: [[1, 2], [3]]\n", {"a": [[1, 2], [3]]}),
         ("a: !!opencv-matrix\n  rows: 1\n  data: [ 1., 2. ]\n", {"a": {"rows": 1, "data": [1.0, 2.0]}}),
+        ("a: left! camera\nb: 'run!1/x.png'\n", {"a": "left! camera", "b": "run!1/x.png"}),
         ("a: 1\n...\nleft: out\n", {"a": 1}),
         ("# first\na: 1 # one\n\n  # indented\nb: 2\n", {"a": 1, "b": 2}),
         ("-\n  a: 1\n-\n  b: 2\n", [{"a": 1}, {"b": 2}]),

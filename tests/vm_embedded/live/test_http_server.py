@@ -9,7 +9,7 @@ import pytest
 from tests.vm_embedded.live.running import running
 from vm_embedded.errors import InputError
 from vm_embedded.live.http_server import HttpServer
-from vm_embedded.sockets import is_open_to_network
+from vm_embedded.sockets import datagram_socket, is_open_to_network
 
 
 def test_a_busy_port_and_an_unknown_host_are_named_once():
@@ -18,9 +18,14 @@ def test_a_busy_port_and_an_unknown_host_are_named_once():
         busy.listen()
         where = f"127.0.0.1:{busy.getsockname()[1]}"
         with pytest.raises(InputError, match=rf"^can't listen at {where}: Address already in use$"):
-            asyncio.run(HttpServer(where, {}).open())
+            asyncio.run(HttpServer(where, "--status-page", {}).open())
     with pytest.raises(InputError, match=r"^can't listen at host\.invalid:1: (?!Unknown error)"):
-        asyncio.run(HttpServer("host.invalid:1", {}).open())
+        asyncio.run(HttpServer("host.invalid:1", "--status-page", {}).open())
+    for host in ("a..b", "a" * 64):
+        with pytest.raises(InputError, match="can't be the name of a host"):
+            asyncio.run(HttpServer(f"{host}:1", "--status-page", {}).open())
+        with pytest.raises(InputError, match="can't be the name of a host"):
+            datagram_socket(host, 1, "can't send to")
 
 
 def test_orientations_beside_the_camera_s_are_prepared_between_frames(tmp_path):

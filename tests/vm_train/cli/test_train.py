@@ -95,6 +95,7 @@ def test_a_loss_that_is_no_number_ends_the_training_at_once(data, configuration,
     wild = ["--set", "training.rate=1000", "--set", "training.clip=0", "--set", "training.optimizer=sgd"]
     done = run(data, "-o", tmp_path / "run", "--config", configuration, *wild, code=1)
     assert "is NaN or infinite: begin again with a lower training.rate" in done.stderr
+    assert "resume" not in done.stderr  # it would end in the same way
 
 
 @pytest.mark.long

@@ -6,8 +6,12 @@ import pytest
 
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
+from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
+from vm_embedded.network.bundled import model_path
+from vm_train.evaluation.answers import load_subject
 from vm_train.look.configuration import LOOK_HEADER, LookConfiguration, LookRecipe
+from vm_train.look.run_folder import judged_class
 
 
 def read(*entries):
@@ -44,6 +48,14 @@ def test_a_wrong_entry_is_named_with_what_is_allowed(entry, said):
     with pytest.raises(InputError) as error:
         read(entry)
     assert said in str(error.value)
+
+
+def test_uprights_need_the_classes_that_tell_where_they_stand():
+    subject = load_subject(model_path("soccer"), Settings())
+    masks = "classes.{}={{ kind = 'upright', colors = [[255, 255, 0]] }}"
+    configuration = read("patches.object_class=robot", masks.format("robot"))
+    with pytest.raises(InputError, match=r"the truth about a robot needs the classes goal, line"):
+        judged_class(configuration, subject, "soccer")
 
 
 @pytest.mark.parametrize(("epochs", "rounds"), [(12, 3), (7, 3), (5, 5), (4, 1)])

@@ -15,7 +15,7 @@ from vm_embedded.detection.settings import Settings
 from vm_embedded.network.bundled import model_path
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.answers import load_subject
-from vm_train.evaluation.object_truth import read_scene
+from vm_train.evaluation.object_truth import SceneTruth, read_scene
 from vm_train.look.configuration import LookConfiguration
 from vm_train.look.labels import NOTHING, OBJECT, UNLABELED, Truths, find_truths, label_places
 
@@ -116,4 +116,8 @@ def test_truth_from_a_mask_is_near_that_of_the_scene(drawn, tmp_path):
             compared += 1
             assert seen.centers == pytest.approx(exact.centers, abs=0.05)
             assert seen.radii == pytest.approx(exact.radii)
+        of_boxes = SceneTruth(RADIUS, (), in_mask=True)  # as vm-train import-boxes writes it
+        imported = find_truths(picture, of_boxes, manifest, observation.view, "ball")
+        assert np.array_equal(imported.centers, seen.centers)
+        assert len(imported.radii) == len(imported.visible) == len(seen)
     assert compared > 3

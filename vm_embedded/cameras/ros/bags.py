@@ -46,13 +46,14 @@ def is_bag(name: str) -> bool:
 class BagReading:
     """How to read a bag.
 
-    ros: its topics and frames. pose: from where poses come, and how old they may be. lens, orientation: used for all
-    images instead of those in the bag. raw: images keep their own channels. max_megapixels: largest image [Mpx].
+    ros: its topics and frames. pose: from where poses come, and how old they may be. own_lens: the frames get no lens,
+    because the caller has one. orientation: used for all images instead of those in the bag. raw: images keep their own
+    channels. max_megapixels: largest image [Mpx].
     """
 
     ros: RosSettings = field(default_factory=RosSettings)
     pose: PoseSettings = field(default_factory=PoseSettings)
-    lens: Lens | None = None
+    own_lens: bool = False
     orientation: Orientation | None = None
     raw: bool = False
     max_megapixels: float = MAX_MEGAPIXELS
@@ -123,8 +124,10 @@ class _BagFrames:
         source = reading.pose.source
         self._pose_topics = (source.removeprefix("topic:"),) if source.startswith("topic:") else ("/tf", "/tf_static")
         self._tree, self._poses = TransformTree(), PoseBuffer(reading.pose)
-        self._lens = reading.lens
-        self._lens_trouble = f"no message on {reading.ros.camera_info}; give --lens"
+        self._lens: Lens | None = None
+        self._lens_trouble = (
+            "" if reading.own_lens else f"no message on {reading.ros.camera_info}; give --lens or --fov"
+        )
         self._pose_trouble = ""
         self._count = 0
 
@@ -153,7 +156,7 @@ class _BagFrames:
             self._reader.close()
 
     def _take_lens(self, message: Any) -> None:
-        if self._reading.lens is not None:
+        if self._reading.own_lens:
             return
         try:
             self._lens, self._lens_trouble = lens_of(message), ""
@@ -192,7 +195,7 @@ class _BagFrames:
     def _frame(self, image: _Waiting) -> Frame:
         index, self._count = self._count, self._count + 1
         source = f"{self._name} at {image.stamp:.3f} s"
-        orientation, trouble = self._reading.orientation, "" if self._lens is not None else self._lens_trouble
+        orientation, trouble = self._reading.orientation, self._lens_trouble
         if orientation is None:
             try:
                 orientation = self._poses.at(image.stamp)
@@ -208,4 +211,6 @@ class _BagFrames:
             except InputError as error:
                 raise InputError(f"{source}: {error}") from error
 
-        return Frame(index, source, read, stamp=image.stamp, lens=self._lens, orientation=orientation)
+        return Frame(
+            index, source, Path(self._name).stem, read, stamp=image.stamp, lens=self._lens, orientation=orientation
+        )
