@@ -155,7 +155,7 @@ def _appearance(pixels: Floats, size: Size) -> Floats:
 
 def _nothing_found(source: str, board: Board, count: int, sharpest: Image) -> str:
     """The message that no frame shows the board."""
-    where = f"none of {count} frames of {Path(source).name}" if count > 1 else Path(source).name
+    where = f"none of {count} frames of {Path(source).name}" if count > 1 else f"no frame of {Path(source).name}"
     other = board.other_size(sharpest)
     if isinstance(board, CharucoBoard):
         if other is not None:

@@ -12,6 +12,7 @@ from vm_embedded.errors import InputError, ModelError, one_line
 from vm_embedded.network.manifest import Manifest
 
 from .grid import VISUAL, Grid
+from .look_checkpoint import LOOK_FORMAT
 from .network import Network
 from .network_shape import NetworkShape
 from .torch_files import load_values, save_values
@@ -54,6 +55,8 @@ class Checkpoint:
         """Read a checkpoint without executing anything in it. Raises InputError or ModelError."""
         content = load_values(path, "a checkpoint")
         if not isinstance(content, dict) or content.get("format") != _FORMAT:
+            if isinstance(content, dict) and content.get("format") == LOOK_FORMAT:
+                raise InputError(f"{path} is a close look; attach it to a network: vm-export MODEL --look {path}")
             raise InputError(f"{path} is not a checkpoint of format {_FORMAT!r}; train the network again")
         missing = [key for key in ("network", "state", "manifest", "grid") if not isinstance(content.get(key), dict)]
         if missing:

@@ -12,6 +12,7 @@ from vm_embedded.cli.program import Parser, program
 from vm_embedded.errors import InputError, VisualMeshError, install_extra
 from vm_embedded.network.bundled import SHIPPED, model_path
 from vm_embedded.network.manifest import EDGES, LAYOUTS
+from vm_embedded.network.model_file import read_model
 
 if TYPE_CHECKING:
     from .checkpoint import Checkpoint
@@ -183,6 +184,7 @@ def _check_options(options: argparse.Namespace) -> None:
         )
     changes = [option for option in ("look", "no_look", "canary") if getattr(options, option)]
     if not changes:
+        read_model(options.model)
         raise InputError(
             f"{options.model} is a model file already; change its close look with --look or --no-look, or its canary "
             "with --canary"

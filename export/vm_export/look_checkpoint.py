@@ -17,7 +17,7 @@ from vm_embedded.network.look_contract import LookContract
 from .look_network import LookNetwork, LookShape
 from .torch_files import load_values, save_values
 
-_FORMAT = "vm-embedded look 3"
+LOOK_FORMAT = "vm-embedded look 3"
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class LookCheckpoint:
 
     def save(self, path: str | Path) -> None:
         """Write the checkpoint. Raises InputError."""
-        save_values(path, {"format": _FORMAT} | self._as_dict())
+        save_values(path, {"format": LOOK_FORMAT} | self._as_dict())
 
     def _as_dict(self) -> dict[str, Any]:
         """Plain values and tensors. The contract of the glance is in the glance's own part."""
@@ -77,9 +77,9 @@ class LookCheckpoint:
     def load(cls, path: str | Path) -> LookCheckpoint:
         """Read a checkpoint without executing anything in it. Raises InputError or ModelError."""
         content = load_values(path, "a checkpoint of a look network")
-        if not isinstance(content, dict) or content.get("format") != _FORMAT:
+        if not isinstance(content, dict) or content.get("format") != LOOK_FORMAT:
             found = content.get("format") if isinstance(content, dict) else None
-            raise InputError(f"{path} is not a checkpoint of format {_FORMAT!r}; its format is {found!r}")
+            raise InputError(f"{path} is not a checkpoint of format {LOOK_FORMAT!r}; its format is {found!r}")
         try:
             return cls._from_dict(content)
         except (RuntimeError, KeyError, TypeError, ValueError, AttributeError) as error:

@@ -103,6 +103,8 @@ def test_pictures_without_a_board_are_an_error(tmp_path, capsys):
     assert "none of 2 frames of film shows a chessboard with 8x5" in run(
         capsys, "lens", folder, *BOARD, *output, code=1
     )
+    (alone, _) = sorted(folder.iterdir())
+    assert f"no frame of {alone.name} shows a chessboard" in run(capsys, "lens", alone, *BOARD, *output, code=1)
     charuco = ("--board", "9x6", "--square", "0.04", "--charuco", "4X4_50", "--marker", "0.03")
     assert "check --charuco" in run(capsys, "lens", folder, *charuco, *output, code=1)
 

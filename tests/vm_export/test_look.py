@@ -206,7 +206,7 @@ def test_a_checkpoint_of_another_kind_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"model\.pt is not .* 'vm-embedded look 3'.* 'vm-embedded checkpoint"):
         LookCheckpoint.load(tmp_path / "model.pt")
     look_checkpoint().save(tmp_path / "look.pt")
-    with pytest.raises(InputError, match=r"look\.pt is not a checkpoint of format 'vm-embedded checkpoint"):
+    with pytest.raises(InputError, match=r"look\.pt is a close look; attach it to a network: vm-export MODEL --look"):
         Checkpoint.load(tmp_path / "look.pt")
     with pytest.raises(InputError, match="can't read"):
         LookCheckpoint.load(tmp_path / "missing.pt")

@@ -76,6 +76,8 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
             processed += 1
             bar.show(frame.index + 1)
         bar.clear()
+        if processed and not work.points:
+            complain("no frame shows a near part of the plane: check --height [m], --pitch (down is above 0), and lens")
     return processed
 
 
@@ -137,9 +139,12 @@ def _object_classes(detector: Detector) -> tuple[str, ...]:
     return tuple(each.name for each in detector.manifest.classes if each.kind == "object")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Pass:
-    """All that a pass over the frames needs. boxes, mcap, video: the files that the options ask for."""
+    """All that a pass over the frames needs.
+
+    boxes, mcap, video: the files that the options ask for. points: number of mesh points in all frames so far.
+    """
 
     detector: Detector
     pose: _DefaultPose
@@ -150,6 +155,7 @@ class _Pass:
     boxes: BoxWriter | None
     mcap: McapFile | None
     video: VideoFile | None
+    points: int = 0
 
     def process(self, frame: Frame) -> str:
         """Detect in a frame, save the files that the options ask for, and return its line of JSON.
@@ -167,6 +173,7 @@ class _Pass:
         lens, orientation = self.pose.of(frame, (image.shape[1], image.shape[0]))
         explain = options.explain or self.boxes is not None
         detections = self.detector.detect(image, orientation, lens, explain=explain)
+        self.points += len(detections.pixels)
         if self.follow is not None:
             detections = self.follow.tracker.update(detections, self.follow.time(frame))
         if self.boxes is not None:

@@ -38,10 +38,7 @@ LIVE = {
 }
 """Sections for live cameras."""
 
-ANGLES = (
-    "Angles are in radians, or in degrees with a suffix as in 20deg. Write negative degrees with an equals sign, as in "
-    "--pitch=-20deg."
-)
+ANGLES = "Angles are in radians, or in degrees with a suffix as in 20deg."
 
 
 def add_model(parser: argparse.ArgumentParser) -> None:

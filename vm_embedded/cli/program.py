@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import errno
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from difflib import get_close_matches
@@ -36,6 +37,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, commands: Sequence[str] = (), **more: Any) -> None:
         super().__init__(**more)
+        self._negative_number_matcher = re.compile(r"-\.?\d")  # "-5deg", too, is a value and no option
         self._given: Sequence[str] = ()
         self._commands = commands
         self.add_argument("--version", action="version", version=version(self.prog), help="show the version and exit")

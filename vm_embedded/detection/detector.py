@@ -79,6 +79,8 @@ class Detector:
         frame = checked_image(image, self.settings.format)
         if orientation is None:
             raise InputError("there is no orientation: perhaps the lens file has no pose (Hoc); give an Orientation")
+        if not isinstance(lens, Lens):
+            raise InputError(f"lens must be a Lens, as read_lens_file(PATH).lens, not {type(lens).__name__}")
         size = frame.shape[1], frame.shape[0]
         lens = lens.for_image(size)
         watch = Stopwatch()

@@ -31,8 +31,8 @@ class Settings:
     cache_mib: float = number(64.0, "memory for meshes and prepared points", "MiB", (0.0, 65536.0))
     object_radius: float | None = number(
         None,
-        "radius of your object, if it differs from the model's; a network that was trained for any radius also gets a "
-        "mesh for it",
+        "radius of your object, if it differs from the model's (0.095 m for those of the package); a network that was "
+        "trained for any radius also gets a mesh for it",
         "m",
         (1e-3, 10.0),
     )

@@ -102,6 +102,10 @@ def read_content(path: str | Path, max_mib: float = 64.0) -> bytes:
         raise ModelError(f"can't read the model {path}: {getattr(error, 'strerror', None) or error}") from error
 
 
+_ZIP = b"PK\x03\x04"
+"""Begins the checkpoints of torch."""
+
+
 def parse_model(path: str | Path, content: bytes) -> ModelFile:
     """Check the content of a model file. path: for messages.
 
@@ -110,6 +114,8 @@ def parse_model(path: str | Path, content: bytes) -> ModelFile:
     self-test, and find nothing.
     """
     try:
+        if content.startswith(_ZIP):
+            raise ModelError(f"not an ONNX file; if it is a checkpoint, vm-export {path} writes a model file from it")
         metadata, digest = _read_fields(content)
         if METADATA_KEY not in metadata:
             raise ModelError("no Visual Mesh manifest in its metadata; was it written by vm-export?")

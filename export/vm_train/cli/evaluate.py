@@ -14,6 +14,7 @@ from vm_embedded.cli.program import program
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError, VisualMeshError, install_extra
 from vm_embedded.live.configuration import read_configuration
+from vm_embedded.network.bundled import model_path
 from vm_workstation.stopping import stoppable
 
 from .evaluate_options import parser as parser
@@ -64,6 +65,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     from ..evaluation.summary import lines
     from ..evaluation.workers import Job, evaluate
 
+    options.model = model_path(options.model)
     settings = _settings(options)
     pictures = select_pictures(options.data, options.list, options.part)
     rules = Rules(options.radius_of, options.min_radius, options.strict)

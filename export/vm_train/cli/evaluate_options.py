@@ -28,7 +28,12 @@ def parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    made.add_argument("model", type=Path, metavar="MODEL", help="checkpoint (.pt) or model file (.onnx)")
+    made.add_argument(
+        "model",
+        type=Path,
+        metavar="MODEL",
+        help="checkpoint (.pt), model file (.onnx), or one from the package: ball, ball-small or soccer",
+    )
     made.add_argument(
         "data",
         type=Path,

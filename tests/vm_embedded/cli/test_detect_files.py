@@ -281,9 +281,12 @@ def test_configuration_and_options_agree(tmp_path, lens):
 
 def test_looking_at_the_sky_gives_an_empty_result(tmp_path, lens):
     shutil.copy(IMAGES[0], tmp_path / "frame.jpg")
-    (line,) = lines(detect(tmp_path / "frame.jpg", "--lens", lens, "--height", 0.8, "--pitch=-90deg"))
-    assert line["points"] == 0
-    assert line["detections"] == []
+    for pitch in (("--pitch=-90deg",), ("--pitch", "-90deg")):
+        done = detect(tmp_path / "frame.jpg", "--lens", lens, "--height", 0.8, *pitch)
+        (line,) = lines(done)
+        assert line["points"] == 0
+        assert line["detections"] == []
+        one_complaint(done, "no frame shows a near part of the plane: check --height")
 
 
 def test_raw_frames_are_read_in_their_format(tmp_path, lens):

@@ -14,6 +14,7 @@ from tests.drawn_scenes import CHECKPOINT, FOLDER, IMAGES, MODEL
 from vm_embedded import Detector, GeometryError, InputError, ModelError, Orientation, Settings, read_lens_file
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.footprint import levels_for
+from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.choose_layout import choose_layout
@@ -180,6 +181,8 @@ def test_bad_frames_are_refused(detector):
         detector.detect(image, Orientation.from_roll_pitch(0.1), lens)
     with pytest.raises(InputError, match="proportions"):
         detector.detect(image, orientation, replace(lens, size=(100, 100)))
+    with pytest.raises(InputError, match=r"must be a Lens, as read_lens_file\(PATH\)\.lens, not LensFile"):
+        detector.detect(image, orientation, LensFile(lens, orientation))
 
 
 def changed(path, change, source=MODEL):

@@ -114,6 +114,11 @@ def test_a_folder_is_no_model(folder):
         read_model(folder)
 
 
+def test_a_checkpoint_comes_with_the_command_that_exports_it(write):
+    with pytest.raises(ModelError, match=r"not an ONNX file; if it is a checkpoint, vm-export .*model\.onnx writes"):
+        read_model(write(b"PK\x03\x04 a file of torch"))
+
+
 def test_an_empty_file_is_refused(write):
     with pytest.raises(ModelError, match=r"model\.onnx: not an ONNX file"):
         read_model(write(b""))

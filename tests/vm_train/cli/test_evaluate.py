@@ -202,6 +202,11 @@ def bad(tmp_path):
     return folder
 
 
+def test_the_networks_of_the_package_have_names(capsys, data, tmp_path):
+    assert "class 'other' has no color in masks" in complaint(capsys, "ball", data, "-o", tmp_path / "out")
+    assert "unknown network 'bal'; did you mean 'ball'?" in complaint(capsys, "bal", data, "-o", tmp_path / "out")
+
+
 def test_strange_colors_come_with_advice_and_a_strict_run_ends_at_the_first_bad_picture(capsys, bad, tmp_path):
     out = ("-o", tmp_path / "out", "--workers", 1)
     said = complaint(capsys, MODEL, bad, *out)
