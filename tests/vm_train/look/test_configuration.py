@@ -52,8 +52,11 @@ def test_a_wrong_entry_is_named_with_what_is_allowed(entry, said):
 
 def test_uprights_need_the_classes_that_tell_where_they_stand():
     subject = load_subject(model_path("soccer"), Settings())
-    masks = "classes.{}={{ kind = 'upright', colors = [[255, 255, 0]] }}"
-    configuration = read("patches.object_class=robot", masks.format("robot"))
+    masks = (
+        "classes.robot={ kind = 'upright', colors = [[255, 255, 0]] }",
+        "classes.other={ kind = 'background', colors = [[0, 0, 0]] }",
+    )
+    configuration = read("patches.object_class=robot", *masks)
     with pytest.raises(InputError, match=r"the truth about a robot needs the classes goal, line"):
         judged_class(configuration, subject, "soccer")
 
