@@ -184,7 +184,7 @@ def _check_options(options: argparse.Namespace) -> None:
         )
     changes = [option for option in ("look", "no_look", "canary") if getattr(options, option)]
     if not changes:
-        read_model(options.model)
+        read_model(options.model)  # raises ModelError for a file of another program
         raise InputError(
             f"{options.model} is a model file already; change its close look with --look or --no-look, or its canary "
             "with --canary"

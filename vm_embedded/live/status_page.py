@@ -95,8 +95,8 @@ class StatusPage:
             b"Cache-Control: no-store\r\nConnection: close\r\n\r\n"
         )
         while True:
+            sent = self._latest
             picture = await self._picture()
-            sent = None if self._shown is None else self._shown[0]
             if picture is not None:
                 head = b"\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(picture)
                 await write(_BOUNDARY + head + picture + b"\r\n")

@@ -42,6 +42,9 @@ _REFUSED = {
 SEAL_KEY = "visual_mesh_sha256"
 """Key of the seal in the metadata of a model file: the SHA-256 of everything else in the file."""
 
+_ZIP = b"PK\x03\x04"
+"""First bytes of a zip archive, which is what torch writes."""
+
 _METADATA_PROPS = 14
 _EXTERNAL_DATA, _DATA_LOCATION = 13, 14
 _OP_TYPE = 4
@@ -100,10 +103,6 @@ def read_content(path: str | Path, max_mib: float = 64.0) -> bytes:
         return path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
         raise ModelError(f"can't read the model {path}: {getattr(error, 'strerror', None) or error}") from error
-
-
-_ZIP = b"PK\x03\x04"
-"""Begins the checkpoints of torch."""
 
 
 def parse_model(path: str | Path, content: bytes) -> ModelFile:

@@ -29,7 +29,7 @@ def save_overlay(path: Path, frame: Frame, detections: Detections) -> None:
 
 
 class FrameNames:
-    """Names, without suffix, for the files of frames, all different. prefix: of names that do not begin with it."""
+    """Names, without suffix, for the files of frames, all different. With a prefix, each name begins with it."""
 
     def __init__(self, prefix: str = "") -> None:
         self._prefix = prefix

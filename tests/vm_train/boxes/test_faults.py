@@ -143,6 +143,17 @@ def test_voc_images_and_boxes_of_wrong_sizes(tmp_path):
     )
 
 
+def test_long_coco_ids_that_begin_alike_are_different(tmp_path):
+    write_coco(tmp_path, {"a": [BALL], "b": [BALL, GOAL]})
+    path = tmp_path / "instances.json"
+    table = json.loads(path.read_text())
+    for name, key in (("images", "id"), ("annotations", "image_id")):
+        for entry in table[name]:
+            entry[key] = f"{'a long path/' * 8}{entry[key]}"
+    path.write_text(json.dumps(table))
+    check(tmp_path, [], {"a": 1, "b": 2})
+
+
 def test_coco_images_and_boxes_of_wrong_sizes(tmp_path):
     write_coco(tmp_path, {**GOOD, "a": [BALL], "b": [BALL] * 6, "c": [BALL], "d": [BALL]})
     path = tmp_path / "instances.json"

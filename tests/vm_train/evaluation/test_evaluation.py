@@ -19,7 +19,7 @@ from vm_train.data.pictures import Picture, find_pictures, read_picture
 from vm_train.evaluation.answers import ExactSubject, load_subject
 from vm_train.evaluation.evaluation import Evaluation, Rules, evaluate_pictures
 from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
-from vm_train.evaluation.object_truth import SceneObject, SceneTruth
+from vm_train.evaluation.object_truth import SceneObject, SceneTruth, read_scene, true_objects
 from vm_train.evaluation.tables import as_csv, as_json
 from vm_train.evaluation.workers import Job, evaluate
 
@@ -224,3 +224,17 @@ def test_the_radius_of_a_scene_makes_mesh_and_fit(files, tmp_path):
     result = evaluate_pictures(subject, find_pictures(folder), CLASSES, Rules(radius_of="scene"))
     assert "scene0000.json" in next(iter(result.faults.values()))
     assert result.radii == [RADIUS]
+
+
+def test_objects_of_masks_have_the_radius_that_was_looked_for(files):
+    """Without its scene, a ball of 0.07 m is placed right only with its own radius."""
+    errors = {0.07: [], 0.095: []}
+    for each in files:
+        picture, scene = read_picture(each, CLASSES), read_scene(each.image.with_name(f"scene{each.number}.json"))
+        for radius, found in errors.items():
+            answer = load_subject(MODEL, Settings(object_radius=radius)).answer(picture)
+            seen = true_objects(picture, None, answer.manifest)["ball"]
+            if len(seen) == len(scene.objects) == 1 and scene.objects[0].visible > 0.95:
+                found.append(np.linalg.norm(seen[0].position - scene.objects[0].center))
+    assert len(errors[0.07]) > 2
+    assert np.median(errors[0.07]) < 0.5 * np.median(errors[0.095])
