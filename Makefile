@@ -47,8 +47,7 @@ lint: .venv/dev ## style, spelling and types
 matrix: .venv/dev ## test the runtime with each Python from 3.10 to 3.14 that is here, the oldest and the newest numpy
 	$(BIN)/python -m tests.matrix
 
-release: .venv/dev ## make a release in dist/: make release VERSION=0.2.0 [URL=https://HOST/OWNER/NAME]
-	@test -n "$(VERSION)" || { echo 'make release needs VERSION, as in make release VERSION=0.2.0'; exit 1; }
+release: need-VERSION .venv/dev ## make a release in dist/: make release VERSION=0.2.0 [URL=https://HOST/OWNER/NAME]
 	$(BIN)/python deploy/release.py $(VERSION) $(if $(URL),--url '$(URL)')
 
 bundle: .venv/bundle ## pack all that a robot needs in one file: make bundle [MODEL=model.onnx] [CONFIG=vm.toml] [TARGET=linux_x86_64-cp311] [KEY=id_ed25519]
@@ -59,13 +58,11 @@ BUNDLE = dist/vm-embedded-robot-$(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' 
 deb: bundle ## pack the bundle as a Debian package
 	$(BIN)/python deploy/debian.py $(BUNDLE)
 
-deploy: ## bundle, copy, install, and show the detections: make deploy ROBOT=user@host [MODEL=] [CONFIG=] [TARGET=] [KEY=] [OPTIONS=--allow-older]
-	@test -n "$(ROBOT)" || { echo 'make deploy needs ROBOT=user@host'; exit 1; }
+deploy: need-ROBOT ## bundle, copy, install, and show the detections: make deploy ROBOT=user@host [MODEL=] [CONFIG=] [TARGET=] [KEY=] [OPTIONS=--allow-older]
 	@$(MAKE) bundle
 	sh deploy/deploy.sh $(BUNDLE) $(ROBOT) $(OPTIONS)
 
-logs: ## follow the log of a robot: make logs ROBOT=user@host
-	@test -n "$(ROBOT)" || { echo 'make logs needs ROBOT=user@host'; exit 1; }
+logs: need-ROBOT ## follow the log of a robot: make logs ROBOT=user@host
 	ssh $(ROBOT) 'if [ "$$(id -u)" = 0 ]; then s=; else s=sudo; fi; $$s journalctl --unit vm-detect --lines 50 --follow'
 
 lock: ## choose the robot's packages, and write their hashes to deploy/robot.txt
@@ -80,15 +77,13 @@ bench: .venv/bench ## measure the speed, also of other detectors; write docs/per
 	$(BIN)/python -m benchmarks.instruction_sets
 	$(BIN)/python -m benchmarks.report
 
-bench-external: .venv/runtime ## compare with another program, see benchmarks/external.py: make bench-external PEER='./engine' [MODEL=ball]
-	@test -n "$(PEER)" || { echo "make bench-external needs PEER='command'"; exit 1; }
+bench-external: need-PEER .venv/runtime ## compare with another program, see benchmarks/external.py: make bench-external PEER='./engine' [MODEL=ball]
 	$(BIN)/python -m benchmarks.external '$(PEER)' $(if $(MODEL),--model '$(MODEL)')
 
-data: .venv/synth ## render a training set: make data HDRI=folder-of-maps [OUT=data/train] [COUNT=8000] [SEED=1] [SCENES=a.toml]
-	@test -n "$(HDRI)" || { echo 'make data needs HDRI=folder-of-maps'; exit 1; }
+data: need-HDRI .venv/synth ## render a training set: make data HDRI=folder-of-maps [OUT=data/train] [COUNT=8000] [SEED=1] [SCENES=a.toml]
 	$(BIN)/vm-synth $(OUT) --count $(COUNT) --hdri $(HDRI) --seed $(SEED) --config $(SCENES)
 
-networks: .venv/dev ## train the networks of the package from their seeds: make networks HDRI=folder-of-maps (hours)
+networks: need-HDRI .venv/dev ## train the networks of the package from their seeds: make networks HDRI=folder-of-maps (hours)
 	$(MAKE) data OUT=data/soccer COUNT=16000 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 	$(BIN)/python -c "from pathlib import Path; from vm_train.tuning.rendered_patches import RENDERED, write_rendered; \
@@ -129,7 +124,7 @@ vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball
 	$(BIN)/vm-export $(BUILD)/balls.onnx --look $(BUILD)/goal-look/look.pt -o $(BUILD)/balls-and-posts.onnx
 	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-look/look.pt -o $@
 
-test-data: .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
+test-data: need-HDRI .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
 	$(BIN)/python -m benchmarks.test_data $(HDRI) $(TEST)
 
 score: .venv/dev ## evaluate the networks of the package; write docs/results.md: make score [TEST=data/test] (10 minutes)
@@ -137,10 +132,10 @@ score: .venv/dev ## evaluate the networks of the package; write docs/results.md:
 	$(BIN)/python -m benchmarks.field $(TEST)
 	$(BIN)/python -m benchmarks.shipped_report
 
-bench-synth: .venv/synth ## measure vm-synth: make bench-synth HDRI=folder-of-maps (8 minutes)
+bench-synth: need-HDRI .venv/synth ## measure vm-synth: make bench-synth HDRI=folder-of-maps (8 minutes)
 	$(BIN)/python -m benchmarks.synth $(HDRI)
 
-bench-train: .venv/dev ## measure vm-train: make bench-train DATA=folder-of-pictures (5 minutes)
+bench-train: need-DATA .venv/dev ## measure vm-train: make bench-train DATA=folder-of-pictures (5 minutes)
 	$(BIN)/python -m benchmarks.training $(DATA)
 
 choices: .venv/dev ## measure what each choice of a training is worth: make choices [TEST=data/test], after networks and test-data (hours)
@@ -151,7 +146,7 @@ look-choices: .venv/dev ## measure what each choice of a close look is worth: ma
 	$(BIN)/python -m benchmarks.look_choices data/soccer $(TEST)/field build/look-choices
 	$(BIN)/python -m benchmarks.look_choices_report
 
-peers: .venv/bench ## train other detectors, and compare their speed and accuracy: make peers HDRI=folder-of-maps [TEST=data/test] (hours)
+peers: need-HDRI .venv/bench ## train other detectors, and compare their speed and accuracy: make peers HDRI=folder-of-maps [TEST=data/test] (hours)
 	$(MAKE) data OUT=data/peers COUNT=2500 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(BIN)/python -m benchmarks.peers.train data/peers build/peers
 	$(BIN)/python -m benchmarks.peers.train data/peers build/peers --lens rectilinear
@@ -172,6 +167,9 @@ docs: .venv/dev demo ## write the generated pages of docs/ and the demo's pictur
 site: .venv/docs ## build docs/ as a web site in build/site
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --config-file docs/site/mkdocs.yml
 	@echo "Open $(CURDIR)/build/site/index.html, or with search: $(BIN)/python -m http.server --directory build/site"
+
+need-%:
+	@test -n "$($*)" || { echo '$* is missing; make help shows how to give it'; exit 1; }
 
 clean: ## remove everything that make made
 	rm -rf .venv demo-out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -19,11 +19,10 @@ from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import GeometryError
 from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
 from vm_embedded.network.model_file import read_model
-from vm_synth.dataset.files import CLASS_COLORS
 from vm_train.data.classes import Classes
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.evaluation import Evaluation, Rules
-from vm_train.evaluation.mask_colors import classes_with_colors
+from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
 from vm_train.evaluation.workers import Job, evaluate
 from vm_train.evaluation.worst_errors import WorstError
 from vm_train.evaluation.worst_pictures import draw_error
@@ -69,10 +68,8 @@ def _job(model: Path, settings: Settings) -> Job:
 
 
 def classes_of(model: Path) -> Classes:
-    """A network's classes with their colors in masks; the class other has those of all that is no ball."""
-    manifest = read_model(model).manifest
-    rest = tuple(color for name, color in CLASS_COLORS.items() if name != "ball")
-    return classes_with_colors(manifest, {name: (color,) for name, color in CLASS_COLORS.items()} | {"other": rest}, [])
+    """A network's classes with their colors in masks of vm-synth."""
+    return classes_with_colors(read_model(model).manifest, default_colors(model, None), [])
 
 
 def numbers(scores: ObjectScores, bins: range | None, overlap: float = 0.5) -> dict[str, Any]:

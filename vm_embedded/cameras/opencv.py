@@ -137,6 +137,7 @@ def check_opencv_settings(settings: CameraSettings) -> None:
     if settings.pixel_format and (len(settings.pixel_format) != 4 or not settings.pixel_format.isascii()):
         raise InputError(f"pixel_format must be four letters such as MJPG, not {settings.pixel_format!r}")
     if settings.source.startswith("gstreamer:"):
-        backends = [cv2.videoio_registry.getBackendName(each) for each in cv2.videoio_registry.getBackends()]
+        registry = cv2.videoio_registry  # lists backends that this OpenCV lacks, too
+        backends = [registry.getBackendName(each) for each in registry.getBackends() if registry.hasBackend(each)]
         if "GSTREAMER" not in backends:
             raise InputError(f"this OpenCV was built without GStreamer (it has {', '.join(backends)})")

@@ -116,6 +116,13 @@ def _run(options: argparse.Namespace) -> int:
     bar = ProgressBar(options.frames)
     runs = measure(detectors, work.image, work.lens, work.orientations, bar.show)
     bar.clear()
+    assumed = ["lens"] * (given.lens is None and given.fov is None) + ["pose"] * (given.fixed_orientation() is None)
+    if assumed:
+        print(
+            f"vm-bench: no {' and no '.join(assumed)} given, so common ones were used; the robot's own decide how many "
+            "points a frame has",
+            file=sys.stderr,
+        )
     found = _figures(model, work, detectors, runs)
     if not json_to_stdout:
         print(bench_table(found), flush=True)

@@ -7,20 +7,24 @@ import errno
 import fcntl
 import math
 import os
+import socket
 import struct
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from ..cameras.camera import without_password
-from ..cameras.open_camera import brings_lens_and_pose, camera_opener
+from ..cameras.open_camera import brings_lens_and_pose, camera_opener, is_live
 from ..cameras.opencv import device_path
 from ..errors import InputError, VisualMeshError, one_line
+from ..geometry.lens import Size
+from ..geometry.radial_lenses import RadialLens
 from ..live.configuration import Configuration
 from ..live.control import control_path
-from ..live.load_detector import prove_model
+from ..live.load_detector import prove_network
 
 GOOD, WARNING, BAD = "ok", "warning", "failure"
 
@@ -32,6 +36,12 @@ _V4L2_BUF_TYPE_VIDEO_CAPTURE = 1
 
 _EARLIEST_TIME = 1735689600.0
 """Start of 2025, since 1970 [s]: a clock that shows less is wrong."""
+
+_PORTS = {"http": 80, "https": 443, "rtsp": 554, "rtmp": 1935}
+"""Usual ports of the addresses of cameras."""
+
+_PATIENCE = 3.0
+"""How long to wait for the host of a camera [s]."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +67,7 @@ def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator
         yield check_model(configuration)
         yield from check_cameras(configuration, root)
         yield check_lens(configuration)
+        yield check_pose(configuration)
         yield check_clock(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", time.time())
         yield check_status_socket(configuration)
     except OSError as error:
@@ -129,7 +140,7 @@ def check_opencv(installed: set[str]) -> Finding:
 def check_model(configuration: Configuration) -> Finding:
     """Whether the model loads, passes its self-tests and finds its canary, in another process."""
     try:
-        model, proved = asyncio.run(prove_model(configuration))
+        model, proved = asyncio.run(prove_network(configuration))
     except VisualMeshError as error:
         return Finding("model", BAD, str(error), "vm-detect --check-config tells whether it works after a change")
     seen = f"{configuration.model}: {proved}, sha256 {model.sha256[:16]}..."
@@ -161,12 +172,30 @@ def check_cameras(configuration: Configuration, root: Path) -> Iterator[Finding]
         return
     may_change = device is not None and "by-" not in str(device)
     shown = without_password(source)
+    refused = _refused_connection(source)
+    if refused:
+        yield Finding("camera", BAD, f"{shown}: {refused}", "ping the host, and compare port and address")
+        return
     yield Finding(
         "camera",
         WARNING if may_change else GOOD,
         f"{shown}: the number may change when cameras are plugged in again" if may_change else shown,
         "ls -l /dev/v4l/by-id/ and use one of these paths" if may_change else "",
     )
+
+
+def _refused_connection(source: str) -> str:
+    """Why the host of a camera's address can't be reached; empty if it can, and for other sources."""
+    try:
+        address = urlsplit(source)
+        if address.scheme not in _PORTS or not address.hostname:
+            return ""
+        with socket.create_connection((address.hostname, address.port or _PORTS[address.scheme]), _PATIENCE):
+            return ""
+    except OSError as error:
+        return error.strerror or str(error)
+    except ValueError as error:  # for example a port that is no number
+        return str(error)
 
 
 def _check_video_device(node: Path) -> Finding:
@@ -209,7 +238,8 @@ def check_lens(configuration: Configuration) -> Finding:
     if lens is None:
         if brings_lens_and_pose(camera.source):
             return Finding("lens", GOOD, f"{camera.source} has its own")
-        return Finding("lens", WARNING, "no lens is configured", "vm-detect --lens FILE, or set lens in vm.toml")
+        state = BAD if is_live(camera.source) else WARNING
+        return Finding("lens", state, "no lens is configured", "vm-detect --lens FILE, or set lens in vm.toml")
     if lens.lens.size is None:
         return Finding(
             "lens",
@@ -217,6 +247,13 @@ def check_lens(configuration: Configuration) -> Finding:
             "the lens has no image size",
             "add it to the lens: size: [width, height] in YAML, size = [width, height] in TOML, image_width and "
             "image_height in a calibration",
+        )
+    if isinstance(lens.lens, RadialLens) and _is_position(lens.lens.center, lens.lens.size):
+        return Finding(
+            "lens",
+            WARNING,
+            f"center {list(lens.lens.center)} px is far from the middle of the picture",
+            "center is the picture's middle minus the optical center, [0, 0] if they are the same; correct the lens",
         )
     if not (camera.width and camera.height):
         return Finding(
@@ -232,6 +269,33 @@ def check_lens(configuration: Configuration) -> Finding:
             "calibrate at the camera's size, or set [camera] width and height to the lens size",
         )
     return Finding("lens", GOOD, f"for {lens.lens.size[0]} x {lens.lens.size[1]} px; fits the camera")
+
+
+def _is_position(center: tuple[float, float], size: Size) -> bool:
+    """Whether a lens center [px] looks like a position in a picture of a size [px], and not like an offset."""
+    return min(abs(offset) / side for offset, side in zip(center, size, strict=True)) > 0.25
+
+
+def check_pose(configuration: Configuration) -> Finding:
+    """Whether the detector gets the pose of the camera."""
+    source = configuration.camera.source
+    if configuration.pose.source != "fixed":
+        return Finding("pose", GOOD, f"from {configuration.pose.source}")
+    try:
+        orientation = configuration.fixed_orientation()
+    except VisualMeshError as error:
+        return Finding("pose", BAD, str(error), "vm-detect --height M, or set height in [orientation] of vm.toml")
+    if orientation is not None:
+        pitch, roll = (round(math.degrees(each), 1) + 0.0 for each in (orientation.pitch, orientation.roll))
+        return Finding("pose", GOOD, f"height {orientation.height:g} m, pitch {pitch:g} deg, roll {roll:g} deg")
+    if brings_lens_and_pose(source):
+        return Finding("pose", GOOD, f"{source} has its own")
+    return Finding(
+        "pose",
+        BAD if is_live(source) else WARNING,
+        "no pose of the camera is configured",
+        "vm-detect --height M --pitch ANGLE, or --pose-source; or set them in vm.toml",
+    )
 
 
 def check_clock(source: Path, now: float) -> Finding:

@@ -8,6 +8,7 @@ import json
 import signal
 import sys
 from collections.abc import Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 
 import cv2
@@ -22,8 +23,9 @@ from ..live.control import REFUSED, ask, control_path
 from ..live.daemon import EXIT_CONFIGURATION, Daemon
 from ..live.load_detector import prove_model
 from ..live.log import EventLog
+from ..network.bundled import SHIPPED, shipped_name
 from .detect_files import complain, detect_in_files
-from .options import ANGLES, add_live, add_model, add_pose, add_settings, add_track, read_options
+from .options import ANGLES, LIVE, add_live, add_model, add_pose, add_settings, add_track, read_options
 from .program import Parser, program
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
@@ -38,6 +40,9 @@ _FILES_ONLY = (
     "explain",
 )
 """Options that a live camera rejects."""
+
+_LIVE_ONLY = ("output", "status", "recorder")
+"""Sections of vm.toml whose options only a live camera has."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -157,7 +162,7 @@ def _run(options: argparse.Namespace) -> int:
             raise
         return _report_bad_configuration(error)
     if options.print_config:
-        print(to_commented_toml(given, HEADER), end="")
+        print(to_commented_toml(replace(given, model=_movable(given.model)), HEADER), end="")
         return EXIT_OK
     if options.ask:
         return _ask(given, options.ask)
@@ -169,7 +174,17 @@ def _run(options: argparse.Namespace) -> int:
         raise InputError(f"only one live camera at a time is possible, not {', '.join(options.files)}")
     if options.live or is_live(given.camera.source):
         return _detect_live(options)
+    for name in (f"{section}_{each.name}" for section in _LIVE_ONLY for each in fields(LIVE[section])):
+        if getattr(options, name) is not None:
+            raise InputError(
+                f"--{name.replace('_', '-')} works only with a live camera; --live plays files like a live camera"
+            )
     return EXIT_OK if detect_in_files(options, given) else EXIT_FAILED
+
+
+def _movable(model: str) -> str:
+    """A model as a vm.toml in any folder may name it: by its name in the package, else by its absolute path."""
+    return model if model in SHIPPED else shipped_name(Path(model)) or str(Path(model).absolute())
 
 
 def _ask(given: Configuration, command: str) -> int:

@@ -60,11 +60,13 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
         if options.save_video is not None:
             video = stack.enter_context(VideoFile(options.save_video, source.rate or _IMAGES_RATE))
         work = _Pass(detector, pose, follow, options, emit_points, FrameNames(), boxes, mcap, video)
+        remark = ""
         for frame in source.frames:
             if follow is not None and frame.index == 0:
                 follow.time(frame)  # without times, no frame can be processed
             try:
                 line = work.process(frame)
+                remark = remark or pose.unused(frame)
             except VisualMeshError as error:
                 bar.clear()
                 complain(str(error))
@@ -76,6 +78,8 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
             processed += 1
             bar.show(frame.index + 1)
         bar.clear()
+        if remark:
+            complain(remark)
         if processed and not work.points:
             complain("no frame shows a near part of the plane: check --height [m], --pitch (down is above 0), and lens")
     return processed
@@ -103,6 +107,16 @@ class _DefaultPose:
 
     given: Configuration
     orientation: Orientation | None
+
+    def unused(self, frame: Frame) -> str:
+        """What the lens file beside a frame replaces of what the user gave, as a remark; empty if nothing."""
+        beside = lens_beside(frame.path)
+        if beside is None:
+            return ""
+        lens = self.given.lens is not None or self.given.fov is not None
+        pose = self.orientation is not None and read_lens_file(beside).orientation is not None
+        replaced = ["lens"] * lens + ["pose"] * pose
+        return f"{beside} replaces the given {' and '.join(replaced)}" if replaced else ""
 
     def of(self, frame: Frame, size: Size) -> tuple[Lens, Orientation]:
         """Lens and orientation of a frame of a size [px]; the lens file beside it takes precedence. Raises InputError

@@ -32,7 +32,7 @@ class Parser(argparse.ArgumentParser):
     """A parser of a program's options, or of one of its commands ("vm-train check").
 
     commands: names of the program's commands, for completion. An error of usage is one line, which names the nearest
-    option, and not the whole usage. Exit status 2.
+    option or command, and not the whole usage. Exit status 2.
     """
 
     def __init__(self, commands: Sequence[str] = (), **more: Any) -> None:
@@ -59,7 +59,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print what is wrong as one line, and exit with status 2."""
-        message = self._unknown_option() or message
+        message = self._unknown_option() or self._unknown_command() or message
         self.exit(2, f"{self.prog}: {' '.join(message.split())}; {self.prog} --help lists the options\n")
 
     def completions(self, words: Sequence[str]) -> list[str]:
@@ -73,6 +73,14 @@ class Parser(argparse.ArgumentParser):
         else:
             candidates = list(self._commands) if len(words) < 2 else []
         return [each for each in candidates if each.startswith(last)]
+
+    def _unknown_command(self) -> str | None:
+        """What is wrong with a first argument that resembles a command and is no file; None for other arguments."""
+        first = self._given[0] if self._given else ""
+        near = get_close_matches(first, self._commands, n=1)
+        if not near or first in self._commands or os.path.lexists(first):
+            return None
+        return f"unknown command {first}: did you mean {near[0]}?"
 
     def _unknown_option(self) -> str | None:
         """What is wrong with the first argument that looks like an option but is none; None if all are options."""

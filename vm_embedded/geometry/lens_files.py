@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..config.toml_reader import parse_toml
+from ..config.units import parse_angle
 from ..config.yaml_reader import read_yaml
 from ..errors import InputError, VisualMeshError, unknown
 from .calibrated_lenses import BrownLens, CalibratedLens, FisheyeLens
@@ -44,11 +45,13 @@ _COEFFICIENT_KEYS = (
 class LensFile:
     """The contents of a lens file.
 
-    lens: the lens. orientation: of the camera, or None if the file has no `Hoc`.
+    lens: the lens. orientation: of the camera, or None if the file has no `Hoc`. path: the file, or None for a lens
+    from elsewhere.
     """
 
     lens: Lens
     orientation: Orientation | None
+    path: Path | None = None
 
 
 def read_lens_file(path: str | Path) -> LensFile:
@@ -65,8 +68,8 @@ def read_lens_file(path: str | Path) -> LensFile:
     try:
         if path.suffix.lower() == ".toml":
             table = parse_toml(text)
-            return LensFile(lens_from_table(table.get("lens", table)), None)
-        return parse_lens_yaml(text)
+            return LensFile(lens_from_table(table.get("lens", table)), None, path)
+        return replace(parse_lens_yaml(text), path=path)
     except VisualMeshError as error:
         raise InputError(f"lens file {path}: {error}") from error
 
@@ -125,8 +128,8 @@ def _listed(numbers: Sequence[float]) -> str:
 
 
 def lens_from_table(table: Mapping[str, Any]) -> RadialLens:
-    """A lens from the keys projection, focal_length [px] and fov [rad], and optionally center, distortion and size
-    [px].
+    """A lens from the keys projection, focal_length [px] and fov [rad, or as in "174deg"], and optionally center,
+    distortion and size [px].
 
     Raises InputError for an unknown or missing key and for a wrong value.
     """
@@ -141,7 +144,7 @@ def lens_from_table(table: Mapping[str, Any]) -> RadialLens:
     size = _numbers(table["size"], "size", 2) if "size" in table else None
     return projection_named(table["projection"])(
         focal_length=_number(table["focal_length"], "focal_length"),
-        fov=_number(table["fov"], "fov"),
+        fov=parse_angle(table["fov"], "fov"),
         center=_pair(table.get("center", (0.0, 0.0)), "center"),
         distortion=_pair(table.get("distortion", (0.0, 0.0)), "distortion"),
         size=None if size is None else (int(size[0]), int(size[1])),

@@ -144,8 +144,11 @@ def _commented_fov(value: float | None) -> str:
 def _commented_lens(value: LensFile | None) -> str:
     comment = (
         "# the lens: a calibration file of the Visual Mesh reference, OpenCV or ROS, or a TOML file; or a table,\n"
-        "# [lens], with projection, focal_length [px] and fov [rad], and optionally center, distortion and size [px]\n"
+        '# [lens], with projection, focal_length [px] and fov [rad, or as in "174deg"], and optionally center,\n'
+        "# distortion and size [px]\n"
     )
+    if value is not None and value.path is not None:  # absolute, because the new file may be in another folder
+        return comment + f"lens = {json.dumps(str(value.path.absolute()))}"
     lens = value.lens if value is not None else None
     if not isinstance(lens, RadialLens):
         return comment + '# lens = "lens.yaml"'
@@ -199,7 +202,7 @@ def read_configuration(path: str | Path) -> Configuration:
         lens: object = read.lens  # the sections leave the path of a lens file here
         if isinstance(lens, Path):
             read = replace(read, lens=read_lens_file(path.parent / lens))
-        return replace(read, model=str(path.parent / model_path(read.model)))
+        return replace(read, model=str(model_path(read.model, path.parent)))
     except VisualMeshError as error:
         raise InputError(f"configuration {path}: {error}") from error
 

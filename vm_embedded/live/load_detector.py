@@ -13,12 +13,20 @@ from .proving_process import prove_in_process
 
 
 async def prove_model(configuration: Configuration) -> tuple[ModelFile, str]:
-    """Check camera, lens, poses and trigger class, and prove the configured network in another process.
+    """Check camera, lens, poses and trigger class, and prove the configured network as `prove_network` does.
 
-    Return the model file and in words what was proved. This process does not run the network, so root may call it for
-    a file that it does not trust. Raises VisualMeshError for the first thing that is missing or invalid.
+    Raises VisualMeshError for the first thing that is missing or invalid.
     """
     _check_camera(configuration)
+    return await prove_network(configuration)
+
+
+async def prove_network(configuration: Configuration) -> tuple[ModelFile, str]:
+    """Check the trigger class, and prove the configured network in another process.
+
+    Return the model file and in words what was proved. This process does not run the network, so root may call it for
+    a file that it does not trust. Raises VisualMeshError.
+    """
     path = model_path(configuration.model)
     content = read_content(path)
     proved = await prove_in_process(path, content)

@@ -16,8 +16,8 @@ DEFAULT = "ball"
 _FOLDER = Path(__file__).parents[1] / "models"
 
 
-def model_path(model: str | Path) -> Path:
-    """The file of a network: a name of the package, else a path.
+def model_path(model: str | Path, folder: Path = Path()) -> Path:
+    """The file of a network: a name of the package, else a path, which may be relative to a folder.
 
     Raises InputError for a name that is neither, and for a network that is not installed.
     """
@@ -29,9 +29,10 @@ def model_path(model: str | Path) -> Path:
                 "file, such as /opt/vm-embedded/current/etc/model.onnx"
             )
         return path
-    if not Path(model).suffix and not os.path.exists(model):  # noqa: PTH110 (Path.exists raises for long names)
+    path = folder / model
+    if not path.suffix and not os.path.exists(path):  # noqa: PTH110 (Path.exists raises for long names)
         raise InputError(f"{unknown('network', str(model), SHIPPED)}, or the path of a model file")
-    return Path(model)
+    return path
 
 
 def shipped_name(path: Path) -> str | None:

@@ -31,10 +31,15 @@ def classes_with_colors(
 ) -> Classes:
     """The network's classes with their default colors in masks, and with more colors for some of them.
 
+    A background class without a default color gets the default colors of all classes that the network does not have.
     Raises InputError for a color of a class that the network does not have, and for a class without any color.
     """
     names = [each.name for each in manifest.classes]
-    found: dict[str, tuple[Color, ...]] = {name: defaults.get(name, ()) for name in names}
+    given = [color for _, color in more]
+    rest = tuple(each for name, colors in defaults.items() if name not in names for each in colors if each not in given)
+    found: dict[str, tuple[Color, ...]] = {
+        each.name: defaults.get(each.name, rest if each.kind == "background" else ()) for each in manifest.classes
+    }
     for name, color in more:
         if name not in found:
             raise InputError(unknown("class of --color", name, names))

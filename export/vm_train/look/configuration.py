@@ -120,7 +120,8 @@ class LookRecipe:
     rounds: int = number(
         3,
         "rounds of the training; before each round except the first, the current network scores all patches without "
-        "an object, and those with larger errors are then drawn more often; 1: all with the same chance",
+        "an object, and those with larger errors are then drawn more often; at most one round for each epoch; "
+        "1: all with the same chance",
         "",
         (1, 100),
     )
@@ -142,12 +143,10 @@ class LookRecipe:
 
     def __post_init__(self) -> None:
         check_entries(self)
-        if self.rounds > self.epochs:
-            raise InputError(f"rounds must be at most epochs, which is {self.epochs}, not {self.rounds}")
 
     def round_of(self, epoch: int) -> int:
         """Round of an epoch; both are counted from 0."""
-        return epoch * self.rounds // self.epochs
+        return epoch * min(self.rounds, self.epochs) // self.epochs
 
 
 @dataclass(frozen=True)

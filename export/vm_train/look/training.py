@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from itertools import groupby
 from time import perf_counter
 from typing import Any
 
@@ -87,8 +88,8 @@ class _Training:
     def run(self, stop_requested: Callable[[], bool]) -> bool:
         """Train until the end or a stop. Returns whether it is finished."""
         self._describe()
-        for number in range(self._recipe.rounds):
-            epochs = [each for each in range(self._recipe.epochs) if self._recipe.round_of(each) == number]
+        for number, group in groupby(range(self._recipe.epochs), self._recipe.round_of):
+            epochs = list(group)
             if epochs[-1] < self._progress.validated:
                 continue
             with TrainingLog(self._run.folder, number + 1, self._trainer.done, self._progress.validated) as log:

@@ -1,6 +1,7 @@
 """What vm-doctor finds on a good machine and on bad ones."""
 
 import os
+import socket
 from dataclasses import replace
 
 import pytest
@@ -9,7 +10,8 @@ from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cli.checks import BAD, GOOD, WARNING, check_clock, check_opencv, check_threads, run_checks
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.radial_lenses import Equisolid
-from vm_embedded.live.configuration import Configuration, StatusSettings
+from vm_embedded.live.configuration import Configuration, FixedPose, StatusSettings
+from vm_embedded.poses.settings import PoseSettings
 
 HEALTHY = Configuration(
     camera=CameraSettings(source="synthetic", width=640, height=512),
@@ -113,6 +115,33 @@ def test_a_lens_for_another_size_is_seen(root):
     assert "size: [width, height] in YAML" in found(without, root)["lens"].mend
 
 
+def test_a_lens_center_that_is_a_position_is_seen(root):
+    lens = replace(HEALTHY.lens.lens, center=(650.0, 500.0))
+    finding = found(replace(HEALTHY, lens=LensFile(lens, None)), root)["lens"]
+    assert finding.state == WARNING
+    assert "center [650.0, 500.0] px is far from the middle" in finding.seen
+
+
+def test_a_live_camera_without_lens_or_pose_is_a_failure_of_these_and_not_of_the_model(root):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        source = f"rtsp://127.0.0.1:{server.getsockname()[1]}/1"
+        seen = found(Configuration(camera=CameraSettings(source=source)), root)
+    assert [seen[name].state for name in ("model", "camera", "lens", "pose")] == [GOOD, GOOD, BAD, BAD]
+    low = FixedPose(height=0.5, pitch=0.1)
+    given = Configuration(camera=CameraSettings(source=source), orientation=low, fov=1.0)
+    seen = found(given, root)
+    assert "refused" in seen["camera"].seen
+    assert [seen[name].state for name in ("camera", "lens", "pose")] == [BAD, GOOD, GOOD]
+    assert seen["pose"].seen == "height 0.5 m, pitch 5.7 deg, roll 0 deg"
+
+
+def test_where_poses_come_from_is_shown(root):
+    seen = found(replace(HEALTHY, pose=PoseSettings(source="udp:0.0.0.0:5600")), root)["pose"]
+    assert (seen.state, seen.seen) == (GOOD, "from udp:0.0.0.0:5600")
+    seen = found(replace(HEALTHY, orientation=FixedPose(pitch=0.1)), root)["pose"]
+    assert (seen.state, seen.seen) == (BAD, "pitch and roll need a height: give --height")
+
+
 def test_a_status_socket_without_a_folder_is_seen(root):
     nowhere = replace(HEALTHY, status=StatusSettings(socket="/nowhere/at/all"))
     assert found(nowhere, root)["status socket"].state == BAD
@@ -120,8 +149,8 @@ def test_a_status_socket_without_a_folder_is_seen(root):
 
 def test_a_folder_that_systemd_will_create_is_no_fault(root, monkeypatch):
     monkeypatch.setenv("RUNTIME_DIRECTORY", "/nowhere/at/all")
-    socket = found(HEALTHY, root)["status socket"]
-    assert (socket.state, socket.seen) == (GOOD, "/nowhere/at/all/vm-detect.sock; systemd creates its folder")
+    status = found(HEALTHY, root)["status socket"]
+    assert (status.state, status.seen) == (GOOD, "/nowhere/at/all/vm-detect.sock; systemd creates its folder")
 
 
 def test_every_fault_has_a_command_that_mends_it(root):

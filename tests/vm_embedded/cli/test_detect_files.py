@@ -144,6 +144,18 @@ def test_a_height_takes_precedence_over_hoc_of_the_lens_file(tmp_path):
     assert low["points"] != high["points"]
 
 
+def test_one_line_says_that_the_lens_files_beside_images_replace_what_was_given():
+    for given, replaced in ((("--fov", "60deg"), "lens"), (("--fov", "60deg", "--height", 0.5), "lens and pose")):
+        done = detect(FOLDER, *given)
+        assert done.stderr.splitlines()[-1] == f"vm-detect: {beside(IMAGES[0])} replaces the given {replaced}"
+    assert detect(FOLDER).stderr == ""
+
+
+def test_options_of_a_live_camera_are_rejected_for_files(tmp_path):
+    for option in ("--status-page=127.0.0.1:8080", "--output-udp=127.0.0.1:5000", f"--recorder-folder={tmp_path}"):
+        one_complaint(detect(IMAGES[0], option, code=1), f"{option.partition('=')[0]} works only with a live camera")
+
+
 def test_saved_points_are_the_mesh_on_screen(tmp_path):
     (line,) = lines(detect(IMAGES[0], "--save-points", tmp_path / "points"))
     with np.load(tmp_path / "points" / f"{IMAGES[0].stem}.npz") as saved:

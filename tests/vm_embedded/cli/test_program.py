@@ -56,6 +56,12 @@ def test_a_mistyped_option_is_one_line_with_the_nearest(command, mistyped, meant
     assert run(*suggested.split(), "--help").returncode == 0
 
 
+def test_a_mistyped_command_is_one_line_with_the_nearest():
+    done = run("vm-train", "resum", "runs/ball")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == ("vm-train: unknown command resum: did you mean resume?; vm-train --help lists the options\n")
+
+
 def completed(line, folder):
     """What bash offers at the end of a line, after what a user has in ~/.bashrc. Empty: it completes names of files."""
     words = shlex.split(line) + ([""] if line.endswith(" ") else [])

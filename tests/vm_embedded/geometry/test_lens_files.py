@@ -119,6 +119,8 @@ def test_a_toml_lens_is_read(write, text):
 def test_what_does_not_matter_may_be_left_out():
     lens = lens_from_table({"projection": "Equidistant", "focal_length": 300, "fov": 2})
     assert lens == Equidistant(focal_length=300.0, fov=2.0)
+    lens = lens_from_table({"projection": "Equidistant", "focal_length": 300, "fov": "180deg"})
+    assert lens.fov == math.pi
 
 
 PLUMB_BOB = (-0.35, 0.125, 0.0005, -0.00025, 0.01)

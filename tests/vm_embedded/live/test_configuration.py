@@ -108,6 +108,13 @@ def test_paths_count_from_the_file_s_own_folder(write, tmp_path):
     assert found.lens.lens == Rectilinear(focal_length=500.0, fov=1.5)
 
 
+def test_a_model_file_may_have_a_name_without_a_suffix(write, tmp_path):
+    (tmp_path / "network").write_text("")
+    assert read_configuration(write('model = "network"\n')).model == str(tmp_path / "network")
+    with pytest.raises(InputError, match="unknown network 'netwrk'"):
+        read_configuration(write('model = "netwrk"\n'))
+
+
 def test_absolute_paths_stay_as_they_are(write, tmp_path):
     elsewhere = tmp_path / "elsewhere" / "ball.onnx"
     assert read_configuration(write(f"model = '{elsewhere}'\n")).model == str(elsewhere)

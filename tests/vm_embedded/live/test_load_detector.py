@@ -1,10 +1,13 @@
 """What stops vm-detect at the start, and how it says so."""
 
+import shutil
 import subprocess
 
 import pytest
 
 from tests.vm_embedded.live.running import COMMAND, arguments
+from vm_embedded.live.configuration import read_configuration
+from vm_embedded.network.bundled import model_path
 
 
 @pytest.mark.long
@@ -52,6 +55,25 @@ def test_what_can_not_be_read_or_written_is_said_without_a_traceback(tmp_path):
         assert done.returncode == 78, (more, done.stderr)
         assert says in done.stderr
         assert "Traceback" not in done.stderr
+
+
+def test_the_printed_configuration_can_be_put_into_any_folder(tmp_path):
+    """Model and lens are then named by absolute paths; the lens keeps its distortion and pose."""
+    shutil.copy(model_path("ball-small"), tmp_path / "own.onnx")
+    lens = "camera_matrix: [500, 0, 320, 0, 500, 240, 0, 0, 1]\ndistortion_coefficients: [0.1, 0, 0, 0]\n"
+    (tmp_path / "lens.yaml").write_text(f"{lens}Hoc: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.7], [0, 0, 0, 1]]\n")
+    (tmp_path / "vm.toml").write_text('model = "own.onnx"\nlens = "lens.yaml"\n')
+    command = [COMMAND, "--config", "vm.toml", "--print-config"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True, cwd=tmp_path)
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "vm.toml").write_text(done.stdout)
+    found, expected = (read_configuration(folder / "vm.toml") for folder in (tmp_path / "elsewhere", tmp_path))
+    assert (found.model, found.lens.lens) == (expected.model, expected.lens.lens)
+    assert found.fixed_orientation().height == 0.7
+    alone = subprocess.run([COMMAND, "--print-config"], capture_output=True, text=True, timeout=60, check=True).stdout
+    (tmp_path / "vm.toml").write_text(alone)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True, cwd=tmp_path)
+    assert done.stdout == alone
 
 
 def test_the_printed_configuration_is_one_and_says_what_the_defaults_are(tmp_path):

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from vm_embedded.errors import InputError
+from vm_embedded.network.manifest import ObjectClass
 from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
 
 from .test_evaluation import MANIFEST
@@ -14,7 +15,8 @@ COLORS = default_colors(Path("model.onnx"), None)
 
 
 def test_classes_without_colors_are_asked_for():
-    manifest = replace(MANIFEST, classes=(*MANIFEST.classes[:3], replace(MANIFEST.classes[3], name="grass")))
+    grass = ObjectClass("grass", "area")
+    manifest = replace(MANIFEST, classes=(*MANIFEST.classes[:3], grass))
     with pytest.raises(InputError, match=r"--color grass=R,G,B"):
         classes_with_colors(manifest, COLORS, [])
     assert classes_with_colors(manifest, COLORS, [("grass", (1, 2, 3))]).colors["grass"] == ((1, 2, 3),)
@@ -22,3 +24,10 @@ def test_classes_without_colors_are_asked_for():
         classes_with_colors(MANIFEST, COLORS, [("bal", (1, 2, 3))])
     with pytest.raises(InputError, match="share the color"):
         classes_with_colors(MANIFEST, COLORS, [("environment", (255, 0, 0))])
+
+
+def test_a_background_class_without_a_color_gets_those_of_the_classes_that_the_network_lacks():
+    classes = (ObjectClass("ball", "object"), ObjectClass("other", "background"))
+    known = classes_with_colors(replace(MANIFEST, classes=classes), COLORS, [("ball", (255, 255, 0))]).colors
+    assert known["ball"] == ((255, 0, 0), (255, 255, 0))
+    assert sorted(known["other"]) == [(0, 0, 0), (0, 0, 255), (0, 255, 0), (255, 255, 255)]
