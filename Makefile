@@ -10,7 +10,9 @@ SCENES ?= export/vm_synth/polyhaven.toml
 NETWORKS := ball ball-small soccer
 BUILD ?= build/networks
 PICTURES ?= data/soccer
+CALIBRATION ?= data/calibration
 UPRIGHTS := goal robot
+CALIBRATE := $(BIN)/vm-evaluate calibrate --radius-of scene
 CANARY := --canary vm_embedded/models/canary.jpg export/networks/canary.yaml
 TEST ?= data/test
 TARGET ?= linux_x86_64-cp311
@@ -85,6 +87,7 @@ data: need-HDRI .venv/synth ## render a training set: make data HDRI=folder-of-m
 
 networks: need-HDRI .venv/dev ## train the networks of the package from their seeds: make networks HDRI=folder-of-maps (hours)
 	$(MAKE) data OUT=data/soccer COUNT=16000 SEED=1 SCENES=export/vm_synth/soccer.toml
+	$(BIN)/python -m benchmarks.calibration_data $(HDRI) $(CALIBRATION)
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 	$(BIN)/python -c "from pathlib import Path; from vm_train.tuning.rendered_patches import RENDERED, write_rendered; \
 		from vm_train.tuning.rendered_sample import sample_run; write_rendered(RENDERED, sample_run(Path('$(BUILD)/ball-look')))"
@@ -107,7 +110,8 @@ $(BUILD)/ball.onnx: $(BUILD)/ball-look/look.pt
 	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs -o $@
 
 vm_embedded/models/%.onnx: $(BUILD)/%-look/look.pt
-	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs $(CANARY) -o $@
+	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs $(CANARY) -o $(BUILD)/$*-uncalibrated.onnx
+	$(CALIBRATE) $(BUILD)/$*-uncalibrated.onnx $(CALIBRATION)/* -o $@
 
 $(UPRIGHTS:%=$(BUILD)/%-glance/look.pt): $(BUILD)/%-glance/look.pt: export/networks/upright-glance.toml $(BUILD)/soccer/model.pt
 	if test -e $(BUILD)/$*-glance/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-glance; \
@@ -122,7 +126,8 @@ $(UPRIGHTS:%=$(BUILD)/%-look/look.pt): $(BUILD)/%-look/look.pt: export/networks/
 vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx $(UPRIGHTS:%=$(BUILD)/%-look/look.pt)
 	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $(BUILD)/balls.onnx
 	$(BIN)/vm-export $(BUILD)/balls.onnx --look $(BUILD)/goal-look/look.pt -o $(BUILD)/balls-and-posts.onnx
-	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-look/look.pt -o $@
+	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-look/look.pt -o $(BUILD)/soccer-uncalibrated.onnx
+	$(CALIBRATE) $(BUILD)/soccer-uncalibrated.onnx $(CALIBRATION)/* -o $@
 
 test-data: need-HDRI .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
 	$(BIN)/python -m benchmarks.test_data $(HDRI) $(TEST)

@@ -238,6 +238,7 @@ default {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: {", ".join(e
 - **Training data of the glance and the close look:** {look.provenance["training_pictures"]} pictures of the same kind,
   under 55 panoramas. Seed {look.provenance["seed"]}, configurations `{glance_recipe}` and
   `{look_recipe}`.
+- **Calibration of its confidence:** {look.provenance["calibrated_on"]} (`python -m benchmarks.calibration_data`).
 {_upright_data(manifest)}- **To train it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
   {model.sha256}.
 

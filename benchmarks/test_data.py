@@ -29,9 +29,14 @@ UNCLUTTERED = (
 )
 
 
-def render(hdri: Path, out: Path, count: int, seed: int, *entries: str) -> None:
-    """A test set under the held-out maps."""
-    command = [sys.executable, "-m", "vm_synth", str(out), "--held-out", "--hdri", str(hdri)]
+LARGE = ("camera.picture_width=1280", "camera.picture_height=1024", "ball.even=1.0")
+"""Entries of pictures like those of robots, with balls that are spread evenly over the distances."""
+
+
+def render(hdri: Path, out: Path, count: int, seed: int, *entries: str, held_out: bool = True) -> None:
+    """A set under the held-out maps, or under those of the training."""
+    command = [sys.executable, "-m", "vm_synth", str(out), "--hdri", str(hdri)]
+    command += ["--held-out"] * held_out
     command += ["--count", str(count), "--seed", str(seed), "--config", str(SCENES)]
     for entry in entries:
         command += ["--set", entry]
@@ -43,9 +48,8 @@ def main() -> None:
     parser.add_argument("hdri", type=Path, help="folder of maps")
     parser.add_argument("out", type=Path, help="folder for the sets")
     options = parser.parse_args()
-    large = ("camera.picture_width=1280", "camera.picture_height=1024", "ball.even=1.0")
-    render(options.hdri, options.out / "field", FIELD_PICTURES, 11, *large, *UNCLUTTERED)
-    render(options.hdri, options.out / "clutter", CLUTTER_PICTURES, 9, *large)
+    render(options.hdri, options.out / "field", FIELD_PICTURES, 11, *LARGE, *UNCLUTTERED)
+    render(options.hdri, options.out / "clutter", CLUTTER_PICTURES, 9, *LARGE)
     near = ("ball.radius=[0.095,0.095]", "ball.missing=0", "ball.hidden=0", "ball.distance=[0.4,5]")
     render(options.hdri, options.out / "demo", 12, 22, *near)
     for lens, (width, height), above in product(LENSES, SIZES, HEIGHTS):

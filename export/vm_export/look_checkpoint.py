@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -58,6 +59,14 @@ class LookCheckpoint:
         glance = None if self.glance is None else self.glance.for_points_above(probability)
         contract = replace(self.contract, above=probability, glance=None if glance is None else glance.contract)
         return LookCheckpoint(self.network, contract, self.examples, glance)
+
+    def recalibrated(self, scale: float, offset: float, source: str) -> LookCheckpoint:
+        """The same networks with other probabilities: of their logits, which are multiplied by the scale, plus the
+        offset. The glance keeps its own. source: for the provenance."""
+        network, (first, before) = copy.deepcopy(self.network), self.network.calibration.tolist()
+        network.calibration.copy_(torch.tensor([scale * first, scale * before + offset]))
+        provenance = {**self.contract.provenance, "calibrated_on": source}
+        return LookCheckpoint(network, replace(self.contract, provenance=provenance), self.examples, self.glance)
 
     def save(self, path: str | Path) -> None:
         """Write the checkpoint. Raises InputError."""

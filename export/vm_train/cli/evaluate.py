@@ -17,10 +17,12 @@ from vm_embedded.live.configuration import read_configuration
 from vm_embedded.network.bundled import model_path
 from vm_workstation.stopping import stoppable
 
+from .evaluate_calibrate import run_calibrate
+from .evaluate_options import calibrate_parser, points_parser
 from .evaluate_options import parser as parser
 from .evaluate_options import parsers as parsers
-from .evaluate_options import points_parser
 from .evaluate_points import run_points
+from .evaluating import evaluate_with_progress
 
 if TYPE_CHECKING:
     from vm_embedded.network.look_contract import LookContract
@@ -37,6 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         with stoppable():
+            if given[:1] == ["calibrate"]:
+                return run_calibrate(calibrate_parser().parse_args(given[1:]))
             if given[:1] == ["points"]:
                 return run_points(points_parser().parse_args(given[1:]))
             return _evaluate(parser().parse_args(given))
@@ -54,7 +58,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _evaluate(options: argparse.Namespace) -> int:
     # Imported here: without torch or matplotlib, help works and the error is one clear line.
-    from vm_embedded.cli.progress import ProgressBar
     from vm_workstation.plots import new_figure
 
     from ..evaluation.evaluation import Rules
@@ -63,7 +66,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     from ..evaluation.picture_selection import select_pictures
     from ..evaluation.points_on_ball_plot import median_camera_figure
     from ..evaluation.summary import lines
-    from ..evaluation.workers import Job, evaluate
+    from ..evaluation.workers import Job
 
     options.model = model_path(options.model)
     settings = _settings(options)
@@ -75,15 +78,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     subject = _subject(options, settings)
     classes = classes_with_colors(subject.manifest, default_colors(options.model, options.list), options.color)
     job = Job(options.model, settings, options.as_robot, classes, rules)
-    bar = ProgressBar(len(pictures), "vm-evaluate")
-    try:
-        result = evaluate(job, subject, pictures, options.workers or len(os.sched_getaffinity(0)), bar.advance)
-    finally:
-        bar.clear()
-    for path, fault in result.faults.items():
-        print(f"vm-evaluate: skipped {path}: {fault}", file=sys.stderr)
-    if not result.poses:
-        raise InputError("no picture could be evaluated")
+    result = evaluate_with_progress(job, subject, pictures, options.workers)
     about = _about(options, settings, subject, job.classes.colors)
     about["notes"] = _notes(options, settings, subject, result)
     figure, about["camera"] = median_camera_figure(result.poses, job.classes, subject.manifest, subject.grid)

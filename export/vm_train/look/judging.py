@@ -18,6 +18,7 @@ from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.network.look_contract import LookContract
 from vm_export.look_network import LookNetwork
 
+from ..scores.calibration import logits_from
 from .labels import OBJECT, UNLABELED, VISIBLE, label_places
 from .observing import Item, Observer, items_of, results_of
 from .run_folder import LookRun
@@ -71,10 +72,10 @@ class Judge:
         kept = [each for each in judged if each.reason is None]
         centers = np.array([each.center for each in kept]).reshape(-1, 3)
         labels = label_places(Tangents.at(seen.observation.view, centers), seen.truths).labels
-        p = np.clip(np.array([each.confidence for each in kept], dtype=np.float64), 1e-9, 1.0 - 1e-7)
+        logits = logits_from(np.array([each.confidence for each in kept], dtype=np.float64))
         clear = labels != UNLABELED
         visible = int((seen.truths.visible >= VISIBLE).sum())
-        return Found(np.log(p / (1.0 - p))[clear], labels[clear] == OBJECT, visible, 1)
+        return Found(logits[clear], labels[clear] == OBJECT, visible, 1)
 
 
 def judge_validation(

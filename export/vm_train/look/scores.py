@@ -1,4 +1,4 @@
-"""How good a look network's answers to labeled patches are, and their calibration."""
+"""How good a look network's answers to labeled patches are."""
 
 from __future__ import annotations
 
@@ -11,14 +11,13 @@ import torch
 from vm_embedded.arrays import Floats, Image, Mask, Singles
 from vm_export.look_network import LookNetwork
 
-from ..scores.calibration import Reliability
+from ..scores.calibration import Calibration, Reliability
 from ..scores.curves import PrecisionRecall, without_nan
 from .judging import Found
 from .labels import OBJECT
 from .patch_set import PatchSet
 
 _BATCH = 1024
-_STEPS = 50
 
 
 @torch.no_grad()
@@ -74,46 +73,6 @@ def balanced_loss(logits: Floats, shown: Mask) -> float:
         return np.nan
     losses = np.logaddexp(0.0, np.where(shown, -logits, logits))
     return float(0.5 * losses[shown].mean() + 0.5 * losses[~shown].mean())
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """Scale and offset that turn a logit into that of a calibrated probability."""
-
-    scale: float = 1.0
-    offset: float = 0.0
-
-    def probabilities(self, logits: Floats) -> Floats:
-        """Calibrated probabilities (n,) of logits (n,)."""
-        return np.asarray(0.5 + 0.5 * np.tanh(0.5 * (self.scale * logits + self.offset)))
-
-    @classmethod
-    def fit(cls, logits: Floats, right: Mask) -> Calibration:
-        """The most likely calibration of logits (n,) of which some are right (n,).
-
-        With Platt's targets, (a + 1) / (a + 2) for a right ones and 1 / (b + 2) for b wrong ones, so that a network
-        without a mistake does not get an infinite scale. The scale is at least 0.001.
-        """
-        count, total = int(right.sum()), len(right)
-        targets = np.where(right, (count + 1.0) / (count + 2.0), 1.0 / (total - count + 2.0))
-        inputs = np.stack([logits, np.ones(total)], axis=1)
-        weights = np.array([1.0, 0.0])
-        loss = _loss(inputs @ weights, targets)
-        for _ in range(_STEPS):
-            p = 0.5 + 0.5 * np.tanh(0.5 * (inputs @ weights))
-            curvature = (inputs * (p * (1.0 - p))[:, None]).T @ inputs + 1e-9 * np.eye(2)
-            step = np.linalg.solve(curvature, inputs.T @ (p - targets))
-            while (after := _loss(inputs @ (weights - step), targets)) > loss and np.abs(step).max() > 1e-9:
-                step = 0.5 * step
-            weights, gain, loss = weights - step, loss - after, after
-            if gain < 1e-12 * max(loss, 1.0):
-                break
-        return cls(max(float(weights[0]), 1e-3), float(weights[1]))
-
-
-def _loss(logits: Floats, targets: Floats) -> float:
-    """Cross-entropy of logits (n,) with targets (n,)."""
-    return float((np.logaddexp(0.0, logits) - targets * logits).sum())
 
 
 @dataclass(frozen=True)

@@ -24,12 +24,13 @@ from vm_export.look_network import LookNetwork
 
 from ..learning.log import TrainingLog
 from ..learning.trainer import read_state
+from ..scores.calibration import Calibration
 from .collected import Collected
 from .judging import Found, judge_validation
 from .labels import OBJECT
 from .patch_set import PatchSet
 from .run_folder import LookRun
-from .scores import Calibration, LookResult, LookScore, logits_of
+from .scores import LookResult, LookScore, logits_of
 from .trainer import LookTrainer
 
 _SAVE_INTERVAL = 30.0

@@ -16,6 +16,8 @@ from .curves import without_nan
 BINS = 15
 """Bins of confidence, equally wide."""
 
+_STEPS = 50
+
 _SPREAD = 1.645
 """Standard deviations on each side of the middle that hold 90 % of a normal distribution."""
 
@@ -85,3 +87,49 @@ class Reliability:
     def as_dict(self) -> dict[str, Any]:
         """All numbers, for JSON."""
         return {"found": self.total, **without_nan({"expected_error": self.error}), "bins": self.rows()}
+
+
+def logits_from(probabilities: Floats) -> Floats:
+    """Logits (n,) of probabilities (n,), finite for 0 and 1, too."""
+    p = np.clip(probabilities, 1e-9, 1.0 - 1e-7)
+    return np.asarray(np.log(p / (1.0 - p)))
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Scale and offset that turn a logit into that of a calibrated probability."""
+
+    scale: float = 1.0
+    offset: float = 0.0
+
+    def probabilities(self, logits: Floats) -> Floats:
+        """Calibrated probabilities (n,) of logits (n,)."""
+        return np.asarray(0.5 + 0.5 * np.tanh(0.5 * (self.scale * logits + self.offset)))
+
+    @classmethod
+    def fit(cls, logits: Floats, right: Mask) -> Calibration:
+        """The most likely calibration of logits (n,) of which some are right (n,).
+
+        With Platt's targets, (a + 1) / (a + 2) for a right ones and 1 / (b + 2) for b wrong ones, so that a network
+        without a mistake does not get an infinite scale. The scale is at least 0.001.
+        """
+        count, total = int(right.sum()), len(right)
+        targets = np.where(right, (count + 1.0) / (count + 2.0), 1.0 / (total - count + 2.0))
+        inputs = np.stack([logits, np.ones(total)], axis=1)
+        weights = np.array([1.0, 0.0])
+        loss = _loss(inputs @ weights, targets)
+        for _ in range(_STEPS):
+            p = 0.5 + 0.5 * np.tanh(0.5 * (inputs @ weights))
+            curvature = (inputs * (p * (1.0 - p))[:, None]).T @ inputs + 1e-9 * np.eye(2)
+            step = np.linalg.solve(curvature, inputs.T @ (p - targets))
+            while (after := _loss(inputs @ (weights - step), targets)) > loss and np.abs(step).max() > 1e-9:
+                step = 0.5 * step
+            weights, gain, loss = weights - step, loss - after, after
+            if gain < 1e-12 * max(loss, 1.0):
+                break
+        return cls(max(float(weights[0]), 1e-3), float(weights[1]))
+
+
+def _loss(logits: Floats, targets: Floats) -> float:
+    """Cross-entropy of logits (n,) with targets (n,)."""
+    return float((np.logaddexp(0.0, logits) - targets * logits).sum())

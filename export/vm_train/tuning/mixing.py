@@ -16,7 +16,8 @@ from vm_export.look_network import LookNetwork
 
 from ..look.labels import OBJECT
 from ..look.patch_set import PatchSet
-from ..look.scores import Calibration, balanced_loss, logits_of
+from ..look.scores import balanced_loss, logits_of
+from ..scores.calibration import Calibration
 
 _SHARES = tuple(tenth / 10.0 for tenth in range(10, 0, -1))
 """Shares of the weights after the training to try, the largest first."""

@@ -203,7 +203,8 @@ def bad(tmp_path):
 
 
 def test_the_networks_of_the_package_have_names(capsys, data, tmp_path):
-    assert "class 'other' has no color in masks" in complaint(capsys, "ball", data, "-o", tmp_path / "out")
+    done = run("ball", data, "-o", tmp_path / "out", "--workers", 1)
+    assert "objects of class ball" in done.stdout
     assert "unknown network 'bal'; did you mean 'ball'?" in complaint(capsys, "bal", data, "-o", tmp_path / "out")
 
 

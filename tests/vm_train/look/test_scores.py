@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from vm_train.look.judging import Found
 from vm_train.look.labels import NOTHING, OBJECT
 from vm_train.look.patch_set import PatchSet
-from vm_train.look.scores import Calibration, LookResult, LookScore, average_precision
-from vm_train.scores.calibration import BINS, Reliability
+from vm_train.look.scores import LookResult, LookScore, average_precision
+from vm_train.scores.calibration import BINS, Calibration, Reliability
 
 flags = st.lists(st.booleans(), min_size=1, max_size=40)
 

@@ -1,0 +1,38 @@
+"""An evaluation with a progress bar and a line for each skipped picture."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from vm_embedded.cli.progress import ProgressBar
+from vm_embedded.errors import InputError
+
+if TYPE_CHECKING:
+    from ..data.picture_files import PictureFiles
+    from ..evaluation.answers import Subject
+    from ..evaluation.evaluation import Evaluation
+    from ..evaluation.workers import Job
+
+
+def evaluate_with_progress(
+    job: Job, subject: Subject, pictures: Sequence[PictureFiles], workers: int | None
+) -> Evaluation:
+    """The result for the pictures, from so many processes; None: one for each core.
+
+    Raises the errors of `workers.evaluate`, and InputError if no picture could be evaluated.
+    """
+    from ..evaluation.workers import evaluate  # here, so that help works without torch
+
+    bar = ProgressBar(len(pictures), "vm-evaluate")
+    try:
+        result = evaluate(job, subject, pictures, workers or len(os.sched_getaffinity(0)), bar.advance)
+    finally:
+        bar.clear()
+    for path, fault in result.faults.items():
+        print(f"vm-evaluate: skipped {path}: {fault}", file=sys.stderr)
+    if not result.poses:
+        raise InputError("no picture could be evaluated")
+    return result

@@ -1,0 +1,62 @@
+"""vm-evaluate calibrate as a user types it: a model file whose confidence fits pictures."""
+
+import re
+
+import numpy as np
+import pytest
+
+from tests.looks import random_patches
+from vm_embedded.network.bundled import model_path
+from vm_embedded.network.close_look import CloseLook
+from vm_embedded.network.model_file import read_model
+from vm_train.cli.evaluate import main
+from vm_train.scores.calibration import logits_from
+
+from ...drawn_scenes import MODEL
+from ..drawn import draw_set
+
+FITTED = re.compile(r"ball: (\d+) answers in 60 pictures; .* error ([\d.]+) before, ([\d.]+) after .*scale ([\d.]+), ")
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    return draw_set(tmp_path_factory.mktemp("drawn"), 60)
+
+
+def calibrate(*arguments):
+    return main(["calibrate", *map(str, arguments), "--radius-of", "scene"])
+
+
+def test_the_confidence_fits_the_pictures_afterward_and_all_else_stays(data, tmp_path, capsys):
+    assert calibrate("ball-small", data, "-o", tmp_path / "once.onnx") == 0
+    _, before, after, scale = map(float, FITTED.search(capsys.readouterr().out).groups())
+    assert after < before
+    old, new = (read_model(path) for path in (model_path("ball-small"), tmp_path / "once.onnx"))
+    patches = np.concatenate([old.manifest.look.self_test.patches, random_patches(20, 32)])
+    first, second = (CloseLook.of(each).run(patches) for each in (old, new))
+    np.testing.assert_allclose(second[:, 1:], first[:, 1:], atol=1e-6)
+    logits = [logits_from(each[:, 0].astype(np.float64)) for each in (first, second)]
+    offset = logits[1][0] - scale * logits[0][0]
+    np.testing.assert_allclose(logits[1], scale * logits[0] + offset, atol=0.05)  # the printed scale has two digits
+    assert new.look.glance == old.look.glance
+    assert new.canary is not None
+    assert re.fullmatch(r"\d+ answers in 60 pictures", new.manifest.look.provenance["calibrated_on"])
+
+    assert calibrate(tmp_path / "once.onnx", data, "-o", tmp_path / "twice.onnx") == 0
+    again = float(FITTED.search(capsys.readouterr().out)[4])
+    assert again == pytest.approx(1.0, abs=0.1)
+
+
+def test_what_can_not_be_calibrated_is_one_line(data, tmp_path, capsys):
+    for arguments, said in (
+        ((MODEL, data, "-o", tmp_path / "a.onnx"), "has no close look; vm-export --look attaches one"),
+        (("bal", data, "-o", tmp_path / "a.onnx"), "unknown network 'bal'; did you mean 'ball'?"),
+        ((MODEL, data, "-o", MODEL), "is the input and would be overwritten"),
+        (("ball-small", data, "-o", "/nowhere/a.onnx"), "/nowhere"),
+        (("ball-small", draw_set(tmp_path / "few", 2), "-o", tmp_path / "a.onnx"), "which needs 10 of each"),
+    ):
+        assert calibrate(*arguments) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith("vm-evaluate: ")
+        assert said in line
+    assert not (tmp_path / "a.onnx").exists()
