@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks.frames import frames
-from benchmarks.shipped import CANDIDATES, METERS, RANGES, evaluation, numbers
+from benchmarks.shipped import CANDIDATES, METERS, RANGES, calibration_error, evaluation, numbers
 from vm_embedded.config.sections import read_sections
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
 from vm_embedded.network.bundled import model_path
-from vm_export.change_model import change_look
+from vm_export.change_model import change_looks
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_train.data.pictures import find_pictures
 from vm_train.data.split import Split
@@ -117,7 +117,7 @@ def trained(task: Task) -> Path:
             train_look(run, collect(run, 1), 1, lambda: False)
     path = folder / "model.onnx"
     if not path.exists():
-        change_look(model, path, LookCheckpoint.load(run.look_path))
+        change_looks(model, path, [LookCheckpoint.load(run.look_path)])
     return path
 
 
@@ -145,7 +145,7 @@ def scored(model: Path, test: Path) -> dict[str, Any]:
         "ap75": {each: numbers(ranked, bins, 0.75)["average_precision"] for each, bins in RANGES.items()},
         "used": {each: numbers(used, bins) for each, bins in RANGES.items()},
         "all": numbers(used, None),
-        "calibration_error": round(ranked.ranking(0.5).reliability.error, 5),
+        "calibration_error": round(calibration_error(ranked), 5),
     }
 
 

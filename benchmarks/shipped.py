@@ -26,6 +26,7 @@ from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
 from vm_train.evaluation.workers import Job, evaluate
 from vm_train.evaluation.worst_errors import WorstError
 from vm_train.evaluation.worst_pictures import draw_error
+from vm_train.scores.calibration import Reliability
 from vm_train.scores.object_scores import ObjectScores
 
 HERE = Path(__file__).parent
@@ -46,8 +47,11 @@ SETS = ("field", "clutter")
 """Test sets: a field with robots and people, and a field full of things that resemble a ball."""
 
 METERS = {f"{near} to {near + 1} m": range(2 * near, 2 * near + 2) for near in range(10)}
-CANDIDATES = Settings(min_confidence=0.01)
+CANDIDATES = Settings(min_confidence=0.002)
 """Settings that accept nearly every proposal, for curves over all confidences."""
+
+LIKELY = 0.01
+"""Least confidence of the objects in a calibration error. Below are so many that they would hide the others."""
 
 
 def evaluation(
@@ -100,8 +104,7 @@ def scores_of(model: Path, folder: Path) -> tuple[dict[str, Any], Evaluation]:
         "false_an_hour": round(FRAMES_AN_HOUR * ball.ranking(0.5).at().false_per_picture),
         "proposals": _proposals(used),
         "calibration_error": {
-            kind: round(scores.ranking(0.5).reliability.error, 5)
-            for kind, scores in (("used", ball), ("ranked", curve))
+            kind: round(calibration_error(scores), 5) for kind, scores in (("used", ball), ("ranked", curve))
         },
     }
     for kind, scores in (("used", ball), ("ranked", curve)):
@@ -111,6 +114,13 @@ def scores_of(model: Path, folder: Path) -> tuple[dict[str, Any], Evaluation]:
             }
     found["curve"] = _curve(curve)
     return found, used
+
+
+def calibration_error(scores: ObjectScores) -> float:
+    """Expected calibration error of the objects that are likely."""
+    ranking = scores.ranking(0.5)
+    likely = ranking.confidence >= LIKELY
+    return Reliability.of(ranking.confidence[likely], ranking.right[likely]).error
 
 
 def _proposals(result: Evaluation) -> dict[str, Any]:

@@ -1,14 +1,15 @@
-"""A model file with another look network or another canary; its mesh network stays as it is."""
+"""A model file with other look networks or another canary; its mesh network stays as it is."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vm_embedded.errors import ModelError
 from vm_embedded.network.canary import CANARY_KEY
 from vm_embedded.network.manifest import METADATA_KEY
-from vm_embedded.network.model_file import read_model
+from vm_embedded.network.model_file import parse_model, read_model
 
 from .attach_canary import CanaryPicture, NotFoundError, with_canary
 from .attach_look import attached, detached, tested_contract
@@ -21,30 +22,33 @@ from .strong_self_test import strong_self_test
 
 
 @dataclass(frozen=True)
-class ChangedLook:
-    """What became of a model file. difference: largest one to torch of the look's answers, None without a look.
+class ChangedLooks:
+    """What became of a model file. difference: largest one to torch of the looks' answers, None without a look.
     lost_canary: whether the file had a canary that its networks do not find any more."""
 
     difference: float | None
     lost_canary: bool
 
 
-def change_look(model: str | Path, path: str | Path, look: LookCheckpoint | None) -> ChangedLook:
-    """Write a copy of a model file with this look network, or without any; its mesh network stays as it is.
+def change_looks(model: str | Path, path: str | Path, looks: Sequence[LookCheckpoint]) -> ChangedLooks:
+    """Write a copy of a model file with these look networks, or without any; its mesh network stays as it is.
+
+    Each replaces the one for the same class, and others stay. An empty list removes all.
 
     Its canary gets the new answers, or is removed if the networks do not find every class in it any more.
 
-    Raises ModelError if an answer differs from torch by more than LARGEST_DIFFERENCE, if the look does not fit the
+    Raises ModelError if an answer differs from torch by more than LARGEST_DIFFERENCE, if a look does not fit the
     file's classes, or if there is no look to remove. Raises InputError if the file can't be written.
     """
     read = read_model(model)
-    difference, lost = None, False
-    if look is not None:
-        content, difference = attached(read.content, read.manifest, look)
+    content, differences, lost = read.content, [], False
+    for look in looks:
+        content, difference = attached(content, parse_model(path, content).manifest, look)
         check_difference(path, "answers of the close look", difference)
-    elif read.look is None and not read.upright_looks:
-        raise ModelError(f"{model} has no close look to remove")
-    else:
+        differences.append(difference)
+    if not looks:
+        if read.look is None and not read.upright_looks:
+            raise ModelError(f"{model} has no close look to remove")
         content = detached(read.content, read.manifest)
     if read.canary is not None:
         try:
@@ -52,7 +56,7 @@ def change_look(model: str | Path, path: str | Path, look: LookCheckpoint | None
         except NotFoundError:
             content, lost = with_metadata(content, {CANARY_KEY: None}), True
     write_model(path, content)
-    return ChangedLook(difference, lost)
+    return ChangedLooks(max(differences, default=None), lost)
 
 
 def change_canary(model: str | Path, path: str | Path, canary: CanaryPicture) -> None:

@@ -111,7 +111,7 @@ def _run(options: argparse.Namespace) -> int:
     import torch
 
     from .attach_canary import CanaryPicture
-    from .change_model import change_canary, change_look
+    from .change_model import change_canary, change_looks
     from .export import export, fastest_layout
     from .look_checkpoint import LookCheckpoint
     from .reference import write_reference
@@ -135,7 +135,7 @@ def _run(options: argparse.Namespace) -> int:
         _print_written(output, f"networks of {options.model} with a new canary", None, None)
         return EXIT_OK
     if _is_model_file(options.model):
-        changed = change_look(options.model, output, look)
+        changed = change_looks(options.model, output, [] if look is None else [look])
         _print_written(output, f"mesh network of {options.model}", look, changed.difference)
         if changed.lost_canary:
             print(

@@ -19,7 +19,7 @@ from vm_embedded.network.manifest import ObjectClass
 from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
 from vm_embedded.network.session import Session
 from vm_export import attach_look, export
-from vm_export.change_model import change_look
+from vm_export.change_model import change_looks
 from vm_export.checkpoint import Checkpoint
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_graph import look_model
@@ -278,9 +278,9 @@ def test_a_model_file_holds_both_networks(tmp_path, layout):
 def test_a_look_changes_nothing_but_the_metadata(tmp_path):
     export.export(ball_checkpoint(), tmp_path / "without.onnx")
     export.export(ball_checkpoint(), tmp_path / "with.onnx", look=look_checkpoint())
-    assert change_look(tmp_path / "without.onnx", tmp_path / "attached.onnx", look_checkpoint()).difference < 1e-4
+    assert change_looks(tmp_path / "without.onnx", tmp_path / "attached.onnx", [look_checkpoint()]).difference < 1e-4
     assert (tmp_path / "attached.onnx").read_bytes() == (tmp_path / "with.onnx").read_bytes()
-    assert change_look(tmp_path / "with.onnx", tmp_path / "removed.onnx", None).difference is None
+    assert change_looks(tmp_path / "with.onnx", tmp_path / "removed.onnx", []).difference is None
     assert (tmp_path / "removed.onnx").read_bytes() == (tmp_path / "without.onnx").read_bytes()
     graphs = [onnx.load(tmp_path / name).graph for name in ("without.onnx", "with.onnx")]
     assert graphs[0] == graphs[1]
@@ -288,7 +288,7 @@ def test_a_look_changes_nothing_but_the_metadata(tmp_path):
 
 def test_a_look_replaces_the_one_before(tmp_path):
     export.export(ball_checkpoint(), tmp_path / "model.onnx", look=look_checkpoint(1))
-    change_look(tmp_path / "model.onnx", tmp_path / "other.onnx", look_checkpoint(2))
+    change_looks(tmp_path / "model.onnx", tmp_path / "other.onnx", [look_checkpoint(2)])
     export.export(ball_checkpoint(), tmp_path / "expected.onnx", look=look_checkpoint(2))
     assert (tmp_path / "other.onnx").read_bytes() == (tmp_path / "expected.onnx").read_bytes()
 
@@ -303,7 +303,7 @@ def test_a_model_file_holds_the_glance_too(tmp_path):
         check_self_test(loaded.contract.self_test, made)
         assert loaded.contract.provenance["exported_by"].startswith("vm-export")
     export.export(ball_checkpoint(), tmp_path / "without.onnx")
-    change_look(tmp_path / "model.onnx", tmp_path / "removed.onnx", None)
+    change_looks(tmp_path / "model.onnx", tmp_path / "removed.onnx", [])
     assert (tmp_path / "removed.onnx").read_bytes() == (tmp_path / "without.onnx").read_bytes()
 
 
@@ -333,7 +333,7 @@ def test_other_metadata_of_a_model_file_stays(tmp_path):
     assert model.metadata_props.pop().key == SEAL_KEY
     model.metadata_props.add(key="author", value="Zoë")
     (tmp_path / "model.onnx").write_bytes(sealed(model.SerializeToString()))
-    change_look(tmp_path / "model.onnx", tmp_path / "other.onnx", look_checkpoint())
+    change_looks(tmp_path / "model.onnx", tmp_path / "other.onnx", [look_checkpoint()])
     kept = {each.key: each.value for each in onnx.load(tmp_path / "other.onnx").metadata_props}
     assert sorted(kept) == ["author", "visual_mesh", "visual_mesh_look", "visual_mesh_sha256"]
     assert kept["author"] == "Zoë"
@@ -346,7 +346,7 @@ def test_a_look_that_differs_from_torch_is_not_written(tmp_path, monkeypatch):
     with pytest.raises(ModelError, match=r"answers of the close look .* differ by"):
         export.export(ball_checkpoint(), tmp_path / "new.onnx", look=look_checkpoint())
     with pytest.raises(ModelError, match=r"answers of the close look .* differ by"):
-        change_look(tmp_path / "model.onnx", tmp_path / "new.onnx", look_checkpoint())
+        change_looks(tmp_path / "model.onnx", tmp_path / "new.onnx", [look_checkpoint()])
     assert [path.name for path in tmp_path.iterdir()] == ["model.onnx"]
 
 
@@ -372,7 +372,7 @@ def test_a_look_for_a_class_that_is_no_object_is_not_written(tmp_path):
 def test_there_must_be_a_look_to_remove(tmp_path):
     export.export(ball_checkpoint(), tmp_path / "model.onnx")
     with pytest.raises(ModelError, match=r"model\.onnx has no close look to remove"):
-        change_look(tmp_path / "model.onnx", tmp_path / "other.onnx", None)
+        change_looks(tmp_path / "model.onnx", tmp_path / "other.onnx", [])
 
 
 def test_a_look_of_the_usual_size_fits_its_sizes():
@@ -401,7 +401,7 @@ def field(tmp_path):
 
 def attach(path, *looks):
     for each in looks:
-        assert change_look(path, path, each).difference < 1e-4
+        assert change_looks(path, path, [each]).difference < 1e-4
     return read_model(path)
 
 
@@ -443,7 +443,7 @@ def test_a_look_at_an_upright_replaces_the_one_before_and_no_other(field):
 def test_no_look_removes_all_of_them(field, tmp_path):
     before = field.read_bytes()
     attach(field, upright("goal"), look_checkpoint(), upright("robot"))
-    assert change_look(field, tmp_path / "bare.onnx", None).difference is None
+    assert change_looks(field, tmp_path / "bare.onnx", []).difference is None
     assert (tmp_path / "bare.onnx").read_bytes() == before
 
 
@@ -457,7 +457,7 @@ def test_no_look_removes_all_of_them(field, tmp_path):
 )
 def test_a_look_for_another_kind_of_class_is_refused(field, tmp_path, look, message):
     with pytest.raises(ModelError, match=message):
-        change_look(field, tmp_path / "other.onnx", look)
+        change_looks(field, tmp_path / "other.onnx", [look])
 
 
 def test_a_file_whose_looks_are_not_those_of_its_manifest_is_refused(field, tmp_path):

@@ -45,7 +45,7 @@ class Settings:
     )
     threshold: float = share(0.5, "a point belongs to a class if its probability is above this")
     min_confidence: float = share(
-        0.4, "close look: lowest probability of an object; below it, the proposal is rejected"
+        0.3, "close look: lowest probability of an object; below it, the proposal is rejected"
     )
     max_proposals: int = number(40, "close look: largest number of proposals", "", (1, 1000))
     min_inside: float = share(0.85, "lowest mean probability inside the outline; below it, the object is rejected")

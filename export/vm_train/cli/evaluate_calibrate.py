@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
@@ -11,6 +12,12 @@ from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
 
 from .evaluating import evaluate_with_progress
+
+if TYPE_CHECKING:
+    from vm_embedded.arrays import Floats, Mask
+    from vm_export.look_checkpoint import LookCheckpoint
+
+    from ..evaluation.evaluation import Evaluation
 
 EXIT_OK = 0
 
@@ -31,42 +38,60 @@ def run_calibrate(options: argparse.Namespace) -> int:
     close look.
     """
     # Imported here: without torch, help works and the error is one clear line.
-    from vm_export.change_model import change_look
-    from vm_export.look_weights import look_of
+    from vm_export.change_model import change_looks
+    from vm_export.look_weights import look_of, upright_looks_of
 
     from ..evaluation.evaluation import Rules
     from ..evaluation.mask_colors import classes_with_colors, default_colors
     from ..evaluation.picture_selection import select_pictures
     from ..evaluation.workers import Job
-    from ..scores.calibration import Calibration, Reliability, logits_from
 
     path = model_path(options.model)
     if path.resolve() == options.output.resolve():
         raise InputError(f"{path} is the input and would be overwritten; give another file with --output")
     check_writable(options.output)
     model = read_model(path)
-    look = look_of(model)
+    looks = upright_looks_of(model)
+    if model.look is not None or not looks:
+        looks.insert(0, look_of(model))
     pictures = select_pictures(options.data, options.list, options.part)
     classes = classes_with_colors(model.manifest, default_colors(path, options.list), options.color)
     rules = Rules(options.radius_of, options.min_radius, options.strict)
     job = Job(path, _CANDIDATES, False, classes, rules)
     result = evaluate_with_progress(job, job.subject(), pictures, options.workers)
-    name = look.contract.object_class
-    answers = result.objects[name].ranking(_OVERLAP)
-    right, wrong = int(answers.right.sum()), int((~answers.right).sum())
-    if min(right, wrong) < _FEWEST:
-        raise InputError(
-            f"{right} right and {wrong} wrong answers are too few for a calibration, which needs {_FEWEST} of each: "
-            "give more pictures"
-        )
-    logits = logits_from(answers.confidence)
-    fitted = Calibration.fit(logits, answers.right)
-    after = Reliability.of(fitted.probabilities(logits), answers.right).error
-    source = f"{right + wrong} answers in {answers.pictures} pictures"
-    change_look(path, options.output, look.recalibrated(fitted.scale, fitted.offset, source))
-    print(
-        f"{name}: {source}; expected calibration error {answers.reliability.error:.3f} before, {after:.3f} after "
-        f"(scale {fitted.scale:.2f}, offset {fitted.offset:+.2f} of the logit)"
-    )
+    calibrated = [_calibrated(look, *_answers(result, look.contract.object_class), len(result.poses)) for look in looks]
+    change_looks(path, options.output, calibrated)
     print(f"{options.output}: written")
     return EXIT_OK
+
+
+def _answers(result: Evaluation, name: str) -> tuple[Floats, Mask]:
+    """Confidences (n,) of what was found of a class, and whether each is right (n,)."""
+    if name in result.objects:
+        ranking = result.objects[name].ranking(_OVERLAP)
+        return ranking.confidence, ranking.right
+    if result.features is None:
+        raise InputError(f"the look at {name} needs pictures with the classes of a field to be calibrated")
+    scores = result.features.posts if name == "goal" else result.features.robots
+    return scores.judged()
+
+
+def _calibrated(look: LookCheckpoint, confidence: Floats, right: Mask, pictures: int) -> LookCheckpoint:
+    """The look network with the confidence that fits these answers; print how well it fits before and after."""
+    from ..scores.calibration import Calibration, Reliability, logits_from
+
+    name, count = look.contract.object_class, int(right.sum())
+    if min(count, len(right) - count) < _FEWEST:
+        raise InputError(
+            f"class {name}: {count} right and {len(right) - count} wrong answers are too few for a calibration, which "
+            f"needs {_FEWEST} of each: give more pictures"
+        )
+    logits = logits_from(confidence)
+    fitted = Calibration.fit(logits, right)
+    before, after = (Reliability.of(each, right).error for each in (confidence, fitted.probabilities(logits)))
+    source = f"{len(right)} answers in {pictures} pictures"
+    print(
+        f"{name}: {source}; expected calibration error {before:.3f} before, {after:.3f} after "
+        f"(scale {fitted.scale:.2f}, offset {fitted.offset:+.2f} of the logit)"
+    )
+    return look.recalibrated(fitted.scale, fitted.offset, source)

@@ -59,8 +59,8 @@ def calibrate_parser() -> argparse.ArgumentParser:
     """The options of vm-evaluate calibrate."""
     made = Parser(
         prog="vm-evaluate calibrate",
-        description="Write a copy of a model file whose close look at objects has a confidence that fits pictures, "
-        "which it has not learned from. The order of its answers stays, but the number of those above --min-confidence "
+        description="Write a copy of a model file whose close looks have a confidence that fits pictures, which "
+        "they have not learned from. The order of its answers stays, but the number of those above --min-confidence "
         "changes.",
     )
     made.add_argument(

@@ -56,8 +56,12 @@ class FieldScores:
         """Add a picture: its truth, and the reported features."""
         if truth.uprights is not None:
             by_kind = truth.uprights
-            self.posts.add(by_kind["post"], [each.position for each in found.posts])
-            self.robots.add(by_kind["robot"], [each.position for each in found.robots], by_kind["person"])
+            for scores, kind, reports, people in (
+                (self.posts, "post", found.posts, ()),
+                (self.robots, "robot", found.robots, by_kind["person"]),
+            ):
+                positions, confidences = [each.position for each in reports], [each.confidence for each in reports]
+                scores.add(by_kind[kind], positions, people, confidences)
         if truth.field is not None:
             lines, shown = reported_lines(found, truth.shown)
             self.lines.add(truth.field.lines, truth.field.visible, lines, shown)

@@ -55,10 +55,17 @@ class UprightScores:
         self.edges = checked_edges(edges)
         self.pictures = 0
         self._truths: list[tuple[float, float, bool]] = []  # distance, error [m] or NaN, found
-        self._reports: list[tuple[float, int]] = []  # distance, outcome
+        self._reports: list[tuple[float, int, float]] = []  # distance, outcome, confidence
 
-    def add(self, truths: Sequence[TrueUpright], found: Sequence[Floats], people: Sequence[TrueUpright] = ()) -> None:
-        """Add a picture: its true uprights, visible or not, the reported positions (2,) [m], and its people."""
+    def add(
+        self,
+        truths: Sequence[TrueUpright],
+        found: Sequence[Floats],
+        people: Sequence[TrueUpright] = (),
+        confidences: Sequence[float] | None = None,
+    ) -> None:
+        """Add a picture: its true uprights, visible or not, the reported positions (2,) [m], its people, and the
+        confidences of the reports, 1 if there are none."""
         errors = _errors(truths, found)
         distances = np.array([_distance(each.position) for each in truths])
         visible = np.array([each.visible for each in truths], dtype=bool)
@@ -76,7 +83,8 @@ class UprightScores:
             match = (hits | near).get(number)
             error = math.nan if match is None else float(errors[number, match])
             self._truths.append((float(distances[number]), error, number in hits))
-        self._reports += [(_distance(each), int(outcome)) for each, outcome in zip(found, outcomes, strict=True)]
+        distances_found = [_distance(each) for each in found]
+        self._reports += zip(distances_found, outcomes.tolist(), confidences or [1.0] * len(found), strict=True)
         self.pictures += 1
 
     def _loose(self, truths: Sequence[TrueUpright]) -> Floats:
@@ -113,11 +121,17 @@ class UprightScores:
             return np.ones(len(distances), dtype=bool)
         return np.asarray(bins_of(distances, self.edges) == distance_bin)
 
+    def judged(self) -> tuple[npt.NDArray[np.float64], Mask]:
+        """Confidences (n,) of the reports that are found bases or false, and whether each is a found one (n,)."""
+        _, outcomes, confidences = self._tables[1].T
+        counts = np.isin(outcomes, (_FOUND, _FALSE))
+        return confidences[counts], outcomes[counts] == _FOUND
+
     @property
     def _tables(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        """Numbers of the visible bases (t, 3) and of the reports (r, 2), as they are kept."""
+        """Numbers of the visible bases (t, 3) and of the reports (r, 3), as they are kept."""
         truths = np.array(self._truths, dtype=np.float64).reshape(-1, 3)
-        return truths, np.array(self._reports, dtype=np.float64).reshape(-1, 2)
+        return truths, np.array(self._reports, dtype=np.float64).reshape(-1, 3)
 
     def _row(self, truths: Mask, reports: Mask) -> dict[str, Any]:
         kept, outcomes = self._tables[0][truths], self._tables[1][reports, 1]

@@ -14,7 +14,7 @@ import cv2
 import pytest
 
 from tests.vm_export.looks import look_checkpoint
-from vm_export.change_model import change_look
+from vm_export.change_model import change_looks
 from vm_export.checkpoint import Checkpoint
 from vm_export.grid import Grid
 from vm_train.cli.evaluate import main
@@ -106,7 +106,7 @@ def test_calibration_counts_all_objects_that_the_scores_count(evaluated):
 def looking(tmp_path_factory):
     """A model file with a close look of random weights."""
     path = tmp_path_factory.mktemp("looking") / "looking.onnx"
-    change_look(MODEL, path, look_checkpoint(seed=1))
+    change_looks(MODEL, path, [look_checkpoint(seed=1)])
     return path
 
 

@@ -73,6 +73,16 @@ def test_field_features_have_scores(result):
     assert found["border"]["all"]["reported_share"] == 0.0
 
 
+def test_confidences_of_posts_and_robots_reach_their_scores(result):
+    confidences, right = result.features.posts.judged()
+    assert (confidences.tolist(), right.tolist()) == (
+        [each.confidence for each in REPORTING.reported.posts] * 3,
+        [True] * 3,
+    )
+    confidences, _ = result.features.robots.judged()  # of the two, one is a person
+    assert confidences.tolist() == [REPORTING.reported.robots[0].confidence] * 3
+
+
 def test_parts_add_up(files, result):
     parts = [evaluate_pictures(REPORTING, each, NAMED, Rules()) for each in (files[:1], files[1:])]
     total = Evaluation.empty(REPORTING, Rules()) + parts[0] + parts[1]

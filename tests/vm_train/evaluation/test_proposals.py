@@ -7,7 +7,7 @@ from tests.vm_export.looks import look_checkpoint
 from vm_embedded.detection.settings import Settings
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
-from vm_export.change_model import change_look
+from vm_export.change_model import change_looks
 from vm_export.grid import Grid
 from vm_train.data.pictures import find_pictures
 from vm_train.evaluation.answers import ExactSubject, load_subject
@@ -30,7 +30,7 @@ def files(drawn):
 def looking(tmp_path_factory):
     """A model file with a close look of random weights."""
     path = tmp_path_factory.mktemp("looking") / "looking.onnx"
-    change_look(MODEL, path, look_checkpoint(seed=1, above=0.3))
+    change_looks(MODEL, path, [look_checkpoint(seed=1, above=0.3)])
     return path
 
 

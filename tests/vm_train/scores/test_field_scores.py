@@ -53,6 +53,17 @@ def test_a_shifted_report_is_found_up_to_5_percent_and_false_from_10_percent(sha
     assert row["error_median"] == (None if false else pytest.approx(4.0 * share))
 
 
+def test_confidences_are_judged_by_the_reports_that_are_found_or_false():
+    """A report that is near a base, and one at a person, is neither."""
+    scores = UprightScores(0.05, 8.0)
+    found = at((4.0, 0.1), (7.0, 3.0), (2.15, -1.0), (5.0, -2.0))
+    scores.add([post(4.0), post(2.0, -1.0)], found, [post(5.0, -2.0)], [0.9, 0.2, 0.6, 0.7])
+    scores.add([post(3.0)], at((3.0, 0.0)), (), [0.5])
+    confidences, right = scores.judged()
+    assert confidences.tolist() == [0.9, 0.2, 0.5]
+    assert right.tolist() == [True, False, True]
+
+
 def test_a_second_report_of_the_same_post_is_false():
     row = scored([post(4.0)], at((4.0, 0.0), (4.0, 0.1))).row()
     assert (row["found"], row["reported"], row["false"], row["error_median"]) == (1, 2, 1, 0.0)
