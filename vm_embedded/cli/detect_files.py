@@ -7,7 +7,7 @@ import json
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from ..arrays import Image
 from ..cameras.image_files import Frame, Source, check_file_format, joined, lens_beside, open_source, open_sources
@@ -25,6 +25,7 @@ from ..output.result_files import FrameNames, make_folder, save_overlay, save_po
 from ..output.ros.mcap_file import McapFile
 from ..output.video_file import VideoFile
 from .progress import ProgressBar
+from .size_hint import size_hint, size_ratios
 
 _IMAGES_RATE = 10.0
 """Frame rate of a video of images [1/s]."""
@@ -78,8 +79,10 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
             processed += 1
             bar.show(frame.index + 1)
         bar.clear()
-        if remark:
-            complain(remark)
+        # Without a close look, sizes are as coarse as the mesh.
+        hint = "" if detector.look is None else size_hint(work.sizes, detector.manifest.object_radius)
+        for line in filter(None, (remark, hint)):
+            complain(line)
         if processed and not work.points:
             complain("no frame shows a near part of the plane: check --height [m], --pitch (down is above 0), and lens")
     return processed
@@ -157,7 +160,8 @@ def _object_classes(detector: Detector) -> tuple[str, ...]:
 class _Pass:
     """All that a pass over the frames needs.
 
-    boxes, mcap, video: the files that the options ask for. points: number of mesh points in all frames so far.
+    boxes, mcap, video: the files that the options ask for. points: number of mesh points in all frames so far. sizes:
+    of the objects in them, relative to the expected size.
     """
 
     detector: Detector
@@ -170,6 +174,7 @@ class _Pass:
     mcap: McapFile | None
     video: VideoFile | None
     points: int = 0
+    sizes: list[float] = field(default_factory=list)
 
     def process(self, frame: Frame) -> str:
         """Detect in a frame, save the files that the options ask for, and return its line of JSON.
@@ -188,6 +193,7 @@ class _Pass:
         explain = options.explain or self.boxes is not None
         detections = self.detector.detect(image, orientation, lens, explain=explain)
         self.points += len(detections.pixels)
+        self.sizes += size_ratios(detections)
         if self.follow is not None:
             detections = self.follow.tracker.update(detections, self.follow.time(frame))
         if self.boxes is not None:
