@@ -26,6 +26,10 @@ class InputError(VisualMeshError):
     """An unusable frame, file or option."""
 
 
+class NetworkError(InputError):
+    """An address that this machine can't use yet: its network may still be starting."""
+
+
 class ModelError(VisualMeshError):
     """A damaged or unusable model file."""
 

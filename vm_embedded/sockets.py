@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import ipaddress
 import os
 import socket
@@ -12,7 +13,7 @@ from dataclasses import Field
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError
+from .errors import InputError, NetworkError
 
 _MAX_PATH_BYTES = 107
 """Longest path of a Unix socket on Linux [bytes]."""
@@ -22,6 +23,8 @@ BACKLOG = 16
 
 MOST_CONNECTIONS = 64
 """Largest number of connections to a socket."""
+
+_NO_NETWORK = (errno.EADDRNOTAVAIL, errno.ENETDOWN, errno.ENETUNREACH, errno.EHOSTUNREACH)
 
 _UMASK = 0o117
 """Gives the socket's file mode 0660."""
@@ -168,9 +171,12 @@ def checked_address(entry: Field[Any], value: object) -> str:
 
 
 def checked_addresses(entry: Field[Any], value: object) -> str:
-    """Check of an entry: as `checked_address`, also several separated by commas. Raises InputError."""
+    """Check of an entry: ADDRESS:PORT, or several separated by commas, or empty. Raises InputError as
+    `checked_address` does, also for unix:PATH."""
     for each in value.split(",") if isinstance(value, str) else (value,):
-        checked_address(entry, each)
+        if not checked_address(entry, each).startswith("unix:"):
+            continue
+        raise InputError(f"{entry.name} must be ADDRESS:PORT, as in {entry.metadata['example']}, not {each!r}")
     return str(value)
 
 
@@ -197,12 +203,18 @@ def is_open_to_network(address: str) -> bool:
         return host != "localhost"
 
 
+def may_work_later(error: OSError) -> bool:
+    """Whether an address fails because the network is not up: it has no such address, no route, or no name server."""
+    return isinstance(error, socket.gaierror) or error.errno in _NO_NETWORK
+
+
 def datagram_socket(
     host: str, port: int, failure: str, listen: bool = False
 ) -> tuple[socket.socket, tuple[object, ...]]:
     """A non-blocking UDP socket, and the resolved address to send to.
 
-    listen: bind the socket to that address. failure: start of the error message. Raises InputError.
+    listen: bind the socket to that address. failure: start of the error message. Raises InputError, and NetworkError
+    for what may work later.
     """
     try:
         family, kind, protocol, _, resolved = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
@@ -217,7 +229,8 @@ def datagram_socket(
             opened.close()
             raise
     except OSError as error:
-        raise InputError(f"{failure} {host}:{port}: {error.strerror or error}") from error
+        reason = NetworkError if may_work_later(error) else InputError
+        raise reason(f"{failure} {host}:{port}: {error.strerror or error}") from error
     except UnicodeError as error:
         raise InputError(f"{failure} {host}:{port}: this can't be the name of a host") from error
     return opened, resolved

@@ -25,6 +25,9 @@ _CHECKED_PATCHES = (0, 1, 2, 7, 40)
 _MADE = 64
 """Patches that are made for a self-test."""
 
+_UNSURE = (0.05, 0.65)
+"""Limits of the probability of a patch that a network is unsure of."""
+
 
 def attached(content: bytes, manifest: Manifest, look: LookCheckpoint) -> tuple[bytes, float]:
     """A model file's bytes with a look network and its glance, and the largest difference of an answer to torch.
@@ -70,11 +73,27 @@ def tested_contract(look: LookCheckpoint) -> LookContract:
 
 
 def _self_test(look: LookCheckpoint) -> LookTest:
-    """The most and the least likely example of a look network, with its answers to them and to patches made of them."""
+    """The most and the least likely example of a look network, with its answers to them and to patches made of them.
+
+    A network that is unsure of none of these also gets the mixture of both that it is least sure of: damaged weights
+    hardly change answers that are nearly 0 or 1.
+    """
     probabilities = _answers(look.network.eval(), look.examples)[:, 0]
-    chosen = look.examples[np.unique([probabilities.argmax(), probabilities.argmin()])]
-    patches = np.concatenate([chosen, made_patches(chosen, _MADE)])
-    return LookTest(chosen, _answers(look.network, patches))
+    likely, unlikely = int(probabilities.argmax()), int(probabilities.argmin())
+    test = _tested(look.network, look.examples[np.unique([likely, unlikely])])
+    low, high = _UNSURE
+    if ((test.answers[:, 0] > low) & (test.answers[:, 0] < high)).any():
+        return test
+    shares = np.arange(1, 16)[:, None, None, None]  # in sixteenths
+    one, other = look.examples[likely].astype(np.int32), look.examples[unlikely].astype(np.int32)
+    mixtures = (((16 - shares) * one + shares * other) // 16).astype(np.uint8)
+    least_sure = np.abs(_answers(look.network, mixtures)[:, 0] - 0.5).argmin()
+    return _tested(look.network, np.concatenate([test.patches, mixtures[[least_sure]]]))
+
+
+def _tested(network: LookNetwork, patches: Image) -> LookTest:
+    """The test with these patches and those that are made of them."""
+    return LookTest(patches, _answers(network, np.concatenate([patches, made_patches(patches, _MADE)])))
 
 
 def detached(content: bytes, manifest: Manifest) -> bytes:

@@ -257,6 +257,15 @@ def check_self_test(test, look):
     np.testing.assert_allclose(test.answers, torch_answers(look.network, test.all_patches), atol=1e-5)
 
 
+def test_a_network_that_is_sure_of_all_patches_is_also_tested_with_a_mixture():
+    look = look_checkpoint().recalibrated(1e8, 5.0, "no picture")
+    test = attach_look.tested_contract(look).self_test
+    assert len(test.patches) == 3
+    np.testing.assert_allclose(test.answers, torch_answers(look.network, test.all_patches), atol=1e-5)
+    ends, mixture = test.patches[:2].astype(int), test.patches[2].astype(int)
+    assert ((mixture >= ends.min(axis=0)) & (mixture <= ends.max(axis=0))).all()
+
+
 @pytest.mark.parametrize("layout", ["plain", "runs"])
 def test_a_model_file_holds_both_networks(tmp_path, layout):
     mesh, look = ball_checkpoint(), look_checkpoint(provenance={"trained_by": "a test"})

@@ -9,6 +9,7 @@ import math
 import os
 import socket
 import struct
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -70,6 +71,8 @@ def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator
         yield check_pose(configuration)
         yield check_clock(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", time.time())
         yield check_status_socket(configuration)
+        if configuration.recorder.folder:
+            yield check_recorder(Path(configuration.recorder.folder))
     except OSError as error:
         yield Finding("machine", WARNING, one_line(error))
 
@@ -327,3 +330,15 @@ def check_status_socket(configuration: Configuration) -> Finding:
     if not os.access(path.parent, os.W_OK):
         return Finding("status socket", BAD, f"can't write to {path.parent}", f"sudo install -d -o $USER {path.parent}")
     return Finding("status socket", GOOD, str(path))
+
+
+def check_recorder(folder: Path) -> Finding:
+    """Whether recordings can be written to their folder, which may not exist yet."""
+    existing = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
+    try:
+        with tempfile.TemporaryDirectory(dir=existing):
+            pass
+    except OSError as error:
+        seen = f"can't write to {existing}: {error.strerror or error}"
+        return Finding("recorder", BAD, seen, f"sudo install -d -o $USER {folder}")
+    return Finding("recorder", GOOD, str(folder))

@@ -16,11 +16,12 @@ import cv2
 from ..cameras.library_messages import silence_opencv
 from ..cameras.open_camera import is_live
 from ..cameras.ros.bags import is_bag
+from ..config.toml_reader import parse_toml
 from ..config.toml_writer import to_commented_toml
-from ..errors import InputError, VisualMeshError
+from ..errors import InputError, NetworkError, VisualMeshError
 from ..live.configuration import HEADER, Configuration
 from ..live.control import REFUSED, ask, control_path
-from ..live.daemon import EXIT_CONFIGURATION, Daemon
+from ..live.daemon import EXIT_CONFIGURATION, EXIT_HUNG, Daemon
 from ..live.load_detector import prove_model
 from ..live.log import EventLog
 from ..network.bundled import SHIPPED, shipped_name
@@ -53,7 +54,8 @@ def parser() -> argparse.ArgumentParser:
         epilog="Exit status for files: 0, at least one frame was processed; 1, no frame was processed. For a live "
         "camera: 0, a signal such as Ctrl-C stopped it, or the played file has ended; 1, a second signal ended it at "
         "once, or the played file has ended and no frame could be processed; 75, reads of the camera or a frame "
-        "hang, and a restart may help; 78, the configuration can't be used, and a restart would fail again. "
+        "hang, or the network lacks an address of the configuration, and a restart may help; 78, the configuration "
+        "can't be used, and a restart would fail again. "
         "For --status: 0, the state is ok; 1, the state is not ok, or nothing answers. Always: 2, the options can't be "
         "parsed; 130, Ctrl-C while files are processed, or before the live camera runs. " + ANGLES,
     )
@@ -158,6 +160,9 @@ def _run(options: argparse.Namespace) -> int:
     try:
         given = read_options(options)
     except InputError as error:
+        if options.ask:  # the detector runs with what it has read before
+            complain(str(error))
+            return _ask(options.status_socket or _socket_in(options.config), options.ask)
         if only_asks or not live:
             raise
         return _report_bad_configuration(error)
@@ -165,7 +170,7 @@ def _run(options: argparse.Namespace) -> int:
         print(to_commented_toml(replace(given, model=_movable(given.model)), HEADER), end="")
         return EXIT_OK
     if options.ask:
-        return _ask(given, options.ask)
+        return _ask(given.status.socket, options.ask)
     if options.check_config:
         return _check_configuration(given)
     if not given.camera.source:
@@ -187,9 +192,18 @@ def _movable(model: str) -> str:
     return model if model in SHIPPED else shipped_name(Path(model)) or str(Path(model).absolute())
 
 
-def _ask(given: Configuration, command: str) -> int:
+def _socket_in(config: Path | None) -> str:
+    """[status] socket of a vm.toml that has errors elsewhere; empty if it can't be read."""
+    try:
+        socket = parse_toml((config or Path()).read_text(encoding="utf-8"))["status"]["socket"]
+    except (OSError, ValueError, InputError, KeyError, TypeError):
+        return ""
+    return socket if isinstance(socket, str) else ""
+
+
+def _ask(socket: str, command: str) -> int:
     """Send a command to the running detector and print its reply. Fails unless the detector is in state ok."""
-    reply = ask(control_path(given.status.socket), command)
+    reply = ask(control_path(socket), command)
     if reply.startswith(REFUSED):
         raise InputError(reply.removeprefix(REFUSED))
     try:
@@ -232,9 +246,9 @@ async def _prove_and_run(options: argparse.Namespace) -> int:
 
 
 def _report_bad_configuration(error: VisualMeshError) -> int:
-    """Log why the daemon can't start, and return the exit status that tells systemd not to restart it."""
+    """Log why the daemon can't start, and return the exit status that tells systemd whether to restart it."""
     EventLog("vm-detect")("can't start", "error", reason=str(error))
-    return EXIT_CONFIGURATION
+    return EXIT_HUNG if isinstance(error, NetworkError) else EXIT_CONFIGURATION
 
 
 if __name__ == "__main__":

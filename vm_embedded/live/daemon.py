@@ -23,7 +23,7 @@ from ..cameras.camera import without_password
 from ..cameras.grabber import MOST_HANGING, Grabber
 from ..cameras.open_camera import camera_opener
 from ..detection.detector import Detector
-from ..errors import InputError, VisualMeshError, one_line
+from ..errors import InputError, NetworkError, VisualMeshError, one_line
 from ..output.channels import Channels
 from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
@@ -52,6 +52,9 @@ _TICK = 0.02
 
 _SWITCH_INTERVAL = 0.0005
 """How long another thread may keep the interpreter while a frame waits [s]; Python's default is 5 ms."""
+
+_NETWORK_S = 15.0
+"""Longest wait for the network at the start [s]; the unit's TimeoutStartSec is 30 s, and the proof takes some, too."""
 
 _HEARTBEAT = 1.0
 """Longest pause between two messages [s]."""
@@ -151,7 +154,7 @@ class Daemon:
         self._loop = loop
         try:
             for part in self._parts:
-                await part.open()
+                await self._open(part)
             if self._bridge is not None:
                 await self._bridge.open(self.poses)
         except InputError:
@@ -184,6 +187,20 @@ class Daemon:
         status, reason = self._exit_status()
         self._log("stopped", frames=self.counters.outcomes.frames, reason=reason)
         return status
+
+    async def _open(self, part: Part) -> None:
+        """Open a part; wait some seconds for the network if that needs it. Raises InputError."""
+        deadline, reason = time.monotonic() + _NETWORK_S, ""
+        while True:
+            try:
+                return await part.open()
+            except NetworkError as error:
+                if self._stops or time.monotonic() > deadline:
+                    raise
+                if str(error) != reason:
+                    reason = str(error)
+                    self._log("waiting for the network", "warning", reason=reason)
+            await asyncio.sleep(0.2)
 
     def _log_loop_error(self, _: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         """Log what asyncio would report as a traceback, such as too many open files, in a line."""

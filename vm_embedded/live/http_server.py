@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from ipaddress import ip_address
 from urllib.parse import parse_qsl
 
-from ..errors import InputError, VisualMeshError
-from ..sockets import BACKLOG, Connections, UnixListener, parse_address
+from ..errors import InputError, NetworkError, VisualMeshError
+from ..sockets import BACKLOG, Connections, UnixListener, may_work_later, parse_address
 
 _TIMEOUT = 5.0
 """How long a browser may take to send its request, and to receive each part of the response [s]."""
@@ -70,7 +70,7 @@ class HttpServer:
         self._streaming = 0  # number of streams
 
     async def open(self) -> None:
-        """Listen. Raises InputError."""
+        """Listen. Raises InputError, and NetworkError for what may work later."""
         if self._where.startswith("unix:"):
             self._file = UnixListener(self._where.removeprefix("unix:"), self._option)
             self._server = await asyncio.start_unix_server(
@@ -83,7 +83,8 @@ class HttpServer:
         except OSError as error:
             # asyncio's own text repeats the address. An unknown host name has a negative errno.
             reason = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror or error
-            raise InputError(f"can't listen at {self._where}: {reason}") from error
+            kind = NetworkError if may_work_later(error) else InputError
+            raise kind(f"can't listen at {self._where}: {reason}") from error
         except UnicodeError as error:
             raise InputError(f"can't listen at {self._where}: {host!r} can't be the name of a host") from error
 

@@ -10,9 +10,11 @@ from pathlib import Path
 
 from ..cameras.camera import without_password
 from ..detection.detections import Detections
+from ..errors import InputError
 from ..geometry.orientation import Orientation
 from ..output.messages import Message
 from .answering import Answer, Answerer
+from .control import REFUSED
 from .http_server import HttpServer, Page, Query, Response
 from .status_page import StatusPage
 from .temperatures import read_temperatures
@@ -80,7 +82,10 @@ class LivePage:
         return Response("text/plain; version=0.0.4", self._metrics().encode())
 
     def _start_recording(self, _: Query) -> Response:
-        return _text(self._record())
+        reply = self._record()
+        if reply.startswith(REFUSED):
+            raise InputError(reply.removeprefix(REFUSED))
+        return _text(reply)
 
     def _change_threshold(self, query: Query) -> Response:
         """Use another threshold until the configuration is read again. Raises InputError."""

@@ -17,7 +17,7 @@ async def prove_model(configuration: Configuration) -> tuple[ModelFile, str]:
 
     Raises VisualMeshError for the first thing that is missing or invalid.
     """
-    _check_camera(configuration)
+    check_camera(configuration)
     return await prove_network(configuration)
 
 
@@ -43,7 +43,7 @@ async def load_checked_detector(configuration: Configuration) -> tuple[Detector,
     return Detector(model, configuration.detector), proved
 
 
-def _check_camera(configuration: Configuration) -> None:
+def check_camera(configuration: Configuration) -> None:
     """Raise InputError for a camera, lens or pose that is missing or invalid."""
     camera = configuration.camera.source
     orientation = configuration.fixed_orientation()  # raises InputError for angles without a height

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import sys
 import threading
 import time
@@ -17,8 +18,9 @@ _MOST_LINES, _PERIOD = 50, 10.0
 class EventLog:
     """Writes events, at most 50 of a kind in ten seconds; the next one then counts those that were left out.
 
-    Any thread may log; each event is one whole line. If the log can't be written, it is silent from then on; the
-    detector keeps running.
+    Any thread may log; each event is one whole line. An event is left out, too, if nobody reads the pipe or terminal
+    that the log goes to: the detector must not wait for a reader. If the log can't be written, it is silent from then
+    on; the detector keeps running.
     """
 
     def __init__(self, program: str, stream: TextIO | None = None) -> None:
@@ -34,7 +36,11 @@ class EventLog:
             self._write(event, level, fields)
 
     def _write(self, event: str, level: str, fields: dict[str, Any]) -> None:
-        left_out = self._recent.setdefault(event, _Recent()).count(time.monotonic())
+        recent = self._recent.setdefault(event, _Recent())
+        if not _takes_more(self._stream):
+            recent.left_out += 1
+            return
+        left_out = recent.count(time.monotonic())
         if left_out is None:
             return
         if left_out:
@@ -50,6 +56,16 @@ class EventLog:
             self._stream.flush()
         except (OSError, ValueError):  # a full disk, a closed terminal
             self._stream = open(os.devnull, "w")  # noqa: SIM115, PTH123
+
+
+def _takes_more(stream: TextIO) -> bool:
+    """Whether a stream takes a line without waiting: a full pipe does not."""
+    try:
+        poll = select.poll()
+        poll.register(stream.fileno(), select.POLLOUT)
+        return bool(poll.poll(0))
+    except (OSError, ValueError):  # it is in memory, or closed
+        return True
 
 
 @dataclass

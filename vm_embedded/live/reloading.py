@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from ..detection.detector import Detector
+from ..errors import InputError
 from .configuration import Configuration, recording_files
-from .load_detector import load_checked_detector
+from .load_detector import check_camera, load_checked_detector
 
 _NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder", "ros")
 """Sections that a reload does not change."""
@@ -35,13 +36,20 @@ async def read_again(configure: Callable[[], Configuration], running: Configurat
     The running detector waits only while the network is loaded, after another process has proved it.
     """
     wanted = configure()
-    # The open camera delivers its frames in the format of the start.
-    detector_settings = replace(wanted.detector, format=running.detector.format)
-    configuration = replace(wanted, detector=detector_settings)
-    detector, proved = await load_checked_detector(configuration)
     kept = {name: getattr(running, name) for name in _NEEDS_RESTART}
     needs_restart = [name for name, section in kept.items() if section != getattr(wanted, name)]
+    # The open camera delivers its frames in the format of the start.
+    detector_settings = replace(wanted.detector, format=running.detector.format)
     if wanted.detector.format != running.detector.format:
         needs_restart.append("detector.format")
-    files = recording_files(configuration, detector.session.model)
-    return Reloaded(replace(configuration, **kept), detector, proved, files, needs_restart)
+    configuration = replace(wanted, detector=detector_settings, **kept)
+    check_camera(wanted)
+    try:
+        detector, proved = await load_checked_detector(configuration)
+    except InputError as error:
+        if not needs_restart:
+            raise
+        raise InputError(f"{error} (only a restart changes {', '.join(needs_restart)})") from error
+    return Reloaded(
+        configuration, detector, proved, recording_files(configuration, detector.session.model), needs_restart
+    )

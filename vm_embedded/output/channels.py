@@ -6,6 +6,7 @@ A slow reader never blocks the detector: messages that exceed its backlog are dr
 from __future__ import annotations
 
 import asyncio
+import errno
 import os
 import queue
 import select
@@ -131,8 +132,11 @@ class Channels:
 
 def _open_to_append(path: str) -> int:
     try:
-        return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        # O_NONBLOCK: a named pipe that nobody reads is an error, and does not wait for a reader.
+        return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NONBLOCK, 0o644)
     except OSError as error:
+        if error.errno == errno.ENXIO:
+            raise InputError(f"can't write {path}: no program reads this pipe; start its reader first") from error
         raise InputError(f"can't write {path}: {error.strerror or error}") from error
 
 

@@ -118,20 +118,25 @@ class Recorder:
         if not self._moments:
             raise InputError("no frame to record yet")
         folder = Path(self.settings.folder) / recording_name(time.time())
+        part = folder.with_name(folder.name + PART)
+        try:
+            part.mkdir(parents=True)
+        except OSError as error:
+            raise InputError(f"can't create {part}: {error.strerror or error}") from error
         moments = list(self._moments)
-        arguments = (folder, moments, files)
+        arguments = (folder, part, moments, files)
         self._writer = threading.Thread(target=self._write, args=arguments, name="recorder", daemon=True)
         self._writer.start()
         return f"recording {len(moments)} frames to {folder}"
 
-    def _write(self, folder: Path, moments: Sequence[Moment], files: Mapping[str, bytes]) -> None:
-        """Write a recording. If it can't be completed, keep the frames that were written.
+    def _write(self, folder: Path, part: Path, moments: Sequence[Moment], files: Mapping[str, bytes]) -> None:
+        """Write a recording into the folder `part`, which gets the name `folder` at the end.
+
+        If it can't be completed, keep the frames that were written.
 
         Each frame's message follows its files at once, so vm-detect reads even the folder of a process that was killed.
         """
-        part = folder.with_name(folder.name + PART)
         try:
-            part.mkdir(parents=True)
             with locked(part):
                 self._fill(part, folder, moments, files)
         except OSError as error:
@@ -153,8 +158,7 @@ class Recorder:
                     raise InputError("the detector has stopped")
         except (OSError, InputError) as error:
             trouble = getattr(error, "strerror", None) or str(error)
-        finish(part, written)
-        self._delete_oldest()
+        self._delete_oldest(finish(part, written))
         if written == 0:
             self._report("recording failed", "error", f"{folder}: {trouble}")
         elif written < len(moments):
@@ -171,8 +175,8 @@ class Recorder:
             nbytes += _write_moment(part, index, each, self._closing)
             yield nbytes
 
-    def _delete_oldest(self) -> None:
-        delete_oldest_recordings(Path(self.settings.folder), 2**20 * self.settings.disk_mib)
+    def _delete_oldest(self, newest: Path | None = None) -> None:
+        delete_oldest_recordings(Path(self.settings.folder), 2**20 * self.settings.disk_mib, newest)
 
     def finish_left(self) -> None:
         """Finish the recordings of killed detectors, so that they count for the disk limit. Call it at the start."""

@@ -67,11 +67,15 @@ def finish_left_recordings(folder: Path) -> list[tuple[Path, int]]:
     return finished
 
 
-def delete_oldest_recordings(folder: Path, limit: float) -> None:
-    """Delete the oldest recordings in a folder until the rest take at most `limit` [bytes]; keep the newest."""
+def delete_oldest_recordings(folder: Path, limit: float, newest: Path | None = None) -> None:
+    """Delete the oldest recordings in a folder until the rest take at most `limit` [bytes]; keep the newest.
+
+    newest: the one that was just made, whatever the clock said then; None: the one with the latest name.
+    """
     recordings = sorted(
         each for each in folder.iterdir() if not each.name.endswith(PART) and (each / MESSAGES).is_file()
     )
+    recordings.sort(key=lambda each: newest is not None and each.name == newest.name)
     sizes = [sum(file.stat().st_size for file in each.iterdir()) for each in recordings]
     while len(recordings) > 1 and sum(sizes) > limit:
         shutil.rmtree(recordings.pop(0), ignore_errors=True)

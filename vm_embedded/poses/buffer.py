@@ -21,7 +21,7 @@ _KEPT = 3.0
 """How long poses are kept [s]; every frame is newer."""
 
 _MIN_INTERVAL = 0.005
-"""Least time between two poses that the jump check assumes [s]: lines that waited together arrive at one moment."""
+"""Least time between two poses that a speed is computed from [s]: lines that waited together arrive at one moment."""
 
 
 class StalePoseError(VisualMeshError):
@@ -96,10 +96,20 @@ class PoseBuffer:
             raise StalePoseError(f"oldest pose is {1e3 * (times[0] - time):.0f} ms newer than the frame")
         if not self.settings.interpolate or len(self._poses) == 1:
             return self._poses[-1][1]
-        time = min(max(time, times[0]), times[-1] + 1e-3 * self.settings.extrapolate_ms)
-        after = min(max(bisect_right(times, time), 1), len(times) - 1)
+        if time > times[-1]:
+            return self._extrapolated(times, min(time - times[-1], 1e-3 * self.settings.extrapolate_ms))
+        after = max(bisect_right(times, time), 1)
+        if after == len(times):
+            return self._poses[-1][1]
         (start, one), (end, other) = self._poses[after - 1], self._poses[after]
-        return interpolate(one, other, (time - start) / (end - start))
+        return interpolate(one, other, (max(time, start) - start) / (end - start))
+
+    def _extrapolated(self, times: list[float], ahead: float) -> Orientation:
+        """The orientation at a time `ahead` [s] after the newest pose, with the speed of the last _MIN_INTERVAL or
+        more."""
+        start = max(bisect_right(times, times[-1] - _MIN_INTERVAL) - 1, 0)
+        elapsed = max(times[-1] - times[start], _MIN_INTERVAL)
+        return interpolate(self._poses[start][1], self._poses[-1][1], 1.0 + ahead / elapsed)
 
 
 def interpolate(one: Orientation, other: Orientation, share: float) -> Orientation:

@@ -11,6 +11,7 @@ from vm_embedded.cli.checks import BAD, GOOD, WARNING, check_clock, check_opencv
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.radial_lenses import Equisolid
 from vm_embedded.live.configuration import Configuration, FixedPose, StatusSettings
+from vm_embedded.output.recorder import RecorderSettings
 from vm_embedded.poses.settings import PoseSettings
 
 HEALTHY = Configuration(
@@ -157,3 +158,12 @@ def test_every_fault_has_a_command_that_mends_it(root):
     broken = Configuration(camera=CameraSettings(source="9"), status=StatusSettings(socket="/nowhere/at/all"))
     for each in run_checks(broken, root):
         assert each.state == GOOD or each.mend, each
+
+
+def test_a_folder_that_takes_no_recording_is_seen(root, tmp_path):
+    file = tmp_path / "file"
+    file.touch()
+    for folder, state in ((file / "recordings", BAD), (tmp_path / "new" / "recordings", GOOD)):
+        recorder = RecorderSettings(folder=str(folder))
+        assert found(replace(HEALTHY, recorder=recorder), root)["recorder"].state == state
+    assert not (tmp_path / "new").exists()

@@ -139,7 +139,7 @@ def test_a_base_is_where_the_look_sees_it(detector):
 
 
 def test_a_doubtful_look_reports_nothing(detector):
-    assert find_bases(post_at(detector, (2.5, 0.3)), Sure(probability=0.35), SETTINGS) == []
+    assert find_bases(post_at(detector, (2.5, 0.3)), Sure(probability=0.25), SETTINGS) == []
 
 
 def test_without_points_of_the_class_there_is_nothing_to_look_at(detector):

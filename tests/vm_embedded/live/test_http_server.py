@@ -86,7 +86,9 @@ def test_figures_are_given_by_address_only_and_nothing_else_is(tmp_path):
         assert asked(b"GET" + change + b"localhost" + right + b"\r\n\r\n").startswith("HTTP/1.1 404")
         assert asked(b"OPTIONS" + change + b"localhost\r\n\r\n").startswith("HTTP/1.1 405")
         assert not [each for each in found.events if each["event"] == "threshold changed"]
-        assert "refused" in asked(b"POST /record HTTP/1.1\r\nHost: [::1]" + right + b"\r\n\r\n")
+        answer = asked(b"POST /record HTTP/1.1\r\nHost: [::1]" + right + b"\r\n\r\n")
+        assert answer.startswith("HTTP/1.1 400")
+        assert answer.endswith("recording is off: set [recorder] folder\n")
         assert asked(b"POST" + change + b"localhost" + right + b"\r\n\r\n").startswith("HTTP/1.1 200")
         found.wait(lambda: [each for each in found.events if each["event"] == "threshold changed"])
         with socket.socket(socket.AF_UNIX) as connection:

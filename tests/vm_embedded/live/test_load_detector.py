@@ -1,11 +1,12 @@
 """What stops vm-detect at the start, and how it says so."""
 
+import json
 import shutil
 import subprocess
 
 import pytest
 
-from tests.vm_embedded.live.running import COMMAND, arguments
+from tests.vm_embedded.live.running import COMMAND, arguments, running
 from vm_embedded.live.configuration import read_configuration
 from vm_embedded.network.bundled import model_path
 
@@ -86,3 +87,23 @@ def test_the_printed_configuration_is_one_and_says_what_the_defaults_are(tmp_pat
     ) == printed.count("\n")
     checked = [COMMAND, "--config", path, "--check-config", "--camera", "synthetic"]
     assert "self-test passed" in subprocess.run(checked, capture_output=True, text=True, timeout=60, check=True).stdout
+
+
+@pytest.mark.long
+def test_an_address_that_the_network_may_get_later_asks_for_a_restart(tmp_path):
+    command = arguments(tmp_path, "--camera", "synthetic", "--status-page", "192.0.2.1:8080")
+    done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+    assert done.returncode == 75
+    assert done.stderr.count("waiting for the network") == 1
+    assert "can't start" in done.stderr
+
+
+def test_a_running_detector_is_asked_although_its_vm_toml_has_got_an_error(tmp_path):
+    (tmp_path / "vm.toml").write_text(f"[camera]\nfsp = 3\n[status]\nsocket = '{tmp_path / 'control'}'\n")
+    with running(tmp_path, "--camera", "synthetic") as found:
+        found.wait_for_state("ok")
+        command = [COMMAND, "--config", tmp_path / "vm.toml", "--status"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["state"] == "ok"
+    assert "did you mean 'fps'" in done.stderr

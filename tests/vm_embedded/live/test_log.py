@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 import sys
 import threading
 
@@ -52,3 +53,17 @@ def test_events_of_several_threads_are_whole_lines(hasty, tmp_path):
     assert sorted((each["event"], each["number"]) for each in events) == sorted(
         (f"thread {thread}, part {number // 40}", number) for thread in range(8) for number in range(400)
     )
+
+
+def test_a_pipe_that_nobody_reads_does_not_stop_the_program():
+    reading, writing = os.pipe()
+    with os.fdopen(reading) as reader, os.fdopen(writing, "w") as stream:
+        log = EventLog("vm-detect", stream)
+        for number in range(3000):
+            log(f"event {number}", text="x" * 100)
+        log("lost")
+        os.set_blocking(reading, False)
+        assert len(os.read(reading, 2**20)) > 50_000
+        log("lost")
+        (line,) = reader.readlines()
+    assert json.loads(line)["left_out"] == 1

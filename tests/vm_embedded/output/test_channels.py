@@ -1,5 +1,6 @@
 """Messages of a real vm-detect on a Unix socket, in a file and by UDP."""
 
+import os
 import signal
 import socket
 
@@ -7,7 +8,9 @@ import pytest
 
 from tests.messages import read_message
 from tests.vm_embedded.live.running import running
+from vm_embedded.errors import InputError
 from vm_embedded.live.control import ask
+from vm_embedded.output.channels import OutputSettings
 
 
 @pytest.mark.long
@@ -63,3 +66,22 @@ def test_what_is_wrong_with_an_output_shows_in_the_state(tmp_path):
         found.wait_for_state("degraded")
         found.wait(lambda: "No space left" in read_message(ask(tmp_path / "control", "status"))["reason"])
         found.stop()
+
+
+def test_a_named_pipe_needs_a_reader(tmp_path):
+    pipe = tmp_path / "lines.fifo"
+    os.mkfifo(pipe)
+    with running(tmp_path, "--camera", "synthetic", "--output-file", pipe) as found:
+        (event,) = found.wait(lambda: [each for each in found.events if each["event"] == "can't start"])
+    assert "no program reads this pipe" in event["reason"]
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    with os.fdopen(reader, "rb") as lines, running(tmp_path, "--camera", "synthetic", "--output-file", pipe) as found:
+        found.wait_for_state("ok")
+        found.wait(lambda: len(found.frames) > 3)
+        found.stop()
+        assert read_message(lines.readline())["type"] == "state"
+
+
+def test_datagrams_have_no_unix_socket():
+    with pytest.raises(InputError, match=r"udp must be ADDRESS:PORT, as in .*, not 'unix:lines\.sock'"):
+        OutputSettings(udp="127.0.0.1:5600,unix:lines.sock")

@@ -10,7 +10,7 @@ import pytest
 from tests.drawn_scenes import MODEL
 from tests.messages import read_message
 from tests.vm_embedded.live.running import COMMAND, arguments, running
-from vm_embedded.output.recordings import locked
+from vm_embedded.output.recordings import delete_oldest_recordings, locked
 
 
 @pytest.mark.long
@@ -164,12 +164,25 @@ def test_a_recording_larger_than_its_limit_keeps_its_first_frames(tmp_path):
     assert f"only {written} of {promised} frames: it is larger than [recorder] disk_mib, 5 MiB" in event["folder"]
 
 
-def test_a_recording_that_can_not_be_written_is_an_error_in_the_log(tmp_path):
+def test_a_recording_that_can_not_be_written_is_refused(tmp_path):
     kept = tmp_path / "recordings"
     kept.touch()
     with running(tmp_path, "--camera", "synthetic", "--recorder-folder", kept) as found:
         found.wait(lambda: len(found.frames) > 3)
-        ask_to_record(tmp_path)
-        (event,) = found.wait(lambda: [each for each in found.events if each["event"] == "recording failed"])
+        done = ask_to_record(tmp_path)
+        (event,) = found.wait(lambda: [each for each in found.events if each["event"] == "not recorded"])
         found.stop()
-    assert event["level"] == "error"
+    assert event["level"] == "warning"
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "Not a directory" in done.stderr
+
+
+def test_the_newest_recording_stays_although_the_clock_was_set_back(tmp_path):
+    for name in ("2026-11-27T03-28-20.541", "2026-11-27T03-30-00.000", "1970-01-01T00-01-40.011"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "recording.jsonl").write_bytes(bytes(1000))
+    newest = tmp_path / "1970-01-01T00-01-40.011"
+    delete_oldest_recordings(tmp_path, 2000, newest)
+    assert sorted(each.name for each in tmp_path.iterdir()) == [newest.name, "2026-11-27T03-30-00.000"]
+    delete_oldest_recordings(tmp_path, 0, newest)
+    assert [each.name for each in tmp_path.iterdir()] == [newest.name]

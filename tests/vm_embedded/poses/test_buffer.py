@@ -115,3 +115,16 @@ def test_only_the_last_seconds_are_kept():
     for at in range(2000):
         poses.add(0.01 * at, Orientation.from_roll_pitch(0.6))
     assert len(poses) <= 302
+
+
+@given(st.floats(1e-6, 4e-3), st.floats(0.0, 0.05))
+def test_poses_that_arrived_together_do_not_give_a_wild_speed(apart, ahead):
+    """The speed is that since an older pose; without one, the two may be five milliseconds apart."""
+    poses = PoseBuffer(PoseSettings(max_age_ms=200.0, extrapolate_ms=50.0))
+    for at, pitch in ((1.0, 0.30), (1.08, 0.34), (1.08 + apart, 0.342)):
+        poses.add(at, Orientation.from_roll_pitch(0.6, 0.0, pitch))
+    assert poses.at(1.08 + apart + ahead).pitch == pytest.approx(0.342 + 0.042 / 0.08 * ahead, abs=2e-3)
+    poses = PoseBuffer(PoseSettings(max_age_ms=200.0, extrapolate_ms=50.0))
+    for at, pitch in ((1.0, 0.30), (1.0 + apart, 0.302)):
+        poses.add(at, Orientation.from_roll_pitch(0.6, 0.0, pitch))
+    assert poses.at(1.0 + apart + ahead).pitch <= 0.302 + 0.002 / 0.005 * ahead + 1e-6
