@@ -46,7 +46,7 @@ def board(options: argparse.Namespace) -> None:
 
 def lens(options: argparse.Namespace) -> None:
     """Estimate a lens and write it."""
-    check_writable(options.output)
+    _check_lens_path(options.output)
     fov = None if options.fov is None else parse_angle(options.fov, "--fov")
     if fov is not None and options.lens in ("auto", "pinhole", "fisheye"):
         raise InputError("--fov is for a radial lens; files of pinhole and fisheye lenses have no field of view")
@@ -60,14 +60,14 @@ def lens(options: argparse.Namespace) -> None:
 
 def kalibr(options: argparse.Namespace) -> None:
     """Convert a lens of Kalibr."""
-    check_writable(options.output)
+    _check_lens_path(options.output)
     name, found = read_kalibr(options.source, options.camera)
     _write(options.output, found, None, [f"lens            {name} of {options.source.name}, from Kalibr"])
 
 
 def pose(options: argparse.Namespace) -> None:
     """Estimate a pose and write it with the lens."""
-    check_writable(options.output)
+    _check_lens_path(options.output)
     if (options.balls is None) == (options.board is None):
         raise InputError("give either --balls, or --board with a video or pictures of the board on the floor")
     file = read_lens_file(options.lens)
@@ -118,6 +118,13 @@ def _pose_from_board(options: argparse.Namespace, lens: Lens) -> PoseFit:
     search = find_boards(options.source, _board(options, None))
     sightings = choose(search, _MOST_PLACES)
     return fit_board_on_floor(sightings, lens.for_image(search.size), search.size, options.thickness)
+
+
+def _check_lens_path(path: Path) -> None:
+    """Raise InputError for a file that can't be written, or that vm-detect would read as TOML."""
+    check_writable(path)
+    if path.suffix.lower() == ".toml":
+        raise InputError(f"{path} must end in .yaml: the lens file is YAML")
 
 
 def _write(path: Path, lens: Lens, orientation: Orientation | None, lines: list[str]) -> None:

@@ -59,6 +59,14 @@ def change_looks(model: str | Path, path: str | Path, looks: Sequence[LookCheckp
     return ChangedLooks(max(differences, default=None), lost)
 
 
+def lost_canary_message(output: Path, model: str | Path) -> str:
+    """What to tell a user whose new model file has no canary any more."""
+    return (
+        f"{output} has no canary, because its networks do not find every class in that of {model}; give it another "
+        f"picture with vm-export {output} --canary IMAGE LENS"
+    )
+
+
 def change_canary(model: str | Path, path: str | Path, canary: CanaryPicture) -> None:
     """Write a copy of a model file with new self-tests and this canary; its networks stay as they are.
 

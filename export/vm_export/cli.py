@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .look_checkpoint import LookCheckpoint
     from .reference import Overrides
 
-EXIT_OK, EXIT_FAILED = 0, 1
+EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
 
 def parser() -> argparse.ArgumentParser:
@@ -27,7 +27,7 @@ def parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="vm-export",
         description="Write a network as a self-describing ONNX file, and check its answers against torch.",
-        epilog="Exit status: 0 written, 1 not written (standard error says why), 2 wrong usage.",
+        epilog="Exit status: 0 written, 1 not written (standard error says why), 2 wrong usage, 130 interrupted.",
     )
     parser.add_argument(
         "model",
@@ -100,6 +100,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"vm-export: {missing} is not installed; {install_extra('export')}", file=sys.stderr)
     except VisualMeshError as error:
         print(f"vm-export: {error}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("vm-export: stopped", file=sys.stderr)
+        return EXIT_INTERRUPTED
     return EXIT_FAILED
 
 
@@ -111,7 +114,7 @@ def _run(options: argparse.Namespace) -> int:
     import torch
 
     from .attach_canary import CanaryPicture
-    from .change_model import change_canary, change_looks
+    from .change_model import change_canary, change_looks, lost_canary_message
     from .export import export, fastest_layout
     from .look_checkpoint import LookCheckpoint
     from .reference import write_reference
@@ -126,6 +129,9 @@ def _run(options: argparse.Namespace) -> int:
         for given in filter(None, (options.model, options.look, *(options.canary or ()))):
             if path.resolve() == given.resolve():
                 raise InputError(f"{path} is the input and would be overwritten; give another file with --output")
+    suffixes = (".yaml", ".yml") if options.to_yaml else (".onnx",)
+    if output.suffix not in suffixes:
+        raise InputError(f"--output must end in {suffixes[0]}, not {output}")
     look = LookCheckpoint.load(options.look) if options.look else None
     if look is not None and options.look_above is not None:
         look = look.for_points_above(options.look_above)
@@ -138,11 +144,7 @@ def _run(options: argparse.Namespace) -> int:
         changed = change_looks(options.model, output, [] if look is None else [look])
         _print_written(output, f"mesh network of {options.model}", look, changed.difference)
         if changed.lost_canary:
-            print(
-                f"vm-export: {output} has no canary, because its networks do not find every class in that of "
-                f"{options.model}; give it another picture with vm-export {output} --canary IMAGE LENS",
-                file=sys.stderr,
-            )
+            print(f"vm-export: {lost_canary_message(output, options.model)}", file=sys.stderr)
         return EXIT_OK
     checkpoint = _load(options.model, _overrides(options))
     print(f"{options.model}: {_description(checkpoint)}")
@@ -164,6 +166,9 @@ def _is_model_file(path: Path) -> bool:
 
 def _check_options(options: argparse.Namespace) -> None:
     """Refuse options that do not fit each other or the kind of the input. Raises InputError."""
+    for each in (options.model, options.output):
+        if each is not None and not each.name:
+            raise InputError(f"{each} is a folder: give a file")
     if options.look_above is not None and not options.look:
         raise InputError("--look-above is for the look that --look attaches; add --look, or leave it out")
     if options.look_above is not None and not 0.0 <= options.look_above <= 0.99:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from vm_embedded.cameras.image_files import lens_beside
+from vm_embedded.cameras.image_files import lens_file_of
 from vm_embedded.errors import InputError
 from vm_embedded.output.box_files import CLASSES
 
@@ -50,6 +50,7 @@ def write_training_boxes(folder: BoxFolder, answers: Mapping[str, str], target: 
     if not chosen:
         raise InputError(f"no image of {folder.path} has an answer for each of its crops; judge them on the page first")
     accepted = {image: [crop for crop in by_image[image] if answers[crop.id] == "yes"] for image in chosen}
+    target = target.absolute()  # "." has no name
     part = target.with_name(target.name + ".part")
     try:
         shutil.rmtree(part, ignore_errors=True)
@@ -103,7 +104,7 @@ def _write_image(folder: BoxFolder, target: Path, image: str, crops: list[Crop])
     source, copy = folder.path / image, target / image
     copy.parent.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(source, copy)
-    lens = lens_beside(source)
+    lens = lens_file_of(source)
     if lens is not None:
         shutil.copyfile(lens, copy.with_name(lens.name))
     numbers = {name: number for number, name in enumerate(folder.classes)}

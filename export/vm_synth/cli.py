@@ -18,7 +18,7 @@ from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError, VisualMeshError, unknown
 from vm_embedded.files import atomic_write, check_writable
-from vm_workstation.contact_sheet import check_sheet_path, choose_indices, write_sheet
+from vm_workstation.contact_sheet import check_sheet_path, check_sheet_size, choose_indices, write_sheet
 from vm_workstation.option_types import at_least
 from vm_workstation.stopping import stoppable
 
@@ -111,7 +111,9 @@ def preview_parser() -> argparse.ArgumentParser:
     made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
     made.add_argument("--count", type=at_least(1), default=24, metavar="N", help="number of pictures; default 24")
     made.add_argument("--columns", type=at_least(1), default=6, metavar="N", help="pictures per row; default 6")
-    made.add_argument("--width", type=at_least(1), default=320, metavar="PX", help="width of each picture; default 320")
+    made.add_argument(
+        "--width", type=at_least(16), default=320, metavar="PX", help="width of each picture; default 320"
+    )
     which = made.add_mutually_exclusive_group()
     which.add_argument(
         "--first",
@@ -207,7 +209,8 @@ def _scene_file(given: Path | None) -> Path | None:
 def _render(options: argparse.Namespace) -> int:
     workers = len(os.sched_getaffinity(0)) if options.workers is None else options.workers
     if workers < 1 or options.count < 1:
-        raise InputError(f"--workers ({workers}) and --count ({options.count}) must be at least 1")
+        name, value = ("--workers", workers) if workers < 1 else ("--count", options.count)
+        raise InputError(f"{name} must be at least 1, not {value}")
     configuration = read_sections(
         SceneConfiguration, _scene_file(options.config), parse_overrides(options.set, _EXAMPLE)
     )
@@ -287,6 +290,7 @@ def _preview(options: argparse.Namespace) -> int:
         raise InputError(f"there is no folder {options.out}")
     check_writable(output)
     there = indices_in(options.out)
+    check_sheet_size(options.width * min(options.columns, options.count), options.width)
     cells, name = [], "ball"
     for index in choose_indices(there, options.count, options.first, options.seed):
         try:

@@ -152,3 +152,8 @@ def test_a_board_needs_its_size_and_the_right_kind_of_file(tmp_path, capsys):
     board = ("board", "--board", "9x6")
     assert "give --square in meters" in run(capsys, *board, "-o", tmp_path / "a.svg", code=1)
     assert "ends in .svg" in run(capsys, *board, "--square", "0.03", "-o", tmp_path / "a.pdf", code=1)
+
+
+def test_a_lens_file_in_yaml_is_not_named_like_one_in_toml(tmp_path, capsys):
+    said = run(capsys, "lens", tmp_path, "--board", "9x6", "-o", tmp_path / "lens.toml", code=1)
+    assert "lens.toml must end in .yaml: the lens file is YAML" in said

@@ -169,3 +169,17 @@ def test_a_portable_file_that_can_not_be_written_leaves_no_half_of_the_work(tmp_
     (tmp_path / "model.plain.onnx").mkdir()
     assert "model.plain.onnx" in run(tmp_path / "model.pt", code=1).stderr
     assert names_in(tmp_path) == ["model.plain.onnx", "model.pt"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("ball", "--no-look", "-o", "new.pt"), "--output must end in .onnx, not new.pt"),
+        (("ball", "--no-look", "-o", "."), ". is a folder: give a file"),
+        ((".",), ". is a folder: give a file"),
+    ],
+)
+def test_a_file_must_have_the_suffix_of_its_content(tmp_path, arguments, message):
+    done = subprocess.run([COMMAND, *arguments], capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert (done.returncode, done.stderr) == (1, f"vm-export: {message}\n")
+    assert not list(tmp_path.iterdir())

@@ -34,8 +34,8 @@ def make_folder(folder, count, near=True, classes=("ball",)):
     return folder
 
 
-def run(*arguments, code=0):
-    done = subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=60)
+def run(*arguments, code=0, **more):
+    done = subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=60, **more)
     assert done.returncode == code, (done.returncode, done.stderr)
     assert "Traceback" not in done.stderr
     return done

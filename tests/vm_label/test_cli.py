@@ -187,3 +187,16 @@ def run_prlimit(pid, size):
     before = resource.prlimit(pid, resource.RLIMIT_FSIZE)
     resource.prlimit(pid, resource.RLIMIT_FSIZE, (size, before[1]))
     return before[0]
+
+
+def test_lens_files_of_all_names_are_copied_also_to_the_working_folder(tmp_path):
+    folder = make_folder(tmp_path / "boxes", 2, near=False)
+    for number, name in enumerate(("frame0.yaml", "lensframe1.yaml")):
+        for suffix in (".jpg", ".txt"):
+            (folder / f"image000{number}{suffix}").rename(folder / f"frame{number}{suffix}")
+        (folder / f"lens000{number}.yaml").rename(folder / name)
+    judge(folder, ["yes", "yes"])
+    (tmp_path / "new").mkdir()
+    run(folder, "--write", ".", cwd=tmp_path / "new")
+    written = {path.name for path in (tmp_path / "new").iterdir()}
+    assert written > {"frame0.jpg", "frame0.yaml", "frame1.jpg", "lensframe1.yaml"}

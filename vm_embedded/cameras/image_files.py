@@ -188,6 +188,12 @@ def lens_beside(path: Path | None) -> Path | None:
     return beside if beside.exists() else None
 
 
+def lens_file_of(image: Path) -> Path | None:
+    """The lens file of a frame of any tool: NAME.yaml, lensNAME.yaml, or for imageNAME lensNAME.yaml; None without."""
+    beside = (image.with_suffix(".yaml"), image.with_name(f"lens{image.stem}.yaml"), lens_beside(image))
+    return next((each for each in beside if each is not None and each.is_file()), None)
+
+
 def _video(name: str) -> Source:
     """The frames of a video file; or of a camera, by number or device path."""
     capture = cv2.VideoCapture(int(name) if name.isdigit() else name)

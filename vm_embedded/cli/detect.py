@@ -43,7 +43,7 @@ _FILES_ONLY = (
 """Options that a live camera rejects."""
 
 _LIVE_ONLY = ("output", "status", "recorder")
-"""Sections of vm.toml whose options only a live camera has."""
+"""Sections of vm.toml whose options only a live camera has; [pose] also counts for bags."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -179,7 +179,8 @@ def _run(options: argparse.Namespace) -> int:
         raise InputError(f"only one live camera at a time is possible, not {', '.join(options.files)}")
     if options.live or is_live(given.camera.source):
         return _detect_live(options)
-    for name in (f"{section}_{each.name}" for section in _LIVE_ONLY for each in fields(LIVE[section])):
+    sections = _LIVE_ONLY if any(map(is_bag, options.files)) else (*_LIVE_ONLY, "pose")
+    for name in (f"{section}_{each.name}" for section in sections for each in fields(LIVE[section])):
         if getattr(options, name) is not None:
             raise InputError(
                 f"--{name.replace('_', '-')} works only with a live camera; --live plays files like a live camera"

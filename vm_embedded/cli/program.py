@@ -59,7 +59,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print what is wrong as one line, and exit with status 2."""
-        message = self._unknown_option() or self._unknown_command() or message
+        message = self._unknown_option() or self._unknown_command(message) or message
         self.exit(2, f"{self.prog}: {' '.join(message.split())}; {self.prog} --help lists the options\n")
 
     def completions(self, words: Sequence[str]) -> list[str]:
@@ -74,11 +74,16 @@ class Parser(argparse.ArgumentParser):
             candidates = list(self._commands) if len(words) < 2 else []
         return [each for each in candidates if each.startswith(last)]
 
-    def _unknown_command(self) -> str | None:
-        """What is wrong with a first argument that resembles a command and is no file; None for other arguments."""
+    def _unknown_command(self, message: str) -> str | None:
+        """What is wrong with a first argument that resembles a command and is no file; None for other arguments.
+
+        message: what is wrong if the argument is no command. Missing or surplus arguments speak for a command.
+        """
         first = self._given[0] if self._given else ""
-        near = get_close_matches(first, self._commands, n=1)
-        if not near or first in self._commands or os.path.lexists(first):
+        near = get_close_matches(first, self._commands, n=1, cutoff=0.75)
+        if not near or first in self._commands or "." in first or os.path.lexists(first):
+            return None
+        if "are required" not in message and "unrecognized" not in message:
             return None
         return f"unknown command {first}: did you mean {near[0]}?"
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from vm_embedded.cameras.image_files import lens_beside
+from vm_embedded.cameras.image_files import lens_file_of
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.geometry.lens_files import read_lens_file
 
@@ -105,8 +105,7 @@ def _boxes(
 
 def _lens(files: FolderFiles, image: Path, facts: ImageFacts) -> tuple[Path | None, list[str]]:
     """The good lens file beside an image, if there is one, and what is wrong with it."""
-    beside = (image.with_suffix(".yaml"), image.with_name(f"lens{image.stem}.yaml"), lens_beside(image))
-    path = next((each for each in beside if each is not None and each.is_file()), None)
+    path = lens_file_of(image)
     if path is None:
         return None, []
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from typing import TYPE_CHECKING
 
 from vm_embedded.detection.settings import Settings
@@ -38,7 +39,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
     close look.
     """
     # Imported here: without torch, help works and the error is one clear line.
-    from vm_export.change_model import change_looks
+    from vm_export.change_model import change_looks, lost_canary_message
     from vm_export.look_weights import look_of, upright_looks_of
 
     from ..evaluation.evaluation import Rules
@@ -47,6 +48,8 @@ def run_calibrate(options: argparse.Namespace) -> int:
     from ..evaluation.workers import Job
 
     path = model_path(options.model)
+    if options.output.suffix != ".onnx":
+        raise InputError(f"{options.output} must end in .onnx: it becomes a model file")
     if path.resolve() == options.output.resolve():
         raise InputError(f"{path} is the input and would be overwritten; give another file with --output")
     check_writable(options.output)
@@ -60,8 +63,10 @@ def run_calibrate(options: argparse.Namespace) -> int:
     job = Job(path, _CANDIDATES, False, classes, rules)
     result = evaluate_with_progress(job, job.subject(), pictures, options.workers)
     calibrated = [_calibrated(look, *_answers(result, look.contract.object_class), len(result.poses)) for look in looks]
-    change_looks(path, options.output, calibrated)
-    print(f"{options.output}: written")
+    changed = change_looks(path, options.output, calibrated)
+    print(f"{options.output}: written; other objects may now pass --min-confidence")
+    if changed.lost_canary:
+        print(f"vm-evaluate: {lost_canary_message(options.output, options.model)}", file=sys.stderr)
     return EXIT_OK
 
 

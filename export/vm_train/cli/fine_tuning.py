@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vm_embedded.cli.program import Parser
 from vm_embedded.config.sections import parse_overrides, read_sections
@@ -14,9 +15,13 @@ from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
 
+from ..learning.folder_access import locked
 from ..tuning.configuration import TUNING_HEADER, TuningConfiguration
 from .box_options import parse_names
 from .training import EXIT_OK, stop_requests
+
+if TYPE_CHECKING:
+    from ..tuning.run_folder import TuningRun
 
 _NAMED = 20
 """Faults to name."""
@@ -39,7 +44,8 @@ def print_tune_config(options: argparse.Namespace) -> int:
 
 def resume_fine_tuning(options: argparse.Namespace) -> int:
     """Resume a fine-tuning and return the exit status. Raises VisualMeshError."""
-    return _fine_tune(options.run, options.data, options)
+    with locked(options.run):
+        return _fine_tune(options.run, options.data, options)
 
 
 def begin_fine_tuning(options: argparse.Namespace) -> int:
@@ -56,20 +62,27 @@ def begin_fine_tuning(options: argparse.Namespace) -> int:
     _complain(found.faults, options.boxes)
     if options.strict and found.faults:
         raise InputError("some boxes can't be used, see above: repair them, or leave out --strict to skip them")
-    run = begin_tuning(
-        options.output,
-        source,
-        found,
-        configuration,
-        model_path(options.model),
-        str(options.model),
-        options.rendered,
-        options.threads or 1,
-    )
+    with locked(options.output):
+        run = begin_tuning(
+            options.output,
+            source,
+            found,
+            configuration,
+            model_path(options.model),
+            str(options.model),
+            options.rendered,
+            options.threads or 1,
+        )
+        _describe(run, options.boxes)
+        return _fine_tune(run.folder, None, options)
+
+
+def _describe(run: TuningRun, boxes: Path) -> None:
+    """Print the numbers of frames."""
     recordings = len({each.recording for each in run.pictures})
     count = len(run.split.training), len(run.split.validation)
     print(
-        f"{options.boxes}: {len(run.pictures)} frames of {recordings} recordings: {count[0]} for training, {count[1]} "
+        f"{boxes}: {len(run.pictures)} frames of {recordings} recordings: {count[0]} for training, {count[1]} "
         "for validation",
         flush=True,
     )
@@ -79,7 +92,6 @@ def begin_fine_tuning(options: argparse.Namespace) -> int:
             "training ends",
             file=sys.stderr,
         )
-    return _fine_tune(run.folder, None, options)
 
 
 def _complain(faults: Sequence[str], folder: Path) -> None:
@@ -95,14 +107,13 @@ def _fine_tune(folder: Path, moved_to: Path | None, options: argparse.Namespace)
 
     Raises KeyboardInterrupt after the step in which Ctrl-C or SIGTERM asked for a stop.
     """
-    from ..learning.folder_access import locked
     from ..learning.hardware import set_up_hardware
     from ..tuning.fine_tuning import fine_tune
     from ..tuning.run_folder import read_tuning
 
     run = read_tuning(folder, moved_to)
     workers = options.workers or len(os.sched_getaffinity(0))
-    with locked(folder), set_up_hardware("cpu", workers, options.threads or run.threads) as hardware:
+    with set_up_hardware("cpu", workers, options.threads or run.threads) as hardware:
         if hardware.size > 1:
             raise InputError("vm-train look runs in one process: start it without torchrun")
         with stop_requests() as stop_requested:

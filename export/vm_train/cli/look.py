@@ -18,6 +18,7 @@ from ..data.pictures import find_pictures
 from ..data.split import split_by_seed
 from ..learning.class_table import ClassTable
 from ..learning.configuration import TrainConfiguration
+from ..learning.folder_access import locked
 from ..look.configuration import LOOK_HEADER, LookConfiguration
 from .box_options import add_box_options
 from .fine_tuning import begin_fine_tuning
@@ -122,10 +123,13 @@ def run_look(options: argparse.Namespace) -> int:
     split = split_by_seed(numbers, configuration.data.validation, 0.0, configuration.data.split_seed)
     strict, threads = options.strict, options.threads or 1
     name, glance = str(options.model), options.glance
-    run = begin_look_run(options.output, options.data, split, configuration, model, name, strict, threads, glance)
-    count = len(split.training), len(split.validation)
-    print(f"{options.data}: {len(numbers)} pictures: {count[0]} for training, {count[1]} for validation", flush=True)
-    return _train(run.folder, None, options)
+    with locked(options.output):
+        run = begin_look_run(options.output, options.data, split, configuration, model, name, strict, threads, glance)
+        count = len(split.training), len(split.validation)
+        print(
+            f"{options.data}: {len(numbers)} pictures: {count[0]} for training, {count[1]} for validation", flush=True
+        )
+        return _train(run.folder, None, options)
 
 
 def _with_classes_of(model: Path, configuration: LookConfiguration) -> LookConfiguration:
@@ -143,7 +147,8 @@ def resume_look(options: argparse.Namespace) -> int:
     """Resume the training of a close look and return the exit status. Raises VisualMeshError."""
     if options.device == "cuda":
         raise InputError(f"{options.run} is the training of a close look, which runs on the CPU: leave out --device")
-    return _train(options.run, options.data, options)
+    with locked(options.run):
+        return _train(options.run, options.data, options)
 
 
 def _train(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> int:
@@ -151,7 +156,6 @@ def _train(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> 
 
     Raises KeyboardInterrupt after the step in which Ctrl-C or SIGTERM asked for a stop.
     """
-    from ..learning.folder_access import locked
     from ..learning.hardware import set_up_hardware
     from ..look.collected import collect
     from ..look.run_folder import read_look_run
@@ -161,7 +165,7 @@ def _train(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> 
     if moved_to is not None:
         run = replace(run, data=moved_to.resolve())
     workers = options.workers or len(os.sched_getaffinity(0))
-    with locked(folder), set_up_hardware("cpu", workers, options.threads or run.threads) as hardware:
+    with set_up_hardware("cpu", workers, options.threads or run.threads) as hardware:
         if hardware.size > 1:
             raise InputError("vm-train look runs in one process: start it without torchrun")
         if is_finished(run):

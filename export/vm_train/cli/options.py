@@ -95,7 +95,7 @@ def preview_parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--versions", type=at_least(1), default=5, metavar="N", help="augmented versions of each picture; default 5"
     )
-    made.add_argument("--seed", type=int, default=0, metavar="S", help="random seed; default 0")
+    made.add_argument("--seed", type=at_least(0), default=0, metavar="S", help="random seed; default 0")
     made.add_argument("--width", type=at_least(1), default=320, metavar="PX", help="width of each picture; default 320")
     made.add_argument(
         "-o", "--output", type=Path, default=Path("preview.jpg"), metavar="FILE", help="file to write, .jpg or .png"

@@ -7,7 +7,7 @@ import shutil
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +22,7 @@ from ..data.picture_files import PictureFiles
 from ..data.pictures import find_pictures
 from ..data.split import Split, split_by_lists, split_by_seed
 from ..learning.configuration import TrainConfiguration
+from ..learning.folder_access import locked
 from .check import complaints
 from .stream_options import stream_source
 
@@ -43,11 +44,16 @@ def run_training(options: argparse.Namespace) -> int:
 
     start = load_start(options.start)
     configuration = read_configuration(options, start)
-    with set_up_hardware(options.device, options.workers, options.threads) as hardware:
+    with set_up_hardware(options.device, options.workers, options.threads) as hardware, ExitStack() as held:
         # The leader prepares everything; the other processes wait for its error message, or None.
         error = None
         if hardware.is_leader:
-            error = _message_of_error(lambda: _begin(options, configuration, hardware, start))
+
+            def begin() -> None:
+                held.enter_context(locked(options.output))
+                _begin(options, configuration, hardware, start)
+
+            error = _message_of_error(begin)
         error = hardware.broadcast(error)
         if error is not None:
             raise InputError(error)
@@ -58,7 +64,9 @@ def run_resume(options: argparse.Namespace) -> int:
     """Resume a training and return the exit status. Raises VisualMeshError."""
     from ..learning.hardware import set_up_hardware
 
-    with set_up_hardware(options.device, options.workers, options.threads) as hardware:
+    with set_up_hardware(options.device, options.workers, options.threads) as hardware, ExitStack() as held:
+        if hardware.is_leader:
+            held.enter_context(locked(options.run))
         return _train(options.run, hardware, options.data)
 
 
@@ -150,7 +158,6 @@ def _train(folder: Path, hardware: Hardware, moved_to: Path | None = None) -> in
 
     Raises KeyboardInterrupt after the step in which Ctrl-C or SIGTERM asked for a stop.
     """
-    from ..learning.folder_access import locked
     from ..learning.rounds import train
     from ..learning.run_folder import read_run
 
@@ -162,7 +169,7 @@ def _train(folder: Path, hardware: Hardware, moved_to: Path | None = None) -> in
         hardware = replace(hardware, workers=source.workers)
         if hardware.is_leader:
             print(f"vm-train: {hardware.workers} workers read the stream, as run.json says", file=sys.stderr)
-    with locked(folder) if hardware.is_leader else nullcontext(), stop_requests() as stop_requested:
+    with stop_requests() as stop_requested:
         outcome = train(run, hardware, stop_requested)
     if not outcome.finished:
         raise KeyboardInterrupt

@@ -26,6 +26,9 @@ from .pictures import Picture, parse_lens, read_picture
 
 _HEADER = struct.Struct("<8s32sIIII")  # magic, fingerprint, width, height, bytes of the lens text, zero
 _MAGIC = b"vmtrain1"
+
+_LONGEST = 200
+"""Longest name of a picture that becomes the name of a file; file systems allow 255 bytes."""
 KEPT_FREE = 1 << 30
 """Disk space to leave for the other files of a training [bytes]."""
 
@@ -97,7 +100,10 @@ class DecodedCache:
         return self.folder / "full"
 
     def _path(self, files: PictureFiles) -> Path:
-        return self.folder / f"{quote(files.number, safe='')}.raw"
+        name = quote(files.number, safe="")
+        if len(name) > _LONGEST:
+            name = hashlib.sha256(name.encode()).hexdigest()
+        return self.folder / f"{name}.raw"
 
 
 def read_through_cache(files: PictureFiles, classes: Classes, cache: DecodedCache | None) -> Picture:

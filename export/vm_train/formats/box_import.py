@@ -72,8 +72,9 @@ def _prepare(out: Path) -> None:
 
 
 def _number(path: Path, used: Sequence[str | None]) -> str:
-    """The path of a frame as a picture's number: without separators and dots, and different from all used ones."""
-    number = "_".join(path.with_suffix("").parts).replace(".", "_")
+    """The path of a frame as a picture's number: without separators, dots and the signs of comments in lists of
+    pictures, and different from all used ones."""
+    number = "_".join(path.with_suffix("").parts).replace(".", "_").replace("#", "_")
     while number in used:
         number += "_"
     return number

@@ -61,10 +61,13 @@ def _members(picture: PictureFiles) -> Iterator[tuple[str, bytes]]:
 
 def _prepare(out: Path, pictures: Sequence[PictureFiles], per_shard: int) -> None:
     """Make the folder and its shards.json. Raises InputError if it holds shards of other pictures."""
-    digest = hashlib.sha256("\n".join(each.number for each in pictures).encode("utf-8", "surrogateescape")).hexdigest()
-    plan = {"format": _FORMAT, "pictures": len(pictures), "per_shard": per_shard, "numbers_sha256": digest}
+    if any(each.image.parent.resolve() == out.resolve() for each in pictures):
+        raise InputError(f"{out} is the folder of the pictures: write to another folder")
     path = out / "shards.json"
     try:
+        facts = [f"{each.number} {_size(each.image)} {_size(each.mask)}" for each in pictures]
+        digest = hashlib.sha256("\n".join(facts).encode("utf-8", "surrogateescape")).hexdigest()
+        plan = {"format": _FORMAT, "pictures": len(pictures), "per_shard": per_shard, "files_sha256": digest}
         out.mkdir(parents=True, exist_ok=True)
         if path.exists():
             if json.loads(path.read_text(encoding="utf-8")) != plan:
@@ -77,3 +80,8 @@ def _prepare(out: Path, pictures: Sequence[PictureFiles], per_shard: int) -> Non
         raise InputError(f"{path} is damaged: write to another folder") from error
     with atomic_write(path) as part:
         part.write_text(json.dumps(plan, indent=1) + "\n", encoding="utf-8")
+
+
+def _size(path: Path) -> int:
+    """Size of a file [bytes]; 0 if it is missing, which the writer tells."""
+    return path.stat().st_size if path.exists() else 0

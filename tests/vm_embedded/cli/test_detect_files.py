@@ -152,7 +152,12 @@ def test_one_line_says_that_the_lens_files_beside_images_replace_what_was_given(
 
 
 def test_options_of_a_live_camera_are_rejected_for_files(tmp_path):
-    for option in ("--status-page=127.0.0.1:8080", "--output-udp=127.0.0.1:5000", f"--recorder-folder={tmp_path}"):
+    for option in (
+        "--status-page=127.0.0.1:8080",
+        "--pose-source=udp:127.0.0.1:5600",
+        "--output-udp=127.0.0.1:5000",
+        f"--recorder-folder={tmp_path}",
+    ):
         one_complaint(detect(IMAGES[0], option, code=1), f"{option.partition('=')[0]} works only with a live camera")
 
 

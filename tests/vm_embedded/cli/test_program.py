@@ -60,6 +60,13 @@ def test_a_mistyped_command_is_one_line_with_the_nearest():
     done = run("vm-train", "resum", "runs/ball")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == ("vm-train: unknown command resum: did you mean resume?; vm-train --help lists the options\n")
+    for command, reason in (
+        ("vm-synth configs --count x", "'x' is not a whole number"),
+        ("vm-evaluate calibrated.onnx data", "-o/--output"),
+    ):
+        said = run(*command.split()).stderr
+        assert reason in said
+        assert "unknown command" not in said
 
 
 def completed(line, folder):

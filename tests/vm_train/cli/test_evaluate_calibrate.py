@@ -1,7 +1,10 @@
 """vm-evaluate calibrate as a user types it: a model file whose confidence fits pictures."""
 
+import json
 import re
+import shutil
 
+import cv2
 import numpy as np
 import pytest
 
@@ -49,12 +52,30 @@ def test_the_confidence_fits_the_pictures_afterward_and_all_else_stays(data, tmp
     assert again == pytest.approx(1.0, abs=0.1)
 
 
+def test_a_canary_that_is_not_found_any_more_is_a_warning(data, tmp_path, capsys):
+    """Most balls of these masks are said to be field, so the network becomes unsure of all balls."""
+    shutil.copytree(data, tmp_path / "data")
+    for path in sorted((tmp_path / "data").glob("mask*.png"))[15:]:
+        mask = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        mask[(mask[..., :3] == (0, 0, 255)).all(axis=-1), :3] = (0, 255, 0)
+        cv2.imwrite(str(path), mask)
+        scene = path.with_name(f"scene{path.stem.removeprefix('mask')}.json")
+        scene.write_text(json.dumps(json.loads(scene.read_text()) | {"ball": None}))
+        number = path.stem.removeprefix("mask")
+        for each in (tmp_path / "data").glob(f"*{number}.*"):
+            shutil.copy(each, each.with_name(each.name.replace(number, f"1{number}")))
+    assert calibrate("ball-small", tmp_path / "data", "-o", tmp_path / "unsure.onnx") == 0
+    assert "unsure.onnx has no canary, because its networks do not find every class" in capsys.readouterr().err
+    assert read_model(tmp_path / "unsure.onnx").canary is None
+
+
 def test_what_can_not_be_calibrated_is_one_line(data, tmp_path, capsys):
     for arguments, said in (
         ((MODEL, data, "-o", tmp_path / "a.onnx"), "has no close look; vm-export --look attaches one"),
         (("bal", data, "-o", tmp_path / "a.onnx"), "unknown network 'bal'; did you mean 'ball'?"),
         ((MODEL, data, "-o", MODEL), "is the input and would be overwritten"),
         (("ball-small", data, "-o", "/nowhere/a.onnx"), "/nowhere"),
+        (("ball-small", data, "-o", tmp_path / "a.pt"), "a.pt must end in .onnx"),
         (("ball-small", draw_set(tmp_path / "few", 2), "-o", tmp_path / "a.onnx"), "which needs 10 of each"),
     ):
         assert calibrate(*arguments) == 1

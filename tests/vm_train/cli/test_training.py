@@ -1,6 +1,5 @@
 """Trainings as a user runs them: real processes that are stopped, killed and resumed."""
 
-import fcntl
 import json
 import os
 import pty
@@ -18,6 +17,7 @@ import torch
 
 from tests.vm_train.commands import COMMAND, environment, run
 from vm_export.checkpoint import Checkpoint
+from vm_train.learning.folder_access import locked
 from vm_train.learning.log import read_log
 
 
@@ -212,9 +212,16 @@ def test_a_configuration_that_was_edited_is_refused(whole, tmp_path):
 
 def test_a_training_in_work_is_left_alone(whole, tmp_path):
     folder = copied(whole, tmp_path)
-    with (folder / "run.json").open() as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
+    with locked(folder):
         assert f"another process is training in {folder}" in run("resume", folder, code=1).stderr
+
+
+def test_two_trainings_do_not_begin_in_one_folder(data, configuration, tmp_path):
+    with locked(tmp_path / "run"):
+        done = run(data, "-o", tmp_path / "run", "--config", configuration, code=1)
+        assert f"another process is training in {tmp_path / 'run'}" in done.stderr
+        assert not list((tmp_path / "run").iterdir())
+    assert not (tmp_path / "run").exists()
 
 
 def test_files_of_others_are_not_written_over(data, configuration, tmp_path):

@@ -131,3 +131,13 @@ def test_a_folder_that_can_not_be_made_is_named(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="can't use folder"):
         DecodedCache(tmp_path / "file" / "kept")
+
+
+def test_a_long_number_in_another_script_does_not_switch_the_cache_off(tmp_path, kept):
+    (tmp_path / "long").mkdir()
+    number = "Запись_робота_перед_воротами_кадр_" + "0" * 12
+    write_pictures(tmp_path / "long", [number, number + "1"])
+    for each in find_pictures(tmp_path / "long"):
+        same(read_through_cache(each, CLASSES, kept), read_picture(each, CLASSES))
+        same(kept.get(each, CLASSES), read_picture(each, CLASSES))
+    assert not kept.full

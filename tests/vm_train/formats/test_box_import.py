@@ -31,6 +31,7 @@ from vm_train.cli.import_boxes import import_boxes_parser, run_import_boxes
 from vm_train.data.classes import Classes
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.object_truth import read_scene, true_objects
+from vm_train.formats.box_import import _number
 from vm_train.formats.box_masks import MaskRule, mask_of
 from vm_workstation.outlines import sphere_outline
 
@@ -221,6 +222,11 @@ def test_with_more_classes_only_objects_are_labeled(frames, tmp_path):
     for mask in (tmp_path / "out").glob("mask*.png"):
         labeled, is_ball = labels(mask)
         assert (labeled == is_ball).all()
+
+
+def test_a_number_has_no_sign_of_a_comment():
+    assert _number(Path("clip #1/frame.0.jpg"), []) == "clip _1_frame_0"
+    assert _number(Path("clip #1/frame.0.jpg"), ["clip _1_frame_0"]) == "clip _1_frame_0_"
 
 
 def test_what_is_missing_is_named(frames, configuration, tmp_path):

@@ -55,3 +55,19 @@ def test_numbers_with_a_dot_are_refused(tmp_path):
     write_pictures(tmp_path, ["1.5"])
     with pytest.raises(InputError, match=r"'1\.5' can't go into a shard"):
         write_shards(find_pictures(tmp_path), tmp_path / "out", 3, lambda: None)
+
+
+def test_pictures_of_another_set_with_the_same_numbers_are_refused(shards, pictures, tmp_path):
+    for each in (pictures[0].image.parent).iterdir():
+        (tmp_path / each.name).write_bytes(each.read_bytes())
+    with pictures[0].image.open("rb") as file:
+        (tmp_path / pictures[0].image.name).write_bytes(file.read() + b"\0")
+    with pytest.raises(InputError, match="shards of other pictures"):
+        write_shards(find_pictures(tmp_path), shards[0].parent, 3, lambda: None)
+
+
+def test_the_folder_of_the_pictures_gets_no_shards(pictures):
+    folder = pictures[0].image.parent
+    with pytest.raises(InputError, match="is the folder of the pictures"):
+        write_shards(pictures, folder, 3, lambda: None)
+    assert not list(folder.glob("*.tar"))

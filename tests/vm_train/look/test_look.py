@@ -1,6 +1,5 @@
 """vm-train look as a user types it: real processes that are stopped, killed and resumed."""
 
-import fcntl
 import json
 import re
 import shutil
@@ -23,6 +22,7 @@ from vm_export.checkpoint import Checkpoint
 from vm_export.grid import Grid
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_train.cli.train import main
+from vm_train.learning.folder_access import locked
 from vm_train.learning.log import read_log
 
 STEPS = re.compile(r'"loss"')
@@ -178,8 +178,7 @@ def test_a_finished_training_says_so_and_a_begun_one_is_not_begun_again(whole, l
 
 def test_a_training_in_work_is_left_alone(whole, tmp_path):
     folder = shutil.copytree(whole[0], tmp_path / "run")
-    with (folder / "run.json").open() as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
+    with locked(folder):
         assert f"another process is training in {folder}" in run("resume", folder, code=1).stderr
 
 
