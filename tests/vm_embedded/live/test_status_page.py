@@ -61,7 +61,7 @@ def test_the_page_previews_a_threshold_uses_it_and_records_with_the_token_of_the
         wait(lambda: "pose from fixed" in text("runs"))
         for each in ("model ball", "camera synthetic", "camera height 0.", "pitch, roll ", "temperature"):
             assert each in text("runs")
-        wait(lambda: text("threshold-value") == "0.40")
+        wait(lambda: text("threshold-value") == "0.30")
         slide(1.0)
         wait(lambda: shown("preview") and "0 found" in text("effect"))
         assert not shown("picture")
@@ -80,7 +80,7 @@ def test_the_page_previews_a_threshold_uses_it_and_records_with_the_token_of_the
         seen = len(found.frames)
         found.wait(lambda: len(found.frames) > seen + 20)
         assert not any(each["detections"] for each in found.frames[seen + 1 :])
-        slide(0.4)
+        slide(0.3)
         wait(lambda: shown("preview"))
         browser.find_element("id", "back").click()
         wait(lambda: shown("picture") and text("threshold-value") == "1.00")
@@ -102,6 +102,8 @@ def test_the_addresses_of_the_documentation_answer(tmp_path):
         found.wait_for_state("ok")
         (token,) = [each["token"] for each in found.events if each["event"] == "status page"]
         for method, address in addresses:
+            seen = len(found.frames)  # after a changed threshold, a recording begins anew
+            found.wait(lambda seen=seen: len(found.frames) > seen + 3)
             request = Request(f"http://{where}{address}", method=method, headers={"X-Token": token})
             with urlopen(request, timeout=60.0) as answer:
                 assert answer.status == 200
