@@ -25,6 +25,7 @@ MOST_CONNECTIONS = 64
 """Largest number of connections to a socket."""
 
 _NO_NETWORK = (errno.EADDRNOTAVAIL, errno.ENETDOWN, errno.ENETUNREACH, errno.EHOSTUNREACH)
+"""Errors of an address while the network is not up."""
 
 _UMASK = 0o117
 """Gives the socket's file mode 0660."""
@@ -174,9 +175,8 @@ def checked_addresses(entry: Field[Any], value: object) -> str:
     """Check of an entry: ADDRESS:PORT, or several separated by commas, or empty. Raises InputError as
     `checked_address` does, also for unix:PATH."""
     for each in value.split(",") if isinstance(value, str) else (value,):
-        if not checked_address(entry, each).startswith("unix:"):
-            continue
-        raise InputError(f"{entry.name} must be ADDRESS:PORT, as in {entry.metadata['example']}, not {each!r}")
+        if checked_address(entry, each).startswith("unix:"):
+            raise InputError(f"{entry.name} must be ADDRESS:PORT, as in {entry.metadata['example']}, not {each!r}")
     return str(value)
 
 

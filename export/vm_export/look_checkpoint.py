@@ -61,8 +61,10 @@ class LookCheckpoint:
         return LookCheckpoint(self.network, contract, self.examples, glance)
 
     def recalibrated(self, scale: float, offset: float, source: str) -> LookCheckpoint:
-        """The same networks with other probabilities: of their logits, which are multiplied by the scale, plus the
-        offset. The glance keeps its own. source: for the provenance."""
+        """The same networks, whose probability has the logit `scale * logit + offset`. The glance does not change.
+
+        source: the answers that the scale and the offset fit, for the provenance.
+        """
         network, (first, before) = copy.deepcopy(self.network), self.network.calibration.tolist()
         network.calibration.copy_(torch.tensor([scale * first, scale * before + offset]))
         provenance = {**self.contract.provenance, "calibrated_on": source}

@@ -116,7 +116,8 @@ def _run(options: argparse.Namespace) -> int:
     bar = ProgressBar(options.frames)
     runs = measure(detectors, work.image, work.lens, work.orientations, bar.show)
     bar.clear()
-    assumed = ["lens"] * (given.lens is None and given.fov is None) + ["pose"] * (given.fixed_orientation() is None)
+    has_lens, has_pose = given.lens_for(work.size) is not None, given.fixed_orientation() is not None
+    assumed = [name for name, is_given in (("lens", has_lens), ("pose", has_pose)) if not is_given]
     if assumed:
         print(
             f"vm-bench: no {' and no '.join(assumed)} given, so common ones were used; the robot's own decide how many "

@@ -118,7 +118,7 @@ class _DefaultPose:
             return ""
         lens = self.given.lens is not None or self.given.fov is not None
         pose = self.orientation is not None and read_lens_file(beside).orientation is not None
-        replaced = ["lens"] * lens + ["pose"] * pose
+        replaced = [name for name, is_given in (("lens", lens), ("pose", pose)) if is_given]
         return f"{beside} replaces the given {' and '.join(replaced)}" if replaced else ""
 
     def of(self, frame: Frame, size: Size) -> tuple[Lens, Orientation]:

@@ -64,8 +64,10 @@ class UprightScores:
         people: Sequence[TrueUpright] = (),
         confidences: Sequence[float] | None = None,
     ) -> None:
-        """Add a picture: its true uprights, visible or not, the reported positions (2,) [m], its people, and the
-        confidences of the reports, 1 if there are none."""
+        """Add a picture: its true uprights, visible or not, the reported positions (2,) [m], and its people.
+
+        confidences: of the reports, 0 to 1; None: each report has confidence 1.
+        """
         errors = _errors(truths, found)
         distances = np.array([_distance(each.position) for each in truths])
         visible = np.array([each.visible for each in truths], dtype=bool)
