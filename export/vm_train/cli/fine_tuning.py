@@ -52,9 +52,10 @@ def begin_fine_tuning(options: argparse.Namespace) -> int:
     """Write the folder of a fine-tuning, train, and return the exit status. Raises VisualMeshError."""
     from ..tuning.run_folder import BoxSource, begin_tuning
 
-    if options.data is not None or options.glance is not None:
-        what = "DATA" if options.data is not None else "--glance"
-        raise InputError(f"--boxes fine-tunes the close look that {options.model} has: leave out {what}")
+    others = {"DATA": options.data, "--glance": options.glance, "--start": options.start}
+    given = [name for name, value in others.items() if value is not None]
+    if given:
+        raise InputError(f"--boxes fine-tunes the close look that {options.model} has: leave out {' and '.join(given)}")
     example = "training.epochs=5"
     configuration = read_sections(TuningConfiguration, options.config, parse_overrides(options.set, example))
     source = BoxSource(options.boxes.resolve(), options.format, parse_names(options.names))

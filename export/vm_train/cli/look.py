@@ -6,6 +6,7 @@ import argparse
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vm_embedded.cli.program import Parser
 from vm_embedded.config.sections import parse_overrides, read_sections
@@ -23,6 +24,9 @@ from ..look.configuration import LOOK_HEADER, LookConfiguration
 from .box_options import add_box_options
 from .fine_tuning import begin_fine_tuning
 from .training import EXIT_OK, stop_requests
+
+if TYPE_CHECKING:
+    from ..look.start import LookStart
 
 
 def look_parser() -> argparse.ArgumentParser:
@@ -50,6 +54,13 @@ def look_parser() -> argparse.ArgumentParser:
         type=Path,
         metavar="LOOK",
         help="glance (look.pt) that judges first; the new close look judges what it passes on, and its file has both",
+    )
+    made.add_argument(
+        "--start",
+        metavar="LOOK",
+        help="begin with the weights of a trained close look, not with random ones: a look.pt, a model file (.onnx), "
+        f"or a network of the package ({', '.join(SHIPPED)}). Its patches and layers, its glance, and training.rate "
+        "0.005 become the defaults",
     )
     made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
     made.add_argument(
@@ -108,6 +119,8 @@ def print_look_config(options: argparse.Namespace) -> int:
 
 def run_look(options: argparse.Namespace) -> int:
     """Begin the training of a close look, train, and return the exit status. Raises VisualMeshError."""
+    from vm_export.look_checkpoint import LookCheckpoint
+
     from ..look.run_folder import begin_look_run
 
     if options.boxes is not None:
@@ -116,20 +129,38 @@ def run_look(options: argparse.Namespace) -> int:
         raise InputError("give a folder of rendered pictures, DATA, or one of frames with boxes, --boxes DIR")
     if options.names or options.format or options.rendered:
         raise InputError("--names, --format and --rendered go with --boxes: leave them out, or give --boxes DIR")
-    configuration = read_sections(LookConfiguration, options.config, parse_overrides(options.set, "training.epochs=5"))
+    start, configuration = _start_and_configuration(options)
+    begun = None if start is None else start.look
+    glance = None if begun is None else begun.glance
+    if options.glance is not None:
+        glance = LookCheckpoint.load(options.glance)
     model = model_path(options.model)
     configuration = _with_classes_of(model, configuration)
     numbers = [each.number for each in find_pictures(options.data)]
     split = split_by_seed(numbers, configuration.data.validation, 0.0, configuration.data.split_seed)
     strict, threads = options.strict, options.threads or 1
-    name, glance = str(options.model), options.glance
-    with locked(options.output):
-        run = begin_look_run(options.output, options.data, split, configuration, model, name, strict, threads, glance)
+    output, name = options.output, str(options.model)
+    with locked(output):
+        run = begin_look_run(output, options.data, split, configuration, model, name, strict, threads, glance, begun)
         count = len(split.training), len(split.validation)
         print(
             f"{options.data}: {len(numbers)} pictures: {count[0]} for training, {count[1]} for validation", flush=True
         )
         return _train(run.folder, None, options)
+
+
+def _start_and_configuration(options: argparse.Namespace) -> tuple[LookStart | None, LookConfiguration]:
+    """The network of --start, and the configuration, whose defaults it changes. Raises InputError or ModelError."""
+    from ..look.start import LookStart
+
+    overrides = parse_overrides(options.set, "training.epochs=5")
+    configuration = read_sections(LookConfiguration, options.config, overrides)
+    if options.start is None:
+        return None, configuration
+    start = LookStart.load(model_path(options.start), configuration.patches.object_class)
+    configuration = read_sections(LookConfiguration, options.config, overrides, defaults=start.defaults)
+    start.check(configuration)
+    return start, configuration
 
 
 def _with_classes_of(model: Path, configuration: LookConfiguration) -> LookConfiguration:

@@ -1,8 +1,9 @@
 """The folder of a training of a close look: what it was begun with, and what it has produced.
 
 look.toml: the configuration. pictures.json: the split of the pictures. run.json: where the pictures are. mesh.onnx or
-mesh.pt: a copy of the mesh network. glance.pt: a copy of the glance, if there is one. patches/: the patches, in chunks.
-state.pt: the state to resume from. log.jsonl, tensorboard/: the record of each step. look.pt: the network. result.json:
+mesh.pt: a copy of the mesh network. glance.pt: a copy of the glance, if there is one. start.pt: a copy of the look
+network that the training begins with, if there is one. patches/: the patches, in chunks. state.pt: the state to resume
+from. log.jsonl, tensorboard/: the record of each step. look.pt: the network. result.json:
 what it finds in the validation pictures, and how often its probabilities are right.
 """
 
@@ -30,14 +31,15 @@ from ..learning.folder_access import check_unused
 from .configuration import LookConfiguration
 
 KIND = "look"
-_FORMAT = 3
-_GLANCE = "glance.pt"
+_FORMAT = 4
+_GLANCE, _START = "glance.pt", "start.pt"
 _FILES = (
     "look.toml",
     "pictures.json",
     "mesh.onnx",
     "mesh.pt",
-    "glance.pt",
+    _GLANCE,
+    _START,
     "patches",
     "state.pt",
     "log.jsonl",
@@ -51,8 +53,9 @@ _FILES = (
 class LookRun:
     """A training as its folder describes it; `begin_look_run` and `read_look_run` make it.
 
-    data: folder of the pictures. model: the mesh network as the user named it. mesh: its copy. glance_sha256: digest of
-    the glance's checkpoint, None without one. object_class: class to judge. strict: whether a picture that can't be
+    data: folder of the pictures. model: the mesh network as the user named it. mesh: its copy. glance_sha256,
+    start_sha256: digests of the checkpoints of the glance and of the network to begin with, None without one.
+    object_class: class to judge. strict: whether a picture that can't be
     used ends the training. threads: number of computing threads; a resumed training takes the same.
     """
 
@@ -64,6 +67,7 @@ class LookRun:
     mesh: Path
     mesh_sha256: str
     glance_sha256: str | None
+    start_sha256: str | None
     object_class: str
     strict: bool
     threads: int
@@ -90,8 +94,9 @@ class LookRun:
 
     @property
     def configuration_sha256(self) -> str:
-        """Digest of the configuration, the split, the mesh network and the glance."""
-        text = json.dumps([asdict(self.configuration), asdict(self.split), self.mesh_sha256, self.glance_sha256])
+        """Digest of the configuration, the split, the mesh network, the glance and the network to begin with."""
+        networks = self.mesh_sha256, self.glance_sha256, self.start_sha256
+        text = json.dumps([asdict(self.configuration), asdict(self.split), *networks])
         return hashlib.sha256(text.encode()).hexdigest()
 
     def subject(self) -> ExactSubject:
@@ -100,9 +105,11 @@ class LookRun:
 
     def glance(self) -> LookCheckpoint | None:
         """The network that judges the proposals first, if there is one. Raises InputError or ModelError."""
-        if self.glance_sha256 is None:
-            return None
-        return load_glance(self.folder / _GLANCE, self.object_class, self.upright_radius)
+        return None if self.glance_sha256 is None else LookCheckpoint.load(self.folder / _GLANCE)
+
+    def start(self) -> LookCheckpoint | None:
+        """The look network to begin with, if there is one. Raises InputError or ModelError."""
+        return None if self.start_sha256 is None else LookCheckpoint.load(self.folder / _START)
 
     @property
     def upright_radius(self) -> float:
@@ -124,24 +131,20 @@ def _upright_radius(configuration: LookConfiguration, object_class: str) -> floa
     return configuration.patches.upright_radius if is_upright else 0.0
 
 
-def load_glance(path: Path, object_class: str, upright_radius: float) -> LookCheckpoint:
-    """A look network for this class, and circles of this radius [m], that can go before another one.
-
-    Raises InputError or ModelError.
-    """
-    glance = LookCheckpoint.load(path)
-    if glance.contract.object_class != object_class:
+def _check_glance(glance: LookCheckpoint, object_class: str, upright_radius: float) -> None:
+    """Raise InputError if a look network can't go before one for this class, and circles of this radius [m]."""
+    contract = glance.contract
+    if contract.object_class != object_class:
         raise InputError(
-            f"{path} judges class {glance.contract.object_class!r}; a glance for class {object_class!r} is needed"
+            f"the glance judges class {contract.object_class!r}; a glance for class {object_class!r} is needed"
         )
     if glance.glance is not None:
-        raise InputError(f"{path} has a glance itself; a glance must be a single look network")
-    if glance.contract.upright_radius != upright_radius:
+        raise InputError("the glance has a glance itself; a glance must be a single look network")
+    if contract.upright_radius != upright_radius:
         raise InputError(
-            f"{path} has an upright_radius of {glance.contract.upright_radius:g} m, patches.upright_radius is "
+            f"the glance has an upright_radius of {contract.upright_radius:g} m, patches.upright_radius is "
             f"{upright_radius:g} m: give both the same one"
         )
-    return glance
 
 
 def judged_class(configuration: LookConfiguration, subject: ExactSubject, model: str) -> str:
@@ -175,10 +178,11 @@ def begin_look_run(
     name: str,
     strict: bool = False,
     threads: int = 1,
-    glance: Path | None = None,
+    glance: LookCheckpoint | None = None,
+    start: LookCheckpoint | None = None,
 ) -> LookRun:
-    """Write the files of a new training. model: file of the mesh network; name: as the user named it. glance:
-    checkpoint of the network that goes before the new one.
+    """Write the files of a new training. model: file of the mesh network; name: as the user named it. glance: network
+    that goes before the new one. start: network to begin with, which fits the configuration.
 
     Raises InputError, also if the folder holds a training, and ModelError.
     """
@@ -186,15 +190,15 @@ def begin_look_run(
     _ = configuration.shape
     subject = load_mesh(model)
     object_class = judged_class(configuration, subject, name)
-    glance_sha256 = None
     if glance is not None:
-        load_glance(glance, object_class, _upright_radius(configuration, object_class))
-        glance_sha256 = _sha256(glance)
+        _check_glance(glance, object_class, _upright_radius(configuration, object_class))
     try:
         (folder / "patches").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
     mesh = folder / f"mesh{model.suffix.lower()}"
+    with atomic_write(mesh) as part:
+        part.write_bytes(model.read_bytes())
     run = LookRun(
         folder,
         data.resolve(),
@@ -203,15 +207,12 @@ def begin_look_run(
         name,
         mesh,
         subject.sha256,
-        glance_sha256,
+        _saved(glance, folder / _GLANCE),
+        _saved(start, folder / _START),
         object_class,
         strict,
         threads,
     )
-    for source, copy in ((model, mesh), (glance, folder / _GLANCE)):
-        if source is not None:
-            with atomic_write(copy) as part:
-                part.write_bytes(source.read_bytes())
     write_split(folder / "pictures.json", split)
     _write(folder / "look.toml", to_commented_toml(configuration))
     _write(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
@@ -243,6 +244,7 @@ def read_look_run(folder: Path) -> LookRun:
             folder / str(content["mesh"]),
             str(content["mesh_sha256"]),
             None if content["glance_sha256"] is None else str(content["glance_sha256"]),
+            None if content["start_sha256"] is None else str(content["start_sha256"]),
             str(content["object_class"]),
             bool(content["strict"]),
             int(content["threads"]),
@@ -259,8 +261,9 @@ def read_look_run(folder: Path) -> LookRun:
         )
     if run.subject().sha256 != run.mesh_sha256:
         raise InputError(f"{run.mesh} was changed since the training began: begin another one")
-    if run.glance_sha256 is not None and _sha256(folder / _GLANCE) != run.glance_sha256:
-        raise InputError(f"{folder / _GLANCE} was changed since the training began: begin another one")
+    for name, sha256 in ((_GLANCE, run.glance_sha256), (_START, run.start_sha256)):
+        if sha256 is not None and _sha256(folder / name) != sha256:
+            raise InputError(f"{folder / name} was changed since the training began: begin another one")
     return run
 
 
@@ -275,11 +278,20 @@ def _description(run: LookRun) -> dict[str, Any]:
         "mesh": run.mesh.name,
         "mesh_sha256": run.mesh_sha256,
         "glance_sha256": run.glance_sha256,
+        "start_sha256": run.start_sha256,
         "object_class": run.object_class,
         "strict": run.strict,
         "threads": run.threads,
         "configuration_sha256": run.configuration_sha256,
     }
+
+
+def _saved(look: LookCheckpoint | None, path: Path) -> str | None:
+    """Write a look network, if there is one, and return the digest of its file."""
+    if look is None:
+        return None
+    look.save(path)
+    return _sha256(path)
 
 
 def _sha256(path: Path) -> str:

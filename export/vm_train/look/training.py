@@ -78,6 +78,10 @@ class _Training:
         self._epoch_steps = -(-len(collected.training) // recipe.batch)
         torch.manual_seed(recipe.seed)
         network = LookNetwork(run.configuration.shape)
+        start = run.start()
+        if start is not None:
+            network.load_state_dict(start.network.state_dict())
+            network.calibration.copy_(torch.tensor([1.0, 0.0]))  # the end of the training sets it again
         total = recipe.epochs * self._epoch_steps
         extent, augmentation = run.configuration.patches.extent, run.configuration.augmentation
         self._trainer = LookTrainer(network, collected.training, extent, recipe, augmentation, total)
@@ -204,6 +208,7 @@ class _Training:
             "patches_sha256": found.training.sha256(),
             "mesh_sha256": run.mesh_sha256,
             "configuration_sha256": run.configuration_sha256,
+            **({} if run.start_sha256 is None else {"start_sha256": run.start_sha256}),
             "epochs": str(recipe.epochs),
             "rounds": str(recipe.rounds),
             "seed": str(recipe.seed),
