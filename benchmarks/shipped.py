@@ -28,6 +28,7 @@ from vm_train.evaluation.worst_errors import WorstError
 from vm_train.evaluation.worst_pictures import draw_error
 from vm_train.scores.calibration import Reliability
 from vm_train.scores.object_scores import ObjectScores
+from vm_train.scores.proposal_scores import ProposalScores
 
 HERE = Path(__file__).parent
 RESULTS = HERE / "shipped.json"
@@ -102,7 +103,8 @@ def scores_of(model: Path, folder: Path) -> tuple[dict[str, Any], Evaluation]:
         "points_average_precision": round(used.points.ranking("ball").precision_recall.average_precision, 5),
         "all": numbers(ball, None),
         "false_an_hour": round(FRAMES_AN_HOUR * ball.ranking(0.5).at().false_per_picture),
-        "proposals": _proposals(used),
+        "proposals": _proposals(used.proposals["ball"]),
+        "passed": _proposals(used.passed["ball"]),
         "calibration_error": {
             kind: round(calibration_error(scores), 5) for kind, scores in (("used", ball), ("ranked", curve))
         },
@@ -123,9 +125,8 @@ def calibration_error(scores: ObjectScores) -> float:
     return Reliability.of(ranking.confidence[likely], ranking.right[likely]).error
 
 
-def _proposals(result: Evaluation) -> dict[str, Any]:
+def _proposals(scores: ProposalScores) -> dict[str, Any]:
     """Numbers of proposals, and the recall of balls of at least 3 px of which at least 60 % are visible."""
-    scores = result.proposals["ball"]
     recall = scores.recall(min_radius=3.0, min_visible=0.6).as_dict()
     return {"mean_count": round(scores.mean_count, 2), "largest_count": scores.largest_count, **recall}
 

@@ -88,14 +88,17 @@ def proposals(found: dict[str, Any]) -> str:
                     each,
                     number(scores["proposals"]["recall_0.5"], 1, 100.0),
                     f"{scores['proposals']['mean_count']:.0f}",
+                    number(scores["passed"]["recall_0.5"], 1, 100.0),
+                    f"{scores['passed']['mean_count']:.0f}",
                     number(scores["all"]["center_error"], 3),
                     number(scores["calibration_error"]["ranked"], 3),
                     number(scores["calibration_error"]["used"], 3),
                     *(f"{factor['accepted']} of {factor['balls']}" for factor in wrong),
                 ]
             )
-    heads = ["network", "test pictures", "proposed [%]", "proposals", "center error [radii]", "calibration error, all"]
-    return table([*heads, "reported", "accepted with a mesh for half the radius", "for twice"], rows)
+    heads = ["network", "test pictures", "proposed [%]", "proposals", "passed on [%]", "places", "center error [radii]"]
+    ends = ["calibration error, all", "reported", "accepted with a mesh for half the radius", "for twice"]
+    return table([*heads, *ends], rows)
 
 
 def grid(found: dict[str, Any]) -> str:
@@ -250,7 +253,9 @@ balls of 0.05 to 0.12 m radius:
 With the default settings there are {number(scores["all"]["false_per_picture"], 3)} false balls per picture, and the
 median distance error of balls from 0.5 to 6 m is {number(used["distance_error"], 1, 100.0)} %. Of the balls with a
 radius of at least 3 px that are at least 60 % visible, {number(scores["proposals"]["recall_0.5"], 1, 100.0)} % have a
-proposal within half a radius; there are {scores["proposals"]["mean_count"]:.0f} proposals per picture on average. On
+proposal within half a radius; there are {scores["proposals"]["mean_count"]:.0f} proposals per picture on average. The
+glance moves them and passes on {scores["passed"]["mean_count"]:.0f} places, within half a radius of
+{number(scores["passed"]["recall_0.5"], 1, 100.0)} % of these balls. On
 {clutter["pictures"]} pictures full of things that look like balls, AP50 from 0.5 to 6 m is
 {number(hard["average_precision"], 3)}, with {number(clutter["all"]["false_per_picture"], 3)} false balls per picture.
 docs/results.md has more figures.

@@ -26,6 +26,13 @@ _WORTH, _WORTH_UPRIGHT = 0.005, 0.03
 """Probability above which a place is worth another look: of an object, and of an upright. A glance is less sure about
 uprights: at 0.005, it would pass on nearly all proposals."""
 
+_SURE, _SURE_UPRIGHT = 0.97, 1.0
+"""Probability from which a place needs no second opinion: of an object, and of an upright. The base of an upright is
+seen less exactly than the center of an object, so its place is always a mean."""
+
+_ZOOMS = (0.9, 1.1)
+"""Sides of the patches for a second opinion, as shares of the usual side. In a training, patches differ as much."""
+
 _LARGEST_SIZE = 3.0
 """Limit of the logarithm of a size: with a bad network, math.exp would overflow, and JSON has no infinity."""
 
@@ -52,12 +59,14 @@ class Places(Protocol):
 
     def __len__(self) -> int: ...
 
-    def cut(self, rows: npt.NDArray[np.intp], contract: LookContract) -> Image:
-        """Patches (k, size, size, 3), RGB, of the places with the numbers `rows` (k,), as a contract describes them."""
+    def cut(self, rows: npt.NDArray[np.intp], contract: LookContract, zoom: float = 1.0) -> Image:
+        """Patches (k, size, size, 3), RGB, of the places with the numbers `rows` (k,), as a contract describes them.
 
-    def move(self, right: Floats, down: Floats) -> Mask:
-        """Move the k places of the last `cut`, by these shifts (k,) in expected radii. Returns which of them (k,) may
-        hold an object there."""
+        zoom: their sides, as a share of those in the contract.
+        """
+
+    def move(self, rows: npt.NDArray[np.intp], right: Floats, down: Floats) -> Mask:
+        """Move places by shifts (k,) in expected radii. Returns which of them (k,) may hold an object there."""
 
 
 class PlanePlaces:
@@ -70,22 +79,20 @@ class PlanePlaces:
     def __init__(self, observation: Observation, centers: Floats) -> None:
         self.centers = centers.copy()
         self._observation = observation
-        self._cut: tuple[npt.NDArray[np.intp], Tangents]
 
     def __len__(self) -> int:
         return len(self.centers)
 
-    def cut(self, rows: npt.NDArray[np.intp], contract: LookContract) -> Image:
+    def cut(self, rows: npt.NDArray[np.intp], contract: LookContract, zoom: float = 1.0) -> Image:
         """See Places."""
         view = self._observation.view
-        tangents = Tangents.at(view, self.centers[rows])
-        self._cut = rows, tangents
-        return cut_patches(self._observation.pyramid, patch_nodes(view, tangents, contract.extent), contract.size)
+        nodes = patch_nodes(view, Tangents.at(view, self.centers[rows]), zoom * contract.extent)
+        return cut_patches(self._observation.pyramid, nodes, contract.size)
 
-    def move(self, right: Floats, down: Floats) -> Mask:
+    def move(self, rows: npt.NDArray[np.intp], right: Floats, down: Floats) -> Mask:
         """See Places. A place that moves to the horizon or above it can't hold an object."""
-        view, (rows, tangents) = self._observation.view, self._cut
-        rays = tangents.rays(right, down)
+        view = self._observation.view
+        rays = Tangents.at(view, self.centers[rows]).rays(right, down)
         self.centers[rows] = view.shape.center_along(rays, view.height)
         return np.asarray(rays[:, 2] < 0.0)
 
@@ -134,9 +141,8 @@ def worth_of(contract: LookContract) -> float:
 def look_at(places: Places, look: Look) -> Singles:
     """Look at n places, as often as the contracts of look and glance say, and move them to where an object was seen.
 
-    In the last of several passes, the answers to a patch and to its mirror image are averaged, unless the patch is not
-    worth another look. Returns the last answers (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError
-    if a network does not run.
+    In the last of several passes, a doubtful place gets a second opinion. Returns the last answers (n, 4) to each
+    place, as `CloseLook.run` gives them. Raises ModelError if a network does not run.
     """
     least = worth_of(look.contract)
     # Each pass has its network: first those of the glance, then those of the look.
@@ -144,31 +150,35 @@ def look_at(places: Places, look: Look) -> Singles:
     answers = np.zeros((len(places), 4), dtype=np.float32)
     worth = np.arange(len(places))
     for number, network in enumerate(networks):
-        patches = places.cut(worth, network.contract)
-        found = network.run(patches)
+        found = network.run(places.cut(worth, network.contract))
         if number and number == len(networks) - 1:
-            likely = np.flatnonzero(found[:, 0] > least)
-            found[likely] = _mean_with_mirrored(network, patches[likely], found[likely])
+            sure = _SURE_UPRIGHT if network.contract.upright_radius else _SURE
+            doubtful = np.flatnonzero((found[:, 0] > least) & (found[:, 0] < sure))
+            if len(doubtful):
+                found[doubtful] = _second_opinion(places, worth[doubtful], network)
         answers[worth] = found
-        possible = places.move(found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
+        possible = places.move(worth, found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
         worth = worth[(found[:, 0] > least) & possible]
         if not len(worth):
             break
     return answers
 
 
-def _mean_with_mirrored(look: Look, patches: Image, answers: Singles) -> Singles:
-    """Mean answers (n, 4) to patches and to their mirror images, which show the same objects. answers: to the patches.
+def _second_opinion(places: Places, rows: npt.NDArray[np.intp], look: Look) -> Singles:
+    """Mean answers (k, 4) to a smaller and a larger patch of each of k places, and to the mirror images of both.
 
-    Their errors differ: on validation pictures the mean halved the false objects. Probabilities are averaged as
+    All four show the same object, but the network makes different errors on them. Probabilities are averaged as
     log-odds.
     """
-    mirrored = look.run(np.ascontiguousarray(patches[:, :, ::-1]))
-    mirrored[:, 1] *= -1
-    mean = 0.5 * answers + 0.5 * mirrored
-    yes = np.sqrt(answers[:, 0] * mirrored[:, 0])
-    no = np.sqrt((1 - answers[:, 0]) * (1 - mirrored[:, 0]))
-    mean[:, 0] = yes / np.maximum(yes + no, np.finfo(np.float32).tiny)
+    patches = np.concatenate([places.cut(rows, look.contract, zoom) for zoom in _ZOOMS])
+    answers = look.run(np.concatenate([patches, patches[:, :, ::-1]])).reshape(2, len(_ZOOMS), len(rows), 4)
+    answers[1, ..., 1] *= -1.0
+    for zoom, each in zip(_ZOOMS, answers.swapaxes(0, 1), strict=True):
+        each[..., 1:3] *= zoom
+        each[..., 3] += math.log(zoom)
+    mean, probability = answers.mean(axis=(0, 1)), answers[..., 0].astype(np.float64)
+    yes, no = (np.prod(each, axis=(0, 1)) ** (0.5 / len(_ZOOMS)) for each in (probability, 1.0 - probability))
+    mean[:, 0] = yes / np.maximum(yes + no, np.finfo(np.float64).tiny)
     return np.asarray(mean)
 
 

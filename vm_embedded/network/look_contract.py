@@ -29,7 +29,7 @@ class LookContract:
     extent: half the side of a patch [expected radii], 0.5 to 8.
     above: probability above which a mesh point counts for a proposal, 0 to 0.99.
     passes: how often a proposal is judged at most, 1 to 4; each further pass judges a new patch around the center that
-        the previous pass found. The last of all passes also judges the mirror images of likely patches.
+        the previous pass found. The last of all passes gives doubtful places a second opinion.
     channels: of the network's convolutions at each resolution; the runtime does not use them.
     glance: of a smaller look network for the same class, which judges each proposal first; this one judges only what
         the glance passes on. A glance has none.

@@ -18,6 +18,7 @@ from vm_embedded.arrays import Floats, Mask, Singles
 from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.field_points import locate_features
+from vm_embedded.detection.looking import Look, PlanePlaces, look_at, worth_of
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Network, Observation, classify
 from vm_embedded.detection.prepared_view import PreparedView
@@ -51,7 +52,8 @@ class PictureAnswer:
     and the objects found, most confident first.
 
     proposals: for the close look's class, the centers (c, 3) [m] of its proposals, relative to the camera, in the frame
-    of `Detection.bearing`. Empty without a close look. features: of the field, or None if the network has none.
+    of `Detection.bearing`. Empty without a close look. passed: the same for the places that its glance passes on, where
+    the glance saw an object. Empty without a glance. features: of the field, or None if the network has none.
     manifest: with the radius of the objects that were looked for.
     """
 
@@ -60,6 +62,7 @@ class PictureAnswer:
     probabilities: Singles
     found: tuple[Detection, ...]
     proposals: Mapping[str, Floats]
+    passed: Mapping[str, Floats]
     manifest: Manifest
     features: FieldFeatures | None = None
 
@@ -151,18 +154,35 @@ def _answer(
     settings: Settings,
 ) -> PictureAnswer:
     distances = plane_distances(observation.rays, observation.view.height)
-    proposals = {} if look is None else _proposals(observation, look, settings)
+    proposals, passed = {}, {}
+    if look is not None:
+        contract = look.contract
+        probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
+        centers = propose_places(observation, probabilities, contract.above, settings.max_proposals)
+        proposals[contract.object_class] = centers @ observation.view.heading.T
+        if look.glance is not None:
+            centers = passed_on(observation, centers, look.glance, worth_of(contract))
+            passed[contract.object_class] = centers @ observation.view.heading.T
     return PictureAnswer(
-        observation.pixels, distances, observation.probabilities, found, proposals, observation.manifest, features
+        observation.pixels,
+        distances,
+        observation.probabilities,
+        found,
+        proposals,
+        passed,
+        observation.manifest,
+        features,
     )
 
 
-def _proposals(observation: Observation, look: CloseLook, settings: Settings) -> dict[str, Floats]:
-    """The places that the close look gets to see; see PictureAnswer."""
-    contract = look.contract
-    probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
-    centers = propose_places(observation, probabilities, contract.above, settings.max_proposals)
-    return {contract.object_class: centers @ observation.view.heading.T}
+def passed_on(observation: Observation, centers: Floats, glance: Look, least: float) -> Floats:
+    """Of places with these centers (c, 3), those to which a glance gives more than the probability `least`.
+
+    Their centers (k, 3), where the glance saw an object. Raises ModelError if the glance does not run.
+    """
+    places = PlanePlaces(observation, centers)
+    answers = look_at(places, glance)
+    return places.centers[(answers[:, 0] > least) & (places.centers[:, 2] < 0.0)]
 
 
 def _view(picture: Picture, layout: Layout, manifest: Manifest, grid: Grid) -> PreparedView:

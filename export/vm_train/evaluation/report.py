@@ -17,6 +17,7 @@ from .summary import (
     calibration,
     field_tables,
     object_table,
+    passed_on,
     point_table,
     proposal_counts,
     proposal_tables,
@@ -69,6 +70,7 @@ def page(scores: Scores, plots: Mapping[str, bytes], strips: Mapping[str, Sequen
     for name, found in scores["proposals"].items():
         tables = "".join(html_table(*each) for each in proposal_tables(found))
         parts.append(f"<h2>Proposals for class {escape(name)}</h2><p>{escape(proposal_counts(found))}.</p>")
+        parts += [f"<p>{escape(passed_on(each))}.</p>" for each in (scores["passed"].get(name),) if each]
         parts.append(f'<div class="strip">{tables}</div>')
     parts.append(_plot("proposals", plots, about))
     for heading, pictures in strips.items():

@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Image, Singles
-from vm_embedded.detection.looking import Look, PlanePlaces, look_at, worth_of
+from vm_embedded.detection.looking import Look, worth_of
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.patches import Tangents, cut_patches, patch_nodes
 from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.detection.proposals import propose_places
 
+from ..evaluation.answers import passed_on
 from .configuration import PatchSettings
 from .labels import VISIBLE, Truths
 
@@ -76,9 +77,7 @@ def proposed_places(
     """
     centers = propose_places(observation, probabilities, settings.above, settings.proposals)
     if glance is not None:
-        places = PlanePlaces(observation, centers)
-        answers, centers = look_at(places, glance), places.centers
-        centers = centers[(answers[:, 0] > share * worth_of(glance.contract)) & (centers[:, 2] < 0.0)]
+        centers = passed_on(observation, centers, glance, share * worth_of(glance.contract))
     return Places.of(PROPOSED, centers)
 
 

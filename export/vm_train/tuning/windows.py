@@ -53,11 +53,11 @@ class Windows:
         """The windows after shifts (n,) in expected radii."""
         return Windows(self.centers + np.stack([right, down], axis=1) * self.radii[:, None], self.radii)
 
-    def cut(self, pyramid: Pyramid, contract: LookContract) -> Image:
-        """Patches (n, size, size, 3), RGB, of a frame, as a network needs them."""
+    def cut(self, pyramid: Pyramid, contract: LookContract, zoom: float = 1.0) -> Image:
+        """Patches (n, size, size, 3), RGB, of a frame, as a network needs them. zoom: see looking.Places."""
         if not len(self):
             return np.empty((0, contract.size, contract.size, 3), dtype=np.uint8)
-        reach = contract.extent * self.radii[:, None, None]
+        reach = zoom * contract.extent * self.radii[:, None, None]
         x = self.centers[:, 0, None, None] + reach * _CORNERS
         y = self.centers[:, 1, None, None] + reach * _CORNERS.T
         nodes = np.stack([x, y]).astype(np.float32)
@@ -86,20 +86,18 @@ class WindowPlaces:
     def __init__(self, pyramid: Pyramid, windows: Windows) -> None:
         self.windows = Windows(windows.centers.copy(), windows.radii)
         self._pyramid = pyramid
-        self._cut: npt.NDArray[np.intp]
 
     def __len__(self) -> int:
         return len(self.windows)
 
-    def cut(self, rows: npt.NDArray[np.intp], contract: LookContract) -> Image:
+    def cut(self, rows: npt.NDArray[np.intp], contract: LookContract, zoom: float = 1.0) -> Image:
         """See looking.Places."""
-        self._cut = rows
-        return self.windows.part(rows).cut(self._pyramid, contract)
+        return self.windows.part(rows).cut(self._pyramid, contract, zoom)
 
-    def move(self, right: Floats, down: Floats) -> Mask:
+    def move(self, rows: npt.NDArray[np.intp], right: Floats, down: Floats) -> Mask:
         """See looking.Places. An object may be anywhere."""
-        self.windows.centers[self._cut] = self.windows.part(self._cut).moved(right, down).centers
-        return np.ones(len(self._cut), dtype=np.bool_)
+        self.windows.centers[rows] = self.windows.part(rows).moved(right, down).centers
+        return np.ones(len(rows), dtype=np.bool_)
 
 
 def jittered_windows(

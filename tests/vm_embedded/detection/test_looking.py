@@ -15,6 +15,8 @@ from vm_embedded.network.look_contract import LookContract
 from .views import center_at, observation_of, view_at
 
 EXTENT = 1.75
+OPINION = 4
+"""Patches of a second opinion about a place: a smaller and a larger one, and the mirror images of both."""
 
 
 class BrightDisk:
@@ -117,7 +119,7 @@ def test_a_look_sees_only_what_its_glance_passes_on_where_it_saw_it(scene):
     nothing = center_at(scene.view, (560.0, 400.0))
     beside = ball + np.array([0.0, 0.03, 0.0])
     moved, answers = looked_at(scene, look, np.stack([nothing, beside]))
-    assert (glance.seen, look.seen) == ([2], [1, 1])  # the look sees one patch, then its mirror image
+    assert (glance.seen, look.seen) == ([2], [1, OPINION])
     assert answers[:, 0] == pytest.approx([0.0, 0.9])
     assert np.linalg.norm(moved[1] - ball) < 0.2 * np.linalg.norm(beside - ball)
     found, rejected = found_in(scene, BrightDisk(passes=1, glance=Strict(passes=1)))
@@ -129,7 +131,7 @@ def test_only_proposals_with_a_chance_are_looked_at_again(scene):
     look = BrightDisk()
     bare = replace(scene, slot_probabilities=np.full_like(scene.slot_probabilities, 0.5))
     found_in(bare, look, max_proposals=30)
-    assert look.seen == [30, 30, 30]  # 0.05 is a chance; the second pass also sees the mirror images
+    assert look.seen == [30, 30, 30 * OPINION]  # 0.05 is a chance
 
     class Sure(BrightDisk):
         def run(self, patches):
@@ -143,13 +145,61 @@ def test_only_proposals_with_a_chance_are_looked_at_again(scene):
     assert len(look.seen) == 1 or look.seen[1] < 30
 
 
-def test_only_the_last_pass_sees_mirror_images(scene):
+def test_only_the_last_pass_asks_for_a_second_opinion(scene):
     look = BrightDisk(passes=3)
     looked_at(scene, look, np.stack(true_centers(scene)))
-    assert look.seen == [2, 2, 2, 2]  # two balls in each pass, then their mirror images
+    assert look.seen == [2, 2, 2, 2 * OPINION]
 
 
-def test_only_mirror_images_of_likely_patches_are_looked_at(scene):
+@pytest.mark.parametrize(("radius", "seen"), [(0.0, [2, 2]), (0.4, [2, 2, 2 * OPINION])])
+def test_a_sure_place_needs_no_second_opinion_unless_it_is_an_upright(scene, radius, seen):
+    class Sure(BrightDisk):
+        def run(self, patches):
+            answers = super().run(patches)
+            answers[:, 0] = np.where(answers[:, 0] > 0.5, 0.98, 0.0)
+            return answers
+
+    look = Sure()
+    look.contract = replace(look.contract, upright_radius=radius)
+    _, answers = looked_at(scene, look, np.stack(true_centers(scene)))
+    assert look.seen == seen
+    assert answers[:, 0] == pytest.approx([0.98, 0.98])
+
+
+def test_a_second_opinion_is_the_mean_over_sizes_of_the_patch(scene):
+    """In a patch of 0.9 times the side, a ball looks larger: 10 % are too much only if the network says so."""
+    center = true_centers(scene)[0] + np.array([0.0, 0.02, 0.0])
+    places = PlanePlaces(scene, center[None])
+    row = np.array([0])
+    look = BrightDisk(passes=1)
+    one = look.run(places.cut(row, look.contract))[0]
+    smaller, larger = (look.run(places.cut(row, look.contract, zoom))[0] for zoom in (0.9, 1.1))
+    np.testing.assert_allclose(0.9 * smaller[1:3], one[1:3], atol=0.03)
+    np.testing.assert_allclose(1.1 * larger[1:3], one[1:3], atol=0.03)
+    np.testing.assert_allclose([smaller[3] + np.log(0.9), larger[3] + np.log(1.1)], one[3], atol=0.03)
+
+    class Hopeful(BrightDisk):
+        """A glance that passes everything on where it is."""
+
+        def run(self, patches):
+            answers = super().run(patches)
+            answers[:] = 0.9, 0.0, 0.0, 0.0
+            return answers
+
+    class Short(BrightDisk):
+        """Sees less than there is in the larger patches, and is less sure."""
+
+        def run(self, patches):
+            answers = super().run(patches)
+            answers[answers[:, 3] < -0.05, 0] = 0.1
+            return answers
+
+    _, answers = looked_at(scene, Short(passes=1, glance=Hopeful(passes=1)), center[None])
+    np.testing.assert_allclose(answers[0, 1:], one[1:], atol=0.03)
+    assert answers[0, 0] == pytest.approx(0.5)  # log-odds of 0.9 and 0.1
+
+
+def test_only_likely_places_get_a_second_opinion(scene):
     class Hopeful(BrightDisk):
         """A glance that passes everything on."""
 
@@ -168,7 +218,7 @@ def test_only_mirror_images_of_likely_patches_are_looked_at(scene):
     balls = true_centers(scene)
     nothing = [center_at(scene.view, (560.0, 400.0)), center_at(scene.view, (100.0, 420.0))]
     _, answers = looked_at(scene, look, np.stack([*nothing, *balls]))
-    assert look.seen == [4, len(balls)]
+    assert look.seen == [4, OPINION * len(balls)]
     assert answers[:, 0] == pytest.approx([0.001, 0.001] + [0.9] * len(balls), abs=1e-3)
 
 
@@ -184,7 +234,7 @@ def test_a_place_is_looked_at_again_above_a_limit_which_is_higher_for_uprights(s
     look.contract = replace(look.contract, upright_radius=radius)
     look.glance = glance
     _, answers = looked_at(scene, look, np.stack(true_centers(scene)))
-    assert look.seen == [1, 1]  # the first place, then its mirror image
+    assert look.seen == [1, OPINION]  # only the first place
     assert answers[:, 0] == pytest.approx([0.9, 0.9 * least], abs=1e-3)
 
 

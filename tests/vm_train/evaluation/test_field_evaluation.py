@@ -47,7 +47,7 @@ class Reporting:
 
     def answer(self, picture, radius=None):
         none = np.zeros((0, len(self.manifest.classes)), dtype=np.float32)
-        return PictureAnswer(np.zeros((0, 2)), np.zeros(0), none, (), {}, self.manifest, self.reported)
+        return PictureAnswer(np.zeros((0, 2)), np.zeros(0), none, (), {}, {}, self.manifest, self.reported)
 
 
 REPORTING = Reporting(features(posts=[(5.0, 2.0)], robots=[(2.5, 1.6), (4.0, 0.9)]))

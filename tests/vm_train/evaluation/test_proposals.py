@@ -5,6 +5,7 @@ import pytest
 
 from tests.vm_export.looks import look_checkpoint
 from vm_embedded.detection.settings import Settings
+from vm_embedded.network.bundled import model_path
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
 from vm_export.change_model import change_looks
@@ -12,6 +13,8 @@ from vm_export.grid import Grid
 from vm_train.data.pictures import find_pictures
 from vm_train.evaluation.answers import ExactSubject, load_subject
 from vm_train.evaluation.evaluation import Rules, evaluate_pictures
+from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
+from vm_train.evaluation.summary import passed_on
 from vm_train.evaluation.tables import as_csv, as_json
 from vm_train.evaluation.workers import Job, evaluate
 
@@ -50,6 +53,19 @@ def test_a_network_that_sees_colors_proposes_drawn_balls(files, looking):
     assert min(scores.recall().recalls) > 0.8
     few = ExactSubject(MANIFEST, Grid(), "", Settings(max_proposals=1), ByColor(), subject.look)
     assert evaluate_pictures(few, files, CLASSES, RULES).proposals["ball"].largest_count == 1
+
+
+def test_what_a_glance_passes_on_is_fewer_places_and_nearer_to_the_balls(files):
+    model = model_path("ball-small")
+    subject = load_subject(model, Settings())
+    classes = classes_with_colors(subject.manifest, default_colors(model, None), [])
+    result = evaluate_pictures(subject, files, classes, RULES)
+    proposed, passed = result.proposals["ball"], result.passed["ball"]
+    assert passed.recall().truths == proposed.recall().truths
+    assert 0 < passed.mean_count < proposed.mean_count
+    assert passed.recall().recalls[0] >= proposed.recall().recalls[0]
+    said = passed_on(as_json(result, 0.5)["passed"]["ball"])
+    assert said.startswith(f"The glance passes on {passed.mean_count:.1f} per picture")
 
 
 @pytest.mark.parametrize("as_robot", [False, True])
