@@ -26,12 +26,13 @@ _WORTH, _WORTH_UPRIGHT = 0.005, 0.03
 """Probability above which a place is worth another look: of an object, and of an upright. A glance is less sure about
 uprights: at 0.005, it would pass on nearly all proposals."""
 
-_SURE, _SURE_UPRIGHT = 0.97, 1.0
-"""Probability from which a place needs no second opinion: of an object, and of an upright. The base of an upright is
+_DOUBTFUL, _DOUBTFUL_UPRIGHT = (0.03, 0.97), (0.03, 1.0)
+"""Probabilities between which a place gets a second opinion: of an object, and of an upright. The base of an upright is
 seen less exactly than the center of an object, so its place is always a mean."""
 
-_ZOOMS = (0.9, 1.1)
-"""Sides of the patches for a second opinion, as shares of the usual side. In a training, patches differ as much."""
+_ZOOMS, _ZOOMS_UPRIGHT = (0.9, 1.1), (1.0,)
+"""Sides of the patches for a second opinion, as shares of the usual side. The size of what stands on a base says less,
+so patches of other sizes don't help there."""
 
 _LARGEST_SIZE = 3.0
 """Limit of the logarithm of a size: with a bad network, math.exp would overflow, and JSON has no infinity."""
@@ -152,10 +153,10 @@ def look_at(places: Places, look: Look) -> Singles:
     for number, network in enumerate(networks):
         found = network.run(places.cut(worth, network.contract))
         if number and number == len(networks) - 1:
-            sure = _SURE_UPRIGHT if network.contract.upright_radius else _SURE
-            doubtful = np.flatnonzero((found[:, 0] > least) & (found[:, 0] < sure))
+            low, high = _DOUBTFUL_UPRIGHT if network.contract.upright_radius else _DOUBTFUL
+            doubtful = np.flatnonzero((found[:, 0] > low) & (found[:, 0] < high))
             if len(doubtful):
-                found[doubtful] = _second_opinion(places, worth[doubtful], network)
+                found[doubtful] = _second_opinion(places, worth[doubtful], network, found[doubtful])
         answers[worth] = found
         possible = places.move(worth, found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
         worth = worth[(found[:, 0] > least) & possible]
@@ -164,22 +165,22 @@ def look_at(places: Places, look: Look) -> Singles:
     return answers
 
 
-def _second_opinion(places: Places, rows: npt.NDArray[np.intp], look: Look) -> Singles:
-    """Mean answers (k, 4) to a smaller and a larger patch of each of k places, and to the mirror images of both.
+def _second_opinion(places: Places, rows: npt.NDArray[np.intp], look: Look, answers: Singles) -> Singles:
+    """Mean of the answers (k, 4) to k patches, and to mirror images of smaller and larger ones.
 
-    All four show the same object, but the network makes different errors on them. Probabilities are averaged as
-    log-odds.
+    All show the same object, but the network makes different errors on them. Probabilities are averaged as log-odds.
     """
-    patches = np.concatenate([places.cut(rows, look.contract, zoom) for zoom in _ZOOMS])
-    answers = look.run(np.concatenate([patches, patches[:, :, ::-1]])).reshape(2, len(_ZOOMS), len(rows), 4)
-    answers[1, ..., 1] *= -1.0
-    for zoom, each in zip(_ZOOMS, answers.swapaxes(0, 1), strict=True):
-        each[..., 1:3] *= zoom
-        each[..., 3] += math.log(zoom)
-    mean, probability = answers.mean(axis=(0, 1)), answers[..., 0].astype(np.float64)
-    yes, no = (np.prod(each, axis=(0, 1)) ** (0.5 / len(_ZOOMS)) for each in (probability, 1.0 - probability))
+    zooms = _ZOOMS_UPRIGHT if look.contract.upright_radius else _ZOOMS
+    patches = np.concatenate([places.cut(rows, look.contract, zoom)[:, :, ::-1] for zoom in zooms])
+    mirrored = look.run(np.ascontiguousarray(patches)).reshape(len(zooms), len(rows), 4)
+    for zoom, each in zip(zooms, mirrored, strict=True):
+        each[:, 1:3] *= -zoom, zoom
+        each[:, 3] += math.log(zoom)
+    opinions = np.concatenate([answers[None], mirrored]).astype(np.float64)
+    mean, probability = opinions.mean(axis=0), opinions[..., 0]
+    yes, no = (np.prod(each, axis=0) ** (1.0 / len(opinions)) for each in (probability, 1.0 - probability))
     mean[:, 0] = yes / np.maximum(yes + no, np.finfo(np.float64).tiny)
-    return np.asarray(mean)
+    return mean.astype(np.float32)
 
 
 def _judged(
