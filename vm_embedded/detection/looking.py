@@ -180,7 +180,7 @@ def _second_opinion(places: Places, rows: npt.NDArray[np.intp], look: Look, answ
     mean, probability = opinions.mean(axis=0), opinions[..., 0]
     yes, no = (np.prod(each, axis=0) ** (1.0 / len(opinions)) for each in (probability, 1.0 - probability))
     mean[:, 0] = yes / np.maximum(yes + no, np.finfo(np.float64).tiny)
-    return mean.astype(np.float32)
+    return np.asarray(mean, dtype=np.float32)
 
 
 def _judged(
