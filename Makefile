@@ -10,6 +10,7 @@ SCENES ?= export/vm_synth/polyhaven.toml
 NETWORKS := ball ball-small soccer
 BUILD ?= build/networks
 PICTURES ?= data/soccer
+FURTHER ?= data/further
 CALIBRATION ?= data/calibration
 UPRIGHTS := goal robot
 CALIBRATE := $(BIN)/vm-evaluate calibrate --radius-of scene
@@ -87,6 +88,7 @@ data: need-HDRI .venv/synth ## render a training set: make data HDRI=folder-of-m
 
 networks: need-HDRI .venv/dev ## train the networks of the package from their seeds: make networks HDRI=folder-of-maps (hours)
 	$(MAKE) data OUT=data/soccer COUNT=16000 SEED=1 SCENES=export/vm_synth/soccer.toml
+	$(MAKE) data OUT=$(FURTHER) COUNT=3650 SEED=3 SCENES=export/vm_synth/soccer.toml
 	$(BIN)/python -m benchmarks.calibration_data $(HDRI) $(CALIBRATION)
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 	$(BIN)/python -c "from pathlib import Path; from vm_train.tuning.rendered_patches import RENDERED, write_rendered; \
@@ -123,10 +125,15 @@ $(UPRIGHTS:%=$(BUILD)/%-look/look.pt): $(BUILD)/%-look/look.pt: export/networks/
 		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/soccer/model.pt --glance $(BUILD)/$*-glance/look.pt \
 			-o $(BUILD)/$*-look --config $<; fi
 
-vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx $(UPRIGHTS:%=$(BUILD)/%-look/look.pt)
+$(BUILD)/robot-further/look.pt: export/networks/robot-further.toml $(BUILD)/robot-look/look.pt
+	if test -e $(BUILD)/robot-further/run.json; then $(BIN)/vm-train resume $(BUILD)/robot-further; \
+		else $(BIN)/vm-train look $(FURTHER) --from $(BUILD)/soccer/model.pt --start $(BUILD)/robot-look/look.pt \
+			-o $(BUILD)/robot-further --config $<; fi
+
+vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx $(BUILD)/goal-look/look.pt $(BUILD)/robot-further/look.pt
 	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $(BUILD)/balls.onnx
 	$(BIN)/vm-export $(BUILD)/balls.onnx --look $(BUILD)/goal-look/look.pt -o $(BUILD)/balls-and-posts.onnx
-	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-look/look.pt -o $(BUILD)/soccer-uncalibrated.onnx
+	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-further/look.pt -o $(BUILD)/soccer-uncalibrated.onnx
 	$(CALIBRATE) $(BUILD)/soccer-uncalibrated.onnx $(CALIBRATION)/* -o $@
 
 test-data: need-HDRI .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)

@@ -14,6 +14,7 @@ from benchmarks.field import figures
 from benchmarks.report import fill, table
 from benchmarks.shipped import METERS, NETWORKS, RANGES, RECIPES, RESULTS, SETS
 from vm_embedded.network.bundled import DEFAULT, model_path
+from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import read_model
 
@@ -190,10 +191,17 @@ def _upright_data(manifest: Manifest) -> str:
         f"- **Training data of the close look at class {each.object_class}:** {each.provenance['training_pictures']} "
         f"pictures of the\n  same kind. {each.size} x {each.size} samples, convolutions of "
         f"{', '.join(map(str, each.channels))} channels. Seed {each.provenance['seed']},\n  configurations "
-        f"`export/networks/upright-glance.toml` and `{each.object_class}-look.toml`.\n"
+        f"`export/networks/upright-glance.toml` and `{each.object_class}-look.toml`{_further(each)}.\n"
         for each in manifest.upright_looks
     ]
     return "".join(lines)
+
+
+def _further(look: LookContract) -> str:
+    """How a look was trained that began with the weights of another one."""
+    if "start_sha256" not in look.provenance:
+        return ""
+    return f",\n  then `{look.object_class}-further.toml` on these pictures"
 
 
 def card(found: dict[str, Any], name: str) -> str:
