@@ -21,7 +21,7 @@ from ..config.toml_writer import to_commented_toml
 from ..errors import InputError, NetworkError, VisualMeshError
 from ..live.configuration import HEADER, Configuration
 from ..live.control import REFUSED, ask, control_path
-from ..live.daemon import EXIT_CONFIGURATION, EXIT_HUNG, Daemon
+from ..live.daemon import EXIT_CONFIGURATION, EXIT_RESTART, Daemon
 from ..live.load_detector import prove_model
 from ..live.log import EventLog
 from ..network.bundled import SHIPPED, shipped_name
@@ -249,7 +249,7 @@ async def _prove_and_run(options: argparse.Namespace) -> int:
 def _report_bad_configuration(error: VisualMeshError) -> int:
     """Log why the daemon can't start, and return the exit status that tells systemd whether to restart it."""
     EventLog("vm-detect")("can't start", "error", reason=str(error))
-    return EXIT_HUNG if isinstance(error, NetworkError) else EXIT_CONFIGURATION
+    return EXIT_RESTART if isinstance(error, NetworkError) else EXIT_CONFIGURATION
 
 
 if __name__ == "__main__":

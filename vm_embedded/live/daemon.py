@@ -44,7 +44,7 @@ from .prometheus import resident_bytes
 from .reloading import read_again
 from .systemd import SystemdNotifier
 
-EXIT_OK, EXIT_FAILED, EXIT_HUNG, EXIT_CONFIGURATION = 0, 1, 75, 78
+EXIT_OK, EXIT_FAILED, EXIT_RESTART, EXIT_CONFIGURATION = 0, 1, 75, 78
 """As in sysexits.h: 75 (EX_TEMPFAIL) asks for a restart, 78 (EX_CONFIG) says that a restart would fail again."""
 
 _TICK = 0.02
@@ -159,7 +159,11 @@ class Daemon:
                 await self._bridge.open(self.poses)
         except InputError:
             await self._close()
-            raise
+            if not self._stops:
+                raise
+            status, reason = self._exit_status()
+            self._log("stopped", frames=0, reason=reason)
+            return status
         for name in ("page", "metrics"):
             for address in getattr(self.configuration.status, name).split(","):
                 if address and is_open_to_network(address):
@@ -210,7 +214,7 @@ class Daemon:
     def _exit_status(self) -> tuple[int, str]:
         """The exit status, and the reason why the daemon stops."""
         if self._hung:
-            return EXIT_HUNG, f"{MOST_HANGING} reads of the camera hang"
+            return EXIT_RESTART, f"{MOST_HANGING} reads of the camera hang"
         if self._stops:
             return EXIT_OK, "signal"
         return EXIT_OK if self.counters.outcomes.frames else EXIT_FAILED, "the camera has ended"
@@ -356,7 +360,7 @@ class Daemon:
         self.outputs.send(state_message("stopping", reason))
         self._notifier.send(STATUS=f"stopping: {reason}")
         time.sleep(_LAST_WORDS_S)
-        os._exit(EXIT_HUNG)
+        os._exit(EXIT_RESTART)
 
     async def _close(self) -> None:
         self._watchdog.close()

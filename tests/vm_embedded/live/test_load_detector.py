@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import signal
 import subprocess
 
 import pytest
@@ -96,6 +97,21 @@ def test_an_address_that_the_network_may_get_later_asks_for_a_restart(tmp_path):
     assert done.returncode == 75
     assert done.stderr.count("waiting for the network") == 1
     assert "can't start" in done.stderr
+
+
+def test_a_signal_ends_the_wait_for_the_network_as_usual(tmp_path):
+    command = arguments(tmp_path, "--camera", "synthetic", "--status-page", "192.0.2.1:8080")
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        seen = next(line for line in process.stderr if "waiting for the network" in line)
+        assert "192.0.2.1" in seen
+        process.send_signal(signal.SIGTERM)
+        _, rest = process.communicate(timeout=10)
+    finally:
+        process.kill()
+    assert process.returncode == 0
+    assert "can't start" not in rest
+    assert "signal" in rest.splitlines()[-1]
 
 
 def test_a_running_detector_is_asked_although_its_vm_toml_has_got_an_error(tmp_path):

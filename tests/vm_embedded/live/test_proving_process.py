@@ -15,7 +15,7 @@ import pytest
 from tests.vm_embedded.live.running import COMMAND, arguments, running
 from tests.vm_embedded.network.burdened import endless, endless_on_many_points, huge
 from vm_embedded.errors import ModelError
-from vm_embedded.live.daemon import EXIT_HUNG
+from vm_embedded.live.daemon import EXIT_RESTART
 from vm_embedded.live.frame_watchdog import FrameWatchdog
 from vm_embedded.live.proving_process import modules_are_public, prove_in_process
 from vm_embedded.network.bundled import model_path
@@ -155,7 +155,7 @@ def test_attack_3_a_frame_that_hangs_ends_the_detector_with_state_and_status(tmp
         status = found.process.wait(120)
         for each in found._threads:
             each.join(60)
-    assert status == EXIT_HUNG
+    assert status == EXIT_RESTART
     assert found.frames == []
     assert found.messages[-1]["state"] == "stopping"
     assert "a frame takes more than 8 s" in found.messages[-1]["reason"]
