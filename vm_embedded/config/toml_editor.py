@@ -36,7 +36,7 @@ def _edited_file(path: Path, section: str, entries: Mapping[str, Any]) -> str:
     except UnicodeDecodeError as error:
         raise InputError(f"configuration {path} is not a text file") from error
     except (OSError, InputError) as error:
-        raise InputError(f"can't read configuration {path}: {error}") from error
+        raise InputError(f"can't read configuration {path}: {getattr(error, 'strerror', None) or error}") from error
     edited = edit_section(text, section, entries)
     try:
         after = parse_toml(edited)

@@ -111,7 +111,8 @@ def _plan(files: Sequence[Path], renaming: Mapping[str, str], normalized: bool) 
     try:
         named = [{"name": path.name, "bytes": path.stat().st_size} for path in files]
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
-        raise InputError(f"can't read {getattr(error, 'filename', None) or files}: {error}") from error
+        name = getattr(error, "filename", None) or files
+        raise InputError(f"can't read {name}: {getattr(error, 'strerror', None) or error}") from error
     return {"format": FORMAT, "files": named, "renaming": dict(renaming), "normalized": normalized}
 
 
