@@ -22,17 +22,26 @@ from .proposals import propose_places
 from .settings import Settings
 from .stopwatch import Stopwatch
 
-_WORTH, _WORTH_UPRIGHT = 0.005, 0.03
-"""Probability above which a place is worth another look: of an object, and of an upright. A glance is less sure about
-uprights: at 0.005, it would pass on nearly all proposals."""
 
-_DOUBTFUL, _DOUBTFUL_UPRIGHT = (0.03, 0.97), (0.03, 1.0)
-"""Probabilities between which a place gets a second opinion: of an object, and of an upright. The base of an upright is
-seen less exactly than the center of an object, so its place is always a mean."""
+@dataclass(frozen=True)
+class _Rules:
+    """How to look at a kind of object.
 
-_ZOOMS, _ZOOMS_UPRIGHT = (0.9, 1.1), (1.0,)
-"""Sides of the patches for a second opinion, as shares of the usual side. The size of what stands on a base says less,
-so patches of other sizes don't help there."""
+    worth: probability above which a place is worth another look. doubtful: probabilities between which it gets a second
+    opinion. zooms: sides of the patches for that, as shares of the usual side.
+    """
+
+    worth: float
+    doubtful: tuple[float, float]
+    zooms: tuple[float, ...]
+
+
+_OBJECT = _Rules(worth=0.005, doubtful=(0.03, 0.97), zooms=(0.9, 1.1))
+
+# A glance is less sure about uprights: at 0.005, it would pass on nearly all proposals. The base of an upright is seen
+# less exactly than the center of an object, so its place is a mean also if it is sure. The size of what stands on a
+# base says less, so patches of other sizes don't help.
+_UPRIGHT = _Rules(worth=0.03, doubtful=(0.03, 1.0), zooms=(1.0,))
 
 _LARGEST_SIZE = 3.0
 """Limit of the logarithm of a size: with a bad network, math.exp would overflow, and JSON has no infinity."""
@@ -136,7 +145,11 @@ def look_closely(
 
 def worth_of(contract: LookContract) -> float:
     """Probability above which a place is worth another look."""
-    return _WORTH_UPRIGHT if contract.upright_radius else _WORTH
+    return _rules_of(contract).worth
+
+
+def _rules_of(contract: LookContract) -> _Rules:
+    return _UPRIGHT if contract.upright_radius else _OBJECT
 
 
 def look_at(places: Places, look: Look) -> Singles:
@@ -145,7 +158,7 @@ def look_at(places: Places, look: Look) -> Singles:
     In the last of several passes, a doubtful place gets a second opinion. Returns the last answers (n, 4) to each
     place, as `CloseLook.run` gives them. Raises ModelError if a network does not run.
     """
-    least = worth_of(look.contract)
+    rules = _rules_of(look.contract)
     # Each pass has its network: first those of the glance, then those of the look.
     networks = [each for each in (look.glance, look) if each for _ in range(each.contract.passes)]
     answers = np.zeros((len(places), 4), dtype=np.float32)
@@ -153,24 +166,25 @@ def look_at(places: Places, look: Look) -> Singles:
     for number, network in enumerate(networks):
         found = network.run(places.cut(worth, network.contract))
         if number and number == len(networks) - 1:
-            low, high = _DOUBTFUL_UPRIGHT if network.contract.upright_radius else _DOUBTFUL
+            low, high = rules.doubtful
             doubtful = np.flatnonzero((found[:, 0] > low) & (found[:, 0] < high))
             if len(doubtful):
-                found[doubtful] = _second_opinion(places, worth[doubtful], network, found[doubtful])
+                found[doubtful] = _second_opinion(places, worth[doubtful], network, rules.zooms, found[doubtful])
         answers[worth] = found
         possible = places.move(worth, found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
-        worth = worth[(found[:, 0] > least) & possible]
+        worth = worth[(found[:, 0] > rules.worth) & possible]
         if not len(worth):
             break
     return answers
 
 
-def _second_opinion(places: Places, rows: npt.NDArray[np.intp], look: Look, answers: Singles) -> Singles:
+def _second_opinion(
+    places: Places, rows: npt.NDArray[np.intp], look: Look, zooms: tuple[float, ...], answers: Singles
+) -> Singles:
     """Mean of the answers (k, 4) to k patches, and to mirror images of smaller and larger ones.
 
     All show the same object, but the network makes different errors on them. Probabilities are averaged as log-odds.
     """
-    zooms = _ZOOMS_UPRIGHT if look.contract.upright_radius else _ZOOMS
     patches = np.concatenate([places.cut(rows, look.contract, zoom)[:, :, ::-1] for zoom in zooms])
     mirrored = look.run(np.ascontiguousarray(patches)).reshape(len(zooms), len(rows), 4)
     for zoom, each in zip(zooms, mirrored, strict=True):
