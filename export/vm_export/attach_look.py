@@ -28,6 +28,9 @@ _MADE = 64
 _UNSURE = (0.05, 0.65)
 """Limits of the probability of a patch that a network is unsure of."""
 
+_PARTS = 256
+"""Steps from one patch to another in a search for such a patch. With sixteen, a network was surer of all of them."""
+
 
 def attached(content: bytes, manifest: Manifest, look: LookCheckpoint) -> tuple[bytes, float]:
     """A model file's bytes with a look network and its glance, and the largest difference of an answer to torch.
@@ -84,9 +87,9 @@ def _self_test(look: LookCheckpoint) -> LookTest:
     low, high = _UNSURE
     if ((test.answers[:, 0] > low) & (test.answers[:, 0] < high)).any():
         return test
-    shares = np.arange(1, 16)[:, None, None, None]  # in sixteenths
+    shares = np.arange(1, _PARTS)[:, None, None, None]
     one, other = look.examples[likely].astype(np.int32), look.examples[unlikely].astype(np.int32)
-    mixtures = (((16 - shares) * one + shares * other) // 16).astype(np.uint8)
+    mixtures = (((_PARTS - shares) * one + shares * other) // _PARTS).astype(np.uint8)
     least_sure = np.abs(_answers(look.network, mixtures)[:, 0] - 0.5).argmin()
     return _tested(look.network, np.concatenate([test.patches, mixtures[[least_sure]]]))
 
