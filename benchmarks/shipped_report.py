@@ -263,8 +263,8 @@ median distance error of balls from 0.5 to 6 m is {number(used["distance_error"]
 radius of at least 3 px that are at least 60 % visible, {number(scores["proposals"]["recall_0.5"], 1, 100.0)} % have a
 proposal within half a radius; there are {scores["proposals"]["mean_count"]:.0f} proposals per picture on average. The
 glance moves them and passes on {scores["passed"]["mean_count"]:.0f} places, within half a radius of
-{number(scores["passed"]["recall_0.5"], 1, 100.0)} % of these balls. On
-{clutter["pictures"]} pictures full of things that look like balls, AP50 from 0.5 to 6 m is
+{number(scores["passed"]["recall_0.5"], 1, 100.0)} % of these balls.
+On {clutter["pictures"]} pictures full of things that look like balls, AP50 from 0.5 to 6 m is
 {number(hard["average_precision"], 3)}, with {number(clutter["all"]["false_per_picture"], 3)} false balls per picture.
 docs/results.md has more figures.
 

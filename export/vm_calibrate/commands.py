@@ -51,9 +51,10 @@ def lens(options: argparse.Namespace) -> None:
     fov = None if options.fov is None else parse_angle(options.fov, "--fov")
     if fov is not None and options.lens in ("auto", "pinhole", "fisheye"):
         raise InputError("--fov is for a radial lens; files of pinhole and fisheye lenses have no field of view")
-    widest = math.pi if options.lens == "rectilinear" else 2.0 * math.pi
-    if fov is not None and not 0.0 < fov < widest:
-        raise InputError(f"--fov of this lens must be above 0 and below {math.degrees(widest):g}deg, not {options.fov}")
+    is_flat = options.lens == "rectilinear"
+    if fov is not None and not (0.0 < fov < math.pi if is_flat else 0.0 < fov <= 2.0 * math.pi):
+        widest = "below 180deg" if is_flat else "up to 360deg"
+        raise InputError(f"--fov of this lens must be above 0 and {widest}, not {options.fov}")
     search = find_boards(options.source, _board(options, 1.0))
     fit = _fit(options.lens, choose(search, options.frames), search.size)
     found = fit.lens if fov is None else replace(fit.lens, fov=fov)

@@ -67,7 +67,7 @@ def test_the_command_line_knows_the_kinds_of_lenses():
         (("9x6", "--square", "1", "--charuco", "4x4_5", "--marker", "0.7"), "unknown --charuco dictionary '4x4_5'"),
         (("20x20", "--square", "1", "--charuco", "4X4_50", "--marker", "0.7"), "needs 200 markers, but 4X4_50 has 50"),
         (("9x6", "--fov", "100deg"), "--fov is for a radial lens"),
-        (("9x6", "--lens", "equidistant", "--fov", "400deg"), "must be above 0 and below 360deg, not 400deg"),
+        (("9x6", "--lens", "equidistant", "--fov", "400deg"), "must be above 0 and up to 360deg, not 400deg"),
         (("9x6", "--lens", "rectilinear", "--fov", "190deg"), "must be above 0 and below 180deg, not 190deg"),
     ],
 )

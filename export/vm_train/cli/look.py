@@ -26,7 +26,7 @@ from .fine_tuning import begin_fine_tuning
 from .training import EXIT_OK, stop_requests
 
 if TYPE_CHECKING:
-    from ..look.start import LookStart
+    from vm_export.look_checkpoint import LookCheckpoint
 
 
 def look_parser() -> argparse.ArgumentParser:
@@ -130,10 +130,10 @@ def run_look(options: argparse.Namespace) -> int:
     if options.names or options.format or options.rendered:
         raise InputError("--names, --format and --rendered go with --boxes: leave them out, or give --boxes DIR")
     start, configuration = _start_and_configuration(options)
-    begun = None if start is None else start.look
-    glance = None if begun is None else begun.glance
     if options.glance is not None:
-        glance = LookCheckpoint.load(options.glance)
+        glance: LookCheckpoint | None = LookCheckpoint.load(options.glance)
+    else:
+        glance = start.glance if start else None
     model = model_path(options.model)
     configuration = _with_classes_of(model, configuration)
     numbers = [each.number for each in find_pictures(options.data)]
@@ -141,7 +141,7 @@ def run_look(options: argparse.Namespace) -> int:
     strict, threads = options.strict, options.threads or 1
     output, name = options.output, str(options.model)
     with locked(output):
-        run = begin_look_run(output, options.data, split, configuration, model, name, strict, threads, glance, begun)
+        run = begin_look_run(output, options.data, split, configuration, model, name, strict, threads, glance, start)
         count = len(split.training), len(split.validation)
         print(
             f"{options.data}: {len(numbers)} pictures: {count[0]} for training, {count[1]} for validation", flush=True
@@ -149,18 +149,18 @@ def run_look(options: argparse.Namespace) -> int:
         return _train(run.folder, None, options)
 
 
-def _start_and_configuration(options: argparse.Namespace) -> tuple[LookStart | None, LookConfiguration]:
+def _start_and_configuration(options: argparse.Namespace) -> tuple[LookCheckpoint | None, LookConfiguration]:
     """The network of --start, and the configuration, whose defaults it changes. Raises InputError or ModelError."""
     from ..look.start import LookStart
 
     overrides = parse_overrides(options.set, "training.epochs=5")
-    configuration = read_sections(LookConfiguration, options.config, overrides)
+    configuration = read_sections(LookConfiguration, options.config, overrides)  # tells the class to judge
     if options.start is None:
         return None, configuration
     start = LookStart.load(model_path(options.start), configuration.patches.object_class)
     configuration = read_sections(LookConfiguration, options.config, overrides, defaults=start.defaults)
     start.check(configuration)
-    return start, configuration
+    return start.look, configuration
 
 
 def _with_classes_of(model: Path, configuration: LookConfiguration) -> LookConfiguration:

@@ -56,7 +56,7 @@ class Evaluation:
     objects: scores for each class of the kind object. proposals: scores for the class of the close look, if there is
     one. passed: the same for what its glance passes on. poses: of the evaluated pictures. radii: of the balls [m], one
     for each picture with a sceneX.json. faults: the reason for each picture that was not evaluated, by path. features:
-    of the field, for a Visual Mesh with the classes for them.
+    scores of field features, for a Visual Mesh with the classes for them.
     """
 
     points: PointScores

@@ -22,7 +22,8 @@ def lines(scores: Scores) -> str:
         rows += ["", f"objects of class {name}", *aligned([heading, *body]), calibration(scores["calibration"][name])]
     for name, found in scores["proposals"].items():
         rows += ["", f"proposals for class {name}: {proposal_counts(found)}"]
-        rows += [passed_on(each) for each in (scores["passed"].get(name),) if each]
+        if name in scores["passed"]:
+            rows.append(passed_on(scores["passed"][name]))
         for heading, body in proposal_tables(found):
             rows += aligned([heading, *body])
     for name, (heading, body) in field_tables(scores["field"]).items():

@@ -3,8 +3,8 @@
 look.toml: the configuration. pictures.json: the split of the pictures. run.json: where the pictures are. mesh.onnx or
 mesh.pt: a copy of the mesh network. glance.pt: a copy of the glance, if there is one. start.pt: a copy of the look
 network that the training begins with, if there is one. patches/: the patches, in chunks. state.pt: the state to resume
-from. log.jsonl, tensorboard/: the record of each step. look.pt: the network. result.json:
-what it finds in the validation pictures, and how often its probabilities are right.
+from. log.jsonl, tensorboard/: the record of each step. look.pt: the network. result.json: what it finds in the
+validation pictures, and how often its probabilities are right.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ class LookRun:
 
     data: folder of the pictures. model: the mesh network as the user named it. mesh: its copy. glance_sha256,
     start_sha256: digests of the checkpoints of the glance and of the network to begin with, None without one.
-    object_class: class to judge. strict: whether a picture that can't be
-    used ends the training. threads: number of computing threads; a resumed training takes the same.
+    object_class: class to judge. strict: whether a picture that can't be used ends the training. threads: number of
+    computing threads; a resumed training takes the same.
     """
 
     folder: Path
@@ -136,14 +136,15 @@ def _check_glance(glance: LookCheckpoint, object_class: str, upright_radius: flo
     contract = glance.contract
     if contract.object_class != object_class:
         raise InputError(
-            f"the glance judges class {contract.object_class!r}; a glance for class {object_class!r} is needed"
+            f"the glance of --glance or --start judges class {contract.object_class!r}; a glance for class "
+            f"{object_class!r} is needed"
         )
     if glance.glance is not None:
-        raise InputError("the glance has a glance itself; a glance must be a single look network")
+        raise InputError("the glance of --glance has a glance itself; a glance must be a single look network")
     if contract.upright_radius != upright_radius:
         raise InputError(
-            f"the glance has an upright_radius of {contract.upright_radius:g} m, patches.upright_radius is "
-            f"{upright_radius:g} m: give both the same one"
+            f"the glance of --glance or --start has an upright_radius of {contract.upright_radius:g} m, "
+            f"patches.upright_radius is {upright_radius:g} m: give both the same one"
         )
 
 

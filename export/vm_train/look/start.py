@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,11 +20,10 @@ _RATE = 0.005
 
 @dataclass(frozen=True, eq=False)
 class LookStart:
-    """A trained look network to begin with. path: its file, a look.pt or a model file. sha256: digest of that file."""
+    """A trained look network to begin with. path: its file, a look.pt or a model file."""
 
     path: Path
     look: LookCheckpoint
-    sha256: str
 
     @classmethod
     def load(cls, path: Path, object_class: str = "") -> LookStart:
@@ -37,7 +35,7 @@ class LookStart:
         look = _chosen(path, object_class) if is_model else LookCheckpoint.load(path)
         if object_class and look.contract.object_class != object_class:
             raise InputError(f"{path} judges class {look.contract.object_class!r}, not {object_class!r}")
-        return cls(path, look, hashlib.sha256(path.read_bytes()).hexdigest())
+        return cls(path, look)
 
     @property
     def defaults(self) -> dict[str, dict[str, Any]]:

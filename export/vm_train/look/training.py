@@ -198,6 +198,7 @@ class _Training:
     def _provenance(self, score: LookScore, result: LookResult) -> dict[str, str]:
         """Where the network comes from, for its contract."""
         run, found, recipe = self._run, self._collected, self._recipe
+        start = {"start_sha256": run.start_sha256} if run.start_sha256 else {}
         return {
             "made_by": f"vm-train {__version__}",
             "data": run.data.name,
@@ -208,7 +209,7 @@ class _Training:
             "patches_sha256": found.training.sha256(),
             "mesh_sha256": run.mesh_sha256,
             "configuration_sha256": run.configuration_sha256,
-            **({} if run.start_sha256 is None else {"start_sha256": run.start_sha256}),
+            **start,
             "epochs": str(recipe.epochs),
             "rounds": str(recipe.rounds),
             "seed": str(recipe.seed),

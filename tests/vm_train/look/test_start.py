@@ -3,17 +3,20 @@
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import torch
 
 from tests.vm_train.commands import run
+from vm_embedded.config.sections import read_sections
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_weights import look_of, upright_looks_of
 from vm_train.cli.train import main
 from vm_train.learning.log import read_log
+from vm_train.look.configuration import LookConfiguration
 from vm_train.look.start import LookStart
 
 STILL = ["--set", "training.rate=1e-9", "--set", "training.decay=0", "--set", "training.epochs=1"]
@@ -105,6 +108,13 @@ def test_of_a_model_file_it_takes_the_look_at_the_class(name, number):
     defaults = start.defaults["patches"]
     assert defaults["object_class"] == name
     assert defaults.get("upright_radius", 0.0) == expected.contract.upright_radius
+
+
+def test_the_recipe_of_the_package_goes_on_from_its_network():
+    start = LookStart.load(model_path("soccer"), "robot")
+    recipe = Path(__file__).parents[3] / "export" / "networks" / "robot-further.toml"
+    start.check(read_sections(LookConfiguration, recipe, defaults=start.defaults))
+    assert recipe.name in model_path("soccer").with_suffix(".md").read_text()
 
 
 @pytest.mark.parametrize(
