@@ -112,9 +112,9 @@ def trained(task: Task) -> Path:
         split = split_of(data, VARIANTS[name].get("pictures", {}).get("training", TRAINING))
         run = begin_look_run(folder, data, split, configuration_of(name, seed), model, model.stem)
     if not is_finished(run):
-        with set_up_hardware("cpu", 1, 1):
+        with set_up_hardware("cpu", 1, 1) as hardware:
             _share_patches(run, out)
-            train_look(run, collect(run, 1), 1, lambda: False)
+            train_look(run, collect(run, 1), hardware, lambda: False)
     path = folder / "model.onnx"
     if not path.exists():
         change_looks(model, path, [LookCheckpoint.load(run.look_path)])

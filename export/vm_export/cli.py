@@ -205,8 +205,7 @@ def _print_written(path: Path, content: str, look: LookCheckpoint | None, differ
         contract = look.contract
         channels = ", ".join(map(str, contract.channels))
         parts.append(f"close look at {contract.object_class} ({contract.size} x {contract.size}, channels {channels})")
-        if contract.glance is not None:
-            parts.append(f"glance ({contract.glance.size} x {contract.glance.size})")
+        parts += [f"glance ({each.size} x {each.size})" for each in contract.chain[1:]]
     parts.append(f"{path.stat().st_size / 1000:.1f} kB")
     if difference is not None:
         parts.append(f"largest difference to torch {difference:.1e}")

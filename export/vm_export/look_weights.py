@@ -20,28 +20,26 @@ from .look_network import LookNetwork, LookShape
 
 
 def look_of(model: ModelFile) -> LookCheckpoint:
-    """The look network of a model file at objects, with its glance: the inverse of attach_look.attached.
+    """The look network of a model file at objects, with its glances: the inverse of attach_look.attached.
 
     Its calibration is part of the last layer's weights, so its own is 1 and 0. Raises ModelError if the file has no
     look network, or one that vm-export did not write.
     """
     if model.manifest.look is None or model.look is None:
         raise ModelError(f"{model.path} has no close look; vm-export --look attaches one")
-    return _with_glance(model, model.manifest.look, model.look)
+    return _look(model, model.manifest.look, model.look)
 
 
 def upright_looks_of(model: ModelFile) -> list[LookCheckpoint]:
     """The same for the looks at uprights, in the manifest's order."""
     pairs = zip(model.manifest.upright_looks, model.upright_looks, strict=True)
-    return [_with_glance(model, contract, files) for contract, files in pairs]
+    return [_look(model, contract, files) for contract, files in pairs]
 
 
-def _with_glance(model: ModelFile, contract: LookContract, files: LookFiles) -> LookCheckpoint:
+def _look(model: ModelFile, contract: LookContract, files: LookFiles) -> LookCheckpoint:
     try:
-        glance = None
-        if contract.glance is not None and files.glance is not None:
-            glance = _checkpoint(contract.glance, files.glance, None)
-        return _checkpoint(contract, files.look, glance)
+        glance = None if contract.glance is None else _look(model, contract.glance, files[1:])
+        return _checkpoint(contract, files[0], glance)
     except (KeyError, ValueError, RuntimeError) as error:
         raise ModelError(f"{model.path}: its close look has other layers than vm-export writes: {error}") from error
 

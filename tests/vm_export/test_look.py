@@ -441,8 +441,25 @@ def test_a_look_at_an_upright_brings_its_glance(field):
     for again, made in zip([look_of(read), *upright_looks_of(read)], looks, strict=True):
         assert again.glance.contract.keys == made.glance.contract.keys
     without = attach(field, upright("goal"))
-    assert without.upright_looks[0].glance is None
+    assert len(without.upright_looks[0]) == 1
     assert without.look == read.look
+
+
+def test_a_glance_may_have_a_glance(field):
+    for changes in ({}, {"object_class": "goal", "upright_radius": 0.3}):
+        first, last = glancing_checkpoint(**changes), look_checkpoint(7, LookShape(size=10, channels=(3, 4, 5)), **changes)
+        made = replace(last, contract=replace(last.contract, glance=first.contract), glance=first)
+        read = attach(field, made)
+        close = CloseLook.of_uprights(read)["goal"] if changes else CloseLook.of(read)
+        (again,) = upright_looks_of(read)[:1] if changes else [look_of(read)]
+        for _ in range(3):
+            patches = random_patches(5, size=made.contract.size)
+            np.testing.assert_allclose(close.run(patches), torch_answers(made.network, patches), atol=1e-5)
+            np.testing.assert_allclose(torch_answers(again.network, patches), close.run(patches), atol=1e-5)
+            check_self_test(close.contract.self_test, made)
+            close, made, again = close.glance, made.glance, again.glance
+        assert close is made is again is None
+    assert len(attach(field, look_checkpoint()).look) == 1
 
 
 def test_a_look_at_an_upright_replaces_the_one_before_and_no_other(field):
@@ -475,7 +492,7 @@ def test_a_look_for_another_kind_of_class_is_refused(field, tmp_path, look, mess
 
 def test_a_file_whose_looks_are_not_those_of_its_manifest_is_refused(field, tmp_path):
     read = attach(field, upright("goal"))
-    key, glance_key = upright("goal").contract.keys
+    (key,), glance_key = upright("goal").contract.keys, "visual_mesh_glance_goal"
     (text,) = (each.value for each in onnx.load_from_string(read.content).metadata_props if each.key == key)
     for entries, message in (
         ({key: None}, "manifest has a close look at goal, its metadata has none"),

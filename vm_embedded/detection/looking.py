@@ -160,7 +160,7 @@ def look_at(places: Places, look: Look) -> Singles:
     """
     rules = _rules_of(look.contract)
     # Each pass has its network: first those of the glance, then those of the look.
-    networks = [each for each in (look.glance, look) if each for _ in range(each.contract.passes)]
+    networks = [each for each in _chain(look) for _ in range(each.contract.passes)]
     answers = np.zeros((len(places), 4), dtype=np.float32)
     worth = np.arange(len(places))
     for number, network in enumerate(networks):
@@ -176,6 +176,11 @@ def look_at(places: Places, look: Look) -> Singles:
         if not len(worth):
             break
     return answers
+
+
+def _chain(look: Look) -> list[Look]:
+    """A look and its glances, in the order in which they judge."""
+    return [*(_chain(look.glance) if look.glance else []), look]
 
 
 def _second_opinion(

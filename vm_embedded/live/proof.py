@@ -31,11 +31,9 @@ def prove(model: ModelFile) -> str:
     """
     manifest = model.manifest
     parts: dict[str, Manifest | LookContract] = {"mesh network": manifest}
-    for each in (manifest.look, *manifest.upright_looks):
-        if each is not None:
-            parts[f"close look at {each.object_class}"] = each
-        if each is not None and each.glance is not None:
-            parts[f"glance at {each.object_class}"] = each.glance
+    for each in manifest.looks:
+        names = ("close look", "glance", "first glance")
+        parts |= {f"{name} at {each.object_class}": part for name, part in zip(names, each.chain, strict=False)}
     for name, part in parts.items():
         if not part.self_test:
             raise ModelError(f"{model.path}: its {name} has no self-test; export it again")

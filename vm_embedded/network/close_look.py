@@ -1,7 +1,7 @@
 """The look network of a model file, ready to run. It judges each proposal of the mesh network.
 
 A smaller network, the glance, may judge the proposals first. Most of them are so clearly nothing that it can tell, and
-the look network has time for the rest.
+the look network has time for the rest. The glance may have a glance, too.
 """
 
 from __future__ import annotations
@@ -49,25 +49,31 @@ class CloseLook:
         contract, files = model.manifest.look, model.look
         if contract is None or files is None:
             return None
-        return cls._with_glance(f"{model.path}, ", contract, files, threads, spinning)
+        return cls._chain(f"{model.path}, ", contract, files, threads, spinning)
 
     @classmethod
     def of_uprights(cls, model: ModelFile, threads: int = 1, spinning: bool = False) -> dict[str, CloseLook]:
         """The look networks of a model file for classes of kind upright, by class. Raises ModelError."""
         return {
-            each.object_class: cls._with_glance(f"{model.path}, {each.object_class}: ", each, files, threads, spinning)
+            each.object_class: cls._chain(f"{model.path}, {each.object_class}: ", each, files, threads, spinning)
             for each, files in zip(model.manifest.upright_looks, model.upright_looks, strict=True)
         }
 
     @classmethod
-    def _with_glance(
-        cls, prefix: str, contract: LookContract, files: LookFiles, threads: int, spinning: bool
+    def _chain(
+        cls,
+        prefix: str,
+        contract: LookContract,
+        files: LookFiles,
+        threads: int,
+        spinning: bool,
+        name: str = "close look",
     ) -> CloseLook:
-        """A look network and its glance. prefix: of their names."""
+        """A look network with its glance, which may have a glance. prefix, name: of the network, for messages."""
         glance = None
-        if contract.glance is not None and files.glance is not None:
-            glance = cls(f"{prefix}glance", contract.glance, files.glance, None, threads, spinning)
-        return cls(f"{prefix}close look", contract, files.look, glance, threads, spinning)
+        if contract.glance is not None:
+            glance = cls._chain(prefix, contract.glance, files[1:], threads, spinning, "glance")
+        return cls(f"{prefix}{name}", contract, files[0], glance, threads, spinning)
 
     def run(self, patches: Image) -> Singles:
         """Answers (n, 4) to patches (n, size, size, 3), RGB. Raises ModelError, also for answers that are not finite.

@@ -14,7 +14,10 @@ LOOK_KEY = "visual_mesh_look"
 ends with the class: visual_mesh_look_goal."""
 
 GLANCE_KEY = "visual_mesh_glance"
-"""Key of its glance, in the same form."""
+"""Key of its glance, in the same form. That of the glance's own glance is visual_mesh_glance2."""
+
+MOST_NETWORKS = 3
+"""Limit of the networks in a chain."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +35,7 @@ class LookContract:
         the previous pass found. The last of all passes gives doubtful places a second opinion.
     channels: of the network's convolutions at each resolution; the runtime does not use them.
     glance: of a smaller look network for the same class, which judges each proposal first; this one judges only what
-        the glance passes on. A glance has none.
+        the glance passes on. The glance may have a glance, too.
     self_test: an example with its answers, which each loading of the model file runs.
     provenance: origin of the network; the runtime does not use it.
 
@@ -67,6 +70,8 @@ class LookContract:
                 raise ModelError(f"{name} of the close look must be {kind} from {low} to {high}, not {value!r}")
         if self.glance is None:
             return
+        if len(self.chain) > MOST_NETWORKS:
+            raise ModelError(f"a close look may have {MOST_NETWORKS} networks with all its glances, not more")
         if self.glance.object_class != self.object_class:
             raise ModelError(
                 f"the close look judges class {self.object_class!r}, its glance class {self.glance.object_class!r}; "
@@ -77,14 +82,17 @@ class LookContract:
                 f"the close look has the upright_radius {self.upright_radius:g} m, its glance "
                 f"{self.glance.upright_radius:g} m; both must be the same"
             )
-        if self.glance.glance is not None:
-            raise ModelError("the glance of the close look has a glance, too; only a close look can have one")
 
     @property
-    def keys(self) -> tuple[str, str]:
-        """Keys of the network and of its glance in the metadata of a model file."""
+    def chain(self) -> tuple[LookContract, ...]:
+        """The contract, that of the glance, and that of the glance's glance, as far as there are any."""
+        return (self,) if self.glance is None else (self, *self.glance.chain)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the chain's networks in the metadata of a model file."""
         end = f"_{self.object_class}" if self.upright_radius else ""
-        return LOOK_KEY + end, GLANCE_KEY + end
+        return tuple(key + end for key in (LOOK_KEY, GLANCE_KEY, f"{GLANCE_KEY}2")[: len(self.chain)])
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -97,8 +105,11 @@ class LookContract:
         }
 
     @classmethod
-    def from_dict(cls, data: object) -> LookContract:
-        """Inverse of `as_dict`. Raises ModelError for missing, unknown or malformed entries."""
+    def from_dict(cls, data: object, networks: int = MOST_NETWORKS) -> LookContract:
+        """Inverse of `as_dict`. networks: most in the chain. Raises ModelError for missing, unknown or malformed
+        entries."""
+        if not networks:
+            raise ModelError(f"a close look may have {MOST_NETWORKS} networks with all its glances, not more")
         names = {each.name for each in fields(cls)}
         if not isinstance(data, dict) or set(data) != names:
             found = sorted(data) if isinstance(data, dict) else data
@@ -108,7 +119,7 @@ class LookContract:
             provenance = {str(key): str(value) for key, value in data["provenance"].items()}
         except (TypeError, ValueError, OverflowError, AttributeError) as error:
             raise ModelError(f"look in the model's manifest has malformed channels or provenance: {error}") from error
-        glance = None if data["glance"] is None else cls.from_dict(data["glance"])
+        glance = None if data["glance"] is None else cls.from_dict(data["glance"], networks - 1)
         contract = cls(**data | {"channels": channels, "glance": glance, "provenance": provenance, "self_test": None})
         if data["self_test"] is None:
             return contract

@@ -163,6 +163,11 @@ class Manifest:
                 f"object_height must be above 0 for a cylinder and 0 for other shapes; {self.shape} has {tall:g} m"
             )
 
+    @property
+    def looks(self) -> tuple[LookContract, ...]:
+        """The descriptions of all look networks: at objects, then at uprights."""
+        return self.upright_looks if self.look is None else (self.look, *self.upright_looks)
+
     def _check_looks(self) -> None:
         objects = [each.name for each in self.classes if each.kind == "object"]
         if self.look is not None and self.look.object_class not in objects:

@@ -58,12 +58,8 @@ _Budget = Iterator[int]
 """Gives one number for each field that may still follow."""
 
 
-@dataclass(frozen=True)
-class LookFiles:
-    """The ONNX files of a look network and of its glance, if it has one."""
-
-    look: bytes
-    glance: bytes | None = None
+LookFiles = tuple[bytes, ...]
+"""The ONNX files of a close look's chain: of the look network, of its glance, and of the glance's glance."""
 
 
 @dataclass(frozen=True)
@@ -134,9 +130,8 @@ def parse_model(path: str | Path, content: bytes) -> ModelFile:
 
 
 def _look_files(metadata: dict[str, str], contract: LookContract) -> LookFiles:
-    """The files of a look network with this contract. Raises ModelError."""
-    look, glance = contract.keys
-    return LookFiles(_inner_file(metadata, look), None if contract.glance is None else _inner_file(metadata, glance))
+    """The files of the chain of a look network with this contract. Raises ModelError."""
+    return tuple(_inner_file(metadata, key) for key in contract.keys)
 
 
 def _inner_file(metadata: dict[str, str], key: str) -> bytes:
@@ -153,8 +148,7 @@ def _inner_file(metadata: dict[str, str], key: str) -> bytes:
 
 def _refuse_unknown_looks(metadata: dict[str, str], manifest: Manifest) -> None:
     """Raises ModelError if there are files of looks that the manifest does not describe."""
-    contracts = [each for each in (manifest.look, *manifest.upright_looks) if each is not None]
-    known = {key for each in contracts for key in each.keys[: 1 if each.glance is None else 2]}
+    known = {key for each in manifest.looks for key in each.keys}
     for key in metadata:
         if key.startswith((LOOK_KEY, GLANCE_KEY)) and key not in known:
             raise ModelError(f"its metadata has {_in_words(key)}, its manifest has none")
@@ -164,7 +158,7 @@ def _in_words(key: str) -> str:
     """What is under a key of a look's file."""
     for start, name in ((LOOK_KEY, "a close look"), (GLANCE_KEY, "a glance")):
         if key.startswith(start):
-            what = key.removeprefix(start).lstrip("_")
+            what = key.removeprefix(start).lstrip("2").lstrip("_")
             return f"{name} at {what}" if what else name
     return key
 

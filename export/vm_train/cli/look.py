@@ -22,6 +22,7 @@ from ..learning.configuration import TrainConfiguration
 from ..learning.folder_access import locked
 from ..look.configuration import LOOK_HEADER, LookConfiguration
 from .box_options import add_box_options
+from .device_option import add_device
 from .fine_tuning import begin_fine_tuning
 from .training import EXIT_OK, stop_requests
 
@@ -51,9 +52,9 @@ def look_parser() -> argparse.ArgumentParser:
     )
     made.add_argument(
         "--glance",
-        type=Path,
         metavar="LOOK",
-        help="glance (look.pt) that judges first; the new close look judges what it passes on, and its file has both",
+        help="glance that judges first; the new close look judges what it passes on, and its file has both: a look.pt, "
+        "or the close look of a model file (.onnx) or of a network of the package",
     )
     made.add_argument(
         "--start",
@@ -76,6 +77,7 @@ def look_parser() -> argparse.ArgumentParser:
         metavar="SECTION.ENTRY=VALUE",
         help="override an entry of the configuration, for example training.epochs=5; repeat it for each entry",
     )
+    add_device(made)
     made.add_argument("--strict", action="store_true", help="fail if a picture is damaged; default: skip it")
     made.add_argument("--workers", type=at_least(1), metavar="N", help="processes that cut patches; default: all cores")
     made.add_argument(
@@ -119,9 +121,8 @@ def print_look_config(options: argparse.Namespace) -> int:
 
 def run_look(options: argparse.Namespace) -> int:
     """Begin the training of a close look, train, and return the exit status. Raises VisualMeshError."""
-    from vm_export.look_checkpoint import LookCheckpoint
-
     from ..look.run_folder import begin_look_run
+    from ..look.start import LookStart
 
     if options.boxes is not None:
         return begin_fine_tuning(options)
@@ -130,10 +131,9 @@ def run_look(options: argparse.Namespace) -> int:
     if options.names or options.format or options.rendered:
         raise InputError("--names, --format and --rendered go with --boxes: leave them out, or give --boxes DIR")
     start, configuration = _start_and_configuration(options)
+    glance = start.glance if start else None
     if options.glance is not None:
-        glance: LookCheckpoint | None = LookCheckpoint.load(options.glance)
-    else:
-        glance = start.glance if start else None
+        glance = LookStart.load(model_path(options.glance), configuration.patches.object_class).look
     model = model_path(options.model)
     configuration = _with_classes_of(model, configuration)
     numbers = [each.number for each in find_pictures(options.data)]
@@ -176,8 +176,6 @@ def _with_classes_of(model: Path, configuration: LookConfiguration) -> LookConfi
 
 def resume_look(options: argparse.Namespace) -> int:
     """Resume the training of a close look and return the exit status. Raises VisualMeshError."""
-    if options.device == "cuda":
-        raise InputError(f"{options.run} is the training of a close look, which runs on the CPU: leave out --device")
     with locked(options.run):
         return _train(options.run, options.data, options)
 
@@ -196,7 +194,7 @@ def _train(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> 
     if moved_to is not None:
         run = replace(run, data=moved_to.resolve())
     workers = options.workers or len(os.sched_getaffinity(0))
-    with set_up_hardware("cpu", workers, options.threads or run.threads) as hardware:
+    with set_up_hardware(options.device, workers, options.threads or run.threads) as hardware:
         if hardware.size > 1:
             raise InputError("vm-train look runs in one process: start it without torchrun")
         if is_finished(run):
@@ -204,7 +202,7 @@ def _train(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> 
         else:
             collected = collect(run, workers)
             with stop_requests() as stop_requested:
-                if not train_look(run, collected, workers, stop_requested):
+                if not train_look(run, collected, hardware, stop_requested):
                     raise KeyboardInterrupt
     print(f"next: vm-export {run.mesh} --look {run.look_path} -o {folder / 'model.onnx'}")
     return EXIT_OK

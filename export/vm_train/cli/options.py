@@ -11,14 +11,13 @@ from vm_embedded.network.bundled import SHIPPED
 from vm_workstation.option_types import at_least
 
 from .check import check_parser
+from .device_option import add_device
 from .fine_tuning import tune_config_parser
 from .import_boxes import import_boxes_parser
 from .import_pictures import import_parser
 from .look import look_config_parser, look_parser
 from .shards import shards_parser
 from .stream_options import add_stream
-
-DEVICES = ("auto", "cpu", "cuda")
 
 _EPILOG = """\
 other commands (add --help for their options):
@@ -197,7 +196,7 @@ def _add_cache(made: argparse.ArgumentParser) -> None:
 
 def _add_hardware(made: argparse.ArgumentParser) -> None:
     group = made.add_argument_group("hardware")
-    group.add_argument("--device", choices=DEVICES, default="auto", help="default: a GPU if there is one, else the CPU")
+    add_device(group)
     group.add_argument(
         "--workers",
         type=at_least(0),

@@ -30,16 +30,17 @@ def augment(
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Changed copies of patches, uint8 (n, size, size, 3), as floats from 0 to 255, and their targets (n, 3).
 
-    extent: half the side of a patch [expected radii], the unit of targets. An entry that is switched off leaves the
-    random numbers of the others as they are.
+    extent: half the side of a patch [expected radii], the unit of targets. random: on the CPU, so that each device
+    makes the same changes. An entry that is switched off leaves the random numbers of the others as they are.
     """
-    count = len(patches)
-    chance = torch.rand((7, count), generator=random)
-    strength = torch.rand((3, count), generator=random)
-    normal = torch.randn((6, count), generator=random)
-    offset = 2.0 * torch.rand((2, count), generator=random) - 1.0
-    rectangle, color = torch.rand((4, count), generator=random), torch.rand((count, 3), generator=random)
-    order = torch.rand((count, 3), generator=random).argsort(dim=1)
+    count, device = len(patches), patches.device
+    chance = torch.rand((7, count), generator=random).to(device)
+    strength = torch.rand((3, count), generator=random).to(device)
+    normal = torch.randn((6, count), generator=random).to(device)
+    offset = 2.0 * torch.rand((2, count), generator=random).to(device) - 1.0
+    rectangle = torch.rand((4, count), generator=random).to(device)
+    color = torch.rand((count, 3), generator=random).to(device)
+    order = torch.rand((count, 3), generator=random).argsort(dim=1).to(device)
     x = patches.float() / 255.0
     x, targets = _mirrored(x, targets, chance[0] < settings.mirror)
     if settings.rotation or settings.zoom or settings.shift:
@@ -77,7 +78,7 @@ def _where(chosen: torch.Tensor, change: _Change, x: torch.Tensor) -> torch.Tens
 
 def _mirrored(x: torch.Tensor, targets: torch.Tensor, chosen: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     """Chosen patches (n,) as mirror images; their objects lie to the other side."""
-    sides = torch.where(chosen[:, None], torch.tensor([-1.0, 1.0, 1.0]), torch.tensor(1.0))
+    sides = torch.where(chosen[:, None], torch.tensor([-1.0, 1.0, 1.0], device=x.device), 1.0)
     return torch.where(_each(chosen), x.flip(2), x), targets * sides
 
 
@@ -104,7 +105,7 @@ def _moved(
 
 def _hidden(x: torch.Tensor, rectangle: torch.Tensor, color: torch.Tensor) -> torch.Tensor:
     """Patches behind rectangles of a color (n, 3); rectangle (4, n): place and size of each, all from 0 to 1."""
-    at = (torch.arange(x.shape[1]) + 0.5) / x.shape[1]
+    at = (torch.arange(x.shape[1], device=x.device) + 0.5) / x.shape[1]
     low, high = _HIDDEN
     half = 0.5 * (low + (high - low) * rectangle[2:])
     across, along = ((at - rectangle[axis][:, None]).abs() < half[axis][:, None] for axis in (0, 1))
@@ -119,7 +120,7 @@ def _permuted(x: torch.Tensor, order: torch.Tensor) -> torch.Tensor:
 def _blurred(x: torch.Tensor, sigma: torch.Tensor) -> torch.Tensor:
     """Patches after a Gaussian blur with a standard deviation (n,) for each."""
     count, size = x.shape[:2]
-    steps = torch.arange(-_REACH, _REACH + 1.0)
+    steps = torch.arange(-_REACH, _REACH + 1.0, device=x.device)
     kernel = torch.exp(-0.5 * (steps / sigma[:, None]) ** 2)
     kernel = (kernel / kernel.sum(dim=1, keepdim=True)).repeat_interleave(3, dim=0)[:, None, None, :]
     rows = x.permute(0, 3, 1, 2).reshape(1, 3 * count, size, size)
@@ -131,14 +132,14 @@ def _blurred(x: torch.Tensor, sigma: torch.Tensor) -> torch.Tensor:
 
 def _noisy(x: torch.Tensor, deviation: torch.Tensor, random: torch.Generator) -> torch.Tensor:
     """Patches with noise of a standard deviation (n,) for each, where 1 is white."""
-    return x + torch.randn(x.shape, generator=random) * _each(deviation)
+    return x + torch.randn(x.shape, generator=random).to(x.device) * _each(deviation)
 
 
 def _compressed(x: torch.Tensor, quality: torch.Tensor) -> torch.Tensor:
     """Patches, 0 to 255, after JPEG compression with a quality (n,) for each."""
-    images = x.flip(3).round().to(torch.uint8).numpy()  # BGR, as OpenCV has it
+    images = x.flip(3).round().to(torch.uint8).cpu().numpy()  # BGR, as OpenCV has it
     made = np.empty_like(images)
     for image, target, each in zip(images, made, quality.tolist(), strict=True):
         file = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, round(each)])[1]
         target[:] = cv2.imdecode(file, cv2.IMREAD_COLOR)
-    return torch.from_numpy(made).float().flip(3)
+    return torch.from_numpy(made).to(x.device).float().flip(3)

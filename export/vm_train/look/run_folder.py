@@ -139,8 +139,6 @@ def _check_glance(glance: LookCheckpoint, object_class: str, upright_radius: flo
             f"the glance of --glance or --start judges class {contract.object_class!r}; a glance for class "
             f"{object_class!r} is needed"
         )
-    if glance.glance is not None:
-        raise InputError("the glance of --glance has a glance itself; a glance must be a single look network")
     if contract.upright_radius != upright_radius:
         raise InputError(
             f"the glance of --glance or --start has an upright_radius of {contract.upright_radius:g} m, "

@@ -23,8 +23,9 @@ _BATCH = 1024
 @torch.no_grad()
 def logits_of(network: LookNetwork, patches: Image) -> Singles:
     """Outputs (n, 4) of a network for patches: logit, right, down and log size."""
+    device = network.calibration.device
     parts = [
-        network.logits(torch.from_numpy(patches[start : start + _BATCH])).numpy()
+        network.logits(torch.from_numpy(patches[start : start + _BATCH]).to(device)).cpu().numpy()
         for start in range(0, len(patches), _BATCH)
     ]
     return np.concatenate(parts) if parts else np.empty((0, 4), dtype=np.float32)

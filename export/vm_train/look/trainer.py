@@ -49,8 +49,8 @@ class LookTrainer:
     """A network that is trained for `total` steps on patches.
 
     extent: half the side of a patch [expected radii]. weights (n,): how often each patch is drawn, compared to others
-    of its kind; None: equally often. teacher: gives the target of some patches' presence. Raises InputError if no patch
-    shows an object, or all do."""
+    of its kind; None: equally often. teacher: gives the target of some patches' presence. device: "cpu" or "cuda", as
+    torch names it. Raises InputError if no patch shows an object, or all do."""
 
     def __init__(
         self,
@@ -62,8 +62,9 @@ class LookTrainer:
         total: int,
         weights: Floats | None = None,
         teacher: LookTeacher | None = None,
+        device: str = "cpu",
     ) -> None:
-        self.network = network.train()
+        self.network, self._device = network.to(device).train(), device
         self.recipe, self.total, self.done = recipe, total, 0
         self._augmentation, self._patches, self._extent = augmentation, patches, extent
         self._images, self._targets = torch.from_numpy(patches.patches), torch.from_numpy(patches.targets)
@@ -97,9 +98,9 @@ class LookTrainer:
         rate = self._optimizer.rate
         chosen, shown = self._draw(np.random.default_rng([self.recipe.seed, 1, self.done]))
         random = torch.Generator().manual_seed(_seed(self.recipe.seed, 2, self.done))
-        patches, targets = augment(
-            self._images[chosen], self._targets[chosen], self._extent, self._augmentation, random
-        )
+        images, targets = self._images[chosen].to(self._device), self._targets[chosen].to(self._device)
+        patches, targets = augment(images, targets, self._extent, self._augmentation, random)
+        shown = shown.to(self._device)
         answers = self.network.logits(patches)
         wanted = shown if self._teacher is None else self._teacher.presence(chosen, patches, shown)
         presence = functional.binary_cross_entropy_with_logits(answers[:, 0], wanted)

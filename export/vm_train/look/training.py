@@ -22,6 +22,7 @@ from vm_embedded.network.look_contract import LookContract
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_network import LookNetwork
 
+from ..learning.hardware import Hardware
 from ..learning.log import TrainingLog
 from ..learning.trainer import read_state
 from ..scores.calibration import Calibration
@@ -56,24 +57,29 @@ def is_finished(run: LookRun) -> bool:
     return run.state_path.exists() and LookProgress(**read_state(run.state_path)["more"]).finished
 
 
-def train_look(run: LookRun, collected: Collected, workers: int, stop_requested: Callable[[], bool]) -> bool:
+def train_look(run: LookRun, collected: Collected, hardware: Hardware, stop_requested: Callable[[], bool]) -> bool:
     """Train until the end, or until `stop_requested` returns True. Returns whether it is finished.
 
-    workers: processes that look at the validation pictures at the end. The network is the same however often the
-    training was stopped or killed. Raises InputError and VisualMeshError.
+    hardware: its device trains, its workers look at the validation pictures at the end. On a CPU, the network is the
+    same however often the training was stopped or killed. Raises InputError and VisualMeshError.
     """
     state = read_state(run.state_path) if run.state_path.exists() else None
     progress = LookProgress() if state is None else LookProgress(**state["more"])
-    return _Training(run, collected, workers, progress, state).run(stop_requested)
+    return _Training(run, collected, hardware, progress, state).run(stop_requested)
 
 
 class _Training:
     """A training in work, from its last state on."""
 
     def __init__(
-        self, run: LookRun, collected: Collected, workers: int, progress: LookProgress, state: dict[str, Any] | None
+        self,
+        run: LookRun,
+        collected: Collected,
+        hardware: Hardware,
+        progress: LookProgress,
+        state: dict[str, Any] | None,
     ) -> None:
-        self._run, self._collected, self._workers, self._progress = run, collected, workers, progress
+        self._run, self._collected, self._workers, self._progress = run, collected, hardware.workers, progress
         self._recipe = recipe = run.configuration.training
         self._epoch_steps = -(-len(collected.training) // recipe.batch)
         torch.manual_seed(recipe.seed)
@@ -84,7 +90,9 @@ class _Training:
             network.calibration.copy_(torch.tensor([1.0, 0.0]))  # the end of the training sets it again
         total = recipe.epochs * self._epoch_steps
         extent, augmentation = run.configuration.patches.extent, run.configuration.augmentation
-        self._trainer = LookTrainer(network, collected.training, extent, recipe, augmentation, total)
+        self._trainer = LookTrainer(
+            network, collected.training, extent, recipe, augmentation, total, device=hardware.device
+        )
         if state is not None:
             self._trainer.load(state)
         self._bar = ProgressBar(total, "vm-train", self._trainer.done)
@@ -152,7 +160,7 @@ class _Training:
 
     def _finish(self, stop_requested: Callable[[], bool]) -> bool:
         """Calibrate the network on what it finds in the validation pictures, and write look.pt. False after a stop."""
-        run, network, patches = self._run, self._trainer.network.eval(), self._run.configuration.patches
+        run, network, patches = self._run, self._trainer.network.cpu().eval(), self._run.configuration.patches
         round_weights(network)
         glance = run.glance()
         contract = LookContract(

@@ -100,13 +100,18 @@ def test_a_glance_that_does_not_fit_is_refused(load, manifest, glance, message):
     assert message in refusal(load, LOOK, manifest, glance)
 
 
-def test_a_glance_must_judge_the_same_thing_and_have_no_glance():
+def test_a_glance_must_judge_the_same_thing_and_a_chain_has_three_networks():
     with pytest.raises(ModelError, match=r"upright_radius 0.3 m, its glance 0 m; both must be the same"):
         look_contract(upright_radius=0.3, glance=look_contract())
     with pytest.raises(ModelError, match="class 'ball', its glance class 'goal'"):
         look_contract(glance=look_contract(object_class="goal"))
-    with pytest.raises(ModelError, match="has a glance, too"):
-        look_contract(glance=look_contract(glance=look_contract()))
+    chain = look_contract(glance=look_contract(glance=look_contract()))
+    assert len(chain.chain) == len(chain.keys) == 3
+    assert LookContract.from_dict(chain.as_dict()) == chain
+    with pytest.raises(ModelError, match="3 networks"):
+        look_contract(glance=chain)
+    with pytest.raises(ModelError, match="3 networks"):
+        LookContract.from_dict(chain.as_dict() | {"glance": chain.as_dict()})
 
 
 def test_the_self_test_catches_other_weights(load):

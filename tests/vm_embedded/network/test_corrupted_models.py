@@ -30,11 +30,8 @@ LARGEST_CHANGE = 1e-3
 
 def looks_of(content):
     """The contracts of a model file's looks and glances, by the key of their network."""
-    manifest = parse_model("model.onnx", content).manifest
-    found = {}
-    for each in (manifest.look, *manifest.upright_looks):
-        found |= zip(each.keys, (each, each.glance), strict=True)
-    return {key: each for key, each in found.items() if each is not None}
+    looks = parse_model("model.onnx", content).manifest.looks
+    return {key: part for each in looks for key, part in zip(each.keys, each.chain, strict=True)}
 
 
 def networks_of(content):
