@@ -61,14 +61,19 @@ class LookCheckpoint:
         return LookCheckpoint(self.network, contract, self.examples, glance)
 
     def recalibrated(self, scale: float, offset: float, source: str) -> LookCheckpoint:
-        """The same networks, whose probability has the logit `scale * logit + offset`. The glance does not change.
+        """The same networks, whose probability has the logit `scale * logit + offset`.
 
-        source: the answers that the scale and the offset fit, for the provenance.
+        The glance changes only if this is a wide look: then its logit is a part of that mean. source: the answers that
+        the scale and the offset fit, for the provenance.
         """
+        glance = self.glance
+        if glance is not None and self.contract.is_wide:
+            glance = glance.recalibrated(scale, offset, source)
         network, (first, before) = copy.deepcopy(self.network), self.network.calibration.tolist()
         network.calibration.copy_(torch.tensor([scale * first, scale * before + offset]))
         provenance = {**self.contract.provenance, "calibrated_on": source}
-        return LookCheckpoint(network, replace(self.contract, provenance=provenance), self.examples, self.glance)
+        contract = replace(self.contract, provenance=provenance, glance=None if glance is None else glance.contract)
+        return LookCheckpoint(network, contract, self.examples, glance)
 
     def save(self, path: str | Path) -> None:
         """Write the checkpoint. Raises InputError."""

@@ -447,7 +447,10 @@ def test_a_look_at_an_upright_brings_its_glance(field):
 
 def test_a_glance_may_have_a_glance(field):
     for changes in ({}, {"object_class": "goal", "upright_radius": 0.3}):
-        first, last = glancing_checkpoint(**changes), look_checkpoint(7, LookShape(size=10, channels=(3, 4, 5)), **changes)
+        first, last = (
+            glancing_checkpoint(**changes),
+            look_checkpoint(7, LookShape(size=10, channels=(3, 4, 5)), **changes),
+        )
         made = replace(last, contract=replace(last.contract, glance=first.contract), glance=first)
         read = attach(field, made)
         close = CloseLook.of_uprights(read)["goal"] if changes else CloseLook.of(read)

@@ -2,12 +2,14 @@
 
 It sees a patch of the picture in which the proposed object would fill the same disk at every distance. It says how
 probable the object is, where its center is, and how large it is. Then it looks again, where it saw the center. A
-still smaller network, the glance, may go before it and leave out what is clearly nothing.
+still smaller network, the glance, may go before it and leave out what is clearly nothing. A third one, the wide look,
+may go after both: it sees more of the surroundings of what may be an object.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -38,10 +40,18 @@ class _Rules:
 
 _OBJECT = _Rules(worth=0.005, doubtful=(0.03, 0.97), zooms=(0.9, 1.1))
 
+# A wide look is large, so it sees only what the close look takes seriously. Where it is sure, a mirror image would not
+# change much.
+_WIDE = _Rules(worth=0.03, doubtful=(0.15, 0.8), zooms=(1.0,))
+
 # A glance is less sure about uprights: at 0.005, it would pass on nearly all proposals. The base of an upright is seen
 # less exactly than the center of an object, so its place is a mean also if it is sure. The size of what stands on a
 # base says less, so patches of other sizes don't help.
 _UPRIGHT = _Rules(worth=0.03, doubtful=(0.03, 1.0), zooms=(1.0,))
+
+_EARLIER = 0.3
+"""Weight of the answer before the last one in the mean of both: other errors were made there. A glance, which is the
+first of several networks, knows too little."""
 
 _LARGEST_SIZE = 3.0
 """Limit of the logarithm of a size: with a bad network, math.exp would overflow, and JSON has no infinity."""
@@ -149,38 +159,51 @@ def worth_of(contract: LookContract) -> float:
 
 
 def _rules_of(contract: LookContract) -> _Rules:
-    return _UPRIGHT if contract.upright_radius else _OBJECT
+    if contract.upright_radius:
+        return _UPRIGHT
+    return _WIDE if contract.is_wide else _OBJECT
+
+
+def chain_of(look: Look) -> list[Look]:
+    """A look and its glances, in the order in which they judge."""
+    return [*([] if look.glance is None else chain_of(look.glance)), look]
 
 
 def look_at(places: Places, look: Look) -> Singles:
     """Look at n places, as often as the contracts of look and glance say, and move them to where an object was seen.
 
-    In the last of several passes, a doubtful place gets a second opinion. Returns the last answers (n, 4) to each
-    place, as `CloseLook.run` gives them. Raises ModelError if a network does not run.
+    In the last of several passes, a doubtful place gets a second opinion. In the last of three or more, its probability
+    is a mean with the one before. Returns the last answers (n, 4) to each place, as `CloseLook.run` gives them. Raises
+    ModelError if a network does not run.
     """
-    rules = _rules_of(look.contract)
     # Each pass has its network: first those of the glance, then those of the look.
-    networks = [each for each in _chain(look) for _ in range(each.contract.passes)]
+    networks = [each for each in chain_of(look) for _ in range(each.contract.passes)]
     answers = np.zeros((len(places), 4), dtype=np.float32)
     worth = np.arange(len(places))
     for number, network in enumerate(networks):
+        rules = _rules_of(network.contract)
+        if number:
+            worth = worth[answers[worth, 0] > rules.worth]
+        if not len(worth):
+            break
         found = network.run(places.cut(worth, network.contract))
         if number and number == len(networks) - 1:
             low, high = rules.doubtful
             doubtful = np.flatnonzero((found[:, 0] > low) & (found[:, 0] < high))
             if len(doubtful):
                 found[doubtful] = _second_opinion(places, worth[doubtful], network, rules.zooms, found[doubtful])
+            if number > 1:
+                found[:, 0] = _mean_odds(np.stack([answers[worth, 0], found[:, 0]]), [_EARLIER, 1.0 - _EARLIER])
         answers[worth] = found
-        possible = places.move(worth, found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
-        worth = worth[(found[:, 0] > rules.worth) & possible]
-        if not len(worth):
-            break
+        worth = worth[places.move(worth, found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))]
     return answers
 
 
-def _chain(look: Look) -> list[Look]:
-    """A look and its glances, in the order in which they judge."""
-    return [*(_chain(look.glance) if look.glance else []), look]
+def _mean_odds(probabilities: Singles, weights: Sequence[float]) -> Floats:
+    """Probabilities (n,) whose log-odds are the weighted mean of those of (k, n). weights (k,): with the sum 1."""
+    exact, weight = probabilities.astype(np.float64), np.array(weights)[:, None]
+    yes, no = (np.prod(each**weight, axis=0) for each in (exact, 1.0 - exact))
+    return np.asarray(yes / np.maximum(yes + no, np.finfo(np.float64).tiny))
 
 
 def _second_opinion(
@@ -195,10 +218,9 @@ def _second_opinion(
     for zoom, each in zip(zooms, mirrored, strict=True):
         each[:, 1:3] *= -zoom, zoom
         each[:, 3] += math.log(zoom)
-    opinions = np.concatenate([answers[None], mirrored]).astype(np.float64)
-    mean, probability = opinions.mean(axis=0), opinions[..., 0]
-    yes, no = (np.prod(each, axis=0) ** (1.0 / len(opinions)) for each in (probability, 1.0 - probability))
-    mean[:, 0] = yes / np.maximum(yes + no, np.finfo(np.float64).tiny)
+    opinions = np.concatenate([answers[None], mirrored])
+    mean = opinions.mean(axis=0)
+    mean[:, 0] = _mean_odds(opinions[..., 0], [1.0 / len(opinions)] * len(opinions))
     return np.asarray(mean, dtype=np.float32)
 
 

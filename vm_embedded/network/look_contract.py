@@ -89,6 +89,11 @@ class LookContract:
         return (self,) if self.glance is None else (self, *self.glance.chain)
 
     @property
+    def is_wide(self) -> bool:
+        """Whether it is a wide look: the third network of its chain."""
+        return len(self.chain) == MOST_NETWORKS
+
+    @property
     def keys(self) -> tuple[str, ...]:
         """Keys of the chain's networks in the metadata of a model file."""
         end = f"_{self.object_class}" if self.upright_radius else ""

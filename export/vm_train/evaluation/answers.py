@@ -18,7 +18,7 @@ from vm_embedded.arrays import Floats, Mask, Singles
 from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.field_points import locate_features
-from vm_embedded.detection.looking import Look, PlanePlaces, look_at, worth_of
+from vm_embedded.detection.looking import Look, PlanePlaces, chain_of, look_at, worth_of
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Network, Observation, classify
 from vm_embedded.detection.prepared_view import PreparedView
@@ -52,8 +52,8 @@ class PictureAnswer:
     and the objects found, most confident first.
 
     proposals: for the close look's class, the centers (c, 3) [m] of its proposals, relative to the camera, in the frame
-    of `Detection.bearing`. Empty without a close look. passed: the same for the places that its glance passes on, where
-    the glance saw an object. Empty without a glance. features: of the field, or None if the network has none.
+    of `Detection.bearing`. Empty without a close look. passed: the same for the places that its first glance passes on,
+    where the glance saw an object. Empty without a glance. features: of the field, or None if the network has none.
     manifest: with the radius of the objects that were looked for.
     """
 
@@ -160,8 +160,9 @@ def _answer(
         probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
         centers = propose_places(observation, probabilities, contract.above, settings.max_proposals)
         proposals[contract.object_class] = centers @ observation.view.heading.T
-        if look.glance is not None:
-            centers = passed_on(observation, centers, look.glance, worth_of(contract))
+        chain = chain_of(look)
+        if len(chain) > 1:
+            centers = passed_on(observation, centers, chain[0], worth_of(chain[1].contract))
             passed[contract.object_class] = centers @ observation.view.heading.T
     return PictureAnswer(
         observation.pixels,

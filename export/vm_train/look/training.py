@@ -178,12 +178,13 @@ class _Training:
             return False
         calibration = Calibration.fit(found.logits, found.right)
         result = LookResult.of(found, calibration)
-        network.calibration.copy_(torch.tensor([calibration.scale, calibration.offset]))
         logits = self._validate()
         score = LookScore.of(logits, self._collected.validation)
         contract = replace(contract, provenance=self._provenance(score, result))
         examples = _examples(self._collected.validation, logits[:, 0])
-        LookCheckpoint(network, contract, examples, glance).save(run.look_path)
+        look = LookCheckpoint(network, contract, examples, glance)
+        source = f"{len(run.split.validation)} validation pictures of {run.data.name}"
+        look.recalibrated(calibration.scale, calibration.offset, source).save(run.look_path)
         with atomic_write(run.folder / "result.json") as part:
             part.write_text(json.dumps(result.as_dict(), indent=1) + "\n", encoding="utf-8")
         print(f"{run.look_path}: {result}")

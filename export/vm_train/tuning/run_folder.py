@@ -24,6 +24,7 @@ from vm_embedded.files import atomic_write
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.model_file import ModelFile, read_model
+from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_weights import look_of
 
 from ..boxes.box import BoxedPicture, BoxedSet
@@ -104,10 +105,10 @@ class TuningRun:
 
     @property
     def contract(self) -> LookContract:
-        """The contract of the look network that it began with."""
-        contract = self.before.manifest.look
-        assert contract is not None  # begin_tuning refuses a model file without one
-        return contract
+        """The contract of the look network that it began with; see `tuned_look`."""
+        look = self.before.manifest.look
+        assert look is not None  # begin_tuning refuses a model file without one
+        return look.chain[1] if look.is_wide else look
 
     @property
     def object_class(self) -> str:
@@ -129,6 +130,16 @@ class TuningRun:
         return search_radii(all_objects(self.part(self.split.training), self.object_class, self.is_round))
 
 
+def tuned_look(model: ModelFile) -> LookCheckpoint:
+    """The close look of a model file, which a fine-tuning changes. A wide look behind it is left out: it would not
+    know the new objects, and there are no rendered patches for it, without which it would forget the others.
+
+    Raises ModelError if the file has no look.
+    """
+    look = look_of(model)
+    return look.glance if look.glance is not None and look.contract.is_wide else look
+
+
 def begin_tuning(
     folder: Path,
     boxes: BoxSource,
@@ -147,7 +158,7 @@ def begin_tuning(
     """
     check_unused(folder, _FILES)
     before = read_model(model)
-    look = look_of(before)
+    look = tuned_look(before)
     check_boxes(found, look.contract.object_class, str(boxes.folder))
     check_rendered(look.contract, rendered)
     split = split_by_recording(found.pictures, configuration.data.validation, configuration.data.split_seed)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from vm_export.look_checkpoint import LookCheckpoint
-from vm_export.look_weights import look_of
 
-from .run_folder import TuningRun
+from .run_folder import TuningRun, tuned_look
 
 GLANCE, LOOK = "glance", "look"
 
@@ -22,7 +21,7 @@ def network_before(run: TuningRun, stage: str) -> LookCheckpoint:
 
     Raises InputError or ModelError.
     """
-    before = look_of(run.before)
+    before = tuned_look(run.before)
     if before.glance is None:
         return before
     if stage == GLANCE:
