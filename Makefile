@@ -11,6 +11,7 @@ NETWORKS := ball ball-small soccer
 BUILD ?= build/networks
 PICTURES ?= data/soccer
 FURTHER ?= data/further
+THIRD ?= data/third
 CALIBRATION ?= data/calibration
 UPRIGHTS := goal robot
 CALIBRATE := $(BIN)/vm-evaluate calibrate --radius-of scene
@@ -89,6 +90,7 @@ data: need-HDRI .venv/synth ## render a training set: make data HDRI=folder-of-m
 networks: need-HDRI .venv/dev ## train the networks of the package from their seeds: make networks HDRI=folder-of-maps (hours)
 	$(MAKE) data OUT=data/soccer COUNT=16000 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(MAKE) data OUT=$(FURTHER) COUNT=3650 SEED=3 SCENES=export/vm_synth/soccer.toml
+	$(MAKE) data OUT=$(THIRD) COUNT=4423 SEED=5 SCENES=export/vm_synth/soccer.toml
 	$(BIN)/python -m benchmarks.calibration_data $(HDRI) $(CALIBRATION)
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 	$(BIN)/python -c "from pathlib import Path; from vm_train.tuning.rendered_patches import RENDERED, write_rendered; \
@@ -111,9 +113,21 @@ $(BUILD)/%-look/look.pt: export/networks/%-look.toml $(BUILD)/glance/look.pt
 $(BUILD)/ball.onnx: $(BUILD)/ball-look/look.pt
 	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs -o $@
 
-vm_embedded/models/%.onnx: $(BUILD)/%-look/look.pt
+$(BUILD)/%-calibrated.onnx: $(BUILD)/%-look/look.pt
 	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs $(CANARY) -o $(BUILD)/$*-uncalibrated.onnx
 	$(CALIBRATE) $(BUILD)/$*-uncalibrated.onnx $(CALIBRATION)/* -o $@
+
+vm_embedded/models/ball-small.onnx: $(BUILD)/ball-small-calibrated.onnx
+	cp $< $@
+
+$(BUILD)/wide-look/look.pt: export/networks/wide-look.toml $(BUILD)/ball-calibrated.onnx
+	if test -e $(BUILD)/wide-look/run.json; then $(BIN)/vm-train resume $(BUILD)/wide-look; \
+		else $(BIN)/vm-train look $(THIRD) --from $(BUILD)/ball-calibrated.onnx --glance $(BUILD)/ball-calibrated.onnx \
+			-o $(BUILD)/wide-look --config $<; fi
+
+vm_embedded/models/ball.onnx: $(BUILD)/ball-calibrated.onnx $(BUILD)/wide-look/look.pt
+	$(BIN)/vm-export $< --look $(BUILD)/wide-look/look.pt -o $(BUILD)/ball-wide.onnx
+	$(CALIBRATE) $(BUILD)/ball-wide.onnx $(CALIBRATION)/* -o $@
 
 $(UPRIGHTS:%=$(BUILD)/%-glance/look.pt): $(BUILD)/%-glance/look.pt: export/networks/upright-glance.toml $(BUILD)/soccer/model.pt
 	if test -e $(BUILD)/$*-glance/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-glance; \
@@ -130,10 +144,15 @@ $(BUILD)/robot-further/look.pt: export/networks/robot-further.toml $(BUILD)/robo
 		else $(BIN)/vm-train look $(FURTHER) --from $(BUILD)/soccer/model.pt --start $(BUILD)/robot-look/look.pt \
 			-o $(BUILD)/robot-further --config $<; fi
 
-vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt vm_embedded/models/ball.onnx $(BUILD)/goal-look/look.pt $(BUILD)/robot-further/look.pt
-	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $(BUILD)/balls.onnx
+$(BUILD)/robot-third/look.pt: export/networks/robot-further.toml $(BUILD)/robot-further/look.pt
+	if test -e $(BUILD)/robot-third/run.json; then $(BIN)/vm-train resume $(BUILD)/robot-third; \
+		else $(BIN)/vm-train look $(THIRD) --from $(BUILD)/soccer/model.pt --start $(BUILD)/robot-further/look.pt \
+			-o $(BUILD)/robot-third --config $< --set data.validation=0.05; fi
+
+vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt $(BUILD)/wide-look/look.pt $(BUILD)/goal-look/look.pt $(BUILD)/robot-third/look.pt
+	$(BIN)/vm-export $< --look $(BUILD)/wide-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $(BUILD)/balls.onnx
 	$(BIN)/vm-export $(BUILD)/balls.onnx --look $(BUILD)/goal-look/look.pt -o $(BUILD)/balls-and-posts.onnx
-	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-further/look.pt -o $(BUILD)/soccer-uncalibrated.onnx
+	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-third/look.pt -o $(BUILD)/soccer-uncalibrated.onnx
 	$(CALIBRATE) $(BUILD)/soccer-uncalibrated.onnx $(CALIBRATION)/* -o $@
 
 test-data: need-HDRI .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)

@@ -197,11 +197,29 @@ def _upright_data(manifest: Manifest) -> str:
     return "".join(lines)
 
 
+def _wide_contents(look: LookContract) -> str:
+    """What the wide look is, for a card, if there is one."""
+    if not look.is_wide:
+        return ""
+    return f""" A wide look of the same width judges small
+balls again, on patches of {look.size} x {look.size} samples that show {look.extent:g} radii around a ball."""
+
+
+def _wide_data(look: LookContract) -> str:
+    """The training data of the wide look, for a card, if there is one."""
+    if not look.is_wide:
+        return ""
+    return (
+        f"- **Training data of the wide look:** {look.provenance['training_pictures']} other pictures of the same kind "
+        f"(seed 5). Seed\n  {look.provenance['seed']}, configuration `export/networks/wide-look.toml`.\n"
+    )
+
+
 def _further(look: LookContract) -> str:
     """How a look was trained that began with the weights of another one."""
     if "start_sha256" not in look.provenance:
         return ""
-    return f",\n  then `{look.object_class}-further.toml` on these pictures"
+    return f",\n  then twice `{look.object_class}-further.toml`, the second time on these pictures"
 
 
 def card(found: dict[str, Any], name: str) -> str:
@@ -227,9 +245,9 @@ def card(found: dict[str, Any], name: str) -> str:
         ],
     )
     made, used = manifest.provenance, scores["used 0.5"]["0.5 to 6 m"]
-    look = manifest.look
-    assert look is not None
-    assert look.glance is not None
+    last = manifest.look
+    assert last is not None
+    look, glance = last.chain[-2:]
     channels = ", ".join(map(str, look.channels))
     hard = clutter["ranked 0.5"]["0.5 to 6 m"]
     kilobytes = model_path(name).stat().st_size / 1000
@@ -238,10 +256,11 @@ def card(found: dict[str, Any], name: str) -> str:
 
 Finds {"balls, goal posts, robots, lines and the border" if name == "soccer" else "balls"} on a soccer field.
 {depth} graph convolutions of {width} channels, {activation}, propose places. The mesh is ring6 with
-k = {manifest.intersections:g} and reaches to {manifest.max_distance:g} m. A glance at {look.glance.size} x
-{look.glance.size} samples leaves out most of them. A close look with convolutions of {channels} channels
-decides on patches of {look.size} x {look.size} samples. All suit balls of any radius (`--object-radius`,
-default {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: {", ".join(each.name for each in manifest.classes)}.
+k = {manifest.intersections:g} and reaches to {manifest.max_distance:g} m. A glance at {glance.size} x
+{glance.size} samples leaves out most of them. A close look with convolutions of {channels} channels
+decides on patches of {look.size} x {look.size} samples.{_wide_contents(last)}
+All suit balls of any radius (`--object-radius`, default {manifest.object_radius:g} m).
+{kilobytes:.0f} kB. Classes: {", ".join(each.name for each in manifest.classes)}.
 
 - **Training data of the mesh network:** {made["training_pictures"]} rendered pictures
   (`export/vm_synth/soccer.toml`, seed 1). Validation on {made["validation_pictures"]} other pictures chose epoch
@@ -249,7 +268,8 @@ default {manifest.object_radius:g} m). {kilobytes:.0f} kB. Classes: {", ".join(e
 - **Training data of the glance and the close look:** {look.provenance["training_pictures"]} pictures of the same kind,
   under 55 panoramas. Seed {look.provenance["seed"]}, configurations `{glance_recipe}` and
   `{look_recipe}`.
-- **Calibration of its confidence:** {look.provenance["calibrated_on"]} (`python -m benchmarks.calibration_data`).
+{_wide_data(last)}- **Calibration of its confidence:** {last.provenance["calibrated_on"]}
+  (`python -m benchmarks.calibration_data`).
 {_upright_data(manifest)}- **To train it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
   {model.sha256}.
 

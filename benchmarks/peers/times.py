@@ -23,7 +23,7 @@ import torch
 from vm_embedded import Detector
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.cli.machine import describe_machine, rss_mib, sgemm_rate
-from vm_embedded.detection.looking import Look
+from vm_embedded.detection.looking import Look, chain_of
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
 from vm_export.look_network import LookNetwork, LookShape
@@ -61,6 +61,9 @@ _SLOW = {"YOLO v1, 448", "YOLO v2, 416", "YOLO v3, 416", TWO_STAGE}
 _ROW, _SLOW_ROW = 30, 3
 """Calls in a row in each turn."""
 
+_PARTS = ("glance", "look", "wide look")
+"""The networks of a close look, in the order in which they judge."""
+
 _BATCH = 40
 """Proposals of a call: the default of the setting max_proposals."""
 
@@ -78,10 +81,11 @@ class CountedLook:
 
 
 def look_shapes(name: str) -> dict[str, LookShape]:
-    """The shapes of a packaged network's look and glance."""
-    look = look_of(read_model(model_path(name)))
-    assert look.glance is not None
-    return {"look": look.network.shape, "glance": look.glance.network.shape}
+    """The shapes of the networks of a packaged network's close look."""
+    shapes, look = [], look_of(read_model(model_path(name)))
+    while look is not None:
+        shapes, look = [look.network.shape, *shapes], look.glance
+    return dict(zip(_PARTS, shapes, strict=False))
 
 
 def look_operations(shape: LookShape) -> int:
@@ -103,8 +107,8 @@ def own_work(name: str, detector: Detector, frame: Frame) -> dict[str, Any]:
         look, detector.look = detector.look, counted
         own_call(detector, frame)()
         detector.look = look
-        assert counted.glance is not None
-        found["patches"] = {"look": counted.patches, "glance": counted.glance.patches}
+        chain = [each for each in chain_of(counted) if isinstance(each, CountedLook)]
+        found["patches"] = {part: each.patches for part, each in zip(_PARTS, chain, strict=False)}
         found["operations"] += sum(
             look_operations(shape) * found["patches"][part] for part, shape in look_shapes(name).items()
         )
@@ -176,12 +180,10 @@ def proposals(frame: Frame, rounds: int) -> dict[str, Any]:
     for name, detector in detectors.items():
         look, shapes = detector.look, look_shapes(name)
         assert look is not None
-        assert look.glance is not None
-        for part, network in (("look", look), ("glance", look.glance)):
-            size = shapes[part].size
-            # All packaged networks have the same glance.
-            title = f"glance, {size} x {size}" if part == "glance" else f"close look of {name}, {size} x {size}"
-            networks[title] = partial(look_call, network), look_operations(shapes[part])
+        for (part, shape), network in zip(shapes.items(), chain_of(look), strict=True):
+            # All packaged networks have the same glance, and ball and soccer the same wide look.
+            title = f"close look of {name}" if part == "look" else part
+            networks[f"{title}, {shape.size} x {shape.size}"] = partial(look_call, network), look_operations(shape)
     calls = {f"{name} / {count}": make(count) for name, (make, _) in networks.items() for count in (1, _BATCH)}
     times = interleaved(calls, rounds, row=10)
     found: dict[str, Any] = {

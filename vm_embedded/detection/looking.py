@@ -19,7 +19,7 @@ import numpy.typing as npt
 from ..arrays import Floats, Image, Mask, Singles
 from ..network.look_contract import LookContract
 from .observation import Observation
-from .patches import Tangents, cut_patches, patch_nodes
+from .patches import Tangents, apparent_radii, cut_patches, patch_nodes
 from .proposals import propose_places
 from .settings import Settings
 from .stopwatch import Stopwatch
@@ -48,6 +48,10 @@ _WIDE = _Rules(worth=0.03, doubtful=(0.15, 0.8), zooms=(1.0,))
 # less exactly than the center of an object, so its place is a mean also if it is sure. The size of what stands on a
 # base says less, so patches of other sizes don't help.
 _UPRIGHT = _Rules(worth=0.03, doubtful=(0.03, 1.0), zooms=(1.0,))
+
+_LARGE = 24.0
+"""Radius [px] from which the close look alone decides: it sees enough, and the surroundings of a near object are often
+beyond the border of the picture."""
 
 _EARLIER = 0.3
 """Weight of the answer before the last one in the mean of both: other errors were made there. A glance, which is the
@@ -85,6 +89,9 @@ class Places(Protocol):
         zoom: their sides, as a share of those in the contract.
         """
 
+    def radii(self, rows: npt.NDArray[np.intp]) -> Floats:
+        """Radii (k,) that the objects expected there would have in the picture [px]."""
+
     def move(self, rows: npt.NDArray[np.intp], right: Floats, down: Floats) -> Mask:
         """Move places by shifts (k,) in expected radii. Returns which of them (k,) may hold an object there."""
 
@@ -108,6 +115,11 @@ class PlanePlaces:
         view = self._observation.view
         nodes = patch_nodes(view, Tangents.at(view, self.centers[rows]), zoom * contract.extent)
         return cut_patches(self._observation.pyramid, nodes, contract.size)
+
+    def radii(self, rows: npt.NDArray[np.intp]) -> Floats:
+        """See Places."""
+        view = self._observation.view
+        return apparent_radii(view, Tangents.at(view, self.centers[rows]))
 
     def move(self, rows: npt.NDArray[np.intp], right: Floats, down: Floats) -> Mask:
         """See Places. A place that moves to the horizon or above it can't hold an object."""
@@ -172,9 +184,9 @@ def chain_of(look: Look) -> list[Look]:
 def look_at(places: Places, look: Look) -> Singles:
     """Look at n places, as often as the contracts of look and glance say, and move them to where an object was seen.
 
-    In the last of several passes, a doubtful place gets a second opinion. In the last of three or more, its probability
-    is a mean with the one before. Returns the last answers (n, 4) to each place, as `CloseLook.run` gives them. Raises
-    ModelError if a network does not run.
+    In its last pass, if there are several, a doubtful place gets a second opinion. If that is the third or a later one,
+    its probability is a mean with the one before. Returns the last answers (n, 4) to each place, as `CloseLook.run`
+    gives them. Raises ModelError if a network does not run.
     """
     # Each pass has its network: first those of the glance, then those of the look.
     networks = [each for each in chain_of(look) for _ in range(each.contract.passes)]
@@ -187,16 +199,25 @@ def look_at(places: Places, look: Look) -> Singles:
         if not len(worth):
             break
         found = network.run(places.cut(worth, network.contract))
-        if number and number == len(networks) - 1:
-            low, high = rules.doubtful
-            doubtful = np.flatnonzero((found[:, 0] > low) & (found[:, 0] < high))
-            if len(doubtful):
-                found[doubtful] = _second_opinion(places, worth[doubtful], network, rules.zooms, found[doubtful])
-            if number > 1:
-                found[:, 0] = _mean_odds(np.stack([answers[worth, 0], found[:, 0]]), [_EARLIER, 1.0 - _EARLIER])
+        last = _is_last(places, worth, networks[number + 1 :])
+        low, high = rules.doubtful
+        doubtful = np.flatnonzero(last & (found[:, 0] > low) & (found[:, 0] < high))
+        if number and len(doubtful):
+            found[doubtful] = _second_opinion(places, worth[doubtful], network, rules.zooms, found[doubtful])
+        if number > 1:
+            both = np.stack([answers[worth[last], 0], found[last, 0]])
+            found[last, 0] = _mean_odds(both, [_EARLIER, 1.0 - _EARLIER])
         answers[worth] = found
-        worth = worth[places.move(worth, found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))]
+        possible = places.move(worth, found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
+        worth = worth[possible & ~last]
     return answers
+
+
+def _is_last(places: Places, rows: npt.NDArray[np.intp], following: Sequence[Look]) -> Mask:
+    """Which places with the numbers `rows` (k,) none of the following passes can judge."""
+    if following and following[0].contract.is_wide:
+        return places.radii(rows) >= _LARGE
+    return np.full(len(rows), not following)
 
 
 def _mean_odds(probabilities: Singles, weights: Sequence[float]) -> Floats:

@@ -94,6 +94,10 @@ class WindowPlaces:
         """See looking.Places."""
         return self.windows.part(rows).cut(self._pyramid, contract, zoom)
 
+    def radii(self, rows: npt.NDArray[np.intp]) -> Floats:
+        """See looking.Places."""
+        return self.windows.radii[rows]
+
     def move(self, rows: npt.NDArray[np.intp], right: Floats, down: Floats) -> Mask:
         """See looking.Places. An object may be anywhere."""
         self.windows.centers[rows] = self.windows.part(rows).moved(right, down).centers

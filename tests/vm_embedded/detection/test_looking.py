@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from vm_embedded.detection.looking import PlanePlaces, look_at
 from vm_embedded.detection.objects import locate
@@ -140,6 +142,70 @@ def test_a_look_sees_only_what_its_glance_passes_on_where_it_saw_it(scene):
     found, rejected = found_in(scene, BrightDisk(passes=1, glance=Strict(passes=1)))
     assert len(found) == 2
     assert all(each.reason for each in rejected)
+
+
+class Fixed(BrightDisk):
+    """Sees every object with the same probability, in the middle of the patch."""
+
+    def __init__(self, probability, glance=None):
+        super().__init__(passes=1, glance=glance)
+        self.contract = replace(self.contract, glance=None if glance is None else glance.contract)
+        self.probability = probability
+
+    def run(self, patches):
+        self.seen.append(len(patches))
+        return np.tile(np.array([self.probability, 0.0, 0.0, 0.0], dtype=np.float32), (len(patches), 1))
+
+
+def chain(*probabilities):
+    """A wide look behind a close look and its glance. probabilities: those of the three, the glance first."""
+    look = None
+    for each in probabilities:
+        look = Fixed(each, look)
+    return look
+
+
+def small_and_large(scene):
+    """Centers of a small and of a large ball in the picture, with radii below and above 24 px."""
+    centers = np.stack([center_at(scene.view, (430.0, 225.0)), center_at(scene.view, (300.0, 470.0))])
+    radii = PlanePlaces(scene, centers).radii(np.arange(2))
+    assert radii[0] < 24.0 < radii[1]
+    return centers
+
+
+@pytest.mark.parametrize(("close", "wide"), [(0.9, 0.95), (0.04, 0.99), (0.99, 0.01), (1.0, 0.9), (1.0, 1.0)])
+def test_a_wide_look_judges_small_objects_and_the_close_look_counts_too(scene, close, wide):
+    look = chain(0.5, close, wide)
+    _, answers = looked_at(scene, look, small_and_large(scene))
+    yes, no = close**0.3 * wide**0.7, (1.0 - close) ** 0.3 * (1.0 - wide) ** 0.7
+    assert answers[:, 0] == pytest.approx([yes / (yes + no), close], abs=1e-6)
+    assert look.seen == [1]
+
+
+def test_a_wide_look_sees_only_what_the_close_look_takes_seriously(scene):
+    look = chain(0.5, 0.02, 0.9)
+    _, answers = looked_at(scene, look, small_and_large(scene))
+    assert answers[:, 0] == pytest.approx([0.02, 0.02])
+    assert look.seen == []
+
+
+@pytest.mark.parametrize(("wide", "opinions"), [(0.1, 0), (0.5, 1), (0.9, 0)])
+def test_where_a_wide_look_is_sure_it_sees_no_mirror_image(scene, wide, opinions):
+    look = chain(0.5, 0.5, wide)
+    looked_at(scene, look, small_and_large(scene))
+    assert look.seen == [1] * (1 + opinions)
+    assert look.glance.seen == [2, OPINION]  # about the large ball
+
+
+@given(column=st.floats(100.0, 540.0), row=st.floats(230.0, 440.0))
+def test_places_tell_how_large_an_object_is_in_the_picture(scene, column, row):
+    view = scene.view
+    center = center_at(view, (column, row))
+    outline = view.pixels(view.shape.outline(center, view.height))
+    (radius,) = PlanePlaces(scene, center[None]).radii(np.arange(1))
+    x, y = outline.T
+    area = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    assert radius == pytest.approx(np.sqrt(area / np.pi), rel=0.05)
 
 
 def test_only_proposals_with_a_chance_are_looked_at_again(scene):
