@@ -270,6 +270,21 @@ def test_a_network_that_is_sure_of_all_patches_is_also_tested_with_a_mixture():
     assert ((mixture >= ends.min(axis=0)) & (mixture <= ends.max(axis=0))).all()
 
 
+def test_a_calibration_changes_all_networks_whose_logits_count():
+    """Those of a wide look are a part of a mean with those of its glance."""
+    two = glancing_checkpoint()
+    three = look_checkpoint(7)
+    three = replace(three, contract=replace(three.contract, glance=two.contract), glance=two)
+    for look, count in ((two, 1), (three, 2)):
+        after = look.recalibrated(3.0, 1.0, "a test")
+        for number in range(len(look.contract.chain)):
+            scale, offset = look.network.calibration.tolist()
+            expected = (3.0 * scale, 3.0 * offset + 1.0) if number < count else (scale, offset)
+            assert after.network.calibration.tolist() == pytest.approx(expected)
+            assert ("calibrated_on" in after.contract.provenance) == (number < count)
+            look, after = look.glance, after.glance
+
+
 @pytest.mark.parametrize("layout", ["plain", "runs"])
 def test_a_model_file_holds_both_networks(tmp_path, layout):
     mesh, look = ball_checkpoint(), look_checkpoint(provenance={"trained_by": "a test"})

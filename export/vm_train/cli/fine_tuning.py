@@ -44,6 +44,7 @@ def print_tune_config(options: argparse.Namespace) -> int:
 
 def resume_fine_tuning(options: argparse.Namespace) -> int:
     """Resume a fine-tuning and return the exit status. Raises VisualMeshError."""
+    _check_device(options.device)
     with locked(options.run):
         return _fine_tune(options.run, options.data, options)
 
@@ -52,6 +53,7 @@ def begin_fine_tuning(options: argparse.Namespace) -> int:
     """Write the folder of a fine-tuning, train, and return the exit status. Raises VisualMeshError."""
     from ..tuning.run_folder import BoxSource, begin_tuning
 
+    _check_device(options.device)
     others = {"DATA": options.data, "--glance": options.glance, "--start": options.start}
     given = [name for name, value in others.items() if value is not None]
     if given:
@@ -78,8 +80,16 @@ def begin_fine_tuning(options: argparse.Namespace) -> int:
         return _fine_tune(run.folder, None, options)
 
 
+def _check_device(device: str) -> None:
+    if device == "cuda":
+        raise InputError("a fine-tuning runs on the CPU: leave out --device")
+
+
 def _describe(run: TuningRun, boxes: Path) -> None:
-    """Print the numbers of frames."""
+    """Print the numbers of frames, and what is left out."""
+    look = run.before.manifest.look
+    if look is not None and look.is_wide:
+        print(f"{run.model}: its wide look is left out; it would not know your {run.object_class}", flush=True)
     recordings = len({each.recording for each in run.pictures})
     count = len(run.split.training), len(run.split.validation)
     print(

@@ -252,8 +252,9 @@ def test_a_loss_that_is_no_number_ends_the_training(look, tmp_path):
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_a_training_of_a_look_stays_on_the_processor(whole):
-    assert "runs on the CPU" in run("resume", whole[0], "--device", "cuda", code=1).stderr
+@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
+def test_a_missing_gpu_is_named(whole):
+    assert "torch finds no GPU" in run("resume", whole[0], "--device", "cuda", code=1).stderr
 
 
 @pytest.mark.long

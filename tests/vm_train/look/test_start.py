@@ -123,7 +123,7 @@ def test_the_recipe_of_the_package_goes_on_from_its_network():
         (["--start", "bal"], "unknown network 'bal'; did you mean 'ball'?"),
         (["--start", "none.pt"], "can't read none.pt"),
         (["--start", "ball", "--set", "patches.size=16"], "16 x 16 samples"),
-        (["--start", "ball", "--set", "patches.extent=2"], "patches.extent 1.75"),
+        (["--start", "ball", "--set", "patches.extent=2"], "patches.extent 4"),
         (["--start", "ball", "--set", "patches.object_class=robot"], "unknown close look of"),
         (["--start", "ball", "--boxes", "frames"], "leave out DATA and --start"),
     ],

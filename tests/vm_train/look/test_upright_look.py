@@ -121,7 +121,7 @@ def test_a_trained_look_goes_into_a_model_file_and_runs_there(field, tiny, tmp_p
 def test_a_glance_has_the_same_class_and_radius_as_its_look(field, tiny, tmp_path):
     glance = tmp_path / "glance.pt"
     for object_class, radius, complaint in (
-        ("robot", 0.3, "a glance for class 'goal' is needed"),
+        ("robot", 0.3, "judges class 'robot', not 'goal'"),
         ("goal", 0.5, "give both the same one"),
     ):
         look_checkpoint(object_class=object_class, upright_radius=radius).save(glance)

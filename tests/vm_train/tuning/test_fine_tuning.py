@@ -67,13 +67,27 @@ def test_the_new_model_differs_only_in_its_close_look(whole):
     before, after = read_model(model_path("ball-small")), read_model(folder / "model.onnx")
     assert after.manifest.classes == before.manifest.classes
     assert after.manifest.self_test.as_dict() == before.manifest.self_test.as_dict()
-    assert after.look.look != before.look.look
-    assert after.look.glance != before.look.glance
+    for new, old in zip(after.look, before.look, strict=True):
+        assert new != old
     provenance = after.manifest.look.provenance
     assert provenance["fine_tuned_frames"] == "8"
     assert provenance["fine_tuned_from_sha256"] == before.sha256
     assert provenance["data"] == before.manifest.look.provenance["data"]
     assert CloseLook.of(after).glance is not None  # loads, and passes its self-tests
+
+
+def test_a_wide_look_is_left_out(tune, tmp_path):
+    done = tune(tmp_path / "run", "--from", "ball")
+    assert done.stdout.splitlines()[0] == "ball: its wide look is left out; it would not know your ball"
+    before, after = read_model(model_path("ball")), read_model(tmp_path / "run" / "model.onnx")
+    assert [each.size for each in after.manifest.look.chain] == [each.size for each in before.manifest.look.chain[1:]]
+    assert len(after.look) == 2
+    assert CloseLook.of(after).glance is not None
+
+
+def test_a_fine_tuning_stays_on_the_processor(tune, whole, tmp_path):
+    assert "runs on the CPU" in tune(tmp_path / "run", "--device", "cuda", code=1).stderr
+    assert "runs on the CPU" in run("resume", whole[0], "--device", "cuda", code=1).stderr
 
 
 def test_a_log_has_each_step_once(whole):

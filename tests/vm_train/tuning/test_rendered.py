@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from vm_embedded.detection.looking import chain_of
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.close_look import CloseLook
@@ -36,8 +37,8 @@ def test_patches_come_back_nearly_as_they_were(tmp_path):
 
 @pytest.mark.parametrize("name", ["ball", "ball-small"])
 def test_a_network_of_the_package_knows_the_patches_of_the_package(name):
-    look = CloseLook.of(read_model(model_path(name)))
-    for each in (look, look.glance):
+    glance, look, *_ = chain_of(CloseLook.of(read_model(model_path(name))))
+    for each in (look, glance):
         patches = read_rendered(RENDERED, each.contract.size)
         likely = each.run(patches.patches)[:, 0] > (0.5 if each is look else 0.02)
         shown = patches.labels == OBJECT
