@@ -252,7 +252,22 @@ def test_a_loss_that_is_no_number_ends_the_training(look, tmp_path):
     assert len(done.stderr.splitlines()) == 1
 
 
-@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
+def test_behind_a_look_with_a_glance_a_wide_look_is_trained(whole, look, tmp_path):
+    before = LookCheckpoint.load(whole[0] / "look.pt")
+    before = replace(before, contract=replace(before.contract, glance=before.contract), glance=before)
+    before.save(tmp_path / "two.pt")
+    folder = tmp_path / "run"
+    look(folder, "--glance", tmp_path / "two.pt", "--set", "patches.extent=4")
+    made = LookCheckpoint.load(folder / "look.pt")
+    assert [each.extent for each in made.contract.chain] == [4.0, before.contract.extent, before.contract.extent]
+    # The calibration of the mean of both answers is applied to both.
+    (scale, offset), (first, less) = (each.network.calibration.tolist() for each in (made, before))
+    assert made.glance.network.calibration.tolist() == pytest.approx([scale * first, scale * less + offset], rel=1e-4)
+    assert made.glance.glance.contract == before.glance.contract
+    run_module("vm_export.cli", "ball-small", "--look", folder / "look.pt", "-o", folder / "model.onnx")
+    assert read_model(folder / "model.onnx").manifest.look.is_wide
+
+
 def test_a_missing_gpu_is_named(whole):
     assert "torch finds no GPU" in run("resume", whole[0], "--device", "cuda", code=1).stderr
 
