@@ -22,6 +22,7 @@ from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.field.uprights import KINDS
 from vm_embedded.files import atomic_write
+from vm_embedded.network.look_contract import MOST_NETWORKS
 from vm_export.look_checkpoint import LookCheckpoint
 
 from ..data.split import Split, read_split, write_split
@@ -138,6 +139,11 @@ def _check_glance(glance: LookCheckpoint, object_class: str, upright_radius: flo
         raise InputError(
             f"the glance of --glance or --start judges class {contract.object_class!r}; a glance for class "
             f"{object_class!r} is needed"
+        )
+    if len(contract.chain) == MOST_NETWORKS:
+        raise InputError(
+            f"the glance of --glance or --start has {MOST_NETWORKS} networks, and the new one would be another: give "
+            f"one with at most {MOST_NETWORKS - 1}, such as ball-small"
         )
     if contract.upright_radius != upright_radius:
         raise InputError(
