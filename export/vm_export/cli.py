@@ -203,9 +203,9 @@ def _print_written(path: Path, content: str, look: LookCheckpoint | None, differ
     parts = [content]
     if look is not None:
         contract = look.contract
-        channels = ", ".join(map(str, contract.channels))
-        parts.append(f"close look at {contract.object_class} ({contract.size} x {contract.size}, channels {channels})")
-        parts += [f"glance ({each.size} x {each.size})" for each in contract.chain[1:]]
+        for name, each in zip(contract.names, contract.chain, strict=True):
+            channels = ", ".join(map(str, each.channels))
+            parts.append(f"{name} at {each.object_class} ({each.size} x {each.size}, channels {channels})")
     parts.append(f"{path.stat().st_size / 1000:.1f} kB")
     if difference is not None:
         parts.append(f"largest difference to torch {difference:.1e}")

@@ -60,20 +60,13 @@ class CloseLook:
         }
 
     @classmethod
-    def _chain(
-        cls,
-        prefix: str,
-        contract: LookContract,
-        files: LookFiles,
-        threads: int,
-        spinning: bool,
-        name: str = "close look",
-    ) -> CloseLook:
-        """A look network with its glance, which may have a glance. prefix, name: of the network, for messages."""
-        glance = None
-        if contract.glance is not None:
-            glance = cls._chain(prefix, contract.glance, files[1:], threads, spinning, "glance")
-        return cls(f"{prefix}{name}", contract, files[0], glance, threads, spinning)
+    def _chain(cls, prefix: str, contract: LookContract, files: LookFiles, threads: int, spinning: bool) -> CloseLook:
+        """A look network with its glances. prefix: of their names in messages."""
+        made: CloseLook | None = None
+        for name, part, file in reversed(list(zip(contract.names, contract.chain, files, strict=True))):
+            made = cls(f"{prefix}{name}", part, file, made, threads, spinning)
+        assert made is not None  # a chain has at least one network
+        return made
 
     def run(self, patches: Image) -> Singles:
         """Answers (n, 4) to patches (n, size, size, 3), RGB. Raises ModelError, also for answers that are not finite.

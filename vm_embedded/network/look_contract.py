@@ -94,6 +94,11 @@ class LookContract:
         return len(self.chain) == MOST_NETWORKS
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """What the chain's networks are called."""
+        return ("wide look", "close look", "glance") if self.is_wide else ("close look", "glance")[: len(self.chain)]
+
+    @property
     def keys(self) -> tuple[str, ...]:
         """Keys of the chain's networks in the metadata of a model file."""
         end = f"_{self.object_class}" if self.upright_radius else ""

@@ -106,6 +106,7 @@ def test_a_glance_must_judge_the_same_thing_and_a_chain_has_three_networks():
     with pytest.raises(ModelError, match="class 'ball', its glance class 'goal'"):
         look_contract(glance=look_contract(object_class="goal"))
     chain = look_contract(glance=look_contract(glance=look_contract()))
+    assert chain.names == ("wide look", "close look", "glance")
     assert len(chain.chain) == len(chain.keys) == 3
     assert LookContract.from_dict(chain.as_dict()) == chain
     with pytest.raises(ModelError, match="3 networks"):
