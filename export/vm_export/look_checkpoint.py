@@ -63,11 +63,11 @@ class LookCheckpoint:
     def recalibrated(self, scale: float, offset: float, source: str) -> LookCheckpoint:
         """The same networks, whose probability has the logit `scale * logit + offset`.
 
-        The glance changes only if this is a wide look: then its logit is a part of that mean. source: the answers that
-        the scale and the offset fit, for the provenance.
+        The glance changes only if this is a wide look with one pass: then its logit is a part of a mean with that of
+        the glance. source: the answers that the scale and the offset fit, for the provenance.
         """
         glance = self.glance
-        if glance is not None and self.contract.is_wide:
+        if glance is not None and self.contract.is_wide and self.contract.passes == 1:
             glance = glance.recalibrated(scale, offset, source)
         network, (first, before) = copy.deepcopy(self.network), self.network.calibration.tolist()
         network.calibration.copy_(torch.tensor([scale * first, scale * before + offset]))

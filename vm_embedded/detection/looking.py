@@ -29,8 +29,8 @@ from .stopwatch import Stopwatch
 class _Rules:
     """How to look at a kind of object.
 
-    worth: probability above which a place is worth another look. doubtful: probabilities between which it gets a second
-    opinion. zooms: sides of the patches for that, as shares of the usual side.
+    worth: probability that a place needs from the answer before, to be worth this look. doubtful: probabilities between
+    which it gets a second opinion. zooms: sides of the patches for that, as shares of the usual side.
     """
 
     worth: float
@@ -50,12 +50,14 @@ _WIDE = _Rules(worth=0.03, doubtful=(0.15, 0.8), zooms=(1.0,))
 _UPRIGHT = _Rules(worth=0.03, doubtful=(0.03, 1.0), zooms=(1.0,))
 
 _LARGE = 24.0
-"""Radius [px] from which the close look alone decides: it sees enough, and the surroundings of a near object are often
-beyond the border of the picture."""
+"""Radius of an object, or of the circle around a base, from which no wide look follows [px]: the close look sees
+enough, and the surroundings of a near object are often beyond the border of the picture."""
 
 _EARLIER = 0.3
-"""Weight of the answer before the last one in the mean of both: other errors were made there. A glance, which is the
-first of several networks, knows too little."""
+"""Weight of the answer before the last one in the mean of both: other errors were made there."""
+
+_SUREST = 1.0 - 1e-6
+"""Limit of a probability in a mean: one that is rounded to 1 would outvote all others."""
 
 _LARGEST_SIZE = 3.0
 """Limit of the logarithm of a size: with a bad network, math.exp would overflow, and JSON has no infinity."""
@@ -166,7 +168,7 @@ def look_closely(
 
 
 def worth_of(contract: LookContract) -> float:
-    """Probability above which a place is worth another look."""
+    """Probability that a place needs from the answer before, to be worth a look."""
     return _rules_of(contract).worth
 
 
@@ -185,11 +187,12 @@ def look_at(places: Places, look: Look) -> Singles:
     """Look at n places, as often as the contracts of look and glance say, and move them to where an object was seen.
 
     In its last pass, if there are several, a doubtful place gets a second opinion. If that is the third or a later one,
-    its probability is a mean with the one before. Returns the last answers (n, 4) to each place, as `CloseLook.run`
-    gives them. Raises ModelError if a network does not run.
+    its probability is a mean with the one before, unless that is the answer of the first of several networks. Returns
+    the last answers (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError if a network does not run.
     """
     # Each pass has its network: first those of the glance, then those of the look.
-    networks = [each for each in chain_of(look) for _ in range(each.contract.passes)]
+    chain = chain_of(look)
+    networks = [each for each in chain for _ in range(each.contract.passes)]
     answers = np.zeros((len(places), 4), dtype=np.float32)
     worth = np.arange(len(places))
     for number, network in enumerate(networks):
@@ -204,7 +207,7 @@ def look_at(places: Places, look: Look) -> Singles:
         doubtful = np.flatnonzero(last & (found[:, 0] > low) & (found[:, 0] < high))
         if number and len(doubtful):
             found[doubtful] = _second_opinion(places, worth[doubtful], network, rules.zooms, found[doubtful])
-        if number > 1:
+        if number > 1 and (len(chain) == 1 or networks[number - 1] is not chain[0]):
             both = np.stack([answers[worth[last], 0], found[last, 0]])
             found[last, 0] = _mean_odds(both, [_EARLIER, 1.0 - _EARLIER])
         answers[worth] = found
@@ -222,9 +225,9 @@ def _is_last(places: Places, rows: npt.NDArray[np.intp], following: Sequence[Loo
 
 def _mean_odds(probabilities: Singles, weights: Sequence[float]) -> Floats:
     """Probabilities (n,) whose log-odds are the weighted mean of those of (k, n). weights (k,): with the sum 1."""
-    exact, weight = probabilities.astype(np.float64), np.array(weights)[:, None]
-    yes, no = (np.prod(each**weight, axis=0) for each in (exact, 1.0 - exact))
-    return np.asarray(yes / np.maximum(yes + no, np.finfo(np.float64).tiny))
+    likely = np.clip(probabilities.astype(np.float64), 1.0 - _SUREST, _SUREST)
+    yes, no = (np.prod(each ** np.array(weights)[:, None], axis=0) for each in (likely, 1.0 - likely))
+    return np.asarray(yes / (yes + no))
 
 
 def _second_opinion(

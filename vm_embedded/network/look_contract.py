@@ -32,10 +32,10 @@ class LookContract:
     extent: half the side of a patch [expected radii], 0.5 to 8.
     above: probability above which a mesh point counts for a proposal, 0 to 0.99.
     passes: how often a proposal is judged at most, 1 to 4; each further pass judges a new patch around the center that
-        the previous pass found. The last of all passes gives doubtful places a second opinion.
+        the previous pass found. In its last pass, a doubtful place gets a second opinion.
     channels: of the network's convolutions at each resolution; the runtime does not use them.
-    glance: of a smaller look network for the same class, which judges each proposal first; this one judges only what
-        the glance passes on. The glance may have a glance, too.
+    glance: of the look network for the same class that judges before this one, which judges only what the glance
+        passes on. The glance may have a glance, too; then this one is a wide look.
     self_test: an example with its answers, which each loading of the model file runs.
     provenance: origin of the network; the runtime does not use it.
 
@@ -71,7 +71,7 @@ class LookContract:
         if self.glance is None:
             return
         if len(self.chain) > MOST_NETWORKS:
-            raise ModelError(f"a close look may have {MOST_NETWORKS} networks with all its glances, not more")
+            raise ModelError(_too_many(len(self.chain)))
         if self.glance.object_class != self.object_class:
             raise ModelError(
                 f"the close look judges class {self.object_class!r}, its glance class {self.glance.object_class!r}; "
@@ -95,12 +95,12 @@ class LookContract:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the chain's networks are called."""
+        """What the chain's networks are called, the last judge first."""
         return ("wide look", "close look", "glance") if self.is_wide else ("close look", "glance")[: len(self.chain)]
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Keys of the chain's networks in the metadata of a model file."""
+        """Keys of the chain's networks in the metadata of a model file, the last judge first."""
         end = f"_{self.object_class}" if self.upright_radius else ""
         return tuple(key + end for key in (LOOK_KEY, GLANCE_KEY, f"{GLANCE_KEY}2")[: len(self.chain)])
 
@@ -119,7 +119,7 @@ class LookContract:
         """Inverse of `as_dict`. networks: most in the chain. Raises ModelError for missing, unknown or malformed
         entries."""
         if not networks:
-            raise ModelError(f"a close look may have {MOST_NETWORKS} networks with all its glances, not more")
+            raise ModelError(_too_many(MOST_NETWORKS + 1))
         names = {each.name for each in fields(cls)}
         if not isinstance(data, dict) or set(data) != names:
             found = sorted(data) if isinstance(data, dict) else data
@@ -134,3 +134,8 @@ class LookContract:
         if data["self_test"] is None:
             return contract
         return replace(contract, self_test=LookTest.from_dict(data["self_test"], contract.size))
+
+
+def _too_many(networks: int) -> str:
+    """What is wrong with a chain of so many networks or more."""
+    return f"a close look may have {MOST_NETWORKS} networks with all its glances, not {networks}"

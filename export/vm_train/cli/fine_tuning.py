@@ -82,14 +82,17 @@ def begin_fine_tuning(options: argparse.Namespace) -> int:
 
 def _check_device(device: str) -> None:
     if device == "cuda":
-        raise InputError("a fine-tuning runs on the CPU: leave out --device")
+        raise InputError("a fine-tuning runs on the CPU: give --device cpu, or leave it out")
 
 
 def _describe(run: TuningRun, boxes: Path) -> None:
     """Print the numbers of frames, and what is left out."""
     look = run.before.manifest.look
     if look is not None and look.is_wide:
-        print(f"{run.model}: its wide look is left out; it would not know your {run.object_class}", flush=True)
+        print(
+            f"{run.model}: its wide look is left out; it would not know your objects of class {run.object_class}",
+            flush=True,
+        )
     recordings = len({each.recording for each in run.pictures})
     count = len(run.split.training), len(run.split.validation)
     print(

@@ -35,8 +35,9 @@ def look_parser() -> argparse.ArgumentParser:
     made = Parser(
         prog="vm-train look",
         description="Train the close look of a mesh network: a small network that judges a patch of the picture at "
-        "each proposal of the mesh network. Or, with --boxes, fine-tune the one that a model file has. You can stop or "
-        "kill it at any time: vm-train resume continues, and the final network is the same as without the stop.",
+        "each proposal of the mesh network. Or, with --boxes, fine-tune the one that a model file has, on the CPU. You "
+        "can stop or kill it at any time: vm-train resume continues. On a CPU, the final network is the same as "
+        "without the stop.",
     )
     made.add_argument(
         "data", type=Path, nargs="?", metavar="DATA", help="folder of imageX.jpg or .png, maskX.png, lensX.yaml"
@@ -121,6 +122,7 @@ def print_look_config(options: argparse.Namespace) -> int:
 
 def run_look(options: argparse.Namespace) -> int:
     """Begin the training of a close look, train, and return the exit status. Raises VisualMeshError."""
+    from ..learning.hardware import check_device
     from ..look.run_folder import begin_look_run
     from ..look.start import LookStart
 
@@ -130,6 +132,7 @@ def run_look(options: argparse.Namespace) -> int:
         raise InputError("give a folder of rendered pictures, DATA, or one of frames with boxes, --boxes DIR")
     if options.names or options.format or options.rendered:
         raise InputError("--names, --format and --rendered go with --boxes: leave them out, or give --boxes DIR")
+    check_device(options.device)
     start, configuration = _start_and_configuration(options)
     glance = start.glance if start else None
     if options.glance is not None:

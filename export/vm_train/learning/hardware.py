@@ -52,6 +52,12 @@ class Hardware:
         return box
 
 
+def check_device(device: str) -> None:
+    """Raise InputError if the device is cuda, and there is none."""
+    if device == "cuda" and not torch.cuda.is_available():
+        raise InputError("torch finds no GPU; use --device cpu")
+
+
 @contextmanager
 def set_up_hardware(device: str, workers: int | None, threads: int | None) -> Iterator[Hardware]:
     """Prepare torch for this process, and connect it with the others if torchrun started it.
@@ -61,8 +67,7 @@ def set_up_hardware(device: str, workers: int | None, threads: int | None) -> It
     """
     size, rank = int(os.environ.get("WORLD_SIZE", "1")), int(os.environ.get("RANK", "0"))
     local, locals_ = int(os.environ.get("LOCAL_RANK", "0")), int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
-    if device == "cuda" and not torch.cuda.is_available():
-        raise InputError("torch finds no GPU; use --device cpu")
+    check_device(device)
     gpu = device != "cpu" and torch.cuda.is_available()
     if gpu and local >= torch.cuda.device_count():
         raise InputError(

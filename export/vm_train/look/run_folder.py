@@ -142,8 +142,8 @@ def _check_glance(glance: LookCheckpoint, object_class: str, upright_radius: flo
         )
     if len(contract.chain) == MOST_NETWORKS:
         raise InputError(
-            f"the glance of --glance or --start has {MOST_NETWORKS} networks, and the new one would be another: give "
-            f"one with at most {MOST_NETWORKS - 1}, such as ball-small"
+            f"the look of --glance has {MOST_NETWORKS} networks, and the new one would be another: give one with at "
+            f"most {MOST_NETWORKS - 1}"
         )
     if contract.upright_radius != upright_radius:
         raise InputError(

@@ -76,7 +76,7 @@ def _chosen(path: Path, object_class: str) -> LookCheckpoint:
     looks = ([look_of(model)] if model.look is not None else []) + upright_looks_of(model)
     names = [each.contract.object_class for each in looks]
     if not looks:
-        raise InputError(f"{path} has no close look to begin with")
+        raise InputError(f"{path} has no close look")
     if object_class and object_class not in names:
         raise InputError(unknown(f"close look of {path}", object_class, names))
     return looks[names.index(object_class) if object_class else 0]

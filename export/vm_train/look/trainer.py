@@ -49,7 +49,7 @@ class LookTrainer:
     """A network that is trained for `total` steps on patches.
 
     extent: half the side of a patch [expected radii]. weights (n,): how often each patch is drawn, compared to others
-    of its kind; None: equally often. teacher: gives the target of some patches' presence. device: "cpu" or "cuda", as
+    of its kind; None: equally often. teacher: gives the target of some patches' presence. device: "cpu" or "cuda:0", as
     torch names it. Raises InputError if no patch shows an object, or all do."""
 
     def __init__(

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.detection.looking import Look, look_at
+from vm_embedded.detection.looking import Look, chain_of, look_at
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.geometry.lens import Size
 
@@ -38,7 +38,7 @@ def find_candidates(pyramid: Pyramid, size: Size, look: Look, radii: Floats, abo
     size: of the frame [px]. radii (s,): to look for [px]. above: lowest probability of a candidate. most: number of
     candidates. Of candidates that overlap, the better one stays. Raises ModelError if the network does not run.
     """
-    first = look.glance or look
+    first = chain_of(look)[0]
     windows = grid_windows(size, radii)
     answers = first.run(windows.cut(pyramid, first.contract)).astype(np.float64)
     likely = np.flatnonzero((answers[:, 0] > above) & (np.abs(answers[:, 3]) < _UNLIKE))

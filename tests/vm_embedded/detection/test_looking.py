@@ -177,8 +177,10 @@ def small_and_large(scene):
 def test_a_wide_look_judges_small_objects_and_the_close_look_counts_too(scene, close, wide):
     look = chain(0.5, close, wide)
     _, answers = looked_at(scene, look, small_and_large(scene))
-    yes, no = close**0.3 * wide**0.7, (1.0 - close) ** 0.3 * (1.0 - wide) ** 0.7
-    assert answers[:, 0] == pytest.approx([yes / (yes + no), close], abs=1e-6)
+    surest = 1.0 - 1e-6  # a probability that is rounded to 1 does not outvote the other one
+    yes, no = min(close, surest) ** 0.3 * min(wide, surest) ** 0.7, (1.0 - min(close, surest)) ** 0.3
+    no *= (1.0 - min(wide, surest)) ** 0.7
+    assert answers[:, 0] == pytest.approx([yes / (yes + no), close], abs=2e-6)
     assert look.seen == [1]
 
 
@@ -195,6 +197,20 @@ def test_where_a_wide_look_is_sure_it_sees_no_mirror_image(scene, wide, opinions
     looked_at(scene, look, small_and_large(scene))
     assert look.seen == [1] * (1 + opinions)
     assert look.glance.seen == [2, OPINION]  # about the large ball
+
+
+@pytest.mark.parametrize(
+    ("passes", "weight"), [((1, 1), 1.0), ((2, 1), 1.0), ((1, 2), 1.0), ((1, 1, 1), 0.7), ((1, 1, 2), 1.0)]
+)
+def test_the_answer_of_a_first_glance_does_not_count(scene, passes, weight):
+    """weight: of the log-odds of 0.9, the last answers. All others are 0.5, whose log-odds are 0."""
+    look = chain(*[0.5] * (len(passes) - 1), 0.9)
+    each = look
+    for count in reversed(passes):
+        each.contract = replace(each.contract, passes=count)
+        each = each.glance
+    _, answers = looked_at(scene, look, small_and_large(scene)[:1])
+    assert answers[0, 0] == pytest.approx(9.0**weight / (1.0 + 9.0**weight))
 
 
 @given(column=st.floats(100.0, 540.0), row=st.floats(230.0, 440.0))

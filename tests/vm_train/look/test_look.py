@@ -257,7 +257,7 @@ def test_behind_a_look_with_a_glance_a_wide_look_is_trained(whole, look, tmp_pat
     before = replace(before, contract=replace(before.contract, glance=before.contract), glance=before)
     before.save(tmp_path / "two.pt")
     folder = tmp_path / "run"
-    look(folder, "--glance", tmp_path / "two.pt", "--set", "patches.extent=4")
+    look(folder, "--glance", tmp_path / "two.pt", "--set", "patches.extent=4", "--set", "patches.passes=1")
     made = LookCheckpoint.load(folder / "look.pt")
     assert [each.extent for each in made.contract.chain] == [4.0, before.contract.extent, before.contract.extent]
     # The calibration of the mean of both answers is applied to both.

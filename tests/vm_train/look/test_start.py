@@ -125,7 +125,7 @@ def test_the_recipe_of_the_package_goes_on_from_its_network():
         (["--start", "ball", "--set", "patches.size=16"], "16 x 16 samples"),
         (["--start", "ball", "--set", "patches.extent=2"], "patches.extent 4"),
         (["--start", "ball", "--set", "patches.object_class=robot"], "unknown close look of"),
-        (["--glance", "ball"], "the new one would be another: give one with at most 2, such as ball-small"),
+        (["--glance", "ball"], "--glance has 3 networks, and the new one would be another: give one with at most 2"),
         (["--start", "ball", "--boxes", "frames"], "leave out DATA and --start"),
     ],
 )

@@ -78,7 +78,9 @@ def test_the_new_model_differs_only_in_its_close_look(whole):
 
 def test_a_wide_look_is_left_out(tune, tmp_path):
     done = tune(tmp_path / "run", "--from", "ball")
-    assert done.stdout.splitlines()[0] == "ball: its wide look is left out; it would not know your ball"
+    assert (
+        done.stdout.splitlines()[0] == "ball: its wide look is left out; it would not know your objects of class ball"
+    )
     before, after = read_model(model_path("ball")), read_model(tmp_path / "run" / "model.onnx")
     assert [each.size for each in after.manifest.look.chain] == [each.size for each in before.manifest.look.chain[1:]]
     assert len(after.look) == 2

@@ -23,9 +23,8 @@ def windows(*rows):
 class Bright:
     """Judges a patch by its bright pixels, as a look network would: probability, shift and size."""
 
-    glance = None
-
-    def __init__(self, passes=1):
+    def __init__(self, passes=1, glance=None):
+        self.glance = glance
         self.contract = LookContract(object_class="ball", size=32, extent=2.0, above=0.03, passes=passes)
 
     def run(self, patches):
@@ -128,6 +127,20 @@ def test_the_network_finds_each_disk_once_wherever_it_is():
     np.testing.assert_allclose(moved.centers[order], true.centers, atol=0.5)
     assert len(find_candidates(pyramid, (200, 150), Bright(), np.array([10.0, 14.0]), 0.1, 1)) == 1
     assert len(find_candidates(disks(), (200, 150), Bright(), np.array([10.0]), 0.1, 10)) == 0
+
+
+def test_the_first_of_all_glances_finds_the_candidates():
+    class Blind(Bright):
+        def run(self, patches):
+            raise AssertionError("only the first glance looks everywhere")
+
+    chain = Blind(glance=Blind(glance=Bright()))
+    assert len(find_candidates(disks((40.3, 60.0, 10.0)), (200, 150), chain, np.array([10.0]), 0.1, 10)) == 1
+
+
+def test_windows_tell_how_large_their_objects_are():
+    places = WindowPlaces(disks(), windows((44.0, 60.0, 10.0), (50.0, 20.0, 30.0)))
+    assert places.radii(np.array([1, 0])).tolist() == [30.0, 10.0]
 
 
 def test_a_look_leaves_the_windows_that_it_was_given_as_they_are():
