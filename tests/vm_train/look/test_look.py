@@ -268,8 +268,10 @@ def test_behind_a_look_with_a_glance_a_wide_look_is_trained(whole, look, tmp_pat
     assert read_model(folder / "model.onnx").manifest.look.is_wide
 
 
-def test_a_missing_gpu_is_named(whole):
+def test_a_missing_gpu_is_named_before_anything_is_written(whole, look, tmp_path):
     assert "torch finds no GPU" in run("resume", whole[0], "--device", "cuda", code=1).stderr
+    assert "torch finds no GPU" in look(tmp_path / "run", "--device", "cuda", code=1).stderr
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.long
