@@ -42,7 +42,8 @@ def test_the_balls_of_a_picture(tmp_path):
     copy = tmp_path / "found.jpg"
     printed = run_example("picture.py", DEMO / "image0000002.jpg", DEMO / "lens0000002.yaml", copy)
     assert printed
-    assert all(re.match(r"ball [01]\.\d\d: -?\d\.\d\d m ahead, -?\d\.\d\d m to the left", line) for line in printed)
+    pattern = r"ball (0\.\d\d|1\.00): -?\d\.\d\d m ahead, -?\d\.\d\d m to the left"
+    assert all(re.match(pattern, line) for line in printed)
     assert cv2.imread(str(copy)).shape == cv2.imread(str(DEMO / "image0000002.jpg")).shape
 
 

@@ -72,7 +72,9 @@ class LookCheckpoint:
         network, (first, before) = copy.deepcopy(self.network), self.network.calibration.tolist()
         network.calibration.copy_(torch.tensor([scale * first, scale * before + offset]))
         provenance = {**self.contract.provenance, "calibrated_on": source}
-        contract = replace(self.contract, provenance=provenance, glance=None if glance is None else glance.contract)
+        contract = replace(self.contract, provenance=provenance)
+        if glance is not None:
+            contract = replace(contract, glance=glance.contract)
         return LookCheckpoint(network, contract, self.examples, glance)
 
     def save(self, path: str | Path) -> None:

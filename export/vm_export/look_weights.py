@@ -38,7 +38,9 @@ def upright_looks_of(model: ModelFile) -> list[LookCheckpoint]:
 
 def _look(model: ModelFile, contract: LookContract, files: LookFiles) -> LookCheckpoint:
     try:
-        glance = None if contract.glance is None else _look(model, contract.glance, files[1:])
+        glance = None
+        if contract.glance is not None:
+            glance = _look(model, contract.glance, files[1:])
         return _checkpoint(contract, files[0], glance)
     except (KeyError, ValueError, RuntimeError) as error:
         raise ModelError(f"{model.path}: its close look has other layers than vm-export writes: {error}") from error

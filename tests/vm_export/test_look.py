@@ -460,24 +460,23 @@ def test_a_look_at_an_upright_brings_its_glance(field):
     assert without.look == read.look
 
 
-def test_a_glance_may_have_a_glance(field):
-    for changes in ({}, {"object_class": "goal", "upright_radius": 0.3}):
-        first, last = (
-            glancing_checkpoint(**changes),
-            look_checkpoint(7, LookShape(size=10, channels=(3, 4, 5)), **changes),
-        )
-        made = replace(last, contract=replace(last.contract, glance=first.contract), glance=first)
-        read = attach(field, made)
-        close = CloseLook.of_uprights(read)["goal"] if changes else CloseLook.of(read)
-        (again,) = upright_looks_of(read)[:1] if changes else [look_of(read)]
-        for _ in range(3):
-            patches = random_patches(5, size=made.contract.size)
-            np.testing.assert_allclose(close.run(patches), torch_answers(made.network, patches), atol=1e-5)
-            np.testing.assert_allclose(torch_answers(again.network, patches), close.run(patches), atol=1e-5)
-            check_self_test(close.contract.self_test, made)
-            close, made, again = close.glance, made.glance, again.glance
-        assert close is made is again is None
-    assert len(attach(field, look_checkpoint()).look) == 1
+@pytest.mark.parametrize("changes", [{}, {"object_class": "goal", "upright_radius": 0.3}], ids=["object", "upright"])
+def test_a_glance_may_have_a_glance(field, changes):
+    two = glancing_checkpoint(**changes)
+    last = look_checkpoint(7, LookShape(size=10, channels=(3, 4, 5)), **changes)
+    made = replace(last, contract=replace(last.contract, glance=two.contract), glance=two)
+    read = attach(field, made)
+    close = CloseLook.of_uprights(read)["goal"] if changes else CloseLook.of(read)
+    again = upright_looks_of(read)[0] if changes else look_of(read)
+    for _ in range(3):
+        patches = random_patches(5, size=made.contract.size)
+        np.testing.assert_allclose(close.run(patches), torch_answers(made.network, patches), atol=1e-5)
+        np.testing.assert_allclose(torch_answers(again.network, patches), close.run(patches), atol=1e-5)
+        check_self_test(close.contract.self_test, made)
+        close, made, again = close.glance, made.glance, again.glance
+    assert (close, made, again) == (None, None, None)
+    replaced = attach(field, look_checkpoint(**changes))
+    assert [len(each) for each in (replaced.look, *replaced.upright_looks) if each is not None] == [1]
 
 
 def test_a_look_at_an_upright_replaces_the_one_before_and_no_other(field):

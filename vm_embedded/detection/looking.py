@@ -180,7 +180,8 @@ def _rules_of(contract: LookContract) -> _Rules:
 
 def chain_of(look: Look) -> list[Look]:
     """A look and its glances, in the order in which they judge."""
-    return [*([] if look.glance is None else chain_of(look.glance)), look]
+    before = [] if look.glance is None else chain_of(look.glance)
+    return [*before, look]
 
 
 def look_at(places: Places, look: Look) -> Singles:
@@ -207,6 +208,7 @@ def look_at(places: Places, look: Look) -> Singles:
         doubtful = np.flatnonzero(last & (found[:, 0] > low) & (found[:, 0] < high))
         if number and len(doubtful):
             found[doubtful] = _second_opinion(places, worth[doubtful], network, rules.zooms, found[doubtful])
+        # A glance, the first of several networks, knows too little for a mean.
         if number > 1 and (len(chain) == 1 or networks[number - 1] is not chain[0]):
             both = np.stack([answers[worth[last], 0], found[last, 0]])
             found[last, 0] = _mean_odds(both, [_EARLIER, 1.0 - _EARLIER])

@@ -86,7 +86,8 @@ class LookContract:
     @property
     def chain(self) -> tuple[LookContract, ...]:
         """The contract, that of the glance, and that of the glance's glance, as far as there are any."""
-        return (self,) if self.glance is None else (self, *self.glance.chain)
+        glances = () if self.glance is None else self.glance.chain
+        return (self, *glances)
 
     @property
     def is_wide(self) -> bool:

@@ -53,7 +53,7 @@ class Hardware:
 
 
 def check_device(device: str) -> None:
-    """Raise InputError if the device is cuda, and there is none."""
+    """Check the device of an option: auto, cpu or cuda. Raises InputError for cuda without a GPU."""
     if device == "cuda" and not torch.cuda.is_available():
         raise InputError("torch finds no GPU; use --device cpu")
 

@@ -18,8 +18,10 @@ class TorchLook:
 
     @classmethod
     def of(cls, glance: LookCheckpoint | None) -> TorchLook | None:
-        """The network of a glance's checkpoint, and its glance."""
-        return None if glance is None else cls(glance.network, glance.contract, cls.of(glance.glance))
+        """The network of a glance's checkpoint, with its own glance, if it has one."""
+        if glance is None:
+            return None
+        return cls(glance.network, glance.contract, cls.of(glance.glance))
 
     def run(self, patches: Image) -> Singles:
         """Answers (n, 4) to patches (n, size, size, 3), as `CloseLook.run` gives them.

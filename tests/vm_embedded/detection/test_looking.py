@@ -149,7 +149,8 @@ class Fixed(BrightDisk):
 
     def __init__(self, probability, glance=None):
         super().__init__(passes=1, glance=glance)
-        self.contract = replace(self.contract, glance=None if glance is None else glance.contract)
+        if glance is not None:
+            self.contract = replace(self.contract, glance=glance.contract)
         self.probability = probability
 
     def run(self, patches):
@@ -178,8 +179,8 @@ def test_a_wide_look_judges_small_objects_and_the_close_look_counts_too(scene, c
     look = chain(0.5, close, wide)
     _, answers = looked_at(scene, look, small_and_large(scene))
     surest = 1.0 - 1e-6  # a probability that is rounded to 1 does not outvote the other one
-    yes, no = min(close, surest) ** 0.3 * min(wide, surest) ** 0.7, (1.0 - min(close, surest)) ** 0.3
-    no *= (1.0 - min(wide, surest)) ** 0.7
+    one, other = min(close, surest), min(wide, surest)
+    yes, no = one**0.3 * other**0.7, (1.0 - one) ** 0.3 * (1.0 - other) ** 0.7
     assert answers[:, 0] == pytest.approx([yes / (yes + no), close], abs=2e-6)
     assert look.seen == [1]
 
