@@ -14,6 +14,7 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.network.look_test import ANSWERS
 
+from .eight_bits import integers_of
 from .look_network import NOISE_FLOOR, LookNetwork
 from .onnx_graph import FLOAT, UINT8, OnnxGraph
 
@@ -68,14 +69,16 @@ def _write_layer(
     graph: OnnxGraph, operator: str, name: str, x: str, kernel: Floats, bias: Floats, **attributes: Any
 ) -> str:
     """Write a linear layer of the input x; return the name of its result."""
-    constants = [_write_weights(graph, f"{name}.kernel", kernel), _write_weights(graph, f"{name}.bias", bias)]
+    constants = [_write_kernel(graph, name, kernel), graph.constant(f"{name}.bias", bias)]
     return graph.node(operator, [x, *constants], f"{name}.linear", **attributes)
 
 
-def _write_weights(graph: OnnxGraph, name: str, values: Floats) -> str:
-    """Write weights; return the name of them as float32. The file holds them as float16 if that changes none: a look
-    network is text in a model file, and half as long then. ONNX Runtime converts them once, when it loads the file."""
-    half = values.astype(np.float16)
-    if np.array_equal(half, values):
-        return graph.node("Cast", [graph.constant(name, half)], f"{name}.single", to=FLOAT)
-    return graph.constant(name, values)
+def _write_kernel(graph: OnnxGraph, name: str, values: Floats) -> str:
+    """Write a kernel (outputs, ...); return the name of it as float32. The file holds it as 8-bit integers if that
+    loses nothing. ONNX Runtime multiplies them with their steps once, when it loads the file."""
+    kernel = values.astype(np.float32)
+    integers, steps = integers_of(kernel)
+    if not np.array_equal(integers * steps, kernel):
+        return graph.constant(f"{name}.kernel", kernel)
+    whole = graph.node("Cast", [graph.constant(f"{name}.kernel", integers)], f"{name}.integers", to=FLOAT)
+    return graph.node("Mul", [whole, graph.constant(f"{name}.steps", steps)], f"{name}.weights")

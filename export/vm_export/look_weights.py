@@ -61,7 +61,7 @@ def _state(constants: Mapping[str, Singles], convolutions: int) -> dict[str, tor
     weights = {"calibration": np.array([1.0, 0.0], dtype=np.float32)}
     names = {f"layer{index}": f"convolutions.{index}" for index in range(convolutions)}
     for name, torch_name in {**names, "hidden": "hidden", "last": "answers"}.items():
-        kernel = constants[f"{name}.kernel"]
+        kernel = constants[f"{name}.kernel"] * constants.get(f"{name}.steps", 1.0)
         if name == "layer0":
             kernel = kernel.reshape(-1, 3, 3, 3).transpose(0, 3, 1, 2)
         weights |= {f"{torch_name}.weight": kernel, f"{torch_name}.bias": constants[f"{name}.bias"]}

@@ -30,10 +30,10 @@ class OnnxGraph:
         self._constants: dict[str, onnx.TensorProto] = {}
 
     def constant(self, name: str, value: npt.ArrayLike) -> str:
-        """Add a constant, integers as int64, other numbers as float32, and truths and float16 as they are; return its
+        """Add a constant, truths and int8 as they are, other integers as int64, other numbers as float32; return its
         name."""
         array = np.asarray(value)
-        if array.dtype not in (np.bool_, np.float16):
+        if array.dtype not in (np.bool_, np.int8):
             array = array.astype(np.int64 if np.issubdtype(array.dtype, np.integer) else np.float32)
         self._constants[name] = numpy_helper.from_array(np.ascontiguousarray(array), name)
         return name

@@ -15,7 +15,7 @@ from .bundles import CHECKOUT
 
 URL = "https://code.example.org/robots/vm-embedded"
 IDENTITY = {f"GIT_{who}_{what}": "a@b.example" for who in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")}
-LARGEST_WHEEL = 8_000_000
+LARGEST_WHEEL = 6_000_000
 """With the networks and all programs [bytes]; test_bundle.py has the limit of the robot's wheel."""
 
 LARGEST_CODE = 1_000_000

@@ -21,13 +21,13 @@ from vm_embedded.network.session import Session
 from vm_export import attach_look, export
 from vm_export.change_model import change_looks
 from vm_export.checkpoint import Checkpoint
+from vm_export.eight_bits import round_kernels
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_graph import look_model
 from vm_export.look_network import LookNetwork, LookShape, normalized
 from vm_export.look_weights import look_of, upright_looks_of
 from vm_export.metadata import with_metadata
 from vm_export.network_shape import NetworkShape
-from vm_train.look.training import round_weights
 
 from ..vm_embedded.strategies import seeds
 
@@ -81,21 +81,22 @@ def test_onnx_runtime_joins_convolutions_and_activations(tmp_path, rounded):
     options.log_severity_level = 4
     network = look_network(shape=LookShape())
     if rounded:
-        round_weights(network)
+        round_kernels(network)
     onnxruntime.InferenceSession(look_model(network), options)
     operators = [node.op_type for node in onnx.load(tmp_path / "optimized.onnx").graph.node]
     assert "Relu" not in operators
     assert sum("Conv" in each for each in operators) == 4
-    assert operators.count("Cast") == 1  # of the patch's colors; the weights are converted already
+    # Those of the patch's colors; the integers of the kernels are multiplied with their steps already.
+    assert (operators.count("Cast"), operators.count("Mul")) == (1, 1)
 
 
-def test_rounded_weights_need_half_of_the_room_and_give_the_same_answers():
+def test_rounded_kernels_need_a_quarter_of_the_room_and_give_the_same_answers():
     network = look_network(shape=LookShape())
     whole = look_model(network)
-    round_weights(network)
-    half, patches = look_model(network), random_patches(9, size=LookShape().size)
-    assert len(half) < 0.55 * len(whole)
-    np.testing.assert_allclose(onnx_answers(half, patches), torch_answers(network, patches), atol=1e-5)
+    round_kernels(network)
+    small, patches = look_model(network), random_patches(9, size=LookShape().size)
+    assert len(small) < 0.3 * len(whole)
+    np.testing.assert_allclose(onnx_answers(small, patches), torch_answers(network, patches), atol=1e-5)
 
 
 @given(seeds, st.integers(-100, 100))
@@ -464,6 +465,7 @@ def test_a_look_at_an_upright_brings_its_glance(field):
 def test_a_glance_may_have_a_glance(field, changes):
     two = glancing_checkpoint(**changes)
     last = look_checkpoint(7, LookShape(size=10, channels=(3, 4, 5)), **changes)
+    round_kernels(last.network)  # a file may hold one network as integers and another one in full
     made = replace(last, contract=replace(last.contract, glance=two.contract), glance=two)
     read = attach(field, made)
     close = CloseLook.of_uprights(read)["goal"] if changes else CloseLook.of(read)

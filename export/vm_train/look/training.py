@@ -19,6 +19,7 @@ from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
 from vm_embedded.files import atomic_write
 from vm_embedded.network.look_contract import LookContract
+from vm_export.eight_bits import round_kernels
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_network import LookNetwork
 
@@ -161,7 +162,7 @@ class _Training:
     def _finish(self, stop_requested: Callable[[], bool]) -> bool:
         """Calibrate the network on what it finds in the validation pictures, and write look.pt. False after a stop."""
         run, network, patches = self._run, self._trainer.network.cpu().eval(), self._run.configuration.patches
-        round_weights(network)
+        round_kernels(network)
         glance = run.glance()
         contract = LookContract(
             object_class=run.object_class,
@@ -229,16 +230,6 @@ class _Training:
             "calibration_error": f"{result.calibration_error:.4f}",
             "torch": str(torch.__version__),
         }
-
-
-def round_weights(network: LookNetwork) -> None:
-    """Round the weights to half precision, in place.
-
-    Answers change in the third digit, and a model file needs half of the room for the network.
-    """
-    with torch.no_grad():
-        for each in network.parameters():
-            each.copy_(each.half().float())
 
 
 def _description(score: LookScore) -> str:
