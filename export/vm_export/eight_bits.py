@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import torch
+from torch import nn
 
 from vm_embedded.arrays import Singles
 
@@ -42,6 +43,7 @@ def round_kernels(network: LookNetwork) -> None:
 
     The kernel of the answers is small, and a calibration multiplies it.
     """
+    layers: list[nn.Conv2d | nn.Linear] = [*network.typed_convolutions, network.hidden]
     with torch.no_grad():
-        for layer in (*network.typed_convolutions, network.hidden):
+        for layer in layers:
             layer.weight.copy_(torch.from_numpy(rounded(layer.weight.numpy(force=True))))
