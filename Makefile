@@ -96,19 +96,18 @@ networks: need-HDRI .venv/dev ## train the networks of the package from their se
 	$(BIN)/python -c "from pathlib import Path; from vm_train.tuning.rendered_patches import RENDERED, write_rendered; \
 		from vm_train.tuning.rendered_sample import sample_run; write_rendered(RENDERED, sample_run(Path('$(BUILD)/ball-look')))"
 
+# Train in the folder of the target, with the first prerequisite as configuration, or go on with that training.
+train = if test -e $(@D)/run.json; then $(BIN)/vm-train resume $(@D); else $(BIN)/vm-train $(1) -o $(@D) --config $<; fi
+
 $(BUILD)/mesh/model.pt $(BUILD)/soccer/model.pt: $(BUILD)/%/model.pt: export/networks/%.toml
-	if test -e $(BUILD)/$*/run.json; then $(BIN)/vm-train resume $(BUILD)/$*; \
-		else $(BIN)/vm-train $(PICTURES) -o $(BUILD)/$* --config $< --unpacked $(BUILD)/unpacked; fi
+	$(call train,$(PICTURES) --unpacked $(BUILD)/unpacked)
 
 $(BUILD)/glance/look.pt: export/networks/glance.toml $(BUILD)/mesh/model.pt
-	if test -e $(BUILD)/glance/run.json; then $(BIN)/vm-train resume $(BUILD)/glance; \
-		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/mesh/model.pt -o $(BUILD)/glance --config $<; fi
+	$(call train,look $(PICTURES) --from $(BUILD)/mesh/model.pt)
 
 .PRECIOUS: $(BUILD)/%-look/look.pt
 $(BUILD)/%-look/look.pt: export/networks/%-look.toml $(BUILD)/glance/look.pt
-	if test -e $(BUILD)/$*-look/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-look; \
-		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/mesh/model.pt --glance $(BUILD)/glance/look.pt \
-			-o $(BUILD)/$*-look --config $<; fi
+	$(call train,look $(PICTURES) --from $(BUILD)/mesh/model.pt --glance $(BUILD)/glance/look.pt)
 
 $(BUILD)/ball.onnx: $(BUILD)/ball-look/look.pt
 	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs -o $@
@@ -121,33 +120,23 @@ vm_embedded/models/ball-small.onnx: $(BUILD)/ball-small-calibrated.onnx
 	cp $< $@
 
 $(BUILD)/wide-look/look.pt: export/networks/wide-look.toml $(BUILD)/ball-calibrated.onnx
-	if test -e $(BUILD)/wide-look/run.json; then $(BIN)/vm-train resume $(BUILD)/wide-look; \
-		else $(BIN)/vm-train look $(THIRD) --from $(BUILD)/ball-calibrated.onnx --glance $(BUILD)/ball-calibrated.onnx \
-			-o $(BUILD)/wide-look --config $<; fi
+	$(call train,look $(THIRD) --from $(BUILD)/ball-calibrated.onnx --glance $(BUILD)/ball-calibrated.onnx)
 
 vm_embedded/models/ball.onnx: $(BUILD)/ball-calibrated.onnx $(BUILD)/wide-look/look.pt
 	$(BIN)/vm-export $< --look $(BUILD)/wide-look/look.pt -o $(BUILD)/ball-wide.onnx
 	$(CALIBRATE) $(BUILD)/ball-wide.onnx $(CALIBRATION)/* -o $@
 
 $(UPRIGHTS:%=$(BUILD)/%-glance/look.pt): $(BUILD)/%-glance/look.pt: export/networks/upright-glance.toml $(BUILD)/soccer/model.pt
-	if test -e $(BUILD)/$*-glance/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-glance; \
-		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/soccer/model.pt -o $(BUILD)/$*-glance --config $< \
-			--set patches.object_class=$*; fi
+	$(call train,look $(PICTURES) --from $(BUILD)/soccer/model.pt --set patches.object_class=$*)
 
 $(UPRIGHTS:%=$(BUILD)/%-look/look.pt): $(BUILD)/%-look/look.pt: export/networks/%-look.toml $(BUILD)/%-glance/look.pt
-	if test -e $(BUILD)/$*-look/run.json; then $(BIN)/vm-train resume $(BUILD)/$*-look; \
-		else $(BIN)/vm-train look $(PICTURES) --from $(BUILD)/soccer/model.pt --glance $(BUILD)/$*-glance/look.pt \
-			-o $(BUILD)/$*-look --config $<; fi
+	$(call train,look $(PICTURES) --from $(BUILD)/soccer/model.pt --glance $(BUILD)/$*-glance/look.pt)
 
 $(BUILD)/robot-further/look.pt: export/networks/robot-further.toml $(BUILD)/robot-look/look.pt
-	if test -e $(BUILD)/robot-further/run.json; then $(BIN)/vm-train resume $(BUILD)/robot-further; \
-		else $(BIN)/vm-train look $(FURTHER) --from $(BUILD)/soccer/model.pt --start $(BUILD)/robot-look/look.pt \
-			-o $(BUILD)/robot-further --config $<; fi
+	$(call train,look $(FURTHER) --from $(BUILD)/soccer/model.pt --start $(BUILD)/robot-look/look.pt)
 
 $(BUILD)/robot-third/look.pt: export/networks/robot-further.toml $(BUILD)/robot-further/look.pt
-	if test -e $(BUILD)/robot-third/run.json; then $(BIN)/vm-train resume $(BUILD)/robot-third; \
-		else $(BIN)/vm-train look $(THIRD) --from $(BUILD)/soccer/model.pt --start $(BUILD)/robot-further/look.pt \
-			-o $(BUILD)/robot-third --config $< --set data.validation=0.05; fi
+	$(call train,look $(THIRD) --from $(BUILD)/soccer/model.pt --start $(BUILD)/robot-further/look.pt --set data.validation=0.05)
 
 vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt $(BUILD)/wide-look/look.pt $(BUILD)/goal-look/look.pt $(BUILD)/robot-third/look.pt
 	$(BIN)/vm-export $< --look $(BUILD)/wide-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $(BUILD)/balls.onnx

@@ -22,6 +22,7 @@ from pathlib import Path
 from vm_embedded.errors import InputError
 
 VERSION_FILE, CHANGELOG, README, PROJECT = "vm_embedded/__init__.py", "CHANGELOG.md", "README.md", "pyproject.toml"
+ROS_PACKAGE = "deploy/ros/package.xml"
 
 _VERSION = re.compile(r"\d+\.\d+\.\d+((a|b|rc)\d+)?")
 _LINK = re.compile(r"(!?\[[^\]]*\])\((?!https?://|#|mailto:)([^)\s]+)\)")
@@ -50,7 +51,7 @@ def _release(top: Path, version: str, url: str | None) -> None:
         raise InputError("the checkout has changes: commit or undo them first")
     if _git(top, "tag", "--list", tag):
         raise InputError(f"the tag {tag} exists; choose another version")
-    for name, change in ((CHANGELOG, dated), (VERSION_FILE, with_version)):
+    for name, change in ((CHANGELOG, dated), (VERSION_FILE, with_version), (ROS_PACKAGE, with_ros_version)):
         path = top / name
         path.write_text(change(path.read_text(encoding="utf-8"), version), encoding="utf-8")
     if _git(top, "status", "--porcelain"):
@@ -84,6 +85,12 @@ def dated(changelog: str, version: str) -> str:
 def with_version(module: str, version: str) -> str:
     """The text of vm_embedded/__init__.py with this version."""
     return re.sub(r'^__version__ = ".*"$', f'__version__ = "{version}"', module, flags=re.MULTILINE)
+
+
+def with_ros_version(package: str, version: str) -> str:
+    """The text of package.xml with the numbers of this version: ROS knows no release candidates."""
+    numbers = re.sub(r"(a|b|rc)\d+$", "", version)
+    return re.sub("<version>.*</version>", f"<version>{numbers}</version>", package)
 
 
 def published_readme(text: str, home: str, tag: str) -> str:

@@ -74,7 +74,7 @@ def test_vm_detect_names_vm_ros_for_topics():
 
 def test_the_package_of_ros_has_this_version_and_depends_on_all_messages():
     package = ElementTree.parse(PACKAGE / "package.xml").getroot()
-    assert package.findtext("version") == __version__
+    assert package.findtext("version") == re.sub(r"(a|b|rc)\d+$", "", __version__)
     needed = {each.text for each in package.findall("exec_depend")}
     assert {full.split("/")[0] for full in FIELDS} <= needed
 
