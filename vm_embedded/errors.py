@@ -44,6 +44,12 @@ def install_extra(extra: str) -> str:
     return f"run: pip install '.[{extra}]' in the folder of vm-embedded"
 
 
+def not_installed(error: ImportError, extra: str) -> str:
+    """Message for a package that is missing, with the extra of pyproject.toml that brings it."""
+    missing = (error.name or str(error)).partition(".")[0]
+    return f"{missing} is not installed; {install_extra(extra)}"
+
+
 def unknown(what: str, value: object, allowed: Iterable[str]) -> str:
     """Message for an unknown value: the value, the nearest allowed one, and all allowed ones."""
     names = list(allowed)

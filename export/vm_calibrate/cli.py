@@ -8,11 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from vm_embedded.cli.program import Parser, is_completing, program
-from vm_embedded.errors import VisualMeshError, install_extra, unknown
+from vm_embedded.cli.program import Parser, program
+from vm_workstation.commands import Commands, run_command
 from vm_workstation.option_types import at_least
-
-EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 LENS_NAMES = ("auto", "pinhole", "fisheye", "rectilinear", "equisolid", "equidistant")
 """What --lens takes; without `auto` the kinds of lens_kinds.py, which loads OpenCV."""
@@ -112,33 +110,13 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-calibrate and return its exit status."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    known = parsers()
-    if not given or given[0] in ("-h", "--help"):
-        print("usage: vm-calibrate COMMAND ...\n\ncommands (vm-calibrate COMMAND --help lists their options):")
-        print("\n".join(f"  {name:9s}{each.description}" for name, each in known.items()))
-        return EXIT_OK if given else EXIT_USAGE
-    if given[0] not in known and (given[0].startswith("-") or is_completing()):
-        Parser(prog="vm-calibrate", commands=tuple(known)).parse_args(given)
-    if given[0] not in known:
-        print(f"vm-calibrate: {unknown('command', given[0], known)}", file=sys.stderr)
-        return EXIT_USAGE
-    options = known[given[0]].parse_args(given[1:])
-    try:
-        from .commands import COMMANDS
+    return run_command("vm-calibrate", parsers(), _load, "calibrate", arguments)
 
-        COMMANDS[given[0]](options)
-    except ImportError as error:
-        missing = (error.name or str(error)).partition(".")[0]
-        print(f"vm-calibrate: {missing} is not installed; {install_extra('calibrate')}", file=sys.stderr)
-        return EXIT_FAILED
-    except VisualMeshError as error:
-        print(f"vm-calibrate: {error}", file=sys.stderr)
-        return EXIT_FAILED
-    except KeyboardInterrupt:
-        print("vm-calibrate: interrupted", file=sys.stderr)
-        return EXIT_INTERRUPTED
-    return EXIT_OK
+
+def _load() -> Commands:
+    from .commands import COMMANDS
+
+    return COMMANDS
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vm_embedded.cli.program import Parser, program
-from vm_embedded.errors import InputError, VisualMeshError, install_extra
+from vm_embedded.errors import InputError, VisualMeshError, not_installed
 from vm_embedded.network.bundled import SHIPPED, model_path
 from vm_embedded.network.manifest import EDGES, LAYOUTS
 from vm_embedded.network.model_file import read_model
@@ -96,8 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(options)
     except ImportError as error:
-        missing = (error.name or str(error)).partition(".")[0]
-        print(f"vm-export: {missing} is not installed; {install_extra('export')}", file=sys.stderr)
+        print(f"vm-export: {not_installed(error, 'export')}", file=sys.stderr)
     except VisualMeshError as error:
         print(f"vm-export: {error}", file=sys.stderr)
     except KeyboardInterrupt:

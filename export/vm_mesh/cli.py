@@ -8,12 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from vm_embedded.cli.program import Parser, is_completing, program
-from vm_embedded.errors import VisualMeshError, unknown
+from vm_embedded.cli.program import Parser, program
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
-
-EXIT_OK, EXIT_FAILED, EXIT_USAGE, EXIT_INTERRUPTED = 0, 1, 2, 130
+from vm_workstation.commands import Commands, run_command
 
 _EPILOG = "Exit status: 0 done, 1 not done (standard error says why), 2 wrong usage, 130 interrupted."
 
@@ -125,30 +123,13 @@ def _add_size(parser: argparse.ArgumentParser) -> None:
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-mesh and return its exit status."""
+    return run_command("vm-mesh", parsers(), _load, "train", arguments)
+
+
+def _load() -> Commands:
     from .commands import COMMANDS
 
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    known = parsers()
-    if not given or given[0] in ("-h", "--help"):
-        print("usage: vm-mesh COMMAND ...\n\ncommands (vm-mesh COMMAND --help lists their options):")
-        print("\n".join(f"  {name:9s}{each.description}" for name, each in known.items()))
-        return EXIT_OK if given else EXIT_USAGE
-    if given[0] not in known and (given[0].startswith("-") or is_completing()):
-        # Which prints the version or completions, or refuses the option, and ends the program.
-        Parser(prog="vm-mesh", commands=tuple(known)).parse_args(given)
-    if given[0] not in known:
-        print(f"vm-mesh: {unknown('command', given[0], known)}", file=sys.stderr)
-        return EXIT_USAGE
-    options = known[given[0]].parse_args(given[1:])
-    try:
-        COMMANDS[given[0]](options)
-    except VisualMeshError as error:
-        print(f"vm-mesh: {error}", file=sys.stderr)
-        return EXIT_FAILED
-    except KeyboardInterrupt:
-        print("vm-mesh: interrupted", file=sys.stderr)
-        return EXIT_INTERRUPTED
-    return EXIT_OK
+    return COMMANDS
 
 
 if __name__ == "__main__":

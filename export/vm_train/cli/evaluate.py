@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import vm_embedded
 from vm_embedded.cli.program import program
 from vm_embedded.detection.settings import Settings
-from vm_embedded.errors import InputError, VisualMeshError, install_extra
+from vm_embedded.errors import InputError, VisualMeshError, not_installed
 from vm_embedded.live.configuration import read_configuration
 from vm_embedded.network.bundled import model_path
 from vm_workstation.stopping import stoppable
@@ -45,8 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 return run_points(points_parser().parse_args(given[1:]))
             return _evaluate(parser().parse_args(given))
     except ImportError as error:
-        missing = (error.name or str(error)).partition(".")[0]
-        print(f"vm-evaluate: {missing} is not installed; {install_extra('train')}", file=sys.stderr)
+        print(f"vm-evaluate: {not_installed(error, 'train')}", file=sys.stderr)
     except VisualMeshError as error:
         print(f"vm-evaluate: {' '.join(str(error).split())}", file=sys.stderr)
     except KeyboardInterrupt:

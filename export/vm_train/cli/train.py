@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from vm_embedded.cli.program import discard_output, program
 from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
-from vm_embedded.errors import VisualMeshError, install_extra
+from vm_embedded.errors import VisualMeshError, not_installed
 from vm_embedded.files import check_writable
 from vm_workstation.stopping import stoppable
 
@@ -57,8 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return run_training(options) if command is None else commands[command](options)
     except ImportError as error:
         if _is_leader():
-            missing = (error.name or str(error)).partition(".")[0]
-            print(f"vm-train: {missing} is not installed; {install_extra('train')}", file=sys.stderr)
+            print(f"vm-train: {not_installed(error, 'train')}", file=sys.stderr)
         return EXIT_FAILED
     except VisualMeshError as error:
         if _is_leader():

@@ -33,13 +33,8 @@ class RosSettings:
     def __post_init__(self) -> None:
         check_entries(self)
 
-    @property
-    def camera_info_topic(self) -> str:
-        """The topic of the lens, as image_transport names it: beside the topic of the images."""
-        return self.camera_info or camera_info_beside(self.image)
-
 
 def camera_info_beside(image_topic: str) -> str:
-    """The usual topic of the lens for a topic of images, raw or compressed."""
+    """The usual topic of the lens for a topic of images, raw or compressed, as image_transport names it."""
     parts = image_topic.removesuffix("/compressed").split("/")
     return "/".join([*parts[:-1], "camera_info"])
