@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 
@@ -51,41 +51,37 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     follow = _Follow(Tracker(given.track), given.camera.fps) if given.track.on else None
     boxes = BoxWriter(options.save_boxes, _object_classes(detector)) if options.save_boxes is not None else None
 
-    processed = 0
-    bar = ProgressBar(source.count)
     with ExitStack() as stack:
-        mcap = None
+        mcap = video = None
         if options.save_mcap is not None:
             mcap = stack.enter_context(McapFile(options.save_mcap, given.ros.plane_frame))
-        video = None
         if options.save_video is not None:
             video = stack.enter_context(VideoFile(options.save_video, source.rate or _IMAGES_RATE))
-        work = _Pass(detector, pose, follow, options, emit_points, FrameNames(), boxes, mcap, video)
-        remark = ""
-        for frame in source.frames:
-            if follow is not None and frame.index == 0:
-                follow.time(frame)  # without times, no frame can be processed
-            try:
-                line = work.process(frame)
-                remark = remark or pose.unused(frame)
-            except VisualMeshError as error:
-                bar.clear()
-                complain(str(error))
-                if mcap is not None:
-                    mcap.write_state(frame, "degraded", str(error))
-                continue
+        work = _Pass(detector, pose, follow, options, emit_points, boxes, mcap, video)
+        _process_all(source, work)
+    for remark in work.remarks():
+        complain(remark)
+    return work.processed
+
+
+def _process_all(source: Source, work: _Pass) -> None:
+    """Process each frame, and print its line or what is wrong with it."""
+    bar = ProgressBar(source.count)
+    for frame in source.frames:
+        if work.follow is not None and frame.index == 0:
+            work.follow.time(frame)  # without times, no frame can be processed
+        try:
+            line = work.process(frame)
+        except VisualMeshError as error:
             bar.clear()
-            print(line, flush=True)
-            processed += 1
-            bar.show(frame.index + 1)
+            complain(str(error))
+            if work.mcap is not None:
+                work.mcap.write_state(frame, "degraded", str(error))
+            continue
         bar.clear()
-        # Without a close look, sizes are as coarse as the mesh.
-        hint = "" if detector.look is None else size_hint(work.sizes, detector.manifest.object_radius)
-        for line in filter(None, (remark, hint)):
-            complain(line)
-        if processed and not work.points:
-            complain("no frame shows a near part of the plane: check --height [m], --pitch (down is above 0), and lens")
-    return processed
+        print(line, flush=True)
+        bar.show(frame.index + 1)
+    bar.clear()
 
 
 def _open(names: Sequence[str], given: Configuration) -> Source:
@@ -160,8 +156,9 @@ def _object_classes(detector: Detector) -> tuple[str, ...]:
 class _Pass:
     """All that a pass over the frames needs.
 
-    boxes, mcap, video: the files that the options ask for. points: number of mesh points in all frames so far. sizes:
-    of the objects in them, relative to the expected size.
+    boxes, mcap, video: the files that the options ask for. processed: number of frames so far. points: number of mesh
+    points in them. sizes: of the objects in them, relative to the expected size. replaced: the first remark about what
+    a lens file replaces.
     """
 
     detector: Detector
@@ -169,12 +166,14 @@ class _Pass:
     follow: _Follow | None
     options: argparse.Namespace
     emit_points: Sequence[str]
-    names: FrameNames
     boxes: BoxWriter | None
     mcap: McapFile | None
     video: VideoFile | None
+    names: FrameNames = field(default_factory=FrameNames)
+    processed: int = 0
     points: int = 0
     sizes: list[float] = field(default_factory=list)
+    replaced: str = ""
 
     def process(self, frame: Frame) -> str:
         """Detect in a frame, save the files that the options ask for, and return its line of JSON.
@@ -183,9 +182,21 @@ class _Pass:
         """
         image = frame.read()  # its errors name the file
         try:
-            return self._detect(image, frame)
+            line = self._detect(image, frame)
         except VisualMeshError as error:
             raise InputError(f"{frame.source}: {error}") from error
+        self.replaced = self.replaced or self.pose.unused(frame)
+        self.processed += 1
+        return line
+
+    def remarks(self) -> Iterator[str]:
+        """What the user should know after the last frame."""
+        if self.replaced:
+            yield self.replaced
+        if self.detector.look is not None:  # without one, sizes are as coarse as the mesh
+            yield from filter(None, [size_hint(self.sizes, self.detector.manifest.object_radius)])
+        if self.processed and not self.points:
+            yield "no frame shows a near part of the plane: check --height [m], --pitch (down is above 0), and lens"
 
     def _detect(self, image: Image, frame: Frame) -> str:
         options, name = self.options, self.names.of(frame)

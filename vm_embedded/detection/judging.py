@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays import Floats
 from .candidates import Candidate
 from .prepared_view import PreparedView
 from .settings import Settings
@@ -21,7 +22,7 @@ _INSIDE_ENDS, _BAND_BEGINS, _BAND_ENDS = -0.25, 0.75, 2.25
 
 def judge(view: PreparedView, candidate: Candidate, accepted: Sequence[Candidate], settings: Settings) -> Candidate:
     """The candidate, with a reason if its points don't show an object at its center or an accepted one is there."""
-    reason = _misfit(view, candidate, settings) or _repeats(view, candidate, accepted)
+    reason = _misfit(view, candidate, settings) or repeated(view, candidate.center, [each.center for each in accepted])
     return replace(candidate, reason=reason)
 
 
@@ -57,10 +58,14 @@ def _misfit(view: PreparedView, candidate: Candidate, settings: Settings) -> str
     return None
 
 
-def _repeats(view: PreparedView, candidate: Candidate, accepted: Sequence[Candidate]) -> str | None:
-    """Why the candidate repeats an accepted object: its center is inside that object's outline. None if it does not."""
-    ray = (candidate.center / np.linalg.norm(candidate.center))[None]
-    for other in accepted:
-        if view.shape.offset(ray, other.center[None], view.height)[0, 0] < 1.0:
-            return f"the same object as the one at {np.linalg.norm(other.center):.2f} m"
-    return None
+def repeated(view: PreparedView, center: Floats, accepted: Sequence[Floats]) -> str | None:
+    """Why an object with this center is an accepted one: the center is inside that one's outline. None if it is not.
+
+    center (3,), and those of the accepted objects: relative to the camera in the mesh frame [m].
+    """
+    if not accepted:
+        return None
+    ray = (center / np.linalg.norm(center))[None]
+    offset = view.shape.offset(ray, np.stack(accepted), view.height)[:, 0]
+    nearest = int(np.argmin(offset))
+    return f"the same object as the one at {np.linalg.norm(accepted[nearest]):.2f} m" if offset[nearest] < 1.0 else None

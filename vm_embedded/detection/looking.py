@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from ..arrays import Floats, Image, Mask, Singles
 from ..network.look_contract import LookContract
+from .judging import repeated
 from .observation import Observation
 from .patches import Tangents, apparent_radii, cut_patches, patch_nodes
 from .proposals import propose_places
@@ -266,11 +267,8 @@ def _judged(
             reason = "on the horizon or above it"
         elif probability < settings.min_confidence:
             reason = f"probability {probability:.2f}, below {settings.min_confidence:g}"
-        elif kept:
-            ray = (center / np.linalg.norm(center))[None]
-            offset = view.shape.offset(ray, np.stack(kept), view.height)[:, 0]
-            if offset.min() < 1.0:
-                reason = f"the same object as the one at {np.linalg.norm(kept[int(np.argmin(offset))]):.2f} m"
+        else:
+            reason = repeated(view, center, kept)
         if reason is None:
             kept.append(center)
         if reason is None or explain:
