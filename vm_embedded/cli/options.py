@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import Field, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..cameras.camera import CameraSettings
 from ..cameras.image_files import MESSAGES
 from ..cameras.ros.settings import RosSettings
+from ..config.entries import EntryError, checked
 from ..detection.settings import Settings
 from ..errors import InputError
 from ..geometry.lens_files import read_lens_file
@@ -67,13 +69,18 @@ def add_pose(parser: argparse.ArgumentParser, description: str) -> None:
         metavar="ANGLE",
         help="instead of a lens file: the horizontal angle of view, such as 70deg, of a lens without distortion",
     )
+    entries = {each.name: partial(_read, each) for each in fields(FixedPose)}
     pose.add_argument(
         "--height",
+        type=entries["height"],
         metavar="M",
         help="height of the camera above the ground plane [m]; default: the pose of the lens file",
     )
-    pose.add_argument("--pitch", metavar="ANGLE", help="angle of the optical axis below the horizon [rad]; default 0")
-    pose.add_argument("--roll", metavar="ANGLE", help="tilt of the camera to its right side [rad]; default 0")
+    for name, meaning in (
+        ("pitch", "angle of the optical axis below the horizon"),
+        ("roll", "tilt of the camera to its right side"),
+    ):
+        pose.add_argument(f"--{name}", type=entries[name], metavar="ANGLE", help=f"{meaning} [rad]; default 0")
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
@@ -102,14 +109,37 @@ def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, skip:
         help = f"{each.metadata['help']}{unit}{_default(each)}".replace("%", "%%")
         name = prefix + each.name
         option = "--" + name.removesuffix("_on").replace("_", "-")
-        if "allowed" in each.metadata:
-            group.add_argument(option, dest=name, choices=each.metadata["allowed"], help=help)
-        elif isinstance(each.default, bool):
+        if isinstance(each.default, bool):
             group.add_argument(option, dest=name, action=argparse.BooleanOptionalAction, default=None, help=help)
         else:
-            kind = str if isinstance(each.default, str) else int if isinstance(each.default, int) else float
-            letter = {str: "TEXT", int: "N", float: "X"}[kind]
-            group.add_argument(option, dest=name, type=kind, metavar=letter, help=help)
+            allowed = each.metadata.get("allowed")
+            letter = "TEXT" if isinstance(each.default, str) else "N" if isinstance(each.default, int) else "X"
+            group.add_argument(
+                option,
+                dest=name,
+                type=partial(_read, each),
+                choices=allowed,
+                metavar=None if allowed else letter,
+                help=help,
+            )
+
+
+def _read(entry: Field[Any], text: str) -> Any:
+    """The value of an entry from the text of its option. Raises ArgumentTypeError with the entry's own message."""
+    try:
+        return checked(entry, text if isinstance(entry.default, str) else _number(text))
+    except EntryError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _number(text: str) -> int | float | str:
+    """A text as a number; as it is, if it is none: the entry says what it allows, for example an angle in degrees."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
 
 
 def _default(entry: Field[Any]) -> str:

@@ -8,7 +8,7 @@ from dataclasses import Field
 from typing import Any
 
 from ..errors import InputError
-from .entries import entry
+from .entries import Limits, entry
 
 _DEGREES = re.compile(r"\s*([-+0-9.eE]+)\s*deg\s*")
 
@@ -24,12 +24,8 @@ def parse_angle(value: object, name: str) -> float:
     name: of the entry or option. Raises InputError for anything else, and for radians beyond a full turn, which are
     probably degrees.
     """
-    message = f"{name} must be an angle in radians, or in degrees as in 20deg, not {value!r}"
-    degrees = _DEGREES.fullmatch(value) if isinstance(value, str) else None
-    if degrees:
-        return math.radians(_finite(degrees.group(1), message))
-    radians = _finite(value, message)
-    if abs(radians) > 2.0 * math.pi:
+    radians = _radians(value, f"{name} must be an angle in radians, or in degrees as in 20deg, not {value!r}")
+    if abs(radians) > 2.0 * math.pi and not _is_degrees(value):
         raise InputError(f"{name} of {radians:g} rad is more than a full turn; did you mean {radians:g}deg?")
     return radians
 
@@ -39,9 +35,9 @@ def length(default: float | None, help: str) -> Any:
     return entry(_checked_length, default, help, "m")
 
 
-def angle(default: float | None, help: str) -> Any:
-    """A configuration entry that holds an angle [rad]."""
-    return entry(_checked_angle, default, help, "rad")
+def angle(default: float | None, help: str, limits: Limits) -> Any:
+    """A configuration entry that holds an angle within limits [rad]."""
+    return entry(_checked_angle, default, help, "rad", limits=limits)
 
 
 def _checked_length(entry: Field[Any], value: object) -> float:
@@ -49,7 +45,24 @@ def _checked_length(entry: Field[Any], value: object) -> float:
 
 
 def _checked_angle(entry: Field[Any], value: object) -> float:
-    return parse_angle(value, entry.name)
+    low, high = entry.metadata["limits"]
+    message = f"{entry.name} must be an angle, as in 0.3 or 20deg, from {low:g} to {high:g} rad, not {value!r}"
+    radians = _radians(value, message)
+    if low <= radians <= high:
+        return radians
+    if not _is_degrees(value) and low <= math.radians(radians) <= high:
+        message += f"; did you mean {radians:g}deg?"
+    raise InputError(message)
+
+
+def _is_degrees(value: object) -> bool:
+    return isinstance(value, str) and _DEGREES.fullmatch(value) is not None
+
+
+def _radians(value: object, message: str) -> float:
+    """An angle [rad] from a number or text. Raises InputError with the message."""
+    degrees = _DEGREES.fullmatch(value) if isinstance(value, str) else None
+    return math.radians(_finite(degrees[1], message)) if degrees else _finite(value, message)
 
 
 def _finite(value: object, message: str) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..config.entries import check_entries, number, one_of, share, switch
+from ..config.units import angle
 from .pixel_formats import FORMATS
 
 
@@ -26,8 +27,8 @@ class Settings:
         "rings",
         (0.0, 2.0),
     )
-    pitch_step: float = number(0.05, "width of the pitch interval that shares one cache entry", "rad", (1e-3, 1.0))
-    roll_step: float = number(0.05, "width of the roll interval that shares one cache entry", "rad", (1e-3, 1.0))
+    pitch_step: float = angle(0.05, "width of the pitch interval that shares one cache entry", (1e-3, 1.0))
+    roll_step: float = angle(0.05, "width of the roll interval that shares one cache entry", (1e-3, 1.0))
     cache_mib: float = number(64.0, "memory for meshes and prepared points", "MiB", (0.0, 65536.0))
     object_radius: float | None = number(
         None,

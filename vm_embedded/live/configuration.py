@@ -49,8 +49,12 @@ class FixedPose:
     """
 
     height: float | None = length(None, "height of the camera above the plane")
-    pitch: float | None = angle(None, 'angle of the optical axis below the horizon, in radians or as in "20deg"')
-    roll: float | None = angle(None, 'roll of the camera to the right, in radians or as in "-2deg"')
+    pitch: float | None = angle(
+        None, 'angle of the optical axis below the horizon, in radians or as in "20deg"', (-math.pi / 2, math.pi / 2)
+    )
+    roll: float | None = angle(
+        None, 'roll of the camera to the right, in radians or as in "-2deg"', (-math.pi, math.pi)
+    )
 
     def __post_init__(self) -> None:
         check_entries(self)

@@ -37,8 +37,11 @@ def test_wrong_usage_exits_with_2(arguments):
 
 
 def test_settings_out_of_range_are_named():
-    one_complaint(detect(IMAGES[0], "--threads", 0, code=1), "threads", "0")
-    one_complaint(detect(IMAGES[0], "--threshold", "nan", code=1), "threshold", "nan")
+    one_complaint(detect(IMAGES[0], "--threads", 0, code=2), "--threads", "from 1 to 256, not 0")
+    one_complaint(detect(IMAGES[0], "--threads", "two", code=2), "--threads", "whole number from 1 to 256, not 'two'")
+    one_complaint(detect(IMAGES[0], "--threshold", "nan", code=2), "--threshold", "from 0 to 1, not nan")
+    one_complaint(detect(IMAGES[0], "--object-radius", "7.5cm", code=2), "--object-radius", "10 m, not '7.5cm'")
+    one_complaint(detect(IMAGES[0], "--format", "RGB", code=2), "--format", "did you mean 'rgb'?", "bayer_rggb")
 
 
 def test_every_setting_is_an_option():

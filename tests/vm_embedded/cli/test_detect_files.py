@@ -377,21 +377,23 @@ def test_a_frame_without_lens_or_orientation_says_what_to_give(tmp_path, lens):
 
 
 @pytest.mark.parametrize(
-    ("pose", "part"),
+    ("pose", "part", "code"),
     [
-        (("--height", "nan"), "nan"),
-        (("--height", "high"), "[orientation] height must be a number of meters, as in 0.8, not 'high'"),
-        (("--height", "-1"), "-1"),
-        (("--height", "0.15"), "0.19"),
-        (("--height", "0.8", "--pitch", "nan"), "nan"),
-        (("--height", "0.8", "--roll", "inf"), "inf"),
-        (("--height", "0.8", "--pitch", "20"), "20deg"),
-        (("--height", "0.8", "--object-radius", "0.5"), "diameter"),
+        (("--height", "nan"), "--height: height must be a number of meters, as in 0.8, not nan", 2),
+        (("--height", "high"), "--height: height must be a number of meters, as in 0.8, not 'high'", 2),
+        (("--height", "-1"), "-1", 1),
+        (("--height", "0.15"), "0.19", 1),
+        (("--height", "0.8", "--pitch", "nan"), "nan", 2),
+        (("--height", "0.8", "--roll", "inf"), "inf", 2),
+        (("--height", "0.8", "--pitch", "20"), "did you mean 20deg?", 2),
+        (("--height", "0.8", "--pitch", "5"), "from -1.5708 to 1.5708 rad, not 5; did you mean 5deg?", 2),
+        (("--height", "0.8", "--pitch", "100deg"), "rad, not '100deg'", 2),
+        (("--height", "0.8", "--object-radius", "0.5"), "diameter", 1),
     ],
 )
-def test_impossible_geometry_is_named(tmp_path, lens, pose, part):
+def test_impossible_geometry_is_named(tmp_path, lens, pose, part, code):
     shutil.copy(IMAGES[0], tmp_path / "frame.jpg")
-    one_complaint(detect(tmp_path / "frame.jpg", "--lens", lens, *pose, code=1), part)
+    one_complaint(detect(tmp_path / "frame.jpg", "--lens", lens, *pose, code=code), part)
 
 
 def test_a_nan_in_hoc_is_named(folder):

@@ -14,6 +14,7 @@ KNOWN = {each.name: each for each in fields(Settings)}
 RANGES = {name: each.metadata["limits"] for name, each in KNOWN.items() if "limits" in each.metadata}
 CHOICES = {name: each.metadata["allowed"] for name, each in KNOWN.items() if "allowed" in each.metadata}
 WHOLE = {"threads", "max_proposals"}
+ANGLES = {"pitch_step", "roll_step"}
 
 
 def test_the_defaults_are_within_their_ranges():
@@ -55,8 +56,18 @@ def test_every_value_out_of_a_range_is_refused_by_name_and_range(name, beyond, b
 @pytest.mark.parametrize("name", RANGES)
 @pytest.mark.parametrize("value", [math.nan, "1", "", True, [1.0], {}])
 def test_what_is_no_number_of_the_range_is_refused_by_name(name, value):
+    if name in ANGLES and value == "1":
+        value = "1deg2"  # the text of an angle may be a number, as the option gives it
     with pytest.raises(InputError, match=name):
         Settings(**{name: value})
+
+
+@pytest.mark.parametrize("name", sorted(ANGLES))
+@given(st.floats(0.1, 50.0))
+def test_an_angle_may_be_in_degrees(name, degrees):
+    assert getattr(Settings(**{name: f"{degrees}deg"}), name) == math.radians(degrees)
+    with pytest.raises(InputError, match=rf"{name} must be .*, not '60deg'"):
+        Settings(**{name: "60deg"})
 
 
 @pytest.mark.parametrize("name", ["threads", "threshold"])
