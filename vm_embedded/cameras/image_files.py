@@ -180,12 +180,17 @@ def read_image(path: str | Path, raw: bool = False, max_megapixels: float = MAX_
         raise InputError(f"{path} {error}") from error
 
 
-def lens_beside(path: Path | None) -> Path | None:
-    """The file lensNAME.yaml beside imageNAME.jpg, or None if it does not exist."""
+def lens_place(path: Path | None) -> Path | None:
+    """Where the lens file of imageNAME.jpg may be: lensNAME.yaml beside it. None for other names."""
     if path is None or not path.stem.startswith("image"):
         return None
-    beside = path.with_name("lens" + path.stem.removeprefix("image") + ".yaml")
-    return beside if beside.exists() else None
+    return path.with_name("lens" + path.stem.removeprefix("image") + ".yaml")
+
+
+def lens_beside(path: Path | None) -> Path | None:
+    """The file lensNAME.yaml beside imageNAME.jpg, or None if it does not exist."""
+    place = lens_place(path)
+    return place if place is not None and place.exists() else None
 
 
 def lens_file_of(image: Path) -> Path | None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 
-from ..errors import InputError
+from ..errors import InputError, unknown
 from .camera import Camera, CameraSettings, without_password
 from .fault import FaultCamera, Faults, FaultScript
 from .files import FileCamera
@@ -16,6 +17,9 @@ from .synthetic import SyntheticCamera, parse_motion
 
 ROS = "ros"
 """Source of the images of a ROS topic, which vm-ros opens."""
+
+_PROTOCOLS = ("http", "https", "rtsp", "rtsps", "rtmp", "rtmps", "rtp", "srt", "tcp", "udp", "file")
+"""Usual protocols of addresses; OpenCV's backends know more."""
 
 Opener = Callable[[], Camera]
 """Opens a camera. Raises CameraError if that fails now but may succeed later."""
@@ -61,6 +65,7 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
         parse_url(source)
         return lambda: _network_camera(settings, raw)
     if device_path(source) is not None or source.startswith("gstreamer:") or "://" in source:
+        _check_protocol(source)
         check_opencv_settings(settings)
         return lambda: OpenCvCamera(settings, raw)
     if not Path(source).exists():
@@ -69,6 +74,13 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
             "synthetic, fault:SCRIPT or gstreamer:PIPELINE"
         )
     return lambda: FileCamera(settings, raw)
+
+
+def _check_protocol(source: str) -> None:
+    """Raise InputError for an address whose protocol looks like a mistyped one."""
+    protocol, slashes, _ = source.partition("://")
+    if slashes and protocol not in _PROTOCOLS and get_close_matches(protocol, _PROTOCOLS, n=1):
+        raise InputError(unknown("protocol", protocol, _PROTOCOLS))
 
 
 def _network_camera(settings: CameraSettings, raw: bool) -> Camera:

@@ -12,14 +12,18 @@ import struct
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from ..arrays import Image
 from ..cameras.camera import without_password
+from ..cameras.image_files import open_source
 from ..cameras.open_camera import brings_lens_and_pose, camera_opener, is_live
 from ..cameras.opencv import device_path
+from ..cameras.ros.bags import is_bag
 from ..errors import InputError, VisualMeshError, one_line
 from ..geometry.lens import Size
 from ..geometry.radial_lenses import RadialLens
@@ -40,6 +44,9 @@ _EARLIEST_TIME = 1735689600.0
 
 _PORTS = {"http": 80, "https": 443, "rtsp": 554, "rtmp": 1935}
 """Usual ports of the addresses of cameras."""
+
+_HIGHEST = 20.0
+"""Height of a camera from which the pose is probably in other units [m]."""
 
 _PATIENCE = 3.0
 """How long to wait for the host of a camera [s]."""
@@ -67,7 +74,7 @@ def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator
         yield check_opencv({each.name.lower() for each in metadata.distributions() if each.name})
         yield check_model(configuration)
         yield from check_cameras(configuration, root)
-        yield check_lens(configuration)
+        yield check_lens(configuration, first_size(configuration))
         yield check_pose(configuration)
         yield check_clock(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", time.time())
         yield check_status_socket(configuration)
@@ -165,7 +172,9 @@ def check_cameras(configuration: Configuration, root: Path) -> Iterator[Finding]
         return
     device = device_path(source)
     try:
-        camera_opener(configuration.camera, configuration.detector.format != "bgr")
+        if is_live(source) or is_bag(source):
+            camera_opener(configuration.camera, configuration.detector.format != "bgr")
+        _first_image(configuration)
         if device is not None and not (root / device.relative_to("/")).exists():
             there = ", ".join(str(each) for each in nodes) or "none"
             yield Finding("camera", BAD, f"{device} does not exist; video devices: {there}", "ls -l /dev/v4l/by-id/")
@@ -185,6 +194,26 @@ def check_cameras(configuration: Configuration, root: Path) -> Iterator[Finding]
         f"{shown}: the number may change when cameras are plugged in again" if may_change else shown,
         "ls -l /dev/v4l/by-id/ and use one of these paths" if may_change else "",
     )
+
+
+def first_size(configuration: Configuration) -> Size | None:
+    """Size [px] of the camera's images: as it is configured, else that of the first image of files; None if unknown."""
+    camera = configuration.camera
+    if camera.width and camera.height:
+        return camera.width, camera.height
+    with suppress(VisualMeshError):  # check_cameras reports it
+        image = _first_image(configuration)
+        return None if image is None else (image.shape[1], image.shape[0])
+    return None
+
+
+def _first_image(configuration: Configuration) -> Image | None:
+    """The first image of files or of a folder; None for a live camera or a bag. Raises InputError."""
+    camera = configuration.camera
+    if not camera.source or is_live(camera.source) or is_bag(camera.source):
+        return None
+    opened = open_source(camera.source, configuration.detector.format != "bgr", camera.max_megapixels)
+    return next(opened.frames).read()
 
 
 def _refused_connection(source: str) -> str:
@@ -233,8 +262,8 @@ def pixel_formats(node: Path) -> list[str]:
         os.close(descriptor)
 
 
-def check_lens(configuration: Configuration) -> Finding:
-    """Whether the lens fits the image size that the camera is configured for."""
+def check_lens(configuration: Configuration, size: Size | None) -> Finding:
+    """Whether the lens fits the images. size: of them [px], None if it is not known."""
     lens, camera = configuration.lens, configuration.camera
     if configuration.fov is not None:
         return Finding("lens", GOOD, f"{math.degrees(configuration.fov):g} degrees wide, without distortion")
@@ -258,12 +287,12 @@ def check_lens(configuration: Configuration) -> Finding:
             f"center {list(lens.lens.center)} px is far from the middle of the picture",
             "center is the picture's middle minus the optical center, [0, 0] if they are the same; correct the lens",
         )
-    if not (camera.width and camera.height):
+    if size is None:
         return Finding(
             "lens", GOOD, f"for {lens.lens.size[0]} x {lens.lens.size[1]} px; the camera chooses its own size"
         )
     try:
-        lens.lens.for_image((camera.width, camera.height))
+        lens.lens.for_image(size)
     except VisualMeshError as error:
         return Finding(
             "lens",
@@ -290,7 +319,10 @@ def check_pose(configuration: Configuration) -> Finding:
         return Finding("pose", BAD, str(error), "vm-detect --height M, or set height in [orientation] of vm.toml")
     if orientation is not None:
         pitch, roll = (round(math.degrees(each), 1) + 0.0 for each in (orientation.pitch, orientation.roll))
-        return Finding("pose", GOOD, f"height {orientation.height:g} m, pitch {pitch:g} deg, roll {roll:g} deg")
+        seen = f"height {orientation.height:g} m, pitch {pitch:g} deg, roll {roll:g} deg"
+        if orientation.height > _HIGHEST:
+            return Finding("pose", WARNING, f"{seen}: few objects are visible from there", "heights are in meters")
+        return Finding("pose", GOOD, seen)
     if brings_lens_and_pose(source):
         return Finding("pose", GOOD, f"{source} has its own")
     return Finding(

@@ -13,8 +13,9 @@ from pathlib import Path
 
 import cv2
 
+from ..cameras.image_files import open_source
 from ..cameras.library_messages import silence_opencv
-from ..cameras.open_camera import is_live
+from ..cameras.open_camera import ROS, camera_opener, is_live
 from ..cameras.ros.bags import is_bag
 from ..config.toml_reader import parse_toml
 from ..config.toml_writer import to_commented_toml
@@ -216,7 +217,12 @@ def _ask(socket: str, command: str) -> int:
 
 
 def _check_configuration(given: Configuration) -> int:
-    """Check the configuration and the model. Raises VisualMeshError."""
+    """Check the configuration, the model and whether its camera can exist. Raises VisualMeshError."""
+    source, raw = given.camera.source, given.detector.format != "bgr"
+    if is_live(source) and source != ROS:
+        camera_opener(given.camera, raw)
+    elif source and not is_live(source) and not is_bag(source):
+        open_source(source, raw, given.camera.max_megapixels)
     model, proved = asyncio.run(prove_model(given))
     print(f"{given.model}: {len(model.manifest.classes)} classes, {proved}; the configuration is good")
     return EXIT_OK

@@ -10,7 +10,16 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 
 from ..arrays import Image
-from ..cameras.image_files import Frame, Source, check_file_format, joined, lens_beside, open_source, open_sources
+from ..cameras.image_files import (
+    Frame,
+    Source,
+    check_file_format,
+    joined,
+    lens_beside,
+    lens_place,
+    open_source,
+    open_sources,
+)
 from ..cameras.ros.bags import BagReading, is_bag, open_bag
 from ..detection.detector import Detector
 from ..detection.tracker import Tracker
@@ -128,7 +137,9 @@ class _DefaultPose:
             file = read_lens_file(beside)
             lens, orientation = file.lens, file.orientation or orientation
         if lens is None:
-            raise InputError("no lens: give --lens or --fov, or put lensNAME.yaml beside imageNAME")
+            place = lens_place(frame.path)
+            beside_it = "lensNAME.yaml beside imageNAME" if place is None else f"{place.name} beside it"
+            raise InputError(f"no lens: give --lens or --fov, or put {beside_it}")
         if orientation is None:
             raise InputError("no orientation: give --height (and --pitch, --roll), or Hoc in the lens file")
         return lens, orientation

@@ -97,6 +97,8 @@ class Parser(argparse.ArgumentParser):
             if name.startswith("--") and not any(option.startswith(name) for option in options):
                 near = get_close_matches(name, options, n=1)
                 return f"unknown option {name}" + (f": did you mean {near[0]}?" if near else "")
+            if name.startswith("-") and f"-{name}" in options:
+                return f"unknown option {name}: did you mean -{name}?"
         return None
 
 

@@ -131,7 +131,10 @@ def _build(kind: Any, table: Mapping[str, Any]) -> Any:
     sections = {}
     for name, value in table.items():
         if name not in known:
-            raise _Fault(name, None, unknown("section" if isinstance(value, Mapping) else "key", name, known))
+            owners = [f"[{each}]" for each, section in known.items() if name in _entries(section)]
+            belongs = f"unknown key {name!r}: it belongs in {' or '.join(owners)}" if owners else ""
+            kind_of_name = "section" if isinstance(value, Mapping) else "key"
+            raise _Fault(name, None, belongs or unknown(kind_of_name, name, known))
         try:
             sections[name] = _read_value(name, known[name], value)
         except _Fault:
@@ -143,12 +146,18 @@ def _build(kind: Any, table: Mapping[str, Any]) -> Any:
     return kind(**sections)
 
 
+def _entries(section: Field[Any]) -> list[str]:
+    """Names of the entries of a section; none of a top-level value with its own `read`."""
+    kind: Any = section.default_factory
+    return [] if "read" in section.metadata else [each.name for each in fields(kind)]
+
+
 def _read_value(name: str, section: Field[Any], value: Any) -> Any:
     """A top-level value: by its own `read`, or as a section. Raises InputError."""
     if "read" in section.metadata:
         return section.metadata["read"](value)
     kind: Any = section.default_factory
-    known = [each.name for each in fields(kind)]
+    known = _entries(section)
     for key in _checked_section(name, value):
         if key not in known:
             raise _Fault(name, key, unknown(f"entry in [{name}]", key, known))

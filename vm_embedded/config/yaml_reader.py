@@ -152,7 +152,7 @@ def _mapping(lines: list[_Line], at: int, indent: int, depth: int) -> tuple[dict
         line = lines[at]
         match = _KEY.match(line.text)
         if not match:
-            break
+            raise _error(line, "expected KEY: VALUE")
         key, content = _unquoted(match.group(1)), _TAG.sub("", match.group(2) or "", count=1)
         if key in table:
             raise _error(line, "duplicate key")

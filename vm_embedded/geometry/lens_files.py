@@ -24,6 +24,9 @@ _LARGEST = 2**20
 
 _LENS_KEYS = ("projection", "focal_length", "center", "distortion", "fov", "size")
 
+_REFERENCE_KEYS = ("projection", "focal_length", "centre", "k", "fov", "size", "Hoc")
+"""Keys of the reference's lens files, and `size`, which only ours have."""
+
 _REFERENCE_NAMES = {"centre": "center", "k": "distortion"}
 """The reference's names of keys, and ours."""
 
@@ -79,12 +82,15 @@ def parse_lens_yaml(text: str) -> LensFile:
     table = read_yaml(text)
     if not isinstance(table, dict):
         raise InputError("expected a table of keys and values")
-    if "projection" in table:
-        table = {_REFERENCE_NAMES.get(key, key): value for key, value in table.items()}
-        hoc = table.pop("Hoc", None)
-        return LensFile(lens_from_table(table), None if hoc is None else Orientation.from_hoc(hoc))
     hoc = table.pop("Hoc", None)
-    return LensFile(lens_from_calibration(table), None if hoc is None else Orientation.from_hoc(hoc))
+    orientation = None if hoc is None else Orientation.from_hoc(hoc)
+    if not {"projection", "focal_length"} & table.keys():
+        return LensFile(lens_from_calibration(table), orientation)
+    for key in table:
+        if key not in (*_REFERENCE_KEYS, *_LENS_KEYS):
+            raise InputError(unknown("lens key", key, _REFERENCE_KEYS))
+    named = {str(_REFERENCE_NAMES.get(key, key)): value for key, value in table.items()}
+    return LensFile(lens_from_table(named), orientation)
 
 
 def format_lens_file(lens: Lens, orientation: Orientation | None) -> str:

@@ -101,7 +101,7 @@ class Orientation:
         try:
             matrix = np.asarray(hoc, dtype=np.float64)
         except (TypeError, ValueError) as error:
-            raise GeometryError(f"Hoc must be 4 x 4 numbers: {error}") from error
+            raise GeometryError(f"Hoc must be 4 x 4 numbers, not {str(hoc)[:60]}") from error
         if matrix.shape != (4, 4):
             raise GeometryError(f"Hoc must be 4 x 4 numbers, not of shape {matrix.shape}")
         return cls(float(matrix[2, 3]), matrix[:3, :3])

@@ -26,7 +26,7 @@ class Sphere(Shape):
     def spacing(self, height: Number) -> Number:
         if not all_between(height, 2.0 * self.radius, math.inf):
             raise GeometryError(
-                f"camera height must be above the ball's diameter, {2.0 * self.radius:g} m, not {height} m"
+                f"camera height must be above the ball's diameter, {2.0 * self.radius:g} m, not {np.min(height):g} m"
             )
         return -np.log1p(-2.0 * self.radius / height)  # what eqn:sphere_phi_1 adds to asinh(tan(phi))
 

@@ -24,3 +24,5 @@ def test_names_of_cameras():
     for wrong in ("nothing", "synthetic:fast", "synthetic:nan", "http://", "http://a:b/"):
         with pytest.raises(InputError):
             camera_opener(CameraSettings(source=wrong))
+    with pytest.raises(InputError, match=r"unknown protocol 'rstp'.*allowed: http, https, rtsp"):
+        camera_opener(CameraSettings(source="rstp://a/b"))

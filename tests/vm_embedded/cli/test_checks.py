@@ -4,6 +4,8 @@ import os
 import socket
 from dataclasses import replace
 
+import cv2
+import numpy as np
 import pytest
 
 from vm_embedded.cameras.camera import CameraSettings
@@ -114,6 +116,29 @@ def test_a_lens_for_another_size_is_seen(root):
     without = replace(HEALTHY, lens=LensFile(Equisolid(focal_length=300.0, fov=2.0), None))
     assert found(without, root)["lens"].state == WARNING
     assert "size: [width, height] in YAML" in found(without, root)["lens"].mend
+
+
+def test_files_that_are_no_pictures_are_seen(root, tmp_path):
+    (tmp_path / "note.txt").write_text("no picture")
+    (tmp_path / "empty").mkdir()
+    for name, says in (("note.txt", "neither an image"), ("empty", "no images"), ("none.mp4", "no such image")):
+        camera = CameraSettings(source=str(tmp_path / name))
+        seen = found(replace(HEALTHY, camera=camera), root)["camera"]
+        assert (seen.state, says in seen.seen) == (BAD, True), seen
+
+
+def test_a_lens_for_other_pictures_is_seen(root, tmp_path):
+    cv2.imwrite(str(tmp_path / "image.png"), np.zeros((480, 640, 3), dtype=np.uint8))
+    lens = found(replace(HEALTHY, camera=CameraSettings(source=str(tmp_path / "image.png"))), root)["lens"]
+    assert (lens.state, "the image has 640 x 480 px" in lens.seen) == (BAD, True), lens
+    cv2.imwrite(str(tmp_path / "image.png"), np.zeros((512, 640, 3), dtype=np.uint8))
+    lens = found(replace(HEALTHY, camera=CameraSettings(source=str(tmp_path / "image.png"))), root)["lens"]
+    assert (lens.state, "fits the camera" in lens.seen) == (GOOD, True), lens
+
+
+def test_a_height_in_other_units_is_seen(root):
+    pose = found(replace(HEALTHY, orientation=FixedPose(height=1289.0)), root)["pose"]
+    assert (pose.state, pose.mend) == (WARNING, "heights are in meters")
 
 
 def test_a_lens_center_that_is_a_position_is_seen(root):

@@ -232,6 +232,14 @@ def test_a_video_that_can_not_be_written_is_named(folder, tmp_path):
     assert len(lines(done)) == 1
 
 
+def test_the_place_of_a_missing_lens_file_is_named(tmp_path):
+    for name, place in (("image7.jpg", "lens7.yaml beside it"), ("photo.jpg", "lensNAME.yaml beside imageNAME")):
+        shutil.copy(IMAGES[0], tmp_path / name)
+        one_complaint(
+            detect(tmp_path / name, "--height", 0.8, code=1), f"no lens: give --lens or --fov, or put {place}"
+        )
+
+
 def test_a_photo_needs_no_lens_file(tmp_path):
     """The same as with the lens file of such a lens."""
     shutil.copy(DEMO, tmp_path / "photo.jpg")

@@ -56,6 +56,12 @@ def test_a_mistyped_option_is_one_line_with_the_nearest(command, mistyped, meant
     assert run(*suggested.split(), "--help").returncode == 0
 
 
+def test_an_option_with_one_dash_is_named_with_two():
+    done = run("vm-detect", "-model", "ball")
+    assert done.returncode == 2
+    assert done.stderr.startswith("vm-detect: unknown option -model: did you mean --model?")
+
+
 def test_a_mistyped_command_is_one_line_with_the_nearest():
     done = run("vm-train", "resum", "runs/ball")
     assert (done.returncode, done.stdout) == (2, "")

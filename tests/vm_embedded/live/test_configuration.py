@@ -144,6 +144,8 @@ WRONG = {
     "lens that lacks a key": ("[lens]\nprojection = 'equisolid'\nfov = 1\n", "needs focal_length"),
     "lens out of range": (FULL.replace("fov = 1.8", "fov = 103"), "fov .*103"),
     "orientation that is no table": ("orientation = 0.8\n", r"\[orientation\], not 0\.8"),
+    "entry without section": ("threads = 1\n", r"unknown key 'threads': it belongs in \[detector\]"),
+    "entry of two sections": ("height = 0.8\n", r"it belongs in \[orientation\] or \[camera\]"),
     "detector that is no table": ('detector = "fast"\n', r"\[detector\], not 'fast'"),
     "list of tables": ("[[detector]]\nthreads = 1\n", r"\[detector\]"),
     "height in words": (

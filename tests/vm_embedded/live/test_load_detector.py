@@ -88,6 +88,13 @@ def test_the_printed_configuration_is_one_and_says_what_the_defaults_are(tmp_pat
     ) == printed.count("\n")
     checked = [COMMAND, "--config", path, "--check-config", "--camera", "synthetic"]
     assert "self-test passed" in subprocess.run(checked, capture_output=True, text=True, timeout=60, check=True).stdout
+    for camera, fault in (
+        ("synthetik", "no such image"),
+        ("rstp://a/b", "unknown protocol 'rstp'"),
+        (tmp_path, "no images"),
+    ):
+        done = subprocess.run([*checked[:-1], str(camera)], capture_output=True, text=True, timeout=60, check=False)
+        assert (done.returncode, fault in done.stderr) == (1, True), done.stderr
 
 
 @pytest.mark.long
