@@ -79,6 +79,11 @@ class Detector:
         frame = checked_image(image, self.settings.format)
         if orientation is None:
             raise InputError("there is no orientation: perhaps the lens file has no pose (Hoc); give an Orientation")
+        if not isinstance(orientation, Orientation):
+            raise InputError(
+                "orientation must be an Orientation, as read_lens_file(PATH).orientation, "
+                f"not {type(orientation).__name__}"
+            )
         if not isinstance(lens, Lens):
             raise InputError(f"lens must be a Lens, as read_lens_file(PATH).lens, not {type(lens).__name__}")
         size = frame.shape[1], frame.shape[0]

@@ -183,6 +183,8 @@ def test_bad_frames_are_refused(detector):
         detector.detect(image, orientation, replace(lens, size=(100, 100)))
     with pytest.raises(InputError, match=r"must be a Lens, as read_lens_file\(PATH\)\.lens, not LensFile"):
         detector.detect(image, orientation, LensFile(lens, orientation))
+    with pytest.raises(InputError, match=r"read_lens_file\(PATH\)\.orientation, not LensFile"):
+        detector.detect(image, LensFile(lens, orientation), lens)
 
 
 def changed(path, change, source=MODEL):
