@@ -69,7 +69,6 @@ class Collector:
             places.cut(observation, self.settings),
             found.labels[kept],
             found.targets[kept],
-            places.kinds,
             np.full(len(places), item.position, dtype=np.int32),
         )
         if not item.validates:

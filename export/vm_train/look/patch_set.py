@@ -17,21 +17,19 @@ from vm_embedded.errors import InputError, one_line
 from vm_embedded.files import atomic_write
 
 from .labels import OBJECT
-from .places import PROPOSED
 
 
 @dataclass(frozen=True, eq=False)
 class PatchSet:
     """n labeled patches.
 
-    patches (n, size, size, 3): RGB. labels (n,): NOTHING or OBJECT. targets (n, 3): see PlaceLabels. kinds (n,): of
-    places, as in places.py. pictures (n,): positions of their pictures in the run's list.
+    patches (n, size, size, 3): RGB. labels (n,): NOTHING or OBJECT. targets (n, 3): see PlaceLabels. pictures (n,):
+    positions of their pictures in the run's list.
     """
 
     patches: Image
     labels: npt.NDArray[np.int8]
     targets: Singles
-    kinds: npt.NDArray[np.int8]
     pictures: npt.NDArray[np.int32]
 
     def __len__(self) -> int:
@@ -41,11 +39,6 @@ class PatchSet:
     def objects(self) -> int:
         """Number of patches that show an object."""
         return int((self.labels == OBJECT).sum())
-
-    @property
-    def proposed(self) -> npt.NDArray[np.bool_]:
-        """Which patches (n,) are at proposals of the mesh network."""
-        return np.asarray(self.kinds == PROPOSED)
 
     def part(self, chosen: npt.NDArray[Any]) -> PatchSet:
         """The patches of a mask (n,), or with these positions."""
@@ -65,7 +58,6 @@ class PatchSet:
             np.empty((count, size, size, 3), dtype=np.uint8),
             np.zeros(count, dtype=np.int8),
             np.zeros((count, 3), dtype=np.float32),
-            np.zeros(count, dtype=np.int8),
             np.zeros(count, dtype=np.int32),
         )
 
@@ -86,7 +78,7 @@ class PatchSet:
         return made
 
     def _arrays(self) -> tuple[npt.NDArray[Any], ...]:
-        return self.patches, self.labels, self.targets, self.kinds, self.pictures
+        return self.patches, self.labels, self.targets, self.pictures
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +103,6 @@ class PatchChunk:
                 patches=patches.patches,
                 labels=patches.labels,
                 targets=patches.targets,
-                kinds=patches.kinds,
                 pictures=patches.pictures,
                 truths=np.array([self.objects, self.proposed], dtype=np.int64),
                 faults=np.array(self.faults, dtype=np.str_),
@@ -123,7 +114,7 @@ class PatchChunk:
         try:
             with np.load(path, allow_pickle=False) as file:
                 objects, proposed = file["truths"].tolist()
-                arrays = (file[name] for name in ("patches", "labels", "targets", "kinds", "pictures"))
+                arrays = (file[name] for name in ("patches", "labels", "targets", "pictures"))
                 return cls(PatchSet(*arrays), objects, proposed, tuple(map(str, file["faults"])))
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
             raise InputError(f"can't read {path}: {one_line(error)}; remove it and resume the training") from error

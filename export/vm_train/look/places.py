@@ -21,41 +21,32 @@ from ..evaluation.answers import passed_on
 from .configuration import PatchSettings
 from .labels import VISIBLE, Truths
 
-PROPOSED, JITTERED, RANDOM = 0, 1, 2
-"""Kinds of places."""
-
 _DRAWS = 4
 """Pixels to draw for each random place; many of them show no plane."""
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """n places: centers (n, 3) relative to the camera in the mesh frame [m], their kinds (n,), and factors (n,) by
-    which their patches are larger than the object that is expected there needs."""
+    """n places: centers (n, 3) relative to the camera in the mesh frame [m], and factors (n,) by which their patches
+    are larger than the object that is expected there needs."""
 
     centers: Floats
-    kinds: npt.NDArray[np.int8]
     factors: Floats
 
     def __len__(self) -> int:
         return len(self.centers)
 
     @classmethod
-    def of(cls, kind: int, centers: Floats, factors: Floats | None = None) -> Places:
-        """Places of one kind. factors: 1 by default."""
-        count = len(centers)
-        return cls(centers, np.full(count, kind, dtype=np.int8), np.ones(count) if factors is None else factors)
+    def of(cls, centers: Floats) -> Places:
+        """Places with factor 1."""
+        return cls(centers, np.ones(len(centers)))
 
     def __add__(self, other: Places) -> Places:
-        return Places(
-            np.concatenate([self.centers, other.centers]),
-            np.concatenate([self.kinds, other.kinds]),
-            np.concatenate([self.factors, other.factors]),
-        )
+        return Places(np.concatenate([self.centers, other.centers]), np.concatenate([self.factors, other.factors]))
 
     def part(self, chosen: npt.NDArray[np.bool_]) -> Places:
         """The places of a mask (n,)."""
-        return Places(self.centers[chosen], self.kinds[chosen], self.factors[chosen])
+        return Places(self.centers[chosen], self.factors[chosen])
 
     def tangents(self, view: PreparedView) -> Tangents:
         """The planes of their patches; the radius includes the factor."""
@@ -78,7 +69,7 @@ def proposed_places(
     centers = propose_places(observation, probabilities, settings.above, settings.proposals)
     if glance is not None:
         centers = passed_on(observation, centers, glance, share * worth_of(glance.contract))
-    return Places.of(PROPOSED, centers)
+    return Places.of(centers)
 
 
 def jittered_places(view: PreparedView, truths: Truths, settings: PatchSettings, random: np.random.Generator) -> Places:
@@ -86,14 +77,14 @@ def jittered_places(view: PreparedView, truths: Truths, settings: PatchSettings,
     chosen = np.flatnonzero(truths.visible >= VISIBLE)
     distance, angle, size = random.random((3, settings.jittered))
     if not len(chosen):
-        return Places.of(JITTERED, np.empty((0, 3)))
+        return Places.of(np.empty((0, 3)))
     chosen = chosen[np.arange(settings.jittered) % len(chosen)]
     objects = Tangents.at(view, truths.centers[chosen])
     off, angle = settings.jitter * np.sqrt(distance), 2.0 * np.pi * angle
     rays = objects.rays(off * np.cos(angle), off * np.sin(angle))
     factors = np.exp(settings.size_jitter * (2.0 * size - 1.0))
     below = rays[:, 2] < 0.0
-    return Places.of(JITTERED, view.shape.center_along(rays[below], view.height), factors[below])
+    return Places(view.shape.center_along(rays[below], view.height), factors[below])
 
 
 def random_places(observation: Observation, settings: PatchSettings, random: np.random.Generator) -> Places:
@@ -104,4 +95,4 @@ def random_places(observation: Observation, settings: PatchSettings, random: np.
     rays = rays[np.isfinite(rays).all(axis=1)]
     centers = view.shape.center_along(rays[rays[:, 2] < 0.0], view.height)
     near = np.hypot(centers[:, 0], centers[:, 1]) < observation.manifest.max_distance
-    return Places.of(RANDOM, centers[near][: settings.random])
+    return Places.of(centers[near][: settings.random])

@@ -22,7 +22,6 @@ from ..look.collection import random_of
 from ..look.labels import UNLABELED
 from ..look.observing import results_of
 from ..look.patch_set import PatchChunk, PatchSet
-from ..look.places import JITTERED, PROPOSED, RANDOM
 from ..look.torch_look import TorchLook
 from .boxed_objects import objects_of
 from .candidates import find_candidates
@@ -68,22 +67,17 @@ class Collector:
         pyramid = Pyramid(read_upright(picture.image), "bgr")
         objects = objects_of(picture, self.object_class, self.is_round)
         random = random_of(settings.seed, picture.image.name)
-        parts = {
-            PROPOSED: find_candidates(
-                pyramid, picture.size, self.look, self.radii, settings.above, settings.candidates
-            ),
-            JITTERED: jittered_windows(objects, settings.jittered, settings.jitter, settings.size_jitter, random),
-            RANDOM: random_windows(picture.size, self.radii, settings.random, random),
-        }
-        windows = Windows.joined(*parts.values())
-        kinds = np.repeat(np.array(list(parts), dtype=np.int8), [len(each) for each in parts.values()])
+        windows = Windows.joined(
+            find_candidates(pyramid, picture.size, self.look, self.radii, settings.above, settings.candidates),
+            jittered_windows(objects, settings.jittered, settings.jitter, settings.size_jitter, random),
+            random_windows(picture.size, self.radii, settings.random, random),
+        )
         found = windows.label(objects)
         clear = found.labels != UNLABELED
         return PatchSet(
             windows.part(clear).cut(pyramid, self.contract),
             found.labels[clear],
             found.targets[clear],
-            kinds[clear],
             np.full(int(clear.sum()), frame.position, dtype=np.int32),
         )
 

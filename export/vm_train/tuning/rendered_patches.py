@@ -29,7 +29,7 @@ _QUALITY = 92
 def write_rendered(path: Path, patches: PatchSet) -> None:
     """Write patches as `read_rendered` reads them. Raises InputError if they can't be written."""
     sheets = {f"sheet{number}": sheet for number, sheet in enumerate(_sheets(patches.patches))}
-    labels = {"labels": patches.labels, "targets": patches.targets.astype(np.float16), "kinds": patches.kinds}
+    labels = {"labels": patches.labels, "targets": patches.targets.astype(np.float16)}
     size = np.array(patches.patches.shape[1])
     with atomic_write(path) as part, part.open("wb") as file:
         np.savez_compressed(file, size=size, **labels, **sheets)  # type: ignore[arg-type]
@@ -44,14 +44,14 @@ def read_rendered(path: Path, size: int) -> PatchSet:
         with np.load(path, allow_pickle=False) as file:
             made, labels = int(file["size"]), file["labels"]
             sheets = [cv2.imdecode(file[f"sheet{number}"], cv2.IMREAD_COLOR) for number in range(_count(len(labels)))]
-            targets, kinds = file["targets"].astype(np.float32), file["kinds"]
+            targets = file["targets"].astype(np.float32)
         patches = np.concatenate([_cut(np.asarray(sheet, dtype=np.uint8), made) for sheet in sheets])[: len(labels)]
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, cv2.error) as error:
         raise InputError(f"can't read {path}: {one_line(error)}") from error
     if size != made:
         method = cv2.INTER_AREA if size < made else cv2.INTER_LINEAR
         patches = np.stack([cv2.resize(each, (size, size), interpolation=method) for each in patches])
-    return PatchSet(patches, labels, targets, kinds, np.full(len(labels), -1, dtype=np.int32))
+    return PatchSet(patches, labels, targets, np.full(len(labels), -1, dtype=np.int32))
 
 
 def _count(patches: int) -> int:

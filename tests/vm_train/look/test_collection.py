@@ -14,7 +14,6 @@ from vm_train.look import collection
 from vm_train.look.configuration import LookConfiguration
 from vm_train.look.labels import NOTHING, OBJECT
 from vm_train.look.patch_set import PatchChunk
-from vm_train.look.places import JITTERED, PROPOSED, RANDOM
 from vm_train.look.run_folder import begin_look_run, is_look_run, read_look_run
 
 
@@ -27,9 +26,9 @@ def _small_chunks(monkeypatch):
 def begin(drawn, tiny, tmp_path):
     """Begins a run on the drawn pictures, or those of another folder."""
 
-    def begin_one(name="run", data=drawn, strict=False):
+    def begin_one(name="run", data=drawn, strict=False, changes=None):
         split = split_by_seed([each.number for each in find_pictures(data)], 0.25, 0.0, 0)
-        configuration = read_sections(LookConfiguration, tiny)
+        configuration = read_sections(LookConfiguration, tiny, changes)
         model = model_path("ball-small")
         return begin_look_run(tmp_path / name, data, split, configuration, model, "ball-small", strict)
 
@@ -55,24 +54,32 @@ def content(run):
     return {path.name: path.read_bytes() for path in sorted(run.patches.iterdir())}
 
 
-def test_patches_have_labels_and_come_from_all_kinds_of_places(begin):
+def test_patches_have_labels_and_validation_counts_the_objects(begin):
     run = begin()
     done = []
     chunks = collect_patches(run, 1, done.append)
     assert done == list(range(21))
     assert sorted(content(run)) == [f"{number:05d}.npz" for number in range(4)]
-    validation = {run.numbers.index(number) for number in run.split.validation}
-    kinds = set()
     for chunk in chunks:
         patches = chunk.patches
         assert patches.patches.shape == (len(patches), 16, 16, 3)
         assert set(patches.labels.tolist()) <= {OBJECT, NOTHING}
         assert not patches.targets[patches.labels == NOTHING].any()
-        validates = np.isin(patches.pictures, list(validation))
-        assert patches.proposed[validates].all()
-        kinds |= set(patches.kinds.tolist())
-    assert kinds == {PROPOSED, JITTERED, RANDOM}
-    assert 3 <= sum(each.proposed for each in chunks) <= sum(each.objects for each in chunks) <= len(validation)
+    objects = sum(each.objects for each in chunks)
+    assert 3 <= sum(each.proposed for each in chunks) <= objects <= len(run.split.validation)
+
+
+def test_pictures_for_training_have_patches_at_all_kinds_of_places_and_those_for_validation_at_proposals(begin):
+    def count(jittered, random):
+        """Numbers of patches for training and for validation."""
+        run = begin(f"{jittered} {random}", changes={"patches": {"jittered": jittered, "random": random}})
+        pictures = np.concatenate([each.patches.pictures for each in collect_patches(run, 1)])
+        validates = np.isin(np.array(run.numbers)[pictures], run.split.validation)
+        return (~validates).sum(), validates.sum()
+
+    (proposed, validation), (beside, second), (anywhere, third) = count(0, 0), count(2, 0), count(0, 2)
+    assert 0 < proposed < min(beside, anywhere)
+    assert 0 < validation == second == third
 
 
 @pytest.mark.long

@@ -36,7 +36,7 @@ def test_patches_with_a_teacher_keep_their_answers_whatever_their_labels_say(sha
     for _ in range(150):
         first.step()
     patches = patch_set()
-    swapped = PatchSet(patches.patches, 1 - patches.labels, patches.targets, patches.kinds, patches.pictures)
+    swapped = PatchSet(patches.patches, 1 - patches.labels, patches.targets, patches.pictures)
     teacher = LookTeacher(copy.deepcopy(first.network), torch.full((len(patches),), share))
     recipe = LookRecipe(batch=24, rate=0.02)
     second = LookTrainer(first.network, swapped, 1.75, recipe, PatchAugmentation(), 150, teacher=teacher)

@@ -33,7 +33,7 @@ def networks():
     for _ in range(100):
         made.step()
     before, patches = copy.deepcopy(made.network), patch_set()
-    swapped = PatchSet(patches.patches, 1 - patches.labels, patches.targets, patches.kinds, patches.pictures)
+    swapped = PatchSet(patches.patches, 1 - patches.labels, patches.targets, patches.pictures)
     wrong = trainer(swapped, LookRecipe(batch=24, rate=0.02), 100)
     wrong.network.load_state_dict(weights(made))
     for _ in range(100):

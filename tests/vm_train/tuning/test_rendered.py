@@ -21,13 +21,11 @@ def test_patches_come_back_nearly_as_they_were(tmp_path):
         np.repeat(np.repeat(coarse, 8, axis=1), 8, axis=2),
         random.integers(0, 2, count).astype(np.int8),
         random.normal(size=(count, 3)).astype(np.float32),
-        random.integers(0, 3, count).astype(np.int8),
         np.zeros(count, dtype=np.int32),
     )
     write_rendered(tmp_path / "some.npz", patches)
     found = read_rendered(tmp_path / "some.npz", size)
     assert (found.labels == patches.labels).all()
-    assert (found.kinds == patches.kinds).all()
     assert (found.pictures == -1).all()
     np.testing.assert_allclose(found.targets, patches.targets, rtol=1e-3, atol=1e-3)
     middle = (slice(None), slice(2, 6), slice(2, 6))
