@@ -1,12 +1,14 @@
-"""Who may write to the folder of a training: a new training to an unused one, and one process at a time."""
+"""Access to the folder of a training: a new training needs an unused one, and one process at a time writes to it."""
 
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from vm_embedded.errors import InputError
 
@@ -22,6 +24,32 @@ def check_unused(folder: Path, names: Sequence[str]) -> None:
         raise InputError(f"{folder} holds {', '.join(present)}, which a training would overwrite: give a new folder")
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder, unless it is there. Raises InputError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
+
+
+@contextmanager
+def description(folder: Path, number: int, what: str = "training") -> Iterator[dict[str, Any]]:
+    """The content of a folder's run.json, for a with statement that takes its entries. number: its format.
+
+    Raises InputError if there is none, if another release wrote it, or if it, or an entry that is taken, is damaged.
+    """
+    path = folder / "run.json"
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content["format"] != number:
+            raise InputError(f"{path} was written by another release: begin the {what} again")
+        yield content
+    except OSError as error:
+        raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError(f"{path} is damaged: {error}") from error
+
+
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
     """Keep other processes from training in the same folder, which is created, and removed if it stays empty.
@@ -30,11 +58,11 @@ def locked(folder: Path) -> Iterator[None]:
     """
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file: give a new folder")
+    make_folder(folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     except OSError as error:
-        raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
+        raise InputError(f"can't open folder {folder}: {error.strerror or error}") from error
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

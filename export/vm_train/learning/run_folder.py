@@ -30,7 +30,7 @@ from ..data.split import read_split, write_split
 from ..graphs.loading import PictureGraphs
 from ..graphs.streamed import StreamedGraphs, StreamSource
 from .configuration import TrainConfiguration
-from .folder_access import check_unused
+from .folder_access import check_unused, description, make_folder
 from .selection import class_weights, selection_shares
 from .start import Start
 from .teacher import Teacher
@@ -146,10 +146,7 @@ def begin_run(
     check_unused(folder, FILES)
     data = replace(data, folder=data.folder.resolve())
     loaded = None if teacher is None else _load_teacher(teacher, configuration)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
+    make_folder(folder)
     counts = data.count_points(configuration)
     if not counts.any():
         raise InputError(
@@ -171,21 +168,13 @@ def begin_run(
 
 def read_run(folder: Path) -> TrainingRun:
     """Read a training that was begun. Raises InputError, also if its files were changed since."""
-    path = folder / "run.json"
-    try:
-        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if content["format"] != _FORMAT:
-            raise InputError(f"{path} was written by another release: begin the training again")
+    with description(folder, _FORMAT) as content:
         counts = np.array(list(content["points"].values()), dtype=np.int64)
         pictures, unpacked, stream = Path(content["data"]), content["unpacked"], content["source"]
         configuration_sha256, teacher_sha256 = content["configuration_sha256"], content["teacher_sha256"]
         started = content.get("start")  # an older run.json lacks this entry; its training began with random weights
         start_name, start_sha256 = (None, None) if started is None else (str(started["file"]), started["sha256"])
         source = None if stream is None else StreamSource(**(stream | {"shards": tuple(stream["shards"])}))
-    except OSError as error:
-        raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path} is damaged: {error}") from error
     configuration = read_sections(TrainConfiguration, folder / "train.toml")
     teacher = None if teacher_sha256 is None else _load_teacher(folder / _TEACHER, configuration)
     start = None if start_name is None else Start.load(folder / start_name)

@@ -28,7 +28,7 @@ from vm_export.look_checkpoint import LookCheckpoint
 from ..data.split import Split, read_split, write_split
 from ..evaluation.answers import ExactSubject, load_subject
 from ..evaluation.field_truth import CLASSES
-from ..learning.folder_access import check_unused
+from ..learning.folder_access import check_unused, description, make_folder
 from .configuration import LookConfiguration
 
 KIND = "look"
@@ -197,10 +197,7 @@ def begin_look_run(
     object_class = judged_class(configuration, subject, name)
     if glance is not None:
         _check_glance(glance, object_class, _upright_radius(configuration, object_class))
-    try:
-        (folder / "patches").mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
+    make_folder(folder / "patches")
     mesh = folder / f"mesh{model.suffix.lower()}"
     with atomic_write(mesh) as part:
         part.write_bytes(model.read_bytes())
@@ -235,11 +232,7 @@ def is_look_run(folder: Path) -> bool:
 
 def read_look_run(folder: Path) -> LookRun:
     """Read a training that was begun. Raises InputError, also if its files were changed since, and ModelError."""
-    path = folder / "run.json"
-    try:
-        content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if content["format"] != _FORMAT:
-            raise InputError(f"{path} was written by another release: begin the training again")
+    with description(folder, _FORMAT) as content:
         run = LookRun(
             folder,
             Path(content["data"]),
@@ -255,10 +248,6 @@ def read_look_run(folder: Path) -> LookRun:
             int(content["threads"]),
         )
         configuration_sha256 = content["configuration_sha256"]
-    except OSError as error:
-        raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path} is damaged: {error}") from error
     if run.configuration_sha256 != configuration_sha256:
         raise InputError(
             f"{folder / 'look.toml'} or pictures.json was changed since the training began: "

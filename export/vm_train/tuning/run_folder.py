@@ -30,7 +30,7 @@ from vm_export.look_weights import look_of
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.read import read_boxes
 from ..data.split import Split
-from ..learning.folder_access import check_unused
+from ..learning.folder_access import check_unused, description, make_folder
 from .boxed_objects import all_objects, boxes_sha256, check_boxes, split_by_recording
 from .candidates import search_radii
 from .configuration import TuningConfiguration
@@ -162,10 +162,7 @@ def begin_tuning(
     check_boxes(found, look.contract.object_class, str(boxes.folder))
     check_rendered(look.contract, rendered)
     split = split_by_recording(found.pictures, configuration.data.validation, configuration.data.split_seed)
-    try:
-        (folder / "patches").mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
+    make_folder(folder / "patches")
     run = TuningRun(folder, boxes, name, before, found.pictures, split, configuration, threads)
     for_training = BoxedSet(tuple(run.part(split.training)), (), ())
     check_boxes(for_training, look.contract.object_class, f"{boxes.folder}, part for training,")
@@ -188,19 +185,11 @@ def is_tuning(folder: Path) -> bool:
 
 def read_tuning(folder: Path, moved_to: Path | None = None) -> TuningRun:
     """The fine-tuning of a folder. moved_to: where its boxes are now. Raises InputError or ModelError."""
-    path = folder / "run.json"
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        if content["format"] != _FORMAT:
-            raise InputError(f"{path} was written by another release: begin the fine-tuning again")
+    with description(folder, _FORMAT, "fine-tuning") as content:
         box_folder = Path(content["boxes"]) if moved_to is None else moved_to.resolve()
         boxes = BoxSource(box_folder, content["format_of_boxes"], dict(content["names"]))
         model, threads = str(content["model"]), int(content["threads"])
         digests = str(content["boxes_sha256"]), str(content["configuration_sha256"]), str(content["before_sha256"])
-    except OSError as error:
-        raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path} is damaged: {error}") from error
     configuration = read_sections(TuningConfiguration, folder / "tune.toml")
     pictures = boxes.read().pictures
     split = split_by_recording(pictures, configuration.data.validation, configuration.data.split_seed)
