@@ -16,6 +16,7 @@ from vm_workstation.stopping import stoppable
 
 from ..data.pictures import find_pictures
 from ..learning.configuration import HEADER, TrainConfiguration
+from ..learning.folder_access import kind_of
 from .check import run_check
 from .check_boxes import refuse_other_options, run_check_boxes
 from .fine_tuning import print_tune_config, resume_fine_tuning
@@ -93,12 +94,13 @@ def _is_leader() -> bool:
 
 def _resume(options: argparse.Namespace) -> int:
     """Resume the training of a network or of a close look, or a fine-tuning."""
-    from ..look.run_folder import is_look_run
-    from ..tuning.run_folder import is_tuning
+    from ..look.run_folder import KIND as LOOK
+    from ..tuning.run_folder import KIND as TUNING
 
-    if is_tuning(options.run):
+    kind = kind_of(options.run)
+    if kind == TUNING:
         return resume_fine_tuning(options)
-    return resume_look(options) if is_look_run(options.run) else run_resume(options)
+    return resume_look(options) if kind == LOOK else run_resume(options)
 
 
 def _check(options: argparse.Namespace) -> int:

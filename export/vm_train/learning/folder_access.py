@@ -32,6 +32,16 @@ def make_folder(folder: Path) -> None:
         raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
 
 
+def kind_of(folder: Path) -> str | None:
+    """The kind of training in a folder, as its run.json says; None if it says none or can't be read."""
+    try:
+        content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    kind = content.get("kind") if isinstance(content, dict) else None
+    return kind if isinstance(kind, str) else None
+
+
 @contextmanager
 def description(folder: Path, number: int, what: str = "training") -> Iterator[dict[str, Any]]:
     """The content of a folder's run.json, for a with statement that takes its entries. number: its format.

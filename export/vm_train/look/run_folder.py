@@ -221,15 +221,6 @@ def begin_look_run(
     return run
 
 
-def is_look_run(folder: Path) -> bool:
-    """Whether a folder holds the training of a close look; false also if its run.json can't be read."""
-    try:
-        content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return False
-    return isinstance(content, dict) and content.get("kind") == KIND
-
-
 def read_look_run(folder: Path) -> LookRun:
     """Read a training that was begun. Raises InputError, also if its files were changed since, and ModelError."""
     with description(folder, _FORMAT) as content:

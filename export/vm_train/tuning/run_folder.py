@@ -174,15 +174,6 @@ def begin_tuning(
     return run
 
 
-def is_tuning(folder: Path) -> bool:
-    """Whether a folder holds a fine-tuning."""
-    try:
-        content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(content, dict) and content.get("kind") == KIND
-
-
 def read_tuning(folder: Path, moved_to: Path | None = None) -> TuningRun:
     """The fine-tuning of a folder. moved_to: where its boxes are now. Raises InputError or ModelError."""
     with description(folder, _FORMAT, "fine-tuning") as content:

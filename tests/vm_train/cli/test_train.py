@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from tests.vm_train.commands import COMMAND, environment, run
+from vm_train.cli.train import main
 
 
 @pytest.mark.long
@@ -68,6 +69,16 @@ def test_without_torch_it_says_what_to_install(arguments, tmp_path):
 def test_a_folder_without_pictures_or_a_training_ends_in_one_line(tmp_path):
     assert "no pictures in" in run(tmp_path, "-o", tmp_path / "run", code=1).stderr
     assert "holds no training" in run("resume", tmp_path, code=1).stderr
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", '{"kind": []}', '{"kind": "look"}', '{"kind": "tuning"}', pytest.param("[" * 200_000, id="deep")]
+)
+def test_a_damaged_description_of_a_training_ends_in_one_line(text, tmp_path, capsys):
+    (tmp_path / "run.json").write_text(text)
+    assert main(["resume", str(tmp_path)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"vm-train: {tmp_path / 'run.json'} is damaged: ")
 
 
 @pytest.mark.long
