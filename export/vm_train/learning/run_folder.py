@@ -36,7 +36,7 @@ from .start import Start
 from .teacher import Teacher
 from .training_data import TrainingData
 
-_FORMAT = 3
+_FORMAT = 4
 _TEACHER = "teacher.pt"
 _STARTS = {".pt": "start.pt", ".onnx": "start.onnx"}
 """Copies of the network to begin with, by the suffix of its file."""
@@ -172,7 +172,7 @@ def read_run(folder: Path) -> TrainingRun:
         counts = np.array(list(content["points"].values()), dtype=np.int64)
         pictures, unpacked, stream = Path(content["data"]), content["unpacked"], content["source"]
         configuration_sha256, teacher_sha256 = content["configuration_sha256"], content["teacher_sha256"]
-        started = content.get("start")  # an older run.json lacks this entry; its training began with random weights
+        started = content["start"]
         start_name, start_sha256 = (None, None) if started is None else (str(started["file"]), started["sha256"])
         source = None if stream is None else StreamSource(**(stream | {"shards": tuple(stream["shards"])}))
     configuration = read_sections(TrainConfiguration, folder / "train.toml")

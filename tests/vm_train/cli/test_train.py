@@ -81,6 +81,14 @@ def test_a_damaged_description_of_a_training_ends_in_one_line(text, tmp_path, ca
     assert line.startswith(f"vm-train: {tmp_path / 'run.json'} is damaged: ")
 
 
+@pytest.mark.parametrize("kind", [None, "look", "tuning"])
+def test_a_training_of_another_release_is_refused_in_one_line(kind, tmp_path, capsys):
+    (tmp_path / "run.json").write_text(json.dumps({"kind": kind, "format": 0}))
+    assert main(["resume", str(tmp_path)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"vm-train: {tmp_path / 'run.json'} was written by another release: begin the ")
+
+
 @pytest.mark.long
 def test_the_rate_finder_proposes_a_rate(data, configuration, tmp_path):
     done = run("rate", data, "--config", configuration, "--steps", 60, "--plot", tmp_path / "rate.png")
