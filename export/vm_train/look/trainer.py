@@ -7,9 +7,10 @@ ends with the same weights.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,12 @@ import torch
 from torch.nn import functional
 
 from vm_embedded.arrays import Floats
+from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError, one_line
 from vm_export.look_network import LookNetwork
 from vm_export.torch_files import save_values
 
+from ..learning.log import TrainingLog
 from ..learning.optimizer import ScheduledOptimizer
 from ..learning.recipe import Recipe
 from .augmentation import augment
@@ -33,6 +36,9 @@ from .teacher import LookTeacher
 
 _PRECISE = 0.1
 """Errors of center and size above this have an absolute instead of a squared loss."""
+
+_SAVE_INTERVAL = 30.0
+"""Time between two states [s]."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +154,36 @@ class LookTrainer:
             self.done = int(state["done"])
         except (RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
             raise InputError(f"the state belongs to another training: {one_line(error)}") from error
+
+
+def train_epoch(
+    trainer: LookTrainer,
+    epoch: int,
+    steps: int,
+    log: TrainingLog,
+    bar: ProgressBar,
+    save: Callable[[], None],
+    stop_requested: Callable[[], bool],
+) -> bool:
+    """Train the rest of an epoch, counted from 1, of so many steps. Returns False after a stop.
+
+    save: writes the state, now and then and at a stop. Raises InputError if the loss is NaN or infinite.
+    """
+    saved = perf_counter()
+    while trainer.done < epoch * steps:
+        step = trainer.step()
+        losses = {"loss": step.presence + step.place, "presence": step.presence, "place": step.place}
+        log.write(step.number, losses | {"rate": step.rate})
+        bar.note = f"epoch {epoch}, loss {losses['loss']:.3f}"
+        bar.advance()
+        if stop_requested():
+            bar.clear()
+            save()
+            return False
+        if perf_counter() - saved > _SAVE_INTERVAL:
+            save()
+            saved = perf_counter()
+    return True
 
 
 def _drawn(

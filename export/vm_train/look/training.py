@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from itertools import groupby
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -33,10 +32,7 @@ from .labels import OBJECT
 from .patch_set import PatchSet
 from .run_folder import LookRun
 from .scores import LookResult, LookScore, logits_of
-from .trainer import LookTrainer
-
-_SAVE_INTERVAL = 30.0
-"""Time between two states [s]."""
+from .trainer import LookTrainer, train_epoch
 
 _EXAMPLES = 2
 """Patches with an object, and as many without, for the self-test of the model file."""
@@ -97,7 +93,6 @@ class _Training:
         if state is not None:
             self._trainer.load(state)
         self._bar = ProgressBar(total, "vm-train", self._trainer.done)
-        self._saved = perf_counter()
 
     def run(self, stop_requested: Callable[[], bool]) -> bool:
         """Train until the end or a stop. Returns whether it is finished."""
@@ -116,18 +111,8 @@ class _Training:
 
     def _train_epoch(self, epoch: int, log: TrainingLog, stop_requested: Callable[[], bool]) -> bool:
         """Train the rest of an epoch, counted from 0, and validate. Returns False after a stop."""
-        while self._trainer.done < (epoch + 1) * self._epoch_steps:
-            step = self._trainer.step()
-            losses = {"loss": step.presence + step.place, "presence": step.presence, "place": step.place}
-            log.write(step.number, losses | {"rate": step.rate})
-            self._bar.note = f"epoch {epoch + 1}, loss {losses['loss']:.3f}"
-            self._bar.advance()
-            if stop_requested():
-                self._bar.clear()
-                self._save()
-                return False
-            if perf_counter() - self._saved > _SAVE_INTERVAL:
-                self._save()
+        if not train_epoch(self._trainer, epoch + 1, self._epoch_steps, log, self._bar, self._save, stop_requested):
+            return False
         score = LookScore.of(self._validate(), self._collected.validation)
         self._progress.validated += 1
         log.write(self._trainer.done, {"epoch": self._progress.validated} | asdict(score))
@@ -147,7 +132,6 @@ class _Training:
 
     def _save(self) -> None:
         self._trainer.save(self._run.state_path, asdict(self._progress))
-        self._saved = perf_counter()
 
     def _describe(self) -> None:
         """Print what was collected."""

@@ -9,7 +9,6 @@ import copy
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -24,12 +23,9 @@ from ..learning.log import TrainingLog
 from ..learning.trainer import read_state
 from ..look.patch_set import PatchSet
 from ..look.teacher import LookTeacher
-from ..look.trainer import LookTrainer
+from ..look.trainer import LookTrainer, train_epoch
 from .mixing import Mixer
 from .run_folder import TuningRun
-
-_SAVE_INTERVAL = 30.0
-"""Time between two states [s]."""
 
 _RENDERED_VALIDATION = 5
 """One of so many rendered patches is for validation."""
@@ -117,7 +113,6 @@ class _Stage:
             self._progress = StageProgress(**state["more"]["progress"])
             self._best = dict(state["more"]["best"])
         self._bar = ProgressBar(self._total, "vm-train", self._trainer.done)
-        self._saved = perf_counter()
 
     def run(self, stop_requested: Callable[[], bool]) -> LookNetwork | None:
         """Train until the end or a stop, and return the calibrated network of the best epoch; None after a stop."""
@@ -143,18 +138,8 @@ class _Stage:
         epoch = self._progress.validated
         if self._trainer.done == epoch * self._recipe.steps and epoch in (0, self._recipe.epochs // 2):
             self._trainer.grade()
-        while self._trainer.done < (epoch + 1) * self._recipe.steps:
-            step = self._trainer.step()
-            losses = {"loss": step.presence + step.place, "presence": step.presence, "place": step.place}
-            log.write(step.number, losses | {"rate": step.rate})
-            self._bar.note = f"epoch {epoch + 1}, loss {losses['loss']:.3f}"
-            self._bar.advance()
-            if stop_requested():
-                self._bar.clear()
-                self._save()
-                return False
-            if perf_counter() - self._saved > _SAVE_INTERVAL:
-                self._save()
+        if not train_epoch(self._trainer, epoch + 1, self._recipe.steps, log, self._bar, self._save, stop_requested):
+            return False
         self._validate(log)
         self._save()
         return True
@@ -182,7 +167,6 @@ class _Stage:
 
     def _save(self) -> None:
         self._trainer.save(self._run.state_path, {"progress": asdict(self._progress), "best": self._best})
-        self._saved = perf_counter()
 
 
 def _copy(network: LookNetwork) -> dict[str, torch.Tensor]:
