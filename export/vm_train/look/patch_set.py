@@ -90,9 +90,19 @@ class PatchChunk:
     """
 
     patches: PatchSet
-    objects: int
-    proposed: int
-    faults: tuple[str, ...]
+    objects: int = 0
+    proposed: int = 0
+    faults: tuple[str, ...] = ()
+
+    @classmethod
+    def joined(cls, parts: Sequence[PatchChunk]) -> PatchChunk:
+        """All of several chunks, at least one, in order."""
+        return cls(
+            PatchSet.joined(parts[0].patches.patches.shape[1], [each.patches for each in parts]),
+            sum(each.objects for each in parts),
+            sum(each.proposed for each in parts),
+            tuple(fault for each in parts for fault in each.faults),
+        )
 
     def save(self, path: Path) -> None:
         """Write the chunk. Raises InputError if it can't be written."""

@@ -1,12 +1,8 @@
-"""Collects patches of boxed frames: beside the boxes, at random places, and at the network's own candidates.
-
-The number of processes does not change the result, nor does an interruption: finished chunks of frames stay.
-"""
+"""Collects patches of boxed frames: beside the boxes, at random places, and at the network's own candidates."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,9 +14,9 @@ from vm_embedded.network.look_contract import LookContract
 
 from ..boxes.box import BoxedPicture
 from ..boxes.image_facts import read_upright
+from ..look.chunks import collect_chunks
 from ..look.collection import random_of
 from ..look.labels import UNLABELED
-from ..look.observing import results_of
 from ..look.patch_set import PatchChunk, PatchSet
 from ..look.torch_look import TorchLook
 from .boxed_objects import objects_of
@@ -61,7 +57,7 @@ class Collector:
         settings = run.configuration.patches
         return cls(look, before.contract, settings, run.radii, run.object_class, run.is_round)
 
-    def __call__(self, frame: Frame) -> PatchSet:
+    def __call__(self, frame: Frame) -> PatchChunk:
         """The patches of a frame. Raises InputError if it can't be read any more."""
         picture, settings = frame.picture, self.settings
         pyramid = Pyramid(read_upright(picture.image), "bgr")
@@ -74,12 +70,9 @@ class Collector:
         )
         found = windows.label(objects)
         clear = found.labels != UNLABELED
-        return PatchSet(
-            windows.part(clear).cut(pyramid, self.contract),
-            found.labels[clear],
-            found.targets[clear],
-            np.full(int(clear.sum()), frame.position, dtype=np.int32),
-        )
+        patches = windows.part(clear).cut(pyramid, self.contract)
+        pictures = np.full(len(patches), frame.position, dtype=np.int32)
+        return PatchChunk(PatchSet(patches, found.labels[clear], found.targets[clear], pictures))
 
 
 def collect_windows(run: TuningRun, stage: str, workers: int, report: Callable[[int], None]) -> PatchSet:
@@ -89,18 +82,7 @@ def collect_windows(run: TuningRun, stage: str, workers: int, report: Callable[[
     InputError, and VisualMeshError if a worker was killed.
     """
     frames = [Frame(picture, position) for position, picture in enumerate(run.pictures)]
-    groups = [frames[start : start + CHUNK] for start in range(0, len(frames), CHUNK)]
-    paths = [run.folder / "patches" / f"{stage}-{number:05d}.npz" for number in range(len(groups))]
-    missing = [(path, group) for path, group in zip(paths, groups, strict=True) if not path.exists()]
-    remaining = [frame for _, group in missing for frame in group]
-    size, done = network_before(run, stage).contract.size, len(frames) - len(remaining)
-    report(done)
-    with closing(results_of(partial(Collector.of, run, stage), remaining, workers)) as results:
-        for path, group in missing:
-            parts = []
-            for _ in group:
-                parts.append(next(results))
-                done += 1
-                report(done)
-            PatchChunk(PatchSet.joined(size, parts), 0, 0, ()).save(path)
+    make = partial(Collector.of, run, stage)
+    paths = collect_chunks(frames, make, CHUNK, run.folder / "patches", f"{stage}-", workers, report)
+    size = network_before(run, stage).contract.size
     return PatchSet.joined(size, [PatchChunk.load(path).patches for path in paths])
