@@ -1,20 +1,23 @@
-"""Signals and threads of worker processes."""
+"""Worker processes: their signals and threads, and work on many items in several of them."""
 
 from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 from threading import Thread
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 
 from vm_embedded.errors import VisualMeshError
+
+Work = TypeVar("Work")
+Result = TypeVar("Result")
 
 
 @contextmanager
@@ -53,6 +56,46 @@ def worker_pool(
         ) from error
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def use_one_thread() -> None:
+    """Make numerical libraries use one thread, in the processes that start from now on."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
+
+
+def results_of(
+    make: Callable[[], Callable[[Work], Result]], items: Sequence[Work], workers: int, chunk: int = 5
+) -> Generator[Result, None, None]:
+    """Results of the function that `make` makes for all items, in order. Each of so many processes makes its own.
+
+    1 uses only this process. chunk: items that a process gets at a time. Raises what the function raises, and
+    VisualMeshError if a worker was killed.
+    """
+    if workers < 2 or len(items) <= chunk:
+        if items:
+            yield from map(make(), items)
+        return
+    use_one_thread()
+    with worker_pool(min(workers, -(-len(items) // chunk)), _start, (make,)) as pool:
+        with interrupts_blocked():
+            results = pool.map(_work, items, chunksize=chunk)
+        yield from results
+
+
+_worker: Callable[[Any], Any] | None = None
+"""The function of a worker process."""
+
+
+def _start(make: Callable[[], Callable[[Any], Any]]) -> None:
+    global _worker
+    start_worker()
+    _worker = make()
+
+
+def _work(item: Any) -> Any:
+    assert _worker is not None
+    return _worker(item)
 
 
 def _end_with_parent() -> None:

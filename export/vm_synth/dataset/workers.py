@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vm_workstation.worker_process import interrupts_blocked, start_worker, worker_pool
+from vm_workstation.worker_process import interrupts_blocked, start_worker, use_one_thread, worker_pool
 
 from ..render.picture import render
 from ..render.tracer import Tracer
@@ -82,8 +82,7 @@ def render_all(job: Job, indices: Sequence[int], workers: int, report: Callable[
 
 def _set_environment() -> None:
     """Make workers use one thread each, and keep freed memory: getting it from the system again takes time."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
+    use_one_thread()
     os.environ["MALLOC_MMAP_THRESHOLD_"] = str(32 << 20)
     os.environ["MALLOC_TRIM_THRESHOLD_"] = str(1 << 30)
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from vm_embedded.detection.settings import Settings
-from vm_workstation.worker_process import interrupts_blocked, start_worker, worker_pool
+from vm_workstation.worker_process import results_of
 
 from ..data.classes import Classes
 from ..data.picture_files import PictureFiles
@@ -55,28 +55,11 @@ def evaluate(
 
 def _parts(job: Job, subject: Subject, chunks: Sequence[Sequence[PictureFiles]], workers: int) -> Iterator[Evaluation]:
     if workers == 1 or len(chunks) < 2:
-        for chunk in chunks:
-            yield evaluate_pictures(subject, chunk, job.classes, job.rules)
-        return
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
-    with worker_pool(min(workers, len(chunks)), _start, (job,)) as pool:
-        with interrupts_blocked():
-            results = pool.map(_evaluate_chunk, chunks)
-        yield from results
+        return map(_evaluator(job, subject), chunks)
+    return results_of(partial(_evaluator, job), chunks, workers, chunk=1)
 
 
-_worker: tuple[Job, Subject] | None = None
-"""The state of a worker process."""
-
-
-def _start(job: Job) -> None:
-    global _worker
-    start_worker()
-    _worker = (job, job.subject())
-
-
-def _evaluate_chunk(pictures: Sequence[PictureFiles]) -> Evaluation:
-    assert _worker is not None
-    job, subject = _worker
-    return evaluate_pictures(subject, pictures, job.classes, job.rules)
+def _evaluator(job: Job, subject: Subject | None = None) -> Callable[[Sequence[PictureFiles]], Evaluation]:
+    """Evaluates pictures. subject: the network of the job; None loads it."""
+    loaded = job.subject() if subject is None else subject
+    return lambda pictures: evaluate_pictures(loaded, pictures, job.classes, job.rules)

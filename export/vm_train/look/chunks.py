@@ -9,7 +9,8 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
 
-from .observing import Work, results_of
+from vm_workstation.worker_process import Work, results_of
+
 from .patch_set import PatchChunk
 
 

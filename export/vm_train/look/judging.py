@@ -17,10 +17,11 @@ from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.network.look_contract import LookContract
 from vm_export.look_network import LookNetwork
+from vm_workstation.worker_process import results_of
 
 from ..scores.calibration import logits_from
 from .labels import OBJECT, UNLABELED, VISIBLE, label_places
-from .observing import Item, Observer, items_of, results_of
+from .observing import Item, Observer, items_of
 from .run_folder import LookRun
 from .torch_look import TorchLook
 

@@ -1,11 +1,8 @@
-"""What the mesh network and the truth say about a picture, and work on many pictures in several processes."""
+"""What the mesh network and the truth say about a picture."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
 
 from vm_embedded.arrays import Singles
 from vm_embedded.detection.observation import Observation
@@ -13,7 +10,6 @@ from vm_embedded.detection.upright_looks import around_bases, nearest_points
 from vm_embedded.errors import InputError
 from vm_embedded.field.uprights import KINDS
 from vm_embedded.network.manifest import Manifest
-from vm_workstation.worker_process import interrupts_blocked, start_worker, worker_pool
 
 from ..data.classes import Classes
 from ..data.picture_files import PictureFiles
@@ -24,12 +20,6 @@ from ..evaluation.object_truth import SceneTruth, read_scene
 from .configuration import PatchSettings
 from .labels import Truths, find_truths, true_bases
 from .run_folder import LookRun
-
-_TASK = 5
-"""Pictures that a worker gets at a time."""
-
-Work = TypeVar("Work")
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -110,37 +100,3 @@ class Observer:
     def _radius(self, scene: SceneTruth | None) -> float | None:
         """Radius of the objects to look for [m]: that of the scene, if the mesh network is for any radius."""
         return scene.radius if scene is not None and self.subject.manifest.any_radius else None
-
-
-def results_of(
-    make: Callable[[], Callable[[Work], Result]], items: Sequence[Work], workers: int
-) -> Generator[Result, None, None]:
-    """Results of the function that `make` makes for all items, in order. Each of so many processes makes its own.
-
-    1 uses only this process. Raises what the function raises, and VisualMeshError if a worker was killed.
-    """
-    if workers < 2 or len(items) <= _TASK:
-        if items:
-            yield from map(make(), items)
-        return
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
-    with worker_pool(min(workers, -(-len(items) // _TASK)), _start, (make,)) as pool:
-        with interrupts_blocked():
-            results = pool.map(_work, items, chunksize=_TASK)
-        yield from results
-
-
-_worker: Callable[[Any], Any] | None = None
-"""The state of a worker process."""
-
-
-def _start(make: Callable[[], Callable[[Any], Any]]) -> None:
-    global _worker
-    start_worker()
-    _worker = make()
-
-
-def _work(item: Any) -> Any:
-    assert _worker is not None
-    return _worker(item)
