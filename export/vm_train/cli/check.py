@@ -19,6 +19,7 @@ from vm_embedded.cli.program import Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.files import atomic_write, check_writable
 from vm_workstation.option_types import at_least
+from vm_workstation.shortened import shortened
 from vm_workstation.text_tables import aligned, summary
 
 from ..data.classes import Classes
@@ -158,8 +159,7 @@ def complaints(found: Inspection) -> list[str]:
     for kind, some in groupby(sorted(found.faults, key=lambda each: order.index(each.kind)), lambda each: each.kind):
         faults = list(some)
         lines.append(f"{len(faults)} of {found.count} pictures {_KINDS[kind]}")
-        lines += [f"  {each.text}" for each in faults[:_NAMED]]
-        if len(faults) > _NAMED:
-            lines.append(f"  and {len(faults) - _NAMED} more; vm-train check --json lists all")
+        named = shortened([each.text for each in faults], _NAMED, "; vm-train check --json lists all")
+        lines += [f"  {each}" for each in named]
     lines += [f"no picture shows class {name}: check its color in the configuration" for name in found.absent]
     return lines

@@ -19,6 +19,7 @@ from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
 from vm_workstation.contact_sheet import check_sheet_path, write_sheet
 from vm_workstation.option_types import at_least
+from vm_workstation.shortened import shortened
 
 from ..boxes.box import BoxedSet
 from ..boxes.read import read_boxes
@@ -97,7 +98,7 @@ def run_check_boxes(options: argparse.Namespace) -> int:
     if options.json is not None:
         with atomic_write(options.json) as part:
             part.write_text(json.dumps(_as_json(found, faults), indent=1) + "\n", encoding="utf-8")
-    for line in [*faults[:_NAMED], *_more(len(faults))]:
+    for line in shortened(faults, _NAMED, "; vm-train check --boxes --json FILE lists all"):
         print(f"vm-train: {line}", file=sys.stderr)
     if options.sheet is not None:
         _write_sheet(options, found, objects)
@@ -128,10 +129,6 @@ def _objects(network: Path) -> tuple[list[str], list[str]]:
     manifest = load_subject(network, Settings()).manifest
     objects = [each.name for each in manifest.classes if each.kind == "object"]
     return objects, objects if manifest.shape == "sphere" else []
-
-
-def _more(count: int) -> list[str]:
-    return [f"and {count - _NAMED} more; vm-train check --boxes --json FILE lists all"] if count > _NAMED else []
 
 
 def _write_sheet(options: argparse.Namespace, found: BoxedSet, objects: Sequence[str]) -> None:

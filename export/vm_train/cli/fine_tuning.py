@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
+from vm_workstation.shortened import shortened
 
 from ..learning.folder_access import locked
 from ..tuning.configuration import TUNING_HEADER, TuningConfiguration
@@ -62,7 +62,8 @@ def begin_fine_tuning(options: argparse.Namespace) -> int:
     configuration = read_sections(TuningConfiguration, options.config, parse_overrides(options.set, example))
     source = BoxSource(options.boxes.resolve(), options.format, parse_names(options.names))
     found = source.read()
-    _complain(found.faults, options.boxes)
+    for line in shortened(found.faults, _NAMED, f"; vm-train check {options.boxes} --boxes lists them all"):
+        print(f"vm-train: {line}", file=sys.stderr)
     if options.strict and found.faults:
         raise InputError("some boxes can't be used, see above: repair them, or leave out --strict to skip them")
     with locked(options.output):
@@ -106,14 +107,6 @@ def _describe(run: TuningRun, boxes: Path) -> None:
             "training ends",
             file=sys.stderr,
         )
-
-
-def _complain(faults: Sequence[str], folder: Path) -> None:
-    for fault in faults[:_NAMED]:
-        print(f"vm-train: {fault}", file=sys.stderr)
-    if len(faults) > _NAMED:
-        more = len(faults) - _NAMED
-        print(f"vm-train: and {more} more; vm-train check {folder} --boxes lists them all", file=sys.stderr)
 
 
 def _fine_tune(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> int:

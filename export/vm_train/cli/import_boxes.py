@@ -14,6 +14,7 @@ from vm_embedded.files import atomic_write
 from vm_embedded.geometry.make_shape import make_shape
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.bundled import SHIPPED
+from vm_workstation.shortened import shortened
 
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.read import read_boxes
@@ -132,10 +133,8 @@ def _has_object(picture: BoxedPicture, rule: MaskRule) -> bool:
 
 
 def _complain(lines: Sequence[str], more: str) -> None:
-    for line in lines[:_NAMED]:
+    for line in shortened(lines, _NAMED, f"; {more}"):
         print(f"vm-train: {line}", file=sys.stderr)
-    if len(lines) > _NAMED:
-        print(f"vm-train: and {len(lines) - _NAMED} more; {more}", file=sys.stderr)
 
 
 def _write_list(path: Path, numbers: Sequence[str]) -> None:

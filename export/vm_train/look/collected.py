@@ -12,6 +12,7 @@ import numpy as np
 from vm_embedded.arrays import Mask
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
+from vm_workstation.shortened import shortened
 
 from .collection import collect_patches
 from .patch_set import PatchChunk, PatchSet
@@ -56,7 +57,8 @@ def collect(run: LookRun, workers: int) -> Collected:
         faults += chunk.faults
         for part in counts:
             counts[part] += int((validates == part).sum())
-    _complain(faults)
+    for line in shortened(faults, _NAMED, " pictures can't be used"):
+        print(f"vm-train: {line}", file=sys.stderr)
     sets = {part: PatchSet.empty(run.configuration.patches.size, count) for part, count in counts.items()}
     ends = {False: 0, True: 0}
     for validates, chunk in _chunks(run, paths):
@@ -74,14 +76,6 @@ def _chunks(run: LookRun, paths: Sequence[Path]) -> Iterator[tuple[Mask, PatchCh
     for path in paths:
         chunk = PatchChunk.load(path)
         yield validates[chunk.patches.pictures], chunk
-
-
-def _complain(faults: Sequence[str]) -> None:
-    """Name the pictures that can't be used."""
-    for fault in faults[:_NAMED]:
-        print(f"vm-train: {fault}", file=sys.stderr)
-    if len(faults) > _NAMED:
-        print(f"vm-train: and {len(faults) - _NAMED} more pictures can't be used", file=sys.stderr)
 
 
 def _check(run: LookRun, part: PatchSet, name: str) -> None:
