@@ -154,7 +154,10 @@ def _save(figure: Any, path: Path) -> None:
 
 
 def plot_accuracy(found: dict[str, Any], path: Path) -> None:
-    """As in the paper's fig:plots: precision over recall, and average precision over distance; IoU 0.75, and 0.5."""
+    """Precision over recall, and average precision over distance; IoU 0.75, and 0.5.
+
+    The paper shows both in fig:plots (section "Precision").
+    """
     figure, panels = pyplot.subplots(1, 3, figsize=(11, 3.6), layout="constrained")
     curves, ap75, ap50 = panels
     for name in (*score.OURS, *(peer.name for peer in TRAINED)):
