@@ -1,4 +1,4 @@
-"""Frames to measure on: the 15 of the paper's dataset where they lie beside the checkout, else six of the demo."""
+"""Frames to measure on: the 15 of the paper's dataset where they lie beside the checkout, else those of the demo."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def frames() -> tuple[str, list[Frame]]:
 
 
 def demo_frames() -> list[Frame]:
-    """Six frames of the demo."""
+    """The frames of the demo."""
     return _read(_TOP / "tests" / "fixtures" / "demo")
 
 
