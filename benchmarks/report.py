@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -246,13 +245,7 @@ def plot_growth(found: dict[str, Any], path: Path) -> None:
 
 def main() -> None:
     found = json.loads(RESULTS.read_text())
-    text = PAGE.read_text()
-    for name, made in TABLES.items():
-        pattern = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-        if not pattern.search(text):
-            raise SystemExit(f"{PAGE} has no place for the table {name}")
-        text = pattern.sub(lambda match, made=made: match[1] + made(found) + "\n" + match[2], text)  # type: ignore[misc]
-    PAGE.write_text(text)
+    fill(PAGE, {name: made(found) for name, made in TABLES.items()})
     fill(README, {"speed": speed(found)})
     plot_peers(found, DOCS / "performance-peers.png")
     plot_roofline(json.loads(PEER_TIMES.read_text()), DOCS / "performance-roofline.png")

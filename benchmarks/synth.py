@@ -14,10 +14,11 @@ import sys
 import tempfile
 from pathlib import Path
 
+from benchmarks.report import DOCS, fill
 from vm_embedded.cli.machine import describe_machine
 
 RESULTS = Path(__file__).with_name("synth.json")
-PAGE = Path(__file__).parents[1] / "docs" / "synth.md"
+PAGE = DOCS / "synth.md"
 CONFIG = Path(__file__).parents[1] / "export" / "vm_synth" / "polyhaven.toml"
 SUMMARY = re.compile(r"(\d+) pictures in (\d+) s, (\d+) per hour; at most (\d+) MiB per worker")
 
@@ -43,10 +44,8 @@ def main() -> None:
     rows = [
         f"| {workers} | {run['pictures']} | {run['an_hour']} | {run['mib_a_worker']} |" for workers, run in runs.items()
     ]
-    heads = "| workers | pictures | pictures per hour | MiB per worker, at most |\n| ---: | ---: | ---: | ---: |\n"
-    table = heads + "\n".join(rows) + "\n"
-    before, after = PAGE.read_text().split("<!-- throughput -->\n")
-    PAGE.write_text(before + "<!-- throughput -->\n" + table + after[after.index("<!-- end -->") :])
+    heads = ["| workers | pictures | pictures per hour | MiB per worker, at most |", "| ---: | ---: | ---: | ---: |"]
+    fill(PAGE, {"throughput": "\n".join([*heads, *rows])})
 
 
 if __name__ == "__main__":

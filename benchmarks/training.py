@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 import torch
 
+from benchmarks.report import DOCS, fill
 from vm_embedded.cli.machine import describe_machine
 from vm_embedded.config.sections import read_sections
 from vm_export.network import Network
@@ -33,7 +34,7 @@ from vm_train.learning.trainer import Trainer
 from vm_train.learning.training_data import TrainingData
 
 RESULTS = Path(__file__).with_name("training.json")
-PAGE = Path(__file__).parents[1] / "docs" / "training.md"
+PAGE = DOCS / "training.md"
 NETWORKS = {"5 x 4": (5, 4), "9 x 8": (9, 8)}
 BATCH = 8
 
@@ -123,9 +124,7 @@ def main() -> None:
     )
     rows = [f"| {name} | {value:.0f} |" for name, value in alone.items() if name != "points"]
     rows += [f"| training, {name}, one core reads, one learns | {value:.0f} |" for name, value in together.items()]
-    table = "| | pictures/s |\n| --- | ---: |\n" + "\n".join(rows) + "\n"
-    before, after = PAGE.read_text().split("<!-- throughput -->\n")
-    PAGE.write_text(before + "<!-- throughput -->\n" + table + after[after.index("<!-- end -->") :])
+    fill(PAGE, {"throughput": "\n".join(["| | pictures/s |", "| --- | ---: |", *rows])})
 
 
 if __name__ == "__main__":
