@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.choices import HEIGHTS, LENSES, RESULTS
-from benchmarks.report import fill, table
-
-DOCS = Path(__file__).parents[1] / "docs"
-PAGE = DOCS / "results.md"
+from benchmarks.report import DOCS, fill, spread, table
+from benchmarks.shipped_report import PAGE
 
 GROUPS = {
     "layers and mesh": (
@@ -46,23 +43,15 @@ BASE = {
 COLORS = {"3 layers": "#7570b3", "5 layers": "#1b9e77", "9 layers": "#d95f02", "as ball": "#444444"}
 
 
-def values(scores: dict[str, Any], *path: str, test: str = "all") -> np.ndarray:
-    """A score of all seeds; NaN where it is missing."""
+def values(scores: dict[str, Any], *path: str, test: str = "all") -> list[float | None]:
+    """A score of all seeds; None where it is missing."""
     found = []
     for each in scores.values():
         value: Any = each.get(test, {})
         for key in path:
             value = value.get(key) if isinstance(value, dict) else None
-        found.append(np.nan if value is None else float(value))
-    return np.array(found)
-
-
-def shown(found: np.ndarray, digits: int = 3) -> str:
-    """Mean, and the range if there are several seeds."""
-    if np.isnan(found).all():
-        return "-"
-    mean = f"{np.nanmean(found):.{digits}f}"
-    return mean if len(found) == 1 else f"{mean} ({np.nanmin(found):.{digits}f} to {np.nanmax(found):.{digits}f})"
+        found.append(value)
+    return found
 
 
 def group(results: dict[str, Any], name: str) -> str:
@@ -74,11 +63,11 @@ def group(results: dict[str, Any], name: str) -> str:
             [
                 BASE[name] if variant == "base" else variant,
                 str(len(scores)),
-                shown(values(scores, "points", "all", "average_precision")),
-                shown(values(scores, "iou_0.5", "average_precision")),
-                shown(values(scores, "iou_0.75", "average_precision")),
-                shown(values(scores, "iou_0.5", "recall")),
-                shown(values(scores, "iou_0.5", "false_per_picture"), 2),
+                spread(values(scores, "points", "all", "average_precision")),
+                spread(values(scores, "iou_0.5", "average_precision")),
+                spread(values(scores, "iou_0.75", "average_precision")),
+                spread(values(scores, "iou_0.5", "recall")),
+                spread(values(scores, "iou_0.5", "false_per_picture"), 2),
             ]
         )
     return table(["", "seeds", "AP of points", "AP50", "AP75", "recall", "false per picture"], rows)
@@ -88,8 +77,8 @@ def transfer(results: dict[str, Any], kinds: tuple[str, ...]) -> str:
     """AP of points of networks that learned on one half of the pictures, on each half."""
     rows = []
     for name in (*(f"learned {kind}" for kind in kinds), "base"):
-        cells = [shown(values(results[name], "points", "all", "average_precision", test=kind)) for kind in kinds]
-        objects = [shown(values(results[name], "iou_0.5", "average_precision", test=kind)) for kind in kinds]
+        cells = [spread(values(results[name], "points", "all", "average_precision", test=kind)) for kind in kinds]
+        objects = [spread(values(results[name], "iou_0.5", "average_precision", test=kind)) for kind in kinds]
         label = "all, 2000 pictures" if name == "base" else f"{name.removeprefix('learned ')}, 800 pictures"
         rows.append([label, *(f"{points}; {balls}" for points, balls in zip(cells, objects, strict=True))])
     return table(["trained on", *(f"tested on {kind}" for kind in kinds)], rows)
@@ -116,9 +105,9 @@ def plot(results: dict[str, Any]) -> None:
                 (each for each in next(iter(results[name].values()))["all"]["points"] if each != "all"),
                 key=lambda each: float(each.split("-")[0]),
             )
-            found = np.array([values(results[name], "points", each, "average_precision").mean() for each in bins])
+            precisions = [values(results[name], "points", each, "average_precision") for each in bins]
             middles = [np.mean([float(end) for end in each.split("-")]) for each in bins]
-            distances.plot(middles, found, style, color=color, label=label)
+            distances.plot(middles, np.array(precisions, float).mean(axis=1), style, color=color, label=label)
     curves.set_xlabel("recall of ball points")
     curves.set_ylabel("precision")
     distances.set_xlabel("distance of the point on the plane [m]")

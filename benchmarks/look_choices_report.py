@@ -8,20 +8,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.look_choices import RESULTS
-from benchmarks.report import fill, table
-from benchmarks.shipped_report import DOCS, PAGE
+from benchmarks.report import DOCS, fill, spread, table
+from benchmarks.shipped_report import PAGE
 
 NEAR, FAR = "0.5 to 6 m", "6 to 10 m"
-
-
-def spread(values: list[float | None], digits: int = 3, unit: float = 1.0) -> str:
-    """The mean of the seeds, and in parentheses the lowest and the highest value."""
-    known = [unit * each for each in values if each is not None]
-    if not known:
-        return "-"
-    low, high = min(known), max(known)
-    mean = f"{np.mean(known):.{digits}f}"
-    return mean if len(known) == 1 else f"{mean} ({low:.{digits}f} to {high:.{digits}f})"
 
 
 def choices(found: dict[str, Any]) -> str:

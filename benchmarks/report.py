@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib import pyplot
@@ -37,6 +39,20 @@ def fill(page: Path, made: dict[str, str]) -> None:
 
 def ms(value: float) -> str:
     return f"{value:.2f}" if value < 10 else f"{value:.1f}"
+
+
+def number(value: float | None, digits: int = 2, unit: float = 1.0) -> str:
+    return "-" if value is None else f"{unit * value:.{digits}f}"
+
+
+def spread(values: Sequence[float | None], digits: int = 3, unit: float = 1.0) -> str:
+    """The mean of the seeds, and in parentheses the lowest and the highest value."""
+    known = [unit * each for each in values if each is not None]
+    if not known:
+        return "-"
+    low, high = min(known), max(known)
+    mean = f"{np.mean(known):.{digits}f}"
+    return mean if len(known) == 1 else f"{mean} ({low:.{digits}f} to {high:.{digits}f})"
 
 
 def machine(found: dict[str, Any]) -> str:

@@ -4,32 +4,25 @@ from __future__ import annotations
 
 import json
 import tomllib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.field import RESULTS as FIELD_RESULTS
 from benchmarks.field import figures
-from benchmarks.report import fill, table
+from benchmarks.report import DOCS, README, fill, number, table
 from benchmarks.shipped import METERS, NETWORKS, RANGES, RECIPES, RESULTS, SETS
 from vm_embedded.network.bundled import DEFAULT, model_path
 from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import read_model
 
-DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "results.md"
-README = DOCS.parent / "README.md"
 COLORS = {"ball": "#d95f02", "ball-small": "#7570b3", "soccer": "#1b9e77"}
 
 
 WEAK = """ A quarter of the robots is missed, and line points beyond 6 m are rare: docs/results.md has
 the figures of all features of the field."""
-
-
-def number(value: float | None, digits: int = 2, unit: float = 1.0) -> str:
-    return "-" if value is None else f"{unit * value:.{digits}f}"
 
 
 def networks(found: dict[str, Any], each_set: str) -> str:

@@ -16,7 +16,7 @@ import matplotlib
 matplotlib.use("Agg")
 from matplotlib import pyplot
 
-from ..report import DOCS, fill, machine, ms, table
+from ..report import DOCS, fill, machine, ms, number, table
 from . import score, train
 from .boxes import LENSES
 from .detector import TRAINED
@@ -75,16 +75,12 @@ def trainings(found: dict[str, Any]) -> str:
         for peer in TRAINED:
             part = found[lens][peer.stem]
             epochs, improved = part["epochs"], "yes" if part["still_improved"] else "no"
-            last = [_number(epochs[-1].get(each)) for each in ("ap50", "ap50_95")]
+            last = [number(epochs[-1].get(each), 3) for each in ("ap50", "ap50_95")]
             seen, loss = f"{found[lens]['training pictures'] * len(epochs):,}", f"{epochs[-1]['loss']:.2f}"
             done = str(len(epochs)) if len(epochs) == part["planned"] else f"{len(epochs)} of {part['planned']}"
             rows.append([peer.name, lens, done, seen, loss, *last, improved])
     heads = ["detector", "learned from", "epochs", "pictures seen", "last loss", "validation AP50", "AP50 to AP95"]
     return table([*heads, "still improved"], rows)
-
-
-def _number(value: float | None, factor: float = 1.0, digits: int = 3) -> str:
-    return "-" if value is None else f"{factor * value:.{digits}f}"
 
 
 def _kinds(found: dict[str, Any]) -> list[tuple[str, str, str]]:
@@ -99,9 +95,9 @@ def accuracy(found: dict[str, Any], which: str) -> str:
     rows = []
     for title, name, ending in _kinds(found):
         part = found[name][which + ending]
-        values = [_number(part[bins]["ap50"]) for bins in ("0.5 to 6 m", "6 to 10 m", "4 to 10 m", "all")]
-        values += [_number(part[bins]["ap75"]) for bins in ("0.5 to 6 m", "6 to 10 m")]
-        values += [_number(part["all"]["found"], 100.0, 1), _number(part["all"]["false"])]
+        values = [number(part[bins]["ap50"], 3) for bins in ("0.5 to 6 m", "6 to 10 m", "4 to 10 m", "all")]
+        values += [number(part[bins]["ap75"], 3) for bins in ("0.5 to 6 m", "6 to 10 m")]
+        values += [number(part["all"]["found"], 1, 100.0), number(part["all"]["false"], 3)]
         rows.append([title, *values])
     heads = ["detector", "AP50, 0.5 to 6 m", "6 to 10 m", "4 to 10 m", "all", "AP75, 0.5 to 6 m", "6 to 10 m"]
     return table([*heads, "found [%]", "false per picture"], rows)
@@ -134,7 +130,7 @@ def lenses(found: dict[str, Any]) -> str:
             values = [part["lenses"][kind]["ap50"] for kind in LENSES]
             drop = None if None in values else values[0] - values[1]
             values += [drop, *(part["sizes"][f"{factor:g}"]["ap50"] for factor in reversed(score.FACTORS))]
-            rows.append([name, lens, *map(_number, values)])
+            rows.append([name, lens, *(number(each, 3) for each in values)])
     sizes = [f"{1280 * factor:.0f} x {1024 * factor:.0f} px" for factor in reversed(score.FACTORS)]
     return table(["detector", "learned from", *LENSES, "difference", *sizes], rows)
 
