@@ -10,6 +10,7 @@ import numpy as np
 from benchmarks.choices import HEIGHTS, LENSES, RESULTS
 from benchmarks.report import DOCS, fill, spread, table
 from benchmarks.shipped_report import PAGE
+from vm_workstation.plots import new_figure, save_figure
 
 GROUPS = {
     "layers and mesh": (
@@ -90,10 +91,7 @@ def plot(results: dict[str, Any]) -> None:
     Both are for both meshes and three depths, as in the paper's fig:pr_curve and fig:pr_map (section "Precision"), and
     for the mesh network of `ball`.
     """
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11.0, 4.4), layout="constrained")
+    figure = new_figure(11.0, 4.4)
     curves, distances = figure.subplots(1, 2)
     for network, color in COLORS.items():
         visual = "base" if network == BASE["layers and mesh"] else network
@@ -119,8 +117,7 @@ def plot(results: dict[str, Any]) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     handles, labels = curves.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=6, fontsize=9, frameon=False)
-    with matplotlib.rc_context({"svg.hashsalt": "choices"}):
-        figure.savefig(DOCS / "choices.svg", metadata={"Date": None})
+    save_figure(figure, DOCS / "choices.svg")
 
 
 def main() -> None:

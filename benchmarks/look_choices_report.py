@@ -10,6 +10,7 @@ import numpy as np
 from benchmarks.look_choices import RESULTS
 from benchmarks.report import DOCS, fill, spread, table
 from benchmarks.shipped_report import PAGE
+from vm_workstation.plots import new_figure, save_figure
 
 NEAR, FAR = "0.5 to 6 m", "6 to 10 m"
 
@@ -36,10 +37,7 @@ def choices(found: dict[str, Any]) -> str:
 
 def plot(found: dict[str, Any]) -> None:
     """AP50 over the time of a whole call, a dot for each variant."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
+    figure = new_figure(9.0, 5.0)
     axes = figure.subplots()
     near = {name: [scores["ap50"][NEAR] for scores in seeds.values()] for name, seeds in found["scores"].items()}
     for place, (name, values) in enumerate(sorted(near.items(), key=lambda each: np.mean(each[1]))):
@@ -55,8 +53,7 @@ def plot(found: dict[str, Any]) -> None:
     axes.set_ylabel("AP50, 0.5 to 6 m (line: lowest and highest seed)")
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
-    with matplotlib.rc_context({"svg.hashsalt": "look"}):
-        figure.savefig(DOCS / "look-choices.svg", metadata={"Date": None})
+    save_figure(figure, DOCS / "look-choices.svg")
 
 
 def main() -> None:

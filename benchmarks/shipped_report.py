@@ -16,6 +16,7 @@ from vm_embedded.network.bundled import DEFAULT, model_path
 from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import read_model
+from vm_workstation.plots import new_figure, save_figure
 
 PAGE = DOCS / "results.md"
 COLORS = {"ball": "#d95f02", "ball-small": "#7570b3", "soccer": "#1b9e77"}
@@ -151,10 +152,7 @@ def by_distance(scores: dict[str, Any]) -> str:
 
 def plot(found: dict[str, Any]) -> None:
     """Precision over recall, and average precision over distance."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11.0, 4.4), layout="constrained")
+    figure = new_figure(11.0, 4.4)
     curves, distances = figure.subplots(1, 2)
     middles = np.arange(len(METERS)) + 0.5
     for name, sets in found["networks"].items():
@@ -174,8 +172,7 @@ def plot(found: dict[str, Any]) -> None:
         axes.grid(alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)
     curves.legend(frameon=False, loc="lower left")
-    with matplotlib.rc_context({"svg.hashsalt": "shipped"}):
-        figure.savefig(DOCS / "networks.svg", metadata={"Date": None})
+    save_figure(figure, DOCS / "networks.svg")
 
 
 def _upright_data(manifest: Manifest) -> str:

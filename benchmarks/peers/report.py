@@ -11,10 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-from matplotlib import pyplot
+from vm_workstation.plots import new_figure, save_figure
 
 from ..report import DOCS, fill, machine, ms, number, table
 from . import score, train
@@ -143,19 +140,13 @@ def _style(name: str) -> dict[str, Any]:
     return {"color": color[next(each.stem for each in TRAINED if each.name == name)], "label": name}
 
 
-def _save(figure: Any, path: Path) -> None:
-    with matplotlib.rc_context({"svg.hashsalt": path.stem}):
-        figure.savefig(path, metadata={"Date": None})
-    pyplot.close(figure)
-
-
 def plot_accuracy(found: dict[str, Any], path: Path) -> None:
     """Precision over recall, and average precision over distance; IoU 0.75, and 0.5.
 
     The paper shows both in fig:plots (section "Precision").
     """
-    figure, panels = pyplot.subplots(1, 3, figsize=(11, 3.6), layout="constrained")
-    curves, ap75, ap50 = panels
+    figure = new_figure(11.0, 3.6)
+    panels = curves, ap75, ap50 = figure.subplots(1, 3)
     for name in (*score.OURS, *(peer.name for peer in TRAINED)):
         if found[name]["curve"]:
             curves.plot(*zip(*found[name]["curve"], strict=True), **_style(name))
@@ -171,12 +162,13 @@ def plot_accuracy(found: dict[str, Any], path: Path) -> None:
         axes.set_ylim(0.0, 1.02)
         axes.spines[["top", "right"]].set_visible(False)
     figure.legend(*ap50.get_legend_handles_labels(), frameon=False, fontsize=8, loc="outside lower center", ncols=5)
-    _save(figure, path)
+    save_figure(figure, path)
 
 
 def plot_times(found: dict[str, Any], calls: dict[str, Any], path: Path) -> None:
     """AP50 of each detector, at all distances, over the time of a whole call."""
-    figure, axes = pyplot.subplots(figsize=(7.5, 3.6), layout="constrained")
+    figure = new_figure(7.5, 3.6)
+    axes = figure.subplots()
     for name in (*score.OURS, *(peer.name for peer in TRAINED)):
         x, ours = calls[name.partition(", same")[0]]["p50"], name in score.OURS
         y = found[name]["field"]["all"]["ap50"]
@@ -193,7 +185,7 @@ def plot_times(found: dict[str, Any], calls: dict[str, Any], path: Path) -> None
     axes.set_xlabel("whole call on one core [ms], log scale")
     axes.set_ylabel("AP50 on fields")
     axes.spines[["top", "right"]].set_visible(False)
-    _save(figure, path)
+    save_figure(figure, path)
 
 
 Tables = dict[str, Callable[[dict[str, Any]], str]]
