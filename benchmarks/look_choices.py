@@ -14,15 +14,16 @@ import os
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from benchmarks.frames import frames
 from benchmarks.shipped import CANDIDATES, METERS, RANGES, calibration_error, evaluation, numbers
+from benchmarks.timing import interleaved
 from vm_embedded.config.sections import read_sections
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
@@ -150,19 +151,14 @@ def scored(model: Path, test: Path) -> dict[str, Any]:
 
 
 def milliseconds(models: dict[str, Path]) -> dict[str, float]:
-    """Median time [ms] of a whole call of each model on the frames of `make bench`, in turns, on one core."""
+    """Median over the frames of `make bench` of the time [ms] of a whole call of each model, in turns, on one core."""
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     detectors = {name: Detector.from_file(path) for name, path in models.items()}
-    times: dict[str, list[float]] = {name: [] for name in models}
-    _, shown = frames()
-    for turn in range(ROUNDS + 1):
-        for frame in shown:
-            for name, detector in detectors.items():
-                start = perf_counter()
-                detector.detect(frame.image, frame.orientation, frame.lens)
-                if turn:  # the first turn fills the caches
-                    times[name].append(1000.0 * (perf_counter() - start))
-    return {name: round(float(np.median(each)), 3) for name, each in times.items()}
+    times = []
+    for frame in frames()[1]:
+        shown = (frame.image, frame.orientation, frame.lens)
+        times.append(interleaved({name: partial(each.detect, *shown) for name, each in detectors.items()}, ROUNDS))
+    return {name: round(float(np.median([each[name]["first"] for each in times])), 3) for name in models}
 
 
 def tasks(data: Path, test: Path, out: Path, seeds: int) -> Iterator[Task]:
