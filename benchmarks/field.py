@@ -10,27 +10,21 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.shipped import SETS, evaluation
 from vm_embedded.detection.settings import Settings
 from vm_embedded.network.bundled import model_path
 from vm_train.data.pictures import find_pictures
-from vm_train.evaluation.answers import load_subject
-from vm_train.evaluation.evaluation import Evaluation, Rules
-from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
+from vm_train.evaluation.evaluation import Evaluation
 from vm_train.evaluation.summary import field_tables
-from vm_train.evaluation.workers import Job, evaluate
 from vm_train.scores.point_scores import PointScores
 from vm_workstation.text_tables import aligned
 
 RESULTS = Path(__file__).parent / "field.json"
-
-SETS = ("field", "clutter")
-"""Test sets: a field with robots and people, and a field full of things that resemble a ball."""
 
 RANGES = {"to 10 m": range(20), "below 6 m": range(12), "6 to 10 m": range(12, 20)}
 """Bins of half a meter."""
@@ -63,21 +57,6 @@ class Figure:
         value = "-" if self.value is None else f"{self.value:.3f}"
         verdict = {True: "yes", False: "NO", None: "-"}[self.is_kept]
         return [self.name, value, f"{'<=' if self.at_most else '>='} {self.limit:g}", verdict]
-
-
-def evaluation(
-    model: Path, folder: Path, settings: Settings, as_robot: bool = False, count: int | None = None, workers: int = 1
-) -> Evaluation:
-    """Evaluation of a network on a folder of vm-synth; each picture gets a mesh for its own ball.
-
-    as_robot: run the detector as on a robot instead, with the mesh for its own ball. count: number of its last pictures
-    to use, or None for all.
-    """
-    subject = load_subject(model, settings, as_robot)
-    classes = classes_with_colors(subject.manifest, default_colors(model, None), [])
-    job = Job(model, settings, as_robot, classes, Rules("all" if as_robot else "scene"))
-    pictures = find_pictures(folder)
-    return evaluate(job, subject, pictures if count is None else pictures[-count:], workers, lambda: None)
 
 
 def f1_of_points(points: PointScores) -> dict[str, dict[str, float | None]]:
@@ -127,15 +106,18 @@ def main() -> None:
     parser.add_argument("test", type=Path, help="folder of test sets, or one set")
     parser.add_argument("--model", default="soccer", help="network of the package, or a model file")
     parser.add_argument("--as-robot", action="store_true", help="run the detector as on a robot")
-    parser.add_argument("--count", type=int, help="use only so many pictures of each set, the last ones")
-    parser.add_argument("--workers", type=int, default=len(os.sched_getaffinity(0)), help="processes")
+    parser.add_argument("--count", type=int, default=0, help="use only so many pictures of each set, the last ones")
+    parser.add_argument("--workers", type=int, help="processes; default: one for each core")
     parser.add_argument("--json", type=Path, default=RESULTS, help="file to write")
     options = parser.parse_args()
     model, folders = model_path(options.model), [options.test / each for each in SETS]
     if not any(each.is_dir() for each in folders):
         folders = [options.test]
-    how = (Settings(), options.as_robot, options.count, options.workers)
-    found = {each.name: report(each.name, evaluation(model, each, *how)) for each in folders}
+    found = {}
+    for each in folders:
+        pictures = find_pictures(each)[-options.count :]  # 0: all
+        done = evaluation(model, pictures, Settings(), options.workers, options.as_robot)
+        found[each.name] = report(each.name, done)
     options.json.write_text(json.dumps({"model": Path(options.model).name, "sets": found}) + "\n")
 
 

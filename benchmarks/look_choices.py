@@ -140,7 +140,8 @@ def _cut(run: LookRun) -> LookConfiguration:
 
 def scored(model: Path, test: Path) -> dict[str, Any]:
     """Average precision, recall and false balls of a model file on the first pictures of a set."""
-    ranked, used = (evaluation(model, test, each, TESTED, 1).objects["ball"] for each in (CANDIDATES, Settings()))
+    pictures = find_pictures(test)[:TESTED]
+    ranked, used = (evaluation(model, pictures, each, 1).objects["ball"] for each in (CANDIDATES, Settings()))
     return {
         "ap50": {each: numbers(ranked, bins)["average_precision"] for each, bins in (RANGES | METERS).items()},
         "ap75": {each: numbers(ranked, bins, 0.75)["average_precision"] for each, bins in RANGES.items()},

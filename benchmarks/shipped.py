@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from vm_embedded.errors import GeometryError
 from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
 from vm_embedded.network.model_file import read_model
 from vm_train.data.classes import Classes
+from vm_train.data.picture_files import PictureFiles
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.evaluation import Evaluation, Rules
 from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
@@ -56,20 +58,23 @@ LIKELY = 0.01
 
 
 def evaluation(
-    model: Path, folder: Path, settings: Settings, count: int | None = None, workers: int | None = None
+    model: Path,
+    pictures: Sequence[PictureFiles],
+    settings: Settings,
+    workers: int | None = None,
+    as_robot: bool = False,
 ) -> Evaluation:
-    """Evaluation of a network on a folder of vm-synth; each picture gets a mesh for its own ball.
+    """Evaluation of a network on pictures of vm-synth; each picture gets a mesh for its own ball.
 
-    count: number of its first pictures to use, or None for all. workers: processes, or None for one for each core.
+    workers: processes, or None for one for each core. as_robot: run the detector as on a robot instead, with the mesh
+    for its own ball.
     """
-    job = _job(model, settings)
-    subject = job.subject()
-    pictures = find_pictures(folder)[:count]
-    return evaluate(job, subject, pictures, workers or len(os.sched_getaffinity(0)), lambda: None)
+    job = _job(model, settings, as_robot)
+    return evaluate(job, job.subject(), pictures, workers or len(os.sched_getaffinity(0)), lambda: None)
 
 
-def _job(model: Path, settings: Settings) -> Job:
-    return Job(model, settings, False, classes_of(model), Rules("scene"))
+def _job(model: Path, settings: Settings, as_robot: bool = False) -> Job:
+    return Job(model, settings, as_robot, classes_of(model), Rules("all" if as_robot else "scene"))
 
 
 def classes_of(model: Path) -> Classes:
@@ -95,7 +100,7 @@ def numbers(scores: ObjectScores, bins: range | None, overlap: float = 0.5) -> d
 
 def scores_of(model: Path, folder: Path) -> tuple[dict[str, Any], Evaluation]:
     """All figures of a network on a test set: with the default settings, and over all confidences."""
-    used, ranked = (evaluation(model, folder, each) for each in (Settings(), CANDIDATES))
+    used, ranked = (evaluation(model, find_pictures(folder), each) for each in (Settings(), CANDIDATES))
     ball, curve = used.objects["ball"], ranked.objects["ball"]
     found: dict[str, Any] = {
         "pictures": ball.pictures,
@@ -210,7 +215,7 @@ def main() -> None:
                 picture, found["worst"] = sheet(used)
                 cv2.imwrite(str(WORST), picture, [cv2.IMWRITE_JPEG_QUALITY, 80])
     for folder in sorted((options.test / "grid").glob("*")) if options.network in (None, DEFAULT) else ():
-        used = evaluation(model_path(DEFAULT), folder, Settings())
+        used = evaluation(model_path(DEFAULT), find_pictures(folder), Settings())
         found["grid"][folder.name] = numbers(used.objects["ball"], None)
         print(folder.name, found["grid"][folder.name], flush=True)
     RESULTS.write_text(json.dumps(found) + "\n")
