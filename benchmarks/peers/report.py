@@ -80,7 +80,7 @@ def trainings(found: dict[str, Any]) -> str:
     return table([*heads, "still improved"], rows)
 
 
-def _kinds(found: dict[str, Any]) -> list[tuple[str, str, str]]:
+def _kinds() -> list[tuple[str, str, str]]:
     """Name of the row, detector, and ending of the names of its test sets."""
     checked = [(f"{peer.name}, sizes checked", peer.name, ", sizes checked") for peer in TRAINED]
     plain = [(peer.name, peer.name, "") for peer in TRAINED]
@@ -90,7 +90,7 @@ def _kinds(found: dict[str, Any]) -> list[tuple[str, str, str]]:
 
 def accuracy(found: dict[str, Any], which: str) -> str:
     rows = []
-    for title, name, ending in _kinds(found):
+    for title, name, ending in _kinds():
         part = found[name][which + ending]
         values = [number(part[bins]["ap50"], 3) for bins in ("0.5 to 6 m", "6 to 10 m", "4 to 10 m", "all")]
         values += [number(part[bins]["ap75"], 3) for bins in ("0.5 to 6 m", "6 to 10 m")]

@@ -56,13 +56,11 @@ SHARED = (("real", 0.11), ("reference", 0.075))
 
 @dataclass(frozen=True)
 class Choice:
-    """What the validation pictures chose for a peer: score and tolerance, each with the F1 that they give."""
+    """What the validation pictures chose for a peer."""
 
     threshold: float
     tolerance: float
     threshold_with_tolerance: float
-    f1: float
-    f1_with_tolerance: float
 
 
 def resized(picture: Picture, factor: float) -> tuple[np.ndarray, LensFile]:
@@ -145,7 +143,7 @@ def choose(detector: BoxDetector, pictures: Sequence[PictureFiles]) -> Choice:
     tallies = tally_peer(detector, pictures, (None, *TOLERANCES))
     best = {tolerance: _best(tally.all) for tolerance, tally in tallies.items()}
     tolerance = max(TOLERANCES, key=lambda each: best[each][0])
-    return Choice(best[None][1], tolerance, best[tolerance][1], best[None][0], best[tolerance][0])
+    return Choice(best[None][1], tolerance, best[tolerance][1])
 
 
 def _best(scores: ObjectScores) -> tuple[float, float]:
