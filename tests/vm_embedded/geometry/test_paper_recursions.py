@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError
 from vm_embedded.geometry.circle import Circle
-from vm_embedded.geometry.paper_recursions import circle_dtheta, circle_phi1, repeat, sample_radius, sphere_phi_1
 from vm_embedded.geometry.sphere import Sphere
 
 from ..strategies import reals
+from .paper_recursions import circle_dtheta, circle_phi1, repeat, sample_radius, sphere_phi_1
 
 radii = reals(0.02, 0.5)
 clearances = reals(1.05, 30.0)

@@ -1,6 +1,7 @@
-"""The paper's recursions as it prints them. Only tests use this module.
+"""The paper's recursions as it prints them.
 
-Meshes are built from closed forms of these equations (`circle.py`, `sphere.py`). The tests compare the two.
+Meshes are built from closed forms of these equations (`circle.py` and `sphere.py` of the package). The tests compare
+the two.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import math
 from collections.abc import Callable
 from fractions import Fraction
 
-from ..errors import GeometryError
+from vm_embedded.errors import GeometryError
 
 Step = Callable[[float, float, float], float]
 """(phi [rad], radius [m], height [m]) -> next phi [rad]."""
