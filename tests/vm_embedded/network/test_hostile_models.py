@@ -17,6 +17,8 @@ from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY
 from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
 from vm_embedded.network.onnx_model import OnnxModel
 
+from .protobuf import varint
+
 onnxruntime = pytest.importorskip("onnxruntime")
 
 LARGE = 0x01520028
@@ -113,14 +115,6 @@ def doubled(wanted, points):
     )
     made = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
     return made.SerializeToString()
-
-
-def varint(value):
-    encoded = b""
-    while value > 127:
-        encoded += bytes([value & 127 | 128])
-        value >>= 7
-    return encoded + bytes([value])
 
 
 def in_both_formats(checked, hidden, folder):

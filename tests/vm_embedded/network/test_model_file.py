@@ -14,6 +14,7 @@ from vm_embedded.network.manifest import METADATA_KEY, Manifest, ObjectClass
 from vm_embedded.network.model_file import read_model, sealed
 
 from ..strategies import attempt
+from .protobuf import varint
 
 MANIFEST = ball_manifest(provenance={"made by": "a test"})
 
@@ -258,15 +259,6 @@ def test_a_place_alone_or_a_mark_alone_is_refused(write):
     for tensor in (marked, placed):
         with pytest.raises(ModelError, match="external data"):
             read_model(write(model(initializers=[tensor])))
-
-
-def varint(value):
-    """A whole number in the wire format, seven bits a byte."""
-    encoded = b""
-    while value > 127:
-        encoded += bytes([value & 127 | 128])
-        value >>= 7
-    return encoded + bytes([value])
 
 
 def field(number, content, tag_offset=0):
