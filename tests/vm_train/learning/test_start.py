@@ -8,8 +8,8 @@ import pytest
 import torch
 
 from tests.vm_export.checkpoints import manifest
-from tests.vm_train.commands import SMALL, run
-from tests.vm_train.drawn import CLASSES, draw_set
+from tests.vm_train.commands import run
+from tests.vm_train.drawn import CLASSES
 from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import SHIPPED, model_path
@@ -23,18 +23,6 @@ from vm_train.learning.start import Start
 
 ONE_EPOCH = ("--set", "training.epochs=1", "--workers", 0, "--threads", 1, "--no-unpacked")
 STILL = ("--set", "training.rate=1e-9", "--set", "training.decay=0")
-
-
-@pytest.fixture(scope="module")
-def data(tmp_path_factory):
-    return draw_set(tmp_path_factory.mktemp("drawn"), 16)
-
-
-@pytest.fixture(scope="module")
-def configuration(tmp_path_factory):
-    path = tmp_path_factory.mktemp("configuration") / "train.toml"
-    path.write_text(CLASSES + SMALL.replace('"hard"', '"all"'))
-    return path
 
 
 @pytest.fixture(scope="module")

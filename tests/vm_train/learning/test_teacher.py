@@ -5,21 +5,8 @@ import hashlib
 import pytest
 import torch
 
-from tests.vm_train.commands import SMALL, run
-from tests.vm_train.drawn import CLASSES, draw_set
+from tests.vm_train.commands import run
 from vm_export.checkpoint import Checkpoint
-
-
-@pytest.fixture(scope="module")
-def data(tmp_path_factory):
-    return draw_set(tmp_path_factory.mktemp("drawn"), 30)
-
-
-@pytest.fixture(scope="module")
-def configuration(tmp_path_factory):
-    path = tmp_path_factory.mktemp("configuration") / "train.toml"
-    path.write_text(CLASSES + SMALL.replace('"hard"', '"all"'))
-    return path
 
 
 @pytest.fixture(scope="module")
