@@ -4,12 +4,13 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pytest
 import yaml
 
+from tests.programs import BIN, run_program
 from tests.vm_export.checkpoints import checkpoint, manifest
 from tests.vm_export.test_reference import reference_file
 from vm_embedded.network.manifest import EDGES, ObjectClass
@@ -17,14 +18,7 @@ from vm_embedded.network.model_file import read_model
 from vm_embedded.network.session import Session
 from vm_export import export
 
-COMMAND = Path(sys.executable).parent / "vm-export"
-
-
-def run(*arguments, code=0):
-    done = subprocess.run([str(COMMAND), *map(str, arguments)], capture_output=True, text=True)
-    assert done.returncode == code, done.stderr
-    assert "Traceback" not in done.stderr
-    return done
+run = partial(run_program, "vm-export")
 
 
 def test_command_exports_a_checkpoint_and_prints_the_difference(tmp_path):
@@ -180,6 +174,6 @@ def test_a_portable_file_that_can_not_be_written_leaves_no_half_of_the_work(tmp_
     ],
 )
 def test_a_file_must_have_the_suffix_of_its_content(tmp_path, arguments, message):
-    done = subprocess.run([COMMAND, *arguments], capture_output=True, text=True, cwd=tmp_path, check=False)
+    done = subprocess.run([BIN / "vm-export", *arguments], capture_output=True, text=True, cwd=tmp_path, check=False)
     assert (done.returncode, done.stderr) == (1, f"vm-export: {message}\n")
     assert not list(tmp_path.iterdir())

@@ -1,21 +1,14 @@
 """Running vm-detect as a user does: real processes, whose output is read back."""
 
 import json
-import subprocess
-import sys
-from pathlib import Path
+from functools import partial
 
 from tests.drawn_scenes import MODEL
 from tests.messages import checked
+from tests.programs import BIN, run_program
 
-COMMAND = Path(sys.executable).parent / "vm-detect"
-
-
-def run(*arguments, code=0, **more):
-    done = subprocess.run([str(COMMAND), *map(str, arguments)], capture_output=True, text=True, **more)
-    assert done.returncode == code, (done.returncode, done.stderr)
-    assert "Traceback" not in done.stderr
-    return done
+COMMAND = BIN / "vm-detect"
+run = partial(run_program, COMMAND)
 
 
 def detect(source, *options, **more):

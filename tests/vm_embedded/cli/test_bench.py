@@ -2,26 +2,18 @@
 
 import json
 import math
-import subprocess
-import sys
-from pathlib import Path
+from functools import partial
 
 import pytest
 
 from tests.drawn_scenes import FOLDER, IMAGES, MODEL
+from tests.programs import run_program
 from vm_embedded import read_lens_file
 from vm_embedded.live.configuration import read_configuration
 from vm_embedded.network.model_file import read_model
 
 STAGES = ("mesh", "project", "sample", "infer", "cluster")
-COMMAND = Path(sys.executable).with_name("vm-bench")
-
-
-def run(*arguments, code=0):
-    done = subprocess.run([str(COMMAND), *map(str, arguments)], capture_output=True, text=True)
-    assert done.returncode == code, done.stderr
-    assert "Traceback" not in done.stderr
-    return done
+run = partial(run_program, "vm-bench")
 
 
 def test_command_prints_a_table_and_keeps_all_figures_as_json(tmp_path):

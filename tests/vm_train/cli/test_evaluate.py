@@ -5,14 +5,15 @@ import json
 import re
 import signal
 import subprocess
-import sys
 import time
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
 import cv2
 import pytest
 
+from tests.programs import BIN, run_program
 from tests.vm_export.looks import look_checkpoint
 from vm_export.change_model import change_looks
 from vm_export.checkpoint import Checkpoint
@@ -22,14 +23,7 @@ from vm_train.cli.evaluate import main
 from ...drawn_scenes import CHECKPOINT, IMAGES, MODEL
 from ..drawn import draw_set
 
-COMMAND = Path(sys.executable).parent / "vm-evaluate"
-
-
-def run(*arguments, code=0):
-    done = subprocess.run([str(COMMAND), *map(str, arguments)], capture_output=True, text=True)
-    assert done.returncode == code, done.stderr
-    assert "Traceback" not in done.stderr
-    return done
+run = partial(run_program, "vm-evaluate")
 
 
 def complaint(capsys, *arguments):
@@ -277,7 +271,7 @@ def test_an_interrupt_ends_it_with_130_and_writes_nothing(data, tmp_path):
         part, suffix = name.split(".")
         for number in range(1, 4000):
             (folder / f"{part}{number:04d}.{suffix}").hardlink_to(folder / f"{part}0000.{suffix}")
-    command = [str(COMMAND), str(MODEL), str(folder), "-o", str(tmp_path / "out"), "--workers", "2"]
+    command = [str(BIN / "vm-evaluate"), str(MODEL), str(folder), "-o", str(tmp_path / "out"), "--workers", "2"]
 
     def heed_interrupts():  # a shell's background jobs ignore them, and so would their children
         signal.signal(signal.SIGINT, signal.SIG_DFL)
