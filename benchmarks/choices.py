@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.config.sections import read_sections
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_train.data.split import Split
 from vm_train.learning.configuration import TrainConfiguration
@@ -245,8 +245,7 @@ def main() -> None:
         for (name, seed), score in zip(todo, scores, strict=True):
             found[name][str(seed)] = score
             print(name, seed, flush=True)
-    with atomic_write(RESULTS) as path:
-        path.write_text(json.dumps(found) + "\n")
+    write_file(RESULTS, json.dumps(found) + "\n")
 
 
 if __name__ == "__main__":

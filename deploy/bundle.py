@@ -33,7 +33,7 @@ from vm_embedded import __version__  # noqa: E402
 from vm_embedded.cameras.camera import CameraSettings  # noqa: E402
 from vm_embedded.config.toml_writer import to_commented_toml  # noqa: E402
 from vm_embedded.errors import InputError, VisualMeshError  # noqa: E402
-from vm_embedded.files import atomic_write  # noqa: E402
+from vm_embedded.files import write_file  # noqa: E402
 from vm_embedded.live.configuration import Configuration, read_configuration  # noqa: E402
 from vm_embedded.network.bundled import DEFAULT, model_path  # noqa: E402
 from vm_embedded.network.model_file import read_model  # noqa: E402
@@ -235,8 +235,7 @@ def write_bundle(
         files["SHA256SUMS.sig"] = _signature(files["SHA256SUMS"], key)
     path = dist / f"{NAME}-{__version__}-{target.name}.tar.gz"
     dist.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path) as part:
-        part.write_bytes(_pack(f"{NAME}-{release}-{target.name}", files, origin.time))
+    write_file(path, _pack(f"{NAME}-{release}-{target.name}", files, origin.time))
     return path
 
 

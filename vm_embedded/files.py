@@ -37,6 +37,12 @@ def atomic_write(path: Path) -> Iterator[Path]:
             part.unlink(missing_ok=True)
 
 
+def write_file(path: Path, content: str | bytes) -> None:
+    """Write a file as a whole, text as UTF-8. Raises InputError; the file is as before then."""
+    with atomic_write(path) as part:
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
 def check_writable(path: Path) -> None:
     """Raise InputError if a file can't be created because of its folder; check this before long work."""
     if not path.resolve().parent.is_dir():

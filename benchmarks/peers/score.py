@@ -24,7 +24,7 @@ from benchmarks import measured_frames
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import GeometryError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
@@ -279,8 +279,7 @@ def _validation(boxes: Path) -> list[PictureFiles]:
 def _write(name: str, row: dict[str, Any]) -> None:
     """Add a row to the results. It reads them again, because another process may score other detectors."""
     found: dict[str, Any] = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
-    with atomic_write(RESULTS) as path:
-        path.write_text(json.dumps(found | {name: row}, indent=1) + "\n")
+    write_file(RESULTS, json.dumps(found | {name: row}, indent=1) + "\n")
     print(name, json.dumps(row["sizes"]["1"]), flush=True)
 
 

@@ -16,7 +16,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 
 from .boxes import LENSES, PARTS, SEED, VALIDATION, link_pictures, write_boxes
 from .course import read_course
@@ -86,8 +86,7 @@ def main() -> None:
         part |= {f"{each} pictures": len(list((out / "boxes" / "labels" / each).glob("*.txt"))) for each in PARTS}
         row = {"seed": 0, "planned": planned, "still_improved": still_improved(stem, log, planned), "epochs": log}
         part[stem] = row
-        with atomic_write(LOG) as path:
-            path.write_text(json.dumps(found, indent=1) + "\n")
+        write_file(LOG, json.dumps(found, indent=1) + "\n")
 
 
 if __name__ == "__main__":

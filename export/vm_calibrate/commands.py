@@ -11,7 +11,7 @@ from pathlib import Path
 
 from vm_embedded.config.units import parse_angle
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write, check_writable
+from vm_embedded.files import check_writable, write_file
 from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.lens_files import format_lens_file, read_lens_file
 from vm_embedded.geometry.orientation import Orientation
@@ -40,8 +40,7 @@ def board(options: argparse.Namespace) -> None:
             f"the drawing of a board is an SVG file; give -o a name that ends in .svg, not {options.output}"
         )
     drawn = _board(options, None)
-    with atomic_write(options.output) as part:
-        part.write_text(board_svg(drawn), encoding="utf-8")
+    write_file(options.output, board_svg(drawn))
     print(f"{options.output}: written; print it at 100 %, and check that a square has {1000.0 * drawn.square:g} mm")
 
 
@@ -135,8 +134,7 @@ def _check_lens_path(path: Path) -> None:
 def _write(path: Path, lens: Lens, orientation: Orientation | None, lines: list[str]) -> None:
     """Write a lens file with a report at its head, and print the report."""
     head = "".join(f"# {line}\n" for line in ["made by vm-calibrate", *lines])
-    with atomic_write(path) as part:
-        part.write_text(head + format_lens_file(lens, orientation), encoding="utf-8")
+    write_file(path, head + format_lens_file(lens, orientation))
     print("\n".join(lines))
     print(f"{path}: written")
 

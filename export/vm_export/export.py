@@ -12,7 +12,7 @@ import torch
 import vm_embedded
 from vm_embedded.arrays import Indices, Singles
 from vm_embedded.errors import ModelError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 from vm_embedded.mesh.grids import lattice_neighbors
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
@@ -108,8 +108,7 @@ def check_difference(path: str | Path, what: str, difference: float) -> None:
 
 def write_model(path: str | Path, content: bytes) -> None:
     """Write a file as a whole. Raises InputError."""
-    with atomic_write(Path(path)) as part:
-        part.write_bytes(content)
+    write_file(Path(path), content)
 
 
 def largest_difference(content: bytes, network: Network, manifest: Manifest) -> float:

@@ -12,15 +12,14 @@ from typing import Any
 import torch
 
 from vm_embedded.errors import InputError, one_line
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 
 
 def save_values(path: str | Path, content: Mapping[str, Any]) -> None:
     """Write plain values and tensors. Raises InputError if the file can't be written."""
     file = io.BytesIO()  # torch reports a full disk in its own way; write_bytes raises OSError
     torch.save(dict(content), file)
-    with atomic_write(Path(path)) as part:
-        part.write_bytes(file.getbuffer())
+    write_file(Path(path), file.getvalue())
 
 
 def load_values(path: str | Path, what: str) -> Any:

@@ -14,7 +14,7 @@ import numpy as np
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.projection import project
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write, check_writable
+from vm_embedded.files import check_writable, write_file
 from vm_embedded.geometry.lens import Size
 from vm_embedded.geometry.lens_files import LensFile
 from vm_workstation.option_types import parse_size
@@ -189,8 +189,7 @@ def _write_json(path: Path | None, content: Any) -> None:
     """Write a JSON file, if there is a path, and say so."""
     if path is None:
         return
-    with atomic_write(path) as part:
-        part.write_text(json.dumps(_without_nan(content), indent=1, allow_nan=False) + "\n")
+    write_file(path, json.dumps(_without_nan(content), indent=1, allow_nan=False) + "\n")
     print(f"{path}: written")
 
 

@@ -17,7 +17,7 @@ from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError, VisualMeshError, unknown
-from vm_embedded.files import atomic_write, check_writable
+from vm_embedded.files import check_writable, write_file
 from vm_workstation.contact_sheet import check_sheet_path, check_sheet_size, choose_indices, write_sheet
 from vm_workstation.option_types import at_least
 from vm_workstation.stopping import stoppable
@@ -321,8 +321,7 @@ def _check(options: argparse.Namespace) -> int:
         bar.clear()
     print(tables(found, options.shards))
     if options.json is not None:
-        with atomic_write(options.json) as part:
-            part.write_text(json.dumps(as_json(found), indent=1) + "\n", encoding="utf-8")
+        write_file(options.json, json.dumps(as_json(found), indent=1) + "\n")
     if options.plots is not None and found.facts:
         title = f"{options.out.resolve().name}: {len(found.facts)} of {found.count} pictures"
         plot(found.facts, found.size, title, options.plots)

@@ -10,7 +10,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 
 Color = tuple[int, int, int]
 """8-bit color in the order that a function's description gives."""
@@ -86,5 +86,4 @@ def write_sheet(path: Path, sheet: Image) -> None:
     """
     check_sheet_path(path)
     check_sheet_size(sheet.shape[1], sheet.shape[0])
-    with atomic_write(path) as part:
-        part.write_bytes(cv2.imencode(path.suffix.lower(), sheet)[1].tobytes())
+    write_file(path, cv2.imencode(path.suffix.lower(), sheet)[1].tobytes())

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from vm_embedded import InputError
-from vm_embedded.files import atomic_write, check_writable
+from vm_embedded.files import atomic_write, check_writable, write_file
 
 
 def write(path, text="new"):
@@ -71,3 +71,21 @@ def test_what_can_not_be_written_is_said_before_the_work_and_after(tmp_path, nam
         check_writable(tmp_path / name)
     with pytest.raises(InputError, match="can't write"):
         write(tmp_path / name)
+
+
+@pytest.mark.parametrize(("content", "written"), [("Bäll\n", "Bäll\n".encode()), (b"\x00\xff", b"\x00\xff"), ("", b"")])
+def test_a_file_is_written_as_a_whole(tmp_path, content, written):
+    path = tmp_path / "file"
+    path.write_text("before")
+    write_file(path, content)
+    assert path.read_bytes() == written
+    assert [each.name for each in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_file_that_can_not_be_written_is_named_and_stays(tmp_path):
+    path = tmp_path / "file"
+    path.write_text("before")
+    path.with_name("file.part").mkdir()
+    with pytest.raises(InputError, match=r"can't write .*file"):
+        write_file(path, "after")
+    assert path.read_text() == "before"

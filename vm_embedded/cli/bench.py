@@ -16,7 +16,7 @@ import cv2
 from ..config.toml_editor import check_editable, write_entries
 from ..detection.detector import Detector
 from ..errors import InputError, VisualMeshError
-from ..files import atomic_write, check_writable
+from ..files import check_writable, write_file
 from ..live.configuration import Configuration
 from ..network.bundled import model_path
 from ..network.model_file import ModelFile, read_model
@@ -138,8 +138,7 @@ def _run(options: argparse.Namespace) -> int:
     if json_to_stdout:
         print(text)
     elif options.json is not None:
-        with atomic_write(options.json) as part:
-            part.write_text(text + "\n", encoding="utf-8")
+        write_file(options.json, text + "\n")
     if options.tune is not None:
         write_entries(options.tune, "detector", found["tuned"])
         chosen = ", ".join(f"{name} = {value}" for name, value in found["tuned"].items())

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files import atomic_write, check_writable
+from ..files import check_writable, write_file
 from .toml_reader import parse_toml
 
 
@@ -24,8 +24,7 @@ def write_entries(path: Path, section: str, entries: Mapping[str, Any]) -> None:
     Raises InputError if the file can't be read or written, or if the section can't be edited line by line.
     """
     edited = _edited_file(path, section, entries)
-    with atomic_write(path) as part:
-        part.write_bytes(edited.encode("utf-8"))
+    write_file(path, edited.encode("utf-8"))
 
 
 def _edited_file(path: Path, section: str, entries: Mapping[str, Any]) -> str:

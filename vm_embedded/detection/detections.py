@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import AnyImage, Floats, Image, Singles
 from ..errors import InputError, unknown
 from ..field.features import FieldFeatures
-from ..files import atomic_write
+from ..files import write_file
 from ..network.manifest import Manifest
 from .detection import Detection
 from .observation import Observation
@@ -111,8 +111,7 @@ class Detections:
             content = encoded.tobytes()
         else:
             raise InputError(f"can't write {path}: {unknown('suffix', suffix, (*_PICTURES, '.json'))}")
-        with atomic_write(path) as part:
-            part.write_bytes(content)
+        write_file(path, content)
 
     @property
     def manifest(self) -> Manifest:

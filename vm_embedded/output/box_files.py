@@ -20,7 +20,7 @@ from ..arrays import Floats, Image
 from ..cameras.image_files import Frame
 from ..detection.detections import Detections
 from ..errors import InputError
-from ..files import atomic_write
+from ..files import write_file
 from ..geometry.lens import Lens
 from ..geometry.lens_files import format_lens_file
 from ..geometry.orientation import Orientation
@@ -64,8 +64,8 @@ class BoxWriter:
             raise InputError(f"--save-boxes {folder}: the folder is not empty; give a new one, to keep its labels")
         self._folder, self._classes = folder, classes
         self._names = FrameNames("image")  # so that the lens file belongs to the image
-        _write(folder / CLASSES, "".join(f"{name}\n" for name in classes).encode())
-        _write(folder / CANDIDATES, b"")
+        write_file(folder / CLASSES, "".join(f"{name}\n" for name in classes).encode())
+        write_file(folder / CANDIDATES, b"")
 
     def write(self, frame: Frame, image: Image, lens: Lens, orientation: Orientation, detections: Detections) -> Path:
         """Write the files of a frame, and return the path of its image.
@@ -75,11 +75,11 @@ class BoxWriter:
         """
         name, boxes = self._names.of(frame), candidate_boxes(detections, (image.shape[1], image.shape[0]))
         path = self._folder / f"{name}{'.png' if frame.path is None else frame.path.suffix}"
-        _write(path, encode_png(image) if frame.path is None else frame.path.read_bytes())
+        write_file(path, encode_png(image) if frame.path is None else frame.path.read_bytes())
         lens_file = format_lens_file(lens, orientation)
-        _write(self._folder / f"lens{name.removeprefix('image')}.yaml", lens_file.encode())
+        write_file(self._folder / f"lens{name.removeprefix('image')}.yaml", lens_file.encode())
         labels = [self._yolo_line(each) for each in boxes if each.found]
-        _write(self._folder / f"{name}.txt", "".join(labels).encode())
+        write_file(self._folder / f"{name}.txt", "".join(labels).encode())
         self._append_candidates("".join(_json_line(path.name, each) for each in boxes))
         return path
 
@@ -140,8 +140,3 @@ def overlap(a: Shares, b: Shares) -> float:
 def _json_line(image: str, box: CandidateBox) -> str:
     fields = {"image": image, "class": box.class_name, "box": box.shares}
     return json.dumps(fields | {"confidence": box.confidence, "found": box.found}) + "\n"
-
-
-def _write(path: Path, content: bytes) -> None:
-    with atomic_write(path) as part:
-        part.write_bytes(content)

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Image
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 from vm_embedded.geometry.lens_files import format_lens_file
 from vm_workstation.outlines import polygon_area, sphere_outline
 
@@ -38,8 +38,7 @@ def write_picture(folder: Path, index: int, map_name: str, scene: Scene, picture
         "scene": (json.dumps(scene_description(index, map_name, scene, picture), allow_nan=False) + "\n").encode(),
     }
     for part, content in contents.items():
-        with atomic_write(file_of(folder, part, index)) as path:
-            path.write_bytes(content)
+        write_file(file_of(folder, part, index), content)
 
 
 def mask_colors(picture: Picture) -> Image:

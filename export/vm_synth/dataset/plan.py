@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 
 from ..scene.configuration import SceneConfiguration
 from .files import FORMAT, PARTS, read_table
@@ -56,8 +56,7 @@ class Plan:
                 f"{folder} contains {others[0].name} but no set.json, so its pictures are not from vm-synth; "
                 "write to another folder"
             )
-        with atomic_write(path) as part:
-            part.write_text(self.as_json(), encoding="utf-8")
+        write_file(path, self.as_json())
 
 
 def read_plan(folder: Path) -> dict[str, Any]:

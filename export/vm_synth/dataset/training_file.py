@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 
 from ..scene.configuration import SceneConfiguration
 from .files import CLASS_COLORS
@@ -16,8 +16,7 @@ def write_training(folder: Path, configuration: SceneConfiguration) -> None:
     """Write the sections [classes] and [mesh] for a set of these objects, unless the folder has the file already."""
     path = folder / NAME
     if not path.exists():
-        with atomic_write(path) as part:
-            part.write_text(training_text(configuration), encoding="utf-8")
+        write_file(path, training_text(configuration))
 
 
 def training_text(configuration: SceneConfiguration) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 
 from vm_embedded.cli.program import Parser
 from vm_embedded.cli.progress import ProgressBar
-from vm_embedded.files import atomic_write, check_writable
+from vm_embedded.files import check_writable, write_file
 from vm_workstation.option_types import at_least
 from vm_workstation.shortened import shortened
 from vm_workstation.text_tables import aligned, summary
@@ -79,8 +79,7 @@ def run_check(options: argparse.Namespace, classes: Classes, objects: Sequence[s
         bar.clear()
     print("\n".join(tables(found)))
     if options.json is not None:
-        with atomic_write(options.json) as part:
-            part.write_text(json.dumps(as_json(found), indent=1) + "\n", encoding="utf-8")
+        write_file(options.json, json.dumps(as_json(found), indent=1) + "\n")
     for line in complaints(found):
         print(f"vm-train: {line}", file=sys.stderr)
     return EXIT_FAULTS if found.faults or (options.strict and found.absent) else EXIT_OK

@@ -13,7 +13,7 @@ from typing import Any
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write, check_writable
+from vm_embedded.files import check_writable, write_file
 from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
@@ -96,8 +96,7 @@ def run_check_boxes(options: argparse.Namespace) -> int:
         faults += _unlabeled(found, network, bool(round_names), options.data)
     print("\n".join(summary_lines(found)))
     if options.json is not None:
-        with atomic_write(options.json) as part:
-            part.write_text(json.dumps(_as_json(found, faults), indent=1) + "\n", encoding="utf-8")
+        write_file(options.json, json.dumps(_as_json(found, faults), indent=1) + "\n")
     for line in shortened(faults, _NAMED, "; vm-train check --boxes --json FILE lists all"):
         print(f"vm-train: {line}", file=sys.stderr)
     if options.sheet is not None:

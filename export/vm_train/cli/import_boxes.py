@@ -10,7 +10,7 @@ from pathlib import Path
 
 from vm_embedded.cli.program import Parser
 from vm_embedded.errors import InputError, unknown
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 from vm_embedded.geometry.make_shape import make_shape
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.bundled import SHIPPED
@@ -139,5 +139,4 @@ def _complain(lines: Sequence[str], more: str) -> None:
 
 def _write_list(path: Path, numbers: Sequence[str]) -> None:
     """Write the list of pictures for validation: whole recordings."""
-    with atomic_write(path) as part:
-        part.write_text("".join(f"{each}\n" for each in numbers), encoding="utf-8")
+    write_file(path, "".join(f"{each}\n" for each in numbers))

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from vm_embedded.errors import InputError, one_line
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 
 from .picture_lists import read_list
 
@@ -86,8 +86,7 @@ def _checked(split: Split, count: int, remedy: str) -> Split:
 
 def write_split(path: Path, split: Split) -> None:
     """Write pictures.json. Raises InputError if it can't be written."""
-    with atomic_write(path) as part:
-        part.write_text(json.dumps(asdict(split), indent=1) + "\n", encoding="utf-8")
+    write_file(path, json.dumps(asdict(split), indent=1) + "\n")
 
 
 def read_split(path: Path) -> Split:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 from vm_workstation.plots import save_figure
 
 from .evaluation import Evaluation
@@ -57,8 +57,7 @@ def write_evaluation(
     images = {name: (out / "plots" / f"{name}.svg").read_bytes() for name in figures}
     texts["report.html"] = page(scores, images, _strips(evaluation))
     for file_name, text in texts.items():
-        with atomic_write(out / file_name) as part:
-            part.write_text(text, encoding="utf-8")
+        write_file(out / file_name, text)
     for stale in {f"{name}.csv" for name in _TABLES}.difference(texts):
         (out / stale).unlink(missing_ok=True)
     for stale in set(_PLOTS).difference(figures):

@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import atomic_write, write_file
 from vm_embedded.geometry.lens_files import read_lens_file
 
 from ..boxes.box import BoxedPicture
@@ -50,10 +50,10 @@ def import_boxes(
             continue
         number = _number(picture.image.relative_to(folder), numbers)
         mask, count, wrong = mask_of(picture, lens, rule)
-        _write(out / f"mask{number}.png", cv2.imencode(".png", mask)[1].tobytes())
+        write_file(out / f"mask{number}.png", cv2.imencode(".png", mask)[1].tobytes())
         _copy(picture.lens, out / f"lens{number}.yaml")
         if write_radius:
-            _write(out / f"scene{number}.json", f"{json.dumps({'ball_radius': rule.shape.radius})}\n".encode())
+            write_file(out / f"scene{number}.json", f"{json.dumps({'ball_radius': rule.shape.radius})}\n".encode())
         _write_image(picture.image, out / f"image{number}")
         numbers.append(number)
         labeled += count
@@ -88,14 +88,9 @@ def _write_image(image: Path, to: Path) -> None:
     decoded = cv2.imread(str(image), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if decoded is None:
         raise InputError(f"can't read image {image}")
-    _write(to.with_name(f"{to.name}.png"), cv2.imencode(".png", decoded)[1].tobytes())
+    write_file(to.with_name(f"{to.name}.png"), cv2.imencode(".png", decoded)[1].tobytes())
 
 
 def _copy(path: Path, to: Path) -> None:
     with atomic_write(to) as part:
         shutil.copyfile(path, part)
-
-
-def _write(path: Path, data: bytes) -> None:
-    with atomic_write(path) as part:
-        part.write_bytes(data)

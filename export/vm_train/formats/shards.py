@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import atomic_write, write_file
 
 from ..data.picture_files import PARTS, PictureFiles
 
@@ -78,8 +78,7 @@ def _prepare(out: Path, pictures: Sequence[PictureFiles], per_shard: int) -> Non
         raise InputError(f"can't use folder {out}: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is damaged: write to another folder") from error
-    with atomic_write(path) as part:
-        part.write_text(json.dumps(plan, indent=1) + "\n", encoding="utf-8")
+    write_file(path, json.dumps(plan, indent=1) + "\n")
 
 
 def _size(path: Path) -> int:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.errors import InputError, VisualMeshError, unknown
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 
 from ..data.picture_files import IMAGES
 from .picture_example import KEYS, SUFFIXES, ExamplePicture, WrongUnitError, picture_of
@@ -91,9 +91,9 @@ def _picture_or_fault(
 def _import_picture(picture: ExamplePicture, number: int, out: Path, wanted: str | None) -> None:
     """Write the files of a picture; before, `wanted` as import.json, if it is not None."""
     if wanted is not None:
-        _write(out / "import.json", wanted.encode())
+        write_file(out / "import.json", wanted.encode())
     for name, data in picture.files(number).items():
-        _write(out / name, data)
+        write_file(out / name, data)
 
 
 def _picture(record: Record, renaming: Mapping[str, str], normalized: bool) -> ExamplePicture:
@@ -153,8 +153,3 @@ def _is_done(out: Path, number: int) -> bool:
     images = (out / f"image{number:07d}{suffix}" for suffix in SUFFIXES.values())
     others = (out / f"mask{number:07d}.png", out / f"lens{number:07d}.yaml")
     return any(each.is_file() for each in images) and all(each.is_file() for each in others)
-
-
-def _write(path: Path, data: bytes) -> None:
-    with atomic_write(path) as part:
-        part.write_bytes(data)

@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 
 
 class TrainingLog:
@@ -75,8 +75,7 @@ def _cut(path: Path, training_round: int, step: int, validated: int) -> None:
         return bool(record["epoch"] <= validated if "epoch" in record else record["step"] <= step)
 
     kept = [line for line, record in read_log(path) if is_before(record)]
-    with atomic_write(path) as part:
-        part.write_text("".join(kept), encoding="utf-8")
+    write_file(path, "".join(kept))
 
 
 def read_log(path: Path) -> list[tuple[str, dict[str, Any]]]:

@@ -24,7 +24,7 @@ from vm_embedded.arrays import Floats
 from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 
 from ..data.split import read_split, write_split
 from ..graphs.loading import PictureGraphs
@@ -156,13 +156,11 @@ def begin_run(
     run = TrainingRun(folder, data, configuration, counts, loaded, start)
     write_split(folder / "pictures.json", data.split)
     if teacher is not None:
-        with atomic_write(folder / _TEACHER) as part:
-            part.write_bytes(teacher.read_bytes())
+        write_file(folder / _TEACHER, teacher.read_bytes())
     if start is not None:
-        with atomic_write(folder / _start_name(start)) as part:
-            part.write_bytes(start.path.read_bytes())
-    _write(folder / "train.toml", to_commented_toml(configuration))
-    _write(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
+        write_file(folder / _start_name(start), start.path.read_bytes())
+    write_file(folder / "train.toml", to_commented_toml(configuration))
+    write_file(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
     return run
 
 
@@ -221,8 +219,3 @@ def _relative(unpacked: Path, folder: Path) -> str:
     """A path inside the training's folder as a relative one, so that the folder can be moved."""
     path = unpacked.resolve()
     return str(path.relative_to(folder.resolve())) if path.is_relative_to(folder.resolve()) else str(path)
-
-
-def _write(path: Path, text: str) -> None:
-    with atomic_write(path) as part:
-        part.write_text(text, encoding="utf-8")

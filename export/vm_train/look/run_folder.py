@@ -21,7 +21,7 @@ from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.field.uprights import KINDS
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 from vm_embedded.network.look_contract import MOST_NETWORKS
 from vm_export.look_checkpoint import LookCheckpoint
 
@@ -199,8 +199,7 @@ def begin_look_run(
         _check_glance(glance, object_class, _upright_radius(configuration, object_class))
     make_folder(folder / "patches")
     mesh = folder / f"mesh{model.suffix.lower()}"
-    with atomic_write(mesh) as part:
-        part.write_bytes(model.read_bytes())
+    write_file(mesh, model.read_bytes())
     run = LookRun(
         folder,
         data.resolve(),
@@ -216,8 +215,8 @@ def begin_look_run(
         threads,
     )
     write_split(folder / "pictures.json", split)
-    _write(folder / "look.toml", to_commented_toml(configuration))
-    _write(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
+    write_file(folder / "look.toml", to_commented_toml(configuration))
+    write_file(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
     return run
 
 
@@ -284,8 +283,3 @@ def _sha256(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
-
-
-def _write(path: Path, text: str) -> None:
-    with atomic_write(path) as part:
-        part.write_text(text, encoding="utf-8")

@@ -16,7 +16,7 @@ from vm_embedded import __version__
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 from vm_embedded.network.look_contract import LookContract
 from vm_export.eight_bits import round_kernels
 from vm_export.look_checkpoint import LookCheckpoint
@@ -170,8 +170,7 @@ class _Training:
         look = LookCheckpoint(network, contract, examples, glance)
         source = f"{len(run.split.validation)} validation pictures of {run.data.name}"
         look.recalibrated(calibration.scale, calibration.offset, source).save(run.look_path)
-        with atomic_write(run.folder / "result.json") as part:
-            part.write_text(json.dumps(result.as_dict(), indent=1) + "\n", encoding="utf-8")
+        write_file(run.folder / "result.json", json.dumps(result.as_dict(), indent=1) + "\n")
         print(f"{run.look_path}: {result}")
         self._progress.finished = True
         self._save()

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from vm_embedded import __version__
 from vm_embedded.cli.progress import ProgressBar
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
 from vm_export.attach_look import attached
@@ -80,8 +80,7 @@ def _finish(run: TuningRun, stop_requested: Callable[[], bool]) -> bool:
     """Write the model file and the report. Returns False after a stop."""
     look = LookCheckpoint.load(run.stage_path(LOOK))
     content, _ = attached(run.before.content, run.before.manifest, look)
-    with atomic_write(run.model_path) as part:
-        part.write_bytes(content)
+    write_file(run.model_path, content)
     frames = run.part(run.split.validation)
     scores: list[WindowScores] = []
     bar = ProgressBar(2 * len(frames), "vm-train")
@@ -95,10 +94,8 @@ def _finish(run: TuningRun, stop_requested: Callable[[], bool]) -> bool:
         scores.append(score)
     bar.clear()
     before, after = scores
-    with atomic_write(run.folder / "result.json") as part:
-        part.write_text(
-            json.dumps({"before": before.as_dict(), "after": after.as_dict()}, indent=1) + "\n", encoding="utf-8"
-        )
+    both = {"before": before.as_dict(), "after": after.as_dict()}
+    write_file(run.folder / "result.json", json.dumps(both, indent=1) + "\n")
     write_report(run, before, after)
     print(f"{run.model_path}: in {len(frames)} frames for validation, it finds {after.found_of()}")
     print(f"before the fine-tuning: {before.found_of()}")

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 from vm_embedded.network.look_contract import LookContract
 
 from ..look.labels import NOTHING, OBJECT
@@ -48,8 +48,7 @@ def write_rendered_for(path: Path, run: Path | None) -> None:
         content = RENDERED.read_bytes()
     except OSError as error:
         raise InputError(f"can't read {RENDERED}: {error.strerror or error}") from error
-    with atomic_write(path) as part:
-        part.write_bytes(content)
+    write_file(path, content)
 
 
 def sample_run(folder: Path) -> PatchSet:

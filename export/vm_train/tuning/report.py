@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Image
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 
 from ..boxes.box import BoxedPicture
 from ..boxes.image_facts import read_upright
@@ -37,8 +37,7 @@ _COLOR = (60, 60, 230)
 def write_report(run: TuningRun, before: WindowScores, after: WindowScores) -> None:
     """Write report.html of a run. Raises InputError if it can't be written."""
     frames = run.part(run.split.validation)
-    with atomic_write(run.folder / REPORT) as part:
-        part.write_text(_page(run, frames, before, after), encoding="utf-8")
+    write_file(run.folder / REPORT, _page(run, frames, before, after))
 
 
 def _page(run: TuningRun, frames: list[BoxedPicture], before: WindowScores, after: WindowScores) -> str:

@@ -20,7 +20,7 @@ from vm_embedded.arrays import Floats
 from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import write_file
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.model_file import ModelFile, read_model
@@ -166,11 +166,10 @@ def begin_tuning(
     run = TuningRun(folder, boxes, name, before, found.pictures, split, configuration, threads)
     for_training = BoxedSet(tuple(run.part(split.training)), (), ())
     check_boxes(for_training, look.contract.object_class, f"{boxes.folder}, part for training,")
-    with atomic_write(folder / "before.onnx") as part:
-        part.write_bytes(before.content)
+    write_file(folder / "before.onnx", before.content)
     write_rendered_for(run.rendered_path, rendered)
-    _write(folder / "tune.toml", to_commented_toml(configuration))
-    _write(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
+    write_file(folder / "tune.toml", to_commented_toml(configuration))
+    write_file(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
     return run
 
 
@@ -214,8 +213,3 @@ def _description(run: TuningRun) -> dict[str, Any]:
 
 def _configuration_sha256(configuration: TuningConfiguration) -> str:
     return hashlib.sha256(json.dumps(asdict(configuration)).encode()).hexdigest()
-
-
-def _write(path: Path, text: str) -> None:
-    with atomic_write(path) as part:
-        part.write_text(text, encoding="utf-8")
