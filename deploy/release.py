@@ -22,7 +22,7 @@ from pathlib import Path
 from vm_embedded.errors import InputError
 
 VERSION_FILE, CHANGELOG, README, PROJECT = "vm_embedded/__init__.py", "CHANGELOG.md", "README.md", "pyproject.toml"
-ROS_PACKAGE = "deploy/ros/package.xml"
+ROS_PACKAGE, USE = "deploy/ros/package.xml", "docs/use.md"
 
 _VERSION = re.compile(r"\d+\.\d+\.\d+((a|b|rc)\d+)?")
 _LINK = re.compile(r"(!?\[[^\]]*\])\((?!https?://|#|mailto:)([^)\s]+)\)")
@@ -51,7 +51,8 @@ def _release(top: Path, version: str, url: str | None) -> None:
         raise InputError("the checkout has changes: commit or undo them first")
     if _git(top, "tag", "--list", tag):
         raise InputError(f"the tag {tag} exists; choose another version")
-    for name, change in ((CHANGELOG, dated), (VERSION_FILE, with_version), (ROS_PACKAGE, with_ros_version)):
+    changes = {CHANGELOG: dated, VERSION_FILE: with_version, ROS_PACKAGE: with_ros_version, USE: with_wheel_version}
+    for name, change in changes.items():
         path = top / name
         path.write_text(change(path.read_text(encoding="utf-8"), version), encoding="utf-8")
     if _git(top, "status", "--porcelain"):
@@ -91,6 +92,11 @@ def with_ros_version(package: str, version: str) -> str:
     """The text of package.xml with the numbers of this version: ROS knows no release candidates."""
     numbers = re.sub(r"(a|b|rc)\d+$", "", version)
     return re.sub("<version>.*</version>", f"<version>{numbers}</version>", package)
+
+
+def with_wheel_version(page: str, version: str) -> str:
+    """The text of use.md with the name of this version's wheel."""
+    return re.sub(r"(dist/vm_embedded-)[^-]+", rf"\g<1>{version}", page)
 
 
 def published_readme(text: str, home: str, tag: str) -> str:

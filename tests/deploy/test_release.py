@@ -67,6 +67,7 @@ def test_a_release_is_tagged_and_its_files_have_checksums(clone, released):
     assert not git(clone, "status", "--porcelain")
     assert re.search(r"^## 9\.8\.7 \(\d{4}-\d\d-\d\d\)$", git(clone, "show", "v9.8.7:CHANGELOG.md"), re.MULTILINE)
     assert "<version>9.8.7</version>" in git(clone, "show", "v9.8.7:deploy/ros/package.xml")
+    assert "dist/vm_embedded-9.8.7-py3-none-any.whl[train]" in git(clone, "show", "v9.8.7:docs/use.md")
     files = {each.name for each in released.iterdir()}
     assert files == {"vm_embedded-9.8.7.tar.gz", "vm_embedded-9.8.7-py3-none-any.whl", "SHA256SUMS"}
     sums = dict(line.split()[::-1] for line in (released / "SHA256SUMS").read_text().splitlines())

@@ -112,7 +112,7 @@ def test_a_clear_ball_without_a_box_is_told(tmp_path):
         key=lambda line: line["confidence"],
     )
     start = f"vm-train: {clearest['image']}: probably an unlabeled ball at "
-    assert start not in run("check", saved, "--boxes", code=1).stderr  # it sees another one in one of the pictures
+    assert run("check", saved, "--boxes").stderr == ""
     (saved / clearest["image"]).with_suffix(".txt").write_text("")
     told = [line for line in run("check", saved, "--boxes", code=1).stderr.splitlines() if line.startswith(start)]
     assert len(told) == 1
