@@ -242,7 +242,6 @@ def test_what_can_t_be_used_is_named_in_one_line(capsys, data, tmp_path):
     assert "did you mean 'ball'" in complaint(capsys, MODEL, data, *out, "--color", "bal=1,2,3")
     assert "--as-robot" in complaint(capsys, MODEL, data, *out, "--as-robot", "--radius-of", "scene")
     assert "bgr" in complaint(capsys, MODEL, data, *out, "--format", "rgb")
-    assert "threshold" in complaint(capsys, MODEL, data, *out, "--threshold", "7")
     (tmp_path / "file").write_text("")
     assert "not a folder" in complaint(capsys, MODEL, data, "-o", tmp_path / "file")
     assert not (tmp_path / "out").exists()
@@ -254,6 +253,11 @@ def test_what_can_t_be_used_is_named_in_one_line(capsys, data, tmp_path):
 )
 def test_wrong_usage_exits_with_2(arguments):
     assert "--help lists the options" in run(*arguments, code=2).stderr
+
+
+def test_a_setting_out_of_range_is_wrong_usage():
+    said = run("model.onnx", "data", "-o", "out", "--threshold", "7", code=2).stderr
+    assert "argument --threshold: threshold must be a number from 0 to 1, not 7" in said
 
 
 @pytest.mark.long
