@@ -39,9 +39,10 @@ def rounded(kernel: Singles) -> Singles:
 
 
 def round_kernels(network: LookNetwork) -> None:
-    """Round all kernels but that of the answers, in place. Probabilities change by about 0.01 at most.
+    """Round all kernels but that of the answers, which is small, and which a calibration multiplies; in place.
 
-    The kernel of the answers is small, and a calibration multiplies it.
+    Of the probabilities that the networks of the package give to proposals, 99 % change by less than 0.02, and none of
+    2,325 by more than 0.05.
     """
     layers: list[nn.Conv2d | nn.Linear] = [*network.typed_convolutions, network.hidden]
     with torch.no_grad():
