@@ -12,24 +12,21 @@ import struct
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from ..arrays import Image
 from ..cameras.camera import without_password
-from ..cameras.image_files import open_source
-from ..cameras.open_camera import brings_lens_and_pose, camera_opener, is_live
+from ..cameras.open_camera import brings_lens_and_pose, is_live
 from ..cameras.opencv import device_path
-from ..cameras.ros.bags import is_bag
 from ..errors import InputError, VisualMeshError, one_line
 from ..geometry.lens import Size
 from ..geometry.radial_lenses import RadialLens
 from ..live.configuration import Configuration
 from ..live.control import control_path
 from ..live.load_detector import prove_network
+from .camera_source import check_source
 
 GOOD, WARNING, BAD = "ok", "warning", "failure"
 
@@ -73,8 +70,13 @@ def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator
         yield check_governor(root / "sys/devices/system/cpu")
         yield check_opencv({each.name.lower() for each in metadata.distributions() if each.name})
         yield check_model(configuration)
-        yield from check_cameras(configuration, root)
-        yield check_lens(configuration, first_size(configuration))
+        size, fault = None, ""
+        try:
+            size = check_source(configuration)
+        except VisualMeshError as error:
+            fault = str(error)
+        yield from check_cameras(configuration, root, fault)
+        yield check_lens(configuration, size)
         yield check_pose(configuration)
         yield check_clock(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", time.time())
         yield check_status_socket(configuration)
@@ -159,8 +161,11 @@ def check_model(configuration: Configuration) -> Finding:
     return Finding("model", GOOD, seen)
 
 
-def check_cameras(configuration: Configuration, root: Path) -> Iterator[Finding]:
-    """Whether each video device can be opened, and whether the configured camera exists."""
+def check_cameras(configuration: Configuration, root: Path, fault: str) -> Iterator[Finding]:
+    """Whether each video device can be opened, and whether the configured camera exists.
+
+    fault: why it can never work, empty if it can.
+    """
     nodes = sorted((root / "dev").glob("video*"))
     for node in nodes:
         yield _check_video_device(node)
@@ -171,16 +176,12 @@ def check_cameras(configuration: Configuration, root: Path) -> Iterator[Finding]
         )
         return
     device = device_path(source)
-    try:
-        if is_live(source) or is_bag(source):
-            camera_opener(configuration.camera, configuration.detector.format != "bgr")
-        _first_image(configuration)
-        if device is not None and not (root / device.relative_to("/")).exists():
-            there = ", ".join(str(each) for each in nodes) or "none"
-            yield Finding("camera", BAD, f"{device} does not exist; video devices: {there}", "ls -l /dev/v4l/by-id/")
-            return
-    except VisualMeshError as error:
-        yield Finding("camera", BAD, str(error), "vm-detect --help lists the allowed cameras")
+    if fault:
+        yield Finding("camera", BAD, fault, "vm-detect --help lists the allowed cameras")
+        return
+    if device is not None and not (root / device.relative_to("/")).exists():
+        there = ", ".join(str(each) for each in nodes) or "none"
+        yield Finding("camera", BAD, f"{device} does not exist; video devices: {there}", "ls -l /dev/v4l/by-id/")
         return
     may_change = device is not None and "by-" not in str(device)
     shown = without_password(source)
@@ -194,26 +195,6 @@ def check_cameras(configuration: Configuration, root: Path) -> Iterator[Finding]
         f"{shown}: the number may change when cameras are plugged in again" if may_change else shown,
         "ls -l /dev/v4l/by-id/ and use one of these paths" if may_change else "",
     )
-
-
-def first_size(configuration: Configuration) -> Size | None:
-    """Size [px] of the camera's images: as it is configured, else that of the first image of files; None if unknown."""
-    camera = configuration.camera
-    if camera.width and camera.height:
-        return camera.width, camera.height
-    with suppress(VisualMeshError):  # check_cameras reports it
-        image = _first_image(configuration)
-        return None if image is None else (image.shape[1], image.shape[0])
-    return None
-
-
-def _first_image(configuration: Configuration) -> Image | None:
-    """The first image of files or of a folder; None for a live camera or a bag. Raises InputError."""
-    camera = configuration.camera
-    if not camera.source or is_live(camera.source) or is_bag(camera.source):
-        return None
-    opened = open_source(camera.source, configuration.detector.format != "bgr", camera.max_megapixels)
-    return next(opened.frames).read()
 
 
 def _refused_connection(source: str) -> str:

@@ -13,9 +13,8 @@ from pathlib import Path
 
 import cv2
 
-from ..cameras.image_files import open_source
 from ..cameras.library_messages import silence_opencv
-from ..cameras.open_camera import ROS, camera_opener, is_live
+from ..cameras.open_camera import is_live
 from ..cameras.ros.bags import is_bag
 from ..config.toml_reader import parse_toml
 from ..config.toml_writer import to_commented_toml
@@ -26,6 +25,7 @@ from ..live.daemon import EXIT_CONFIGURATION, EXIT_RESTART, Daemon
 from ..live.load_detector import prove_model
 from ..live.log import EventLog
 from ..network.bundled import SHIPPED, shipped_name
+from .camera_source import check_source
 from .detect_files import complain, detect_in_files
 from .options import ANGLES, LIVE, add_live, add_model, add_pose, add_settings, add_track, read_options
 from .program import Parser, program
@@ -217,12 +217,8 @@ def _ask(socket: str, command: str) -> int:
 
 
 def _check_configuration(given: Configuration) -> int:
-    """Check the configuration, the model and whether its camera can exist. Raises VisualMeshError."""
-    source, raw = given.camera.source, given.detector.format != "bgr"
-    if is_live(source) and source != ROS:
-        camera_opener(given.camera, raw)
-    elif source and not is_live(source) and not is_bag(source):
-        open_source(source, raw, given.camera.max_megapixels)
+    """Check the configuration, the source of its camera, and the model. Raises VisualMeshError."""
+    check_source(given)
     model, proved = asyncio.run(prove_model(given))
     print(f"{given.model}: {len(model.manifest.classes)} classes, {proved}; the configuration is good")
     return EXIT_OK

@@ -127,6 +127,13 @@ def test_files_that_are_no_pictures_are_seen(root, tmp_path):
         assert (seen.state, says in seen.seen) == (BAD, True), seen
 
 
+def test_a_topic_and_a_pattern_of_pictures_are_cameras(root, tmp_path):
+    cv2.imwrite(str(tmp_path / "image.png"), np.zeros((512, 640, 3), dtype=np.uint8))
+    for source in ("ros", str(tmp_path / "*.png")):
+        seen = found(replace(HEALTHY, camera=CameraSettings(source=source)), root)
+        assert (seen["camera"].state, seen["lens"].state) == (GOOD, GOOD), seen
+
+
 def test_a_lens_for_other_pictures_is_seen(root, tmp_path):
     cv2.imwrite(str(tmp_path / "image.png"), np.zeros((480, 640, 3), dtype=np.uint8))
     lens = found(replace(HEALTHY, camera=CameraSettings(source=str(tmp_path / "image.png"))), root)["lens"]
