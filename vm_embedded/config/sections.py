@@ -131,10 +131,7 @@ def _build(kind: Any, table: Mapping[str, Any]) -> Any:
     sections = {}
     for name, value in table.items():
         if name not in known:
-            owners = [f"[{each}]" for each, section in known.items() if name in _entries(section)]
-            belongs = f"unknown key {name!r}: it belongs in {' or '.join(owners)}" if owners else ""
-            kind_of_name = "section" if isinstance(value, Mapping) else "key"
-            raise _Fault(name, None, belongs or unknown(kind_of_name, name, known))
+            raise _Fault(name, None, _unknown_name(name, value, known))
         try:
             sections[name] = _read_value(name, known[name], value)
         except _Fault:
@@ -144,6 +141,14 @@ def _build(kind: Any, table: Mapping[str, Any]) -> Any:
         except InputError as error:
             raise _Fault(name, None, f"[{name}] {error}" if isinstance(value, Mapping) else str(error)) from error
     return kind(**sections)
+
+
+def _unknown_name(name: str, value: Any, known: Mapping[str, Field[Any]]) -> str:
+    """Message for an unknown name above all sections: an entry of a section, or a mistyped section or key."""
+    owners = [f"[{each}]" for each, section in known.items() if name in _entries(section)]
+    if owners:
+        return f"unknown key {name!r}: it belongs in {' or '.join(owners)}"
+    return unknown("section" if isinstance(value, Mapping) else "key", name, known)
 
 
 def _entries(section: Field[Any]) -> list[str]:
