@@ -56,10 +56,14 @@ def evaluate(
 def _parts(job: Job, subject: Subject, chunks: Sequence[Sequence[PictureFiles]], workers: int) -> Iterator[Evaluation]:
     if workers == 1 or len(chunks) < 2:
         return map(_evaluator(job, subject), chunks)
-    return results_of(partial(_evaluator, job), chunks, workers, chunk=1)
+    return results_of(partial(_loaded_evaluator, job), chunks, workers, chunk=1)
 
 
-def _evaluator(job: Job, subject: Subject | None = None) -> Callable[[Sequence[PictureFiles]], Evaluation]:
-    """Evaluates pictures. subject: the network of the job; None loads it."""
-    loaded = job.subject() if subject is None else subject
-    return lambda pictures: evaluate_pictures(loaded, pictures, job.classes, job.rules)
+def _evaluator(job: Job, subject: Subject) -> Callable[[Sequence[PictureFiles]], Evaluation]:
+    """Evaluates pictures. subject: the network of the job."""
+    return lambda pictures: evaluate_pictures(subject, pictures, job.classes, job.rules)
+
+
+def _loaded_evaluator(job: Job) -> Callable[[Sequence[PictureFiles]], Evaluation]:
+    """The same in a worker process, which loads the network itself."""
+    return _evaluator(job, job.subject())

@@ -46,7 +46,8 @@ def kind_of(folder: Path) -> str | None:
 def description(folder: Path, number: int, what: str = "training") -> Iterator[dict[str, Any]]:
     """The content of a folder's run.json, for a with statement that takes its entries. number: its format.
 
-    Raises InputError if there is none, if another release wrote it, or if it, or an entry that is taken, is damaged.
+    Raises InputError if there is no run.json, if another release wrote it, or if it is damaged. An entry that the
+    statement does not find, or that has the wrong type, also counts as damage.
     """
     path = folder / "run.json"
     try:
