@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vm_embedded.errors import ModelError
+from vm_embedded.files import write_file
 from vm_embedded.network.canary import CANARY_KEY
 from vm_embedded.network.manifest import METADATA_KEY
 from vm_embedded.network.model_file import parse_model, read_model
 
 from .attach_canary import CanaryPicture, NotFoundError, with_canary
 from .attach_look import attached, detached, tested_contract
-from .export import check_difference, write_model
+from .export import check_difference
 from .look_checkpoint import LookCheckpoint
 from .look_weights import look_of, upright_looks_of
 from .metadata import with_metadata
@@ -55,7 +56,7 @@ def change_looks(model: str | Path, path: str | Path, looks: Sequence[LookCheckp
             content = with_canary(content, CanaryPicture.of(read.canary))
         except NotFoundError:
             content, lost = with_metadata(content, {CANARY_KEY: None}), True
-    write_model(path, content)
+    write_file(Path(path), content)
     return ChangedLooks(max(differences, default=None), lost)
 
 
@@ -80,4 +81,4 @@ def change_canary(model: str | Path, path: str | Path, canary: CanaryPicture) ->
         look=None if read.look is None else tested_contract(look_of(read)),
         upright_looks=tuple(tested_contract(each) for each in upright_looks_of(read)),
     )
-    write_model(path, with_canary(with_metadata(read.content, {METADATA_KEY: manifest.as_json()}), canary))
+    write_file(Path(path), with_canary(with_metadata(read.content, {METADATA_KEY: manifest.as_json()}), canary))

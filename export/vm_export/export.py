@@ -93,7 +93,7 @@ def export(
         content, look_difference = attached(content, manifest, look)
         check_difference(path, "answers of the close look", look_difference)
         difference = max(difference, look_difference)
-    write_model(path, content if canary is None else with_canary(content, canary))
+    write_file(Path(path), content if canary is None else with_canary(content, canary))
     return difference
 
 
@@ -104,11 +104,6 @@ def check_difference(path: str | Path, what: str, difference: float) -> None:
             f"{path} is not written: {what} of ONNX Runtime and torch differ by {difference:.2g}; at most "
             f"{LARGEST_DIFFERENCE:g} is allowed"
         )
-
-
-def write_model(path: str | Path, content: bytes) -> None:
-    """Write a file as a whole. Raises InputError."""
-    write_file(Path(path), content)
 
 
 def largest_difference(content: bytes, network: Network, manifest: Manifest) -> float:

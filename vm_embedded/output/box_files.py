@@ -64,7 +64,7 @@ class BoxWriter:
             raise InputError(f"--save-boxes {folder}: the folder is not empty; give a new one, to keep its labels")
         self._folder, self._classes = folder, classes
         self._names = FrameNames("image")  # so that the lens file belongs to the image
-        write_file(folder / CLASSES, "".join(f"{name}\n" for name in classes).encode())
+        write_file(folder / CLASSES, "".join(f"{name}\n" for name in classes))
         write_file(folder / CANDIDATES, b"")
 
     def write(self, frame: Frame, image: Image, lens: Lens, orientation: Orientation, detections: Detections) -> Path:
@@ -77,9 +77,9 @@ class BoxWriter:
         path = self._folder / f"{name}{'.png' if frame.path is None else frame.path.suffix}"
         write_file(path, encode_png(image) if frame.path is None else frame.path.read_bytes())
         lens_file = format_lens_file(lens, orientation)
-        write_file(self._folder / f"lens{name.removeprefix('image')}.yaml", lens_file.encode())
+        write_file(self._folder / f"lens{name.removeprefix('image')}.yaml", lens_file)
         labels = [self._yolo_line(each) for each in boxes if each.found]
-        write_file(self._folder / f"{name}.txt", "".join(labels).encode())
+        write_file(self._folder / f"{name}.txt", "".join(labels))
         self._append_candidates("".join(_json_line(path.name, each) for each in boxes))
         return path
 

@@ -53,7 +53,7 @@ def import_boxes(
         write_file(out / f"mask{number}.png", cv2.imencode(".png", mask)[1].tobytes())
         _copy(picture.lens, out / f"lens{number}.yaml")
         if write_radius:
-            write_file(out / f"scene{number}.json", f"{json.dumps({'ball_radius': rule.shape.radius})}\n".encode())
+            write_file(out / f"scene{number}.json", json.dumps({"ball_radius": rule.shape.radius}) + "\n")
         _write_image(picture.image, out / f"image{number}")
         numbers.append(number)
         labeled += count

@@ -91,7 +91,7 @@ def _picture_or_fault(
 def _import_picture(picture: ExamplePicture, number: int, out: Path, wanted: str | None) -> None:
     """Write the files of a picture; before, `wanted` as import.json, if it is not None."""
     if wanted is not None:
-        write_file(out / "import.json", wanted.encode())
+        write_file(out / "import.json", wanted)
     for name, data in picture.files(number).items():
         write_file(out / name, data)
 
