@@ -58,7 +58,7 @@ _EARLIER = 0.3
 """Weight of the answer before the last one in the mean of both: other errors were made there."""
 
 _SUREST = 1.0 - 1e-6
-"""Limit of a probability in a mean: one that is rounded to 1 would outvote all others."""
+"""Limit of a probability: one that is rounded to 1 would outvote all others in a mean, and pass a threshold of 1."""
 
 _LARGEST_SIZE = 3.0
 """Limit of the logarithm of a size: with a bad network, math.exp would overflow, and JSON has no infinity."""
@@ -260,6 +260,7 @@ def _judged(
     judged: list[Judgment] = []
     for number in np.argsort(-answers[:, 0], kind="stable"):
         center, (probability, _, _, log_size) = centers[number], answers[number].tolist()
+        probability = min(probability, _SUREST)
         if probability < settings.min_confidence and not explain:
             break
         reason = None

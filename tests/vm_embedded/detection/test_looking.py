@@ -362,6 +362,13 @@ def test_reasons_are_only_collected_when_asked_for(scene):
     assert found_in(scene, BrightDisk(), explain=False, min_confidence=0.95) == ((), ())
 
 
+def test_a_probability_that_is_rounded_to_one_does_not_reach_a_threshold_of_one(scene):
+    found, _ = found_in(scene, Fixed(1.0))
+    assert found
+    assert all(0.999 < each.confidence < 1.0 for each in found)
+    assert not found_in(scene, Fixed(1.0), min_confidence=1.0)[0]
+
+
 @pytest.mark.parametrize("size", [-3e38, 3e38])
 def test_a_network_that_sees_impossible_sizes_gives_finite_numbers(scene, size):
     class Giant(BrightDisk):
