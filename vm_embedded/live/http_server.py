@@ -138,9 +138,11 @@ class HttpServer:
         """Stop listening and end all streams."""
         if self._server is not None:
             self._server.close()
-        for task in list(self._tasks):
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        # More than once: until Python 3.11, wait_for may swallow a cancellation.
+        while self._tasks:
+            for task in self._tasks:
+                task.cancel()
+            await asyncio.wait(self._tasks, timeout=0.1)
         if self._file is not None:
             self._file.close()
 

@@ -28,6 +28,35 @@ def test_a_busy_port_and_an_unknown_host_are_named_once():
             datagram_socket(host, 1, "can't send to")
 
 
+@pytest.mark.parametrize("steps", range(6))
+def test_a_server_ends_a_stream_that_is_about_to_send(tmp_path, steps):
+    """Whatever the stream does in the step of the loop in which it is canceled."""
+
+    async def close_while_it_streams():
+        fresh = asyncio.Event()
+
+        async def stream(write):
+            while True:
+                await write(b"picture")
+                await asyncio.wait_for(fresh.wait(), 10.0)
+                fresh.clear()
+
+        server = HttpServer(f"unix:{tmp_path / 'page'}", "--status-page", {}, {"/stream": stream})
+        await server.open()
+        reader, writer = await asyncio.open_unix_connection(tmp_path / "page")
+        writer.write(b"GET /stream HTTP/1.1\r\n\r\n")
+        assert await reader.readexactly(7) == b"picture"
+        await asyncio.sleep(0.05)
+        fresh.set()
+        for _ in range(steps):
+            await asyncio.sleep(0)
+        await asyncio.wait_for(server.close(), 5.0)
+        assert await reader.read() in (b"", b"picture")
+        writer.close()
+
+    asyncio.run(close_while_it_streams())
+
+
 def test_orientations_beside_the_camera_s_are_prepared_between_frames(tmp_path):
     local = ("--status-metrics", f"unix:{tmp_path / 'figures'}")
     with running(tmp_path, "--camera", "synthetic", *local) as found:
