@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from functools import wraps
 from importlib import metadata
+from pathlib import Path
 from typing import Any, NoReturn, ParamSpec
 
 EXIT_OK, EXIT_FAILED = 0, 1
@@ -37,6 +38,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, commands: Sequence[str] = (), **more: Any) -> None:
         super().__init__(**more)
+        self.register("type", Path, _path)
         self._negative_number_matcher = re.compile(r"-\.?\d")  # "-5deg", too, is a value and no option
         self._given: Sequence[str] = ()
         self._commands = commands
@@ -100,6 +102,13 @@ class Parser(argparse.ArgumentParser):
             if name.startswith("-") and f"-{name}" in options:
                 return f"unknown option {name}: did you mean -{name}?"
         return None
+
+
+def _path(text: str) -> Path:
+    """The path in an argument. Raises ArgumentTypeError for an empty one, which Path takes for the current folder."""
+    if not text:
+        raise argparse.ArgumentTypeError("the path is empty")
+    return Path(text)
 
 
 def is_completing() -> bool:

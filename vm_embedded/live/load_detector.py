@@ -33,7 +33,10 @@ async def prove_network(configuration: Configuration) -> tuple[ModelFile, str]:
     model, settings = parse_model(path, content), configuration.detector
     model.manifest.used_for(settings.object_radius, settings.max_distance)  # raises ModelError
     if configuration.recorder.trigger_class:
-        model.manifest.column(configuration.recorder.trigger_class)
+        try:
+            model.manifest.column(configuration.recorder.trigger_class)
+        except InputError as error:
+            raise InputError(f"[recorder] trigger_class: {error}") from error
     return model, proved
 
 

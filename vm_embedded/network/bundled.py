@@ -30,7 +30,8 @@ def model_path(model: str | Path, folder: Path = Path()) -> Path:
             )
         return path
     path = folder / model
-    if not path.suffix and not os.path.exists(path):  # noqa: PTH110 (Path.exists raises for long names)
+    # Path takes an empty name for the current folder, and Path.exists raises for long names.
+    if not str(model) or (not path.suffix and not os.path.exists(path)):  # noqa: PTH110
         raise InputError(f"{unknown('network', str(model), SHIPPED)}, or the path of a model file")
     return path
 

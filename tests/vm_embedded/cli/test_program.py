@@ -62,6 +62,22 @@ def test_an_option_with_one_dash_is_named_with_two():
     assert done.stderr.startswith("vm-detect: unknown option -model: did you mean --model?")
 
 
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("vm-detect x.jpg --lens=", "argument --lens: the path is empty"),
+        ("vm-detect x.jpg --model=", "unknown network ''"),
+        ("vm-doctor --config=", "argument --config: the path is empty"),
+        ("vm-export ''", "argument model: the path is empty"),
+    ],
+)
+def test_an_empty_path_is_not_the_current_folder(command, told, tmp_path):
+    done = run(*shlex.split(command), cwd=tmp_path)
+    assert done.returncode in (1, 2)
+    (line,) = done.stderr.splitlines()
+    assert told in line
+
+
 def test_a_mistyped_command_is_one_line_with_the_nearest():
     done = run("vm-train", "resum", "runs/ball")
     assert (done.returncode, done.stdout) == (2, "")

@@ -17,7 +17,7 @@ def test_what_can_never_work_ends_it_at_the_start_with_a_status_of_its_own(tmp_p
     for options, says in (
         (("--camera", "synthetic:fast"), "synthetic:TURN"),
         (("--camera", "synthetic", "--format", "gray"), "bgr"),
-        (("--camera", "synthetic", "--recorder-trigger-class", "bal"), "'bal'"),
+        (("--camera", "synthetic", "--recorder-trigger-class", "bal"), "[recorder] trigger_class: unknown class 'bal'"),
         (("--camera", "synthetic", "--explain"), "--explain works only with files"),
         (("--camera", "/dev/video-none"), "needs a lens"),
         (("--config", tmp_path / "none.toml"), "none.toml"),
