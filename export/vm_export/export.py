@@ -93,7 +93,9 @@ def export(
         content, look_difference = attached(content, manifest, look)
         check_difference(path, "answers of the close look", look_difference)
         difference = max(difference, look_difference)
-    write_file(Path(path), content if canary is None else with_canary(content, canary))
+    if canary is not None:
+        content = with_canary(content, canary)
+    write_file(Path(path), content)
     return difference
 
 
