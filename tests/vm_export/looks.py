@@ -1,4 +1,4 @@
-"""Seeded look networks and their checkpoints."""
+"""Seeded look networks, their checkpoints and their answers in torch."""
 
 from dataclasses import replace
 
@@ -34,3 +34,9 @@ def glancing_checkpoint(seed=0, **changes):
     glance = look_checkpoint(seed + 1, LookShape(size=9, channels=(4, 5, 6)), **changes)
     look = look_checkpoint(seed, **changes)
     return replace(look, contract=replace(look.contract, glance=glance.contract), glance=glance)
+
+
+def torch_answers(network, patches):
+    """Answers (n, 4) of a look network in torch to patches (n, size, size, 3)."""
+    with torch.inference_mode():
+        return network(torch.from_numpy(patches)).numpy()
