@@ -187,7 +187,7 @@ def parse_address(text: str, name: str, example: str) -> tuple[str, int]:
     """
     host, colon, port = text.strip().rpartition(":")
     host = host.removeprefix("[").removesuffix("]")
-    if not (colon and host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):
+    if not (colon and host and "," not in host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):
         raise InputError(f"{name} must be ADDRESS:PORT, as in {example}, not {text!r}")
     return host, int(port)
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vm_embedded.cli.program import Parser, program
+from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
 from vm_embedded.errors import InputError, VisualMeshError, not_installed
 from vm_embedded.network.bundled import SHIPPED, model_path
 from vm_embedded.network.manifest import EDGES, LAYOUTS
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from .checkpoint import Checkpoint
     from .look_checkpoint import LookCheckpoint
     from .reference import Overrides
-
-EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
 
 def parser() -> argparse.ArgumentParser:

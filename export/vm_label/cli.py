@@ -12,7 +12,7 @@ from contextlib import suppress
 from ipaddress import IPv4Address
 from pathlib import Path
 
-from vm_embedded.cli.program import Parser, program
+from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_workstation.stopping import stoppable
 
@@ -21,8 +21,6 @@ from .box_folder import BoxFolder, read_box_folder
 from .server import LabelServer
 from .session import Session
 from .training_boxes import Written, write_training_boxes
-
-EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
 
 def parser() -> argparse.ArgumentParser:

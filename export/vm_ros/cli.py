@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import asyncio
-import os
-import signal
 import sys
 from collections.abc import Sequence
 
 import cv2
 
+from vm_embedded.cameras.library_messages import silence_opencv
 from vm_embedded.cameras.open_camera import ROS
 from vm_embedded.cameras.ros.settings import NODE
 from vm_embedded.cli.options import ANGLES, add_live, add_model, add_pose, add_settings, add_track, read_options
 from vm_embedded.cli.program import Parser, program
-from vm_embedded.errors import VisualMeshError
+from vm_embedded.cli.run_daemon import run_daemon
 from vm_embedded.live.configuration import Configuration, with_overrides
-from vm_embedded.live.daemon import EXIT_CONFIGURATION, Daemon
+from vm_embedded.live.daemon import Daemon
 from vm_embedded.live.log import EventLog
 
 from .connect import connect
@@ -56,24 +54,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     cut = given.index(ROS_ARGUMENTS) if ROS_ARGUMENTS in given else len(given)
     options = parser().parse_args(given[:cut])
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # vm-ros reports problems with cameras itself
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    silence_opencv()
     cv2.setNumThreads(1)
-    for number in (signal.SIGHUP, signal.SIGUSR1):
-        signal.signal(number, signal.SIG_IGN)  # the daemon handles them once it runs
     log = EventLog("vm-ros")
-    try:
-        return asyncio.run(_prove_and_run(options, given[cut + 1 :], log))
-    except VisualMeshError as error:
-        log("can't start", "error", reason=str(error))
-        return EXIT_CONFIGURATION
+    return run_daemon(log, lambda: _prepare(options, given[cut + 1 :], log))
 
 
-async def _prove_and_run(options: argparse.Namespace, ros_arguments: Sequence[str], log: EventLog) -> int:
-    """Connect to ROS, and run the daemon after its network was proved. Raises VisualMeshError."""
+async def _prepare(options: argparse.Namespace, ros_arguments: Sequence[str], log: EventLog) -> Daemon:
+    """Connect to ROS, and prepare a daemon that publishes there. Raises VisualMeshError."""
     node = Node(configuration(options), connect(NODE, ros_arguments))
-    daemon = await Daemon.prepare(lambda: configuration(options), log, node)
-    return await daemon.run()
+    return await Daemon.prepare(lambda: configuration(options), log, node)
 
 
 def configuration(options: argparse.Namespace) -> Configuration:

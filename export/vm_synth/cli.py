@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from vm_embedded.cli.program import Parser, program
+from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
@@ -36,8 +36,6 @@ from .scene.configuration import HEADER, SceneConfiguration
 from .scene.environment import Environment
 from .scene.maps import find_maps, missing_held_out
 from .scene.rooms import HELD_OUT_ROOMS, ROOMS, room_name
-
-EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
 _EXAMPLE = "camera.picture_width=1280"
 

@@ -6,10 +6,10 @@ import argparse
 import sys
 from collections.abc import Callable, Mapping, Sequence
 
-from vm_embedded.cli.program import EXIT_FAILED, EXIT_OK, Parser, is_completing
+from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, is_completing
 from vm_embedded.errors import VisualMeshError, not_installed, unknown
 
-EXIT_USAGE, EXIT_INTERRUPTED = 2, 130
+EXIT_USAGE = 2
 
 Commands = Mapping[str, Callable[[argparse.Namespace], None]]
 """The functions of the commands, by name. They take the options."""

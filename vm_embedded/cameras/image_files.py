@@ -31,15 +31,15 @@ _BESIDE = ("mask", "coverage", "lens", "scene")
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".pgm", ".ppm", ".tif", ".tiff", ".webp")
 
 
-def check_file_format(format: str) -> None:
-    """Raise InputError for a pixel format that frames read from files never have.
+def check_read_format(format: str) -> None:
+    """Raise InputError for a pixel format that frames of files and cameras never have.
 
-    OpenCV reads colors as BGR and keeps the single channel of a gray or Bayer file.
+    OpenCV reads colors as BGR and keeps the single channel of a gray or Bayer image.
     """
     if format in ("rgb", "bgra", "rgba"):
         allowed = ", ".join(name for name in FORMATS if name not in ("rgb", "bgra", "rgba"))
         raise InputError(
-            f"--format {format} is only for frames passed in from Python; frames read from files are {allowed}"
+            f"--format {format} is only for frames passed in from Python; frames of files and cameras are {allowed}"
         )
 
 

@@ -6,7 +6,7 @@ import base64
 import http.client
 import time
 from contextlib import suppress
-from urllib.parse import SplitResult, unquote, urlsplit
+from urllib.parse import SplitResult, quote, unquote, urlsplit
 
 from ..errors import InputError, one_line
 from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, without_password
@@ -19,6 +19,10 @@ _LARGEST_PART = 64 * 2**20
 
 _MOST_HEADERS = 64
 """Most header lines of a part."""
+
+
+_ALLOWED = "/?%:@!$&'()*+,;="
+"""Characters besides letters and digits that may be in a path or query as they are, and "%", which escapes others."""
 
 
 class NotMotionJpegError(CameraError):
@@ -155,15 +159,18 @@ class MjpegCamera:
 
 
 def parse_url(source: str) -> SplitResult:
-    """Split a URL into its parts. Raises InputError if the host is missing or the port is invalid."""
+    """Split a URL into its parts, and escape what HTTP does not allow in path and query.
+
+    Raises InputError if the host is missing or invalid, or the port is.
+    """
     try:
         url = urlsplit(source)
         valid = bool(url.hostname) and (url.port is None or url.port > 0)
+        (url.hostname or "").encode("idna")  # as the connection does
     except ValueError as error:
         raise InputError(f"{without_password(source)!r} is not a valid address: {error}") from error
     if not valid:
         raise InputError(
             f"{without_password(source)!r} is not a valid address; write it like http://192.168.0.20:8080/stream"
         )
-
-    return url
+    return url._replace(path=quote(url.path, _ALLOWED), query=quote(url.query, _ALLOWED))

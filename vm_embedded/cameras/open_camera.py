@@ -67,6 +67,8 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
     if device_path(source) is not None or source.startswith("gstreamer:") or "://" in source:
         _check_protocol(source)
         check_opencv_settings(settings)
+        if raw and device_path(source) is None and not source.startswith("gstreamer:"):
+            raise InputError(f"camera {without_password(source)} delivers colors: it supports only --format bgr")
         return lambda: OpenCvCamera(settings, raw)
     if not Path(source).exists():
         raise InputError(

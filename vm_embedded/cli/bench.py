@@ -24,12 +24,10 @@ from .bench_table import bench_table
 from .machine import describe_machine, rss_mib, sgemm_rate
 from .measuring import Run, measure, measure_cold
 from .options import ANGLES, add_model, add_pose, add_settings, read_options
-from .program import Parser, program
+from .program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
 from .progress import ProgressBar
 from .tuning import TUNED, fastest_settings
 from .workload import Workload, make_workload
-
-EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
 _TUNING_FRAMES = 300
 """Ten seconds: in a shorter walk most calls are cold."""

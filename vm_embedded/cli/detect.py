@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import fields, replace
@@ -18,19 +17,18 @@ from ..cameras.open_camera import is_live
 from ..cameras.ros.bags import is_bag
 from ..config.toml_reader import parse_toml
 from ..config.toml_writer import to_commented_toml
-from ..errors import InputError, NetworkError, VisualMeshError
+from ..errors import InputError, VisualMeshError
 from ..live.configuration import HEADER, Configuration
 from ..live.control import REFUSED, ask, control_path
-from ..live.daemon import EXIT_CONFIGURATION, EXIT_RESTART, Daemon
+from ..live.daemon import Daemon
 from ..live.load_detector import prove_model
 from ..live.log import EventLog
 from ..network.bundled import SHIPPED, shipped_name
 from .camera_source import check_source
 from .detect_files import complain, detect_in_files
 from .options import ANGLES, LIVE, add_live, add_model, add_pose, add_settings, add_track, read_options
-from .program import Parser, program
-
-EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
+from .program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
+from .run_daemon import report_failed_start, run_daemon
 
 _FILES_ONLY = (
     "save_mcap",
@@ -166,7 +164,7 @@ def _run(options: argparse.Namespace) -> int:
             return _ask(options.status_socket or _socket_in(options.config), options.ask)
         if only_asks or not live:
             raise
-        return _report_bad_configuration(error)
+        return report_failed_start(EventLog("vm-detect"), error)
     if options.print_config:
         print(to_commented_toml(replace(given, model=_movable(given.model)), HEADER), end="")
         return EXIT_OK
@@ -226,32 +224,24 @@ def _check_configuration(given: Configuration) -> int:
 
 def _detect_live(options: argparse.Namespace) -> int:
     """Run the daemon on a live camera until it is stopped."""
-    for number in (signal.SIGHUP, signal.SIGUSR1):
-        signal.signal(number, signal.SIG_IGN)  # the daemon handles them once it runs
+    log = EventLog("vm-detect")
     try:
-        for name in _FILES_ONLY:
-            if getattr(options, name):
-                raise InputError(
-                    f"--{name.replace('_', '-')} works only with files, not with a live camera; make a "
-                    "recording, and give its folder"
-                )
-        if any(map(is_bag, options.files)):
-            raise InputError("a bag can't be played with --live; give it without --live, or play it for vm-ros")
-        return asyncio.run(_prove_and_run(options))
-    except VisualMeshError as error:
-        return _report_bad_configuration(error)
+        _check_live_options(options)
+    except InputError as error:
+        return report_failed_start(log, error)
+    return run_daemon(log, lambda: Daemon.prepare(lambda: read_options(options), log))
 
 
-async def _prove_and_run(options: argparse.Namespace) -> int:
-    """Run the daemon after its network was proved. Raises VisualMeshError."""
-    daemon = await Daemon.prepare(lambda: read_options(options), EventLog("vm-detect"))
-    return await daemon.run()
-
-
-def _report_bad_configuration(error: VisualMeshError) -> int:
-    """Log why the daemon can't start, and return the exit status that tells systemd whether to restart it."""
-    EventLog("vm-detect")("can't start", "error", reason=str(error))
-    return EXIT_RESTART if isinstance(error, NetworkError) else EXIT_CONFIGURATION
+def _check_live_options(options: argparse.Namespace) -> None:
+    """Raise InputError for options that a live camera rejects."""
+    for name in _FILES_ONLY:
+        if getattr(options, name):
+            raise InputError(
+                f"--{name.replace('_', '-')} works only with files, not with a live camera; make a recording, and "
+                "give its folder"
+            )
+    if any(map(is_bag, options.files)):
+        raise InputError("a bag can't be played with --live; give it without --live, or play it for vm-ros")
 
 
 if __name__ == "__main__":

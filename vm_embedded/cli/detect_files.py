@@ -13,7 +13,7 @@ from ..arrays import Image
 from ..cameras.image_files import (
     Frame,
     Source,
-    check_file_format,
+    check_read_format,
     joined,
     lens_beside,
     lens_place,
@@ -52,7 +52,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     emit_points = [name.strip() for name in options.emit_points.split(",")] if options.emit_points else []
     for name in emit_points:
         detector.manifest.column(name)
-    check_file_format(format)
+    check_read_format(format)
     source = _open(options.files or [given.camera.source], given)
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:
@@ -227,7 +227,7 @@ class _Pass:
         if options.save_overlay is not None:
             save_overlay(options.save_overlay / f"{name}.jpg", frame, detections)
         if self.mcap is not None:
-            self.mcap.write(frame, image, lens, orientation, detections)
+            self.mcap.write(frame, lens, orientation, detections)
         if self.video is not None:
             self.video.write(detections.draw())
         return json.dumps(file_message(frame, detections, self.emit_points, options.explain), allow_nan=False)

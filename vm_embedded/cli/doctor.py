@@ -12,9 +12,7 @@ from ..cameras.library_messages import silence_opencv
 from ..errors import VisualMeshError
 from .checks import BAD, Finding, run_checks
 from .options import add_live, add_model, add_pose, add_settings, read_options
-from .program import Parser, program
-
-EXIT_OK, EXIT_FAILED = 0, 1
+from .program import EXIT_FAILED, EXIT_OK, Parser, program
 
 
 def parser() -> argparse.ArgumentParser:

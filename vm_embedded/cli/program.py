@@ -14,7 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NoReturn, ParamSpec
 
-EXIT_OK, EXIT_FAILED = 0, 1
+EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
 _COMPLETING = "_VM_COMPLETE"
 """Environment variable with which the shell asks a program for completions of the words so far."""

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Image
-from ..cameras.image_files import check_file_format, read_image
+from ..cameras.image_files import check_read_format, read_image
 from ..config.units import parse_angle, parse_length
 from ..detection.pixel_formats import checked_image
 from ..errors import InputError
@@ -94,7 +94,7 @@ def _image_and_lens(options: argparse.Namespace, given: Configuration) -> tuple[
         return draw_empty_field(size, format), given.lens_for(size) or _wide_lens(size)
     if options.size is not None:
         raise InputError("--size is only for the drawn field; leave it out with --image")
-    check_file_format(format)
+    check_read_format(format)
     image = checked_image(read_image(options.image, raw=format != "bgr"), format)
     size = image.shape[1], image.shape[0]
     return image, given.lens_for(size) or _wide_lens(size)

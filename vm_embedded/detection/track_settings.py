@@ -17,7 +17,7 @@ class TrackSettings:
 
     center_error: float = number(0.05, "error of the center that the network finds, as a share of the radius")
     pixel_error: float = number(0.5, "error of the center that the network finds, added to the one above", "px")
-    pose_error: float = angle(0.005, "error of the camera's orientation around each axis", (0.0, 0.5))
+    pose_error: float = angle(0.005, "error of the camera's orientation around each axis", (1e-6, 0.5))
     height_error: float = number(0.01, "error of the camera's height", "m")
     wander: float = number(
         0.4, "how much the velocity of a rolling object changes in a second (standard deviation)", "m/s"

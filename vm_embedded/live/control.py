@@ -49,16 +49,18 @@ class ControlServer:
     async def _reply(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if not self._connections.admit(writer):
             return
-        # asyncio logs a traceback for a canceled handler, so suppress that too.
-        with suppress(OSError, ValueError, asyncio.TimeoutError, asyncio.CancelledError):
-            word = (await asyncio.wait_for(reader.readline(), _TIMEOUT)).decode("ascii", "replace").strip()
-            command = self._commands.get(word)
-            self._connections.keep(writer)
-            reply = command() if command else f"unknown command {word!r}; allowed: {', '.join(self._commands)}"
-            writer.write(reply.encode() + b"\n")
-            await asyncio.wait_for(writer.drain(), _TIMEOUT)
-        self._connections.remove(writer)
-        writer.close()
+        try:
+            # asyncio logs a traceback for a canceled handler, so suppress that too.
+            with suppress(OSError, ValueError, asyncio.TimeoutError, asyncio.CancelledError):
+                word = (await asyncio.wait_for(reader.readline(), _TIMEOUT)).decode("ascii", "replace").strip()
+                command = self._commands.get(word)
+                self._connections.keep(writer)
+                reply = command() if command else f"unknown command {word!r}; allowed: {', '.join(self._commands)}"
+                writer.write(reply.encode() + b"\n")
+                await asyncio.wait_for(writer.drain(), _TIMEOUT)
+        finally:
+            self._connections.remove(writer)
+            writer.close()
 
     async def close(self) -> None:
         """Stop listening."""

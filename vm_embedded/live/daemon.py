@@ -165,9 +165,9 @@ class Daemon:
             self._log("stopped", frames=0, reason=reason)
             return status
         for name in ("page", "metrics"):
-            for address in getattr(self.configuration.status, name).split(","):
-                if address and is_open_to_network(address):
-                    self._log("open to the network", "warning", entry=f"[status] {name}", address=address)
+            address = getattr(self.configuration.status, name)
+            if address and is_open_to_network(address):
+                self._log("open to the network", "warning", entry=f"[status] {name}", address=address)
         self.recorder.finish_left()
         self.grabber.start()
         self._watchdog.start()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..cameras.camera import without_password
+from ..cameras.image_files import check_read_format
 from ..cameras.open_camera import ROS, brings_lens_and_pose, camera_opener, is_live
 from ..detection.detector import Detector
 from ..errors import InputError
@@ -47,8 +48,9 @@ async def load_checked_detector(configuration: Configuration) -> tuple[Detector,
 
 
 def check_camera(configuration: Configuration) -> None:
-    """Raise InputError for a camera, lens or pose that is missing or invalid."""
+    """Raise InputError for a camera, pixel format, lens or pose that is missing or invalid."""
     camera = configuration.camera.source
+    check_read_format(configuration.detector.format)
     orientation = configuration.fixed_orientation()  # raises InputError for angles without a height
     if not is_live(camera):
         return

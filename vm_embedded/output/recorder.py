@@ -11,7 +11,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -102,9 +101,11 @@ class Recorder:
         if trigger and any(each["class"] == trigger for each in moment.message["detections"]):
             now = time.monotonic()
             if now - self._last_trigger >= self.settings.pause:
-                with suppress(InputError):
+                self._last_trigger = now
+                try:
                     self.record(files)
-                    self._last_trigger = now
+                except InputError as error:
+                    self._report("not recorded", "warning", str(error))
 
     def record(self, files: Mapping[str, bytes]) -> str:
         """Start to write the kept moments, and return a line that says so. Raises InputError if it can't start.

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from vm_embedded.cli.program import Parser
+from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.files import check_writable, write_file
 from vm_workstation.option_types import at_least
@@ -27,7 +27,7 @@ from ..data.inspection import Inspection, inspect_pictures
 from ..data.pictures import find_pictures
 from .check_boxes import add_check_boxes
 
-EXIT_OK, EXIT_FAULTS = 0, 1
+EXIT_FAULTS = 1
 
 _NAMED = 20
 """Faulty pictures to name, for each kind of fault."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from vm_embedded.cli.program import EXIT_OK
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
@@ -28,7 +29,7 @@ from ..boxes.summary import classes_of, name_faults, summary_lines
 from ..boxes.unlabeled import describe, unlabeled
 from .box_options import add_box_options, parse_names
 
-EXIT_OK, EXIT_FAULTS = 0, 1
+EXIT_FAULTS = 1
 
 _NAMED = 40
 """Faults to print."""

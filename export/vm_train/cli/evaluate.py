@@ -10,7 +10,7 @@ from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import vm_embedded
-from vm_embedded.cli.program import program
+from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, program
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError, VisualMeshError, not_installed
 from vm_embedded.live.configuration import read_configuration
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from ..evaluation.answers import Subject
     from ..evaluation.evaluation import Evaluation
-
-EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
 
 @program

@@ -6,6 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
+from vm_embedded.cli.program import EXIT_OK
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
 from vm_embedded.files import check_writable
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from ..evaluation.evaluation import Evaluation
 
-EXIT_OK = 0
 
 _FEWEST = 10
 """Right and wrong answers that a calibration needs, of each."""

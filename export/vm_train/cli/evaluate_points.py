@@ -5,11 +5,10 @@ from __future__ import annotations
 import argparse
 import math
 
+from vm_embedded.cli.program import EXIT_OK
 from vm_embedded.files import check_writable
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.sphere import Sphere
-
-EXIT_OK = 0
 
 
 def run_points(options: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vm_embedded.cli.program import Parser
+from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
@@ -18,7 +18,7 @@ from vm_workstation.shortened import shortened
 from ..learning.folder_access import locked
 from ..tuning.configuration import TUNING_HEADER, TuningConfiguration
 from .box_options import parse_names
-from .training import EXIT_OK, stop_requests
+from .training import stop_requests
 
 if TYPE_CHECKING:
     from ..tuning.run_folder import TuningRun

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from vm_embedded.cli.program import Parser
+from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.files import write_file
 from vm_embedded.geometry.make_shape import make_shape
@@ -22,7 +22,7 @@ from ..formats.box_import import import_boxes
 from ..formats.box_masks import MaskRule
 from ..learning.configuration import TrainConfiguration
 from .box_options import add_box_options, parse_names
-from .training import EXIT_OK, load_start, read_configuration
+from .training import load_start, read_configuration
 
 _NAMED = 40
 """Faults, and boxes without labels, to print."""

@@ -6,14 +6,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from vm_embedded.cli.program import Parser
+from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError, unknown
 
 from ..formats.picture_example import KEYS
 from ..formats.tfrecord_import import import_records
-
-EXIT_OK = 0
 
 _SHOWN = 20
 """Skipped records to print; a wrong name of a feature skips all of them."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vm_embedded.cli.program import Parser
+from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
@@ -24,7 +24,7 @@ from ..look.configuration import LOOK_HEADER, LookConfiguration
 from .box_options import add_box_options
 from .device_option import add_device
 from .fine_tuning import begin_fine_tuning
-from .training import EXIT_OK, stop_requests
+from .training import stop_requests
 
 if TYPE_CHECKING:
     from vm_export.look_checkpoint import LookCheckpoint

@@ -6,14 +6,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from vm_embedded.cli.program import Parser
+from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_workstation.option_types import at_least
 
 from ..data.pictures import find_pictures
 from ..formats.shards import write_shards
-
-EXIT_OK = 0
 
 
 def shards_parser() -> argparse.ArgumentParser:

@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 
-from vm_embedded.cli.program import discard_output, program
+from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, discard_output, program
 from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import VisualMeshError, not_installed
@@ -25,9 +25,7 @@ from .import_pictures import run_import
 from .look import print_look_config, resume_look, run_look
 from .options import parsers
 from .shards import run_shards
-from .training import EXIT_INTERRUPTED, EXIT_OK, find_good_pictures, read_configuration, run_resume, run_training
-
-EXIT_FAILED = 1
+from .training import find_good_pictures, read_configuration, run_resume, run_training
 
 _TRAININGS = (None, "look", "resume")
 """Commands whose work vm-train resume continues."""

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vm_embedded.cli.program import EXIT_OK
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.errors import InputError, VisualMeshError
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 
 _FEW = 10.0
 """Selected points per picture; with fewer, vm-train warns."""
-
-EXIT_OK, EXIT_INTERRUPTED = 0, 130
 
 
 def run_training(options: argparse.Namespace) -> int:

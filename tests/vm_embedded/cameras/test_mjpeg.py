@@ -18,6 +18,7 @@ from vm_embedded.cameras.grabber import MOST_HANGING
 from vm_embedded.cameras.mjpeg import MjpegCamera, NotMotionJpegError, parse_url
 from vm_embedded.cameras.open_camera import camera_opener
 from vm_embedded.cameras.synthetic import SIZE
+from vm_embedded.errors import InputError
 from vm_embedded.output.recorder import MESSAGES
 
 
@@ -118,6 +119,20 @@ def test_a_server_that_is_killed_and_started_again_is_found_again(tmp_path, pict
 
 def test_a_url_is_split_into_its_parts():
     assert parse_url("http://user:pass@[::1]:81/a?b").port == 81
+    for wrong in ("http://a..b/", f"http://{'a' * 64}/"):
+        with pytest.raises(InputError, match="is not a valid address"):
+            parse_url(wrong)
+
+
+def test_characters_that_http_does_not_allow_are_escaped(pictures):
+    server = Script(HEAD + b"--frame\r\nContent-Length: %d\r\n\r\n" % len(pictures[0]) + pictures[0] + b"\r\n")
+    try:
+        camera = MjpegCamera(CameraSettings(source=f"{server.address}my cam/ä%20?size=1 2&a=ü/?"))
+        assert camera.read().encoded == pictures[0]
+        camera.close()
+    finally:
+        server.kill()
+    assert server.requests[0].startswith(b"GET /my%20cam/%C3%A4%20?size=1%202&a=%C3%BC/? HTTP/1.1\r\n")
 
 
 def test_passwords_of_cameras_are_not_shown(tmp_path):

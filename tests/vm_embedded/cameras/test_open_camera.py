@@ -24,5 +24,7 @@ def test_names_of_cameras():
     for wrong in ("nothing", "synthetic:fast", "synthetic:nan", "http://", "http://a:b/"):
         with pytest.raises(InputError):
             camera_opener(CameraSettings(source=wrong))
+    with pytest.raises(InputError, match=r"^camera rtsp://a/b delivers colors: it supports only --format bgr$"):
+        camera_opener(CameraSettings(source="rtsp://a/b"), raw=True)
     with pytest.raises(InputError, match=r"unknown protocol 'rstp'.*allowed: http, https, rtsp"):
         camera_opener(CameraSettings(source="rstp://a/b"))

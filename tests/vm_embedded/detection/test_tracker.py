@@ -66,6 +66,16 @@ def test_a_ball_that_the_detector_finds_is_where_its_track_says():
     assert rms(tracked) <= 0.7 * rms(single)
 
 
+def test_the_smallest_errors_leave_the_tracks_finite():
+    settings = TrackSettings(center_error=0.0, pixel_error=0.0, pose_error=1e-6, height_error=0.0, wander=0.0)
+    tracker, random = Tracker(settings), np.random.default_rng(1)
+    for time in (1.0, 1.0, 1.0, 1.1):
+        found = tracker.update(detections_of([detection_at(np.array([2.0, 0.5]), random)]), time)
+        assert all(np.isfinite(each.track.position).all() for each in found)
+    with pytest.raises(InputError, match="pose_error must be an angle"):
+        TrackSettings(pose_error=0.0)
+
+
 def test_a_ball_keeps_its_number_when_it_is_hidden_for_a_third_of_a_second():
     kept = 0
     for seed in RUNS:

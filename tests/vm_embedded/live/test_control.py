@@ -1,5 +1,6 @@
 """The control socket of a real vm-detect."""
 
+import asyncio
 import os
 import re
 import socket
@@ -11,8 +12,8 @@ import pytest
 from tests.messages import read_message
 from tests.vm_embedded.live.running import COMMAND, arguments, running
 from vm_embedded.errors import InputError
-from vm_embedded.live.control import ask, control_path
-from vm_embedded.sockets import private_folder
+from vm_embedded.live.control import ControlServer, ask, control_path
+from vm_embedded.sockets import MOST_CONNECTIONS, private_folder
 
 
 def test_a_socket_that_was_left_behind_is_replaced_and_one_in_use_is_not(tmp_path):
@@ -40,6 +41,20 @@ def test_a_client_that_says_nothing_is_let_go_of_at_the_end(tmp_path):
         with socket.socket(socket.AF_UNIX) as silent:
             silent.connect(str(tmp_path / "control"))
             assert found.stop()[0] == 0
+
+
+def test_a_command_that_fails_leaves_no_connection(tmp_path):
+    async def ask_often():
+        server = ControlServer(tmp_path / "control", {"fail": lambda: {}["status"], "status": lambda: "fine"})
+        asyncio.get_running_loop().set_exception_handler(lambda loop, context: None)
+        await server.open()
+        for _ in range(MOST_CONNECTIONS + 1):
+            assert await asyncio.to_thread(ask, tmp_path / "control", "fail") == ""
+        reply = await asyncio.to_thread(ask, tmp_path / "control", "status")
+        await server.close()
+        return reply
+
+    assert asyncio.run(ask_often()) == "fine"
 
 
 def test_asking_what_is_no_detector_ends(tmp_path):

@@ -7,7 +7,7 @@ import subprocess
 
 import pytest
 
-from tests.vm_embedded.live.running import COMMAND, arguments, running
+from tests.vm_embedded.live.running import COMMAND, DEMO, arguments, running
 from vm_embedded.live.configuration import read_configuration
 from vm_embedded.network.bundled import model_path
 
@@ -39,6 +39,7 @@ def test_an_option_that_can_never_work_is_wrong_usage(tmp_path):
         (("--pose-source", "radio"), "radio"),
         (("--output-udp", "here"), "--output-udp: udp must be ADDRESS:PORT"),
         (("--status-page", "127.0.0.1:0"), "127.0.0.1:0"),
+        (("--status-page", "127.0.0.1:80,127.0.0.1:81"), "must be ADDRESS:PORT"),
         (("--status-page", "8080"), "--status-page: page must be ADDRESS:PORT, as in 127.0.0.1:8080"),
         (("--height", "80cm"), "--height: height must be a number of meters"),
     ):
@@ -103,6 +104,16 @@ def test_the_printed_configuration_is_one_and_says_what_the_defaults_are(tmp_pat
     ):
         done = subprocess.run([*checked[:-1], str(camera)], capture_output=True, text=True, timeout=60, check=False)
         assert (done.returncode, fault in done.stderr) == (1, True), done.stderr
+
+
+@pytest.mark.parametrize("format", ["rgb", "bgra", "rgba"])
+def test_a_pixel_format_that_no_camera_delivers_is_refused(tmp_path, format):
+    command = arguments(tmp_path, "--live", "--check-config", "--camera", DEMO, "--format", format)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1
+    assert f"--format {format} is only for frames passed in from Python; frames of files and cameras are bgr, gray" in (
+        done.stderr
+    )
 
 
 @pytest.mark.long

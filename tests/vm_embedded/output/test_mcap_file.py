@@ -55,6 +55,17 @@ def test_pictures_detections_and_states_are_in_the_file(tmp_path, scene_folder):
     assert [message.status[0].level for message in found["/diagnostics"]] == [0, 0, 1, 0, 0]
 
 
+def test_pictures_of_bayer_patterns_have_colors_in_the_file(tmp_path, scene_folder):
+    for path in scene_folder.glob("image*"):
+        colors = cv2.imread(str(path))
+        mosaic = colors[:, :, 1].copy()
+        mosaic[::2, ::2], mosaic[1::2, 1::2] = colors[::2, ::2, 2], colors[1::2, 1::2, 0]
+        cv2.imwrite(str(path), mosaic)
+    run(scene_folder, "--save-mcap", tmp_path / "out.mcap", "--format", "bayer_rggb")
+    picture = cv2.imdecode(messages_of(tmp_path / "out.mcap")["/camera/image/compressed"][-1].data, cv2.IMREAD_COLOR)
+    assert np.abs(picture.astype(float) - colors).mean() < 10.0
+
+
 def test_the_file_is_a_bag_with_lens_and_poses(tmp_path, scene_folder):
     path = tmp_path / "out.mcap"
     first = lines(run(scene_folder, "--save-mcap", path))

@@ -177,6 +177,17 @@ def test_a_recording_that_can_not_be_written_is_refused(tmp_path):
     assert "Not a directory" in done.stderr
 
 
+def test_a_recording_that_a_class_triggers_and_that_can_not_be_written_is_logged_once_per_pause(tmp_path):
+    kept = tmp_path / "recordings"
+    kept.touch()
+    options = ("--recorder-folder", kept, "--recorder-trigger-class", "ball")
+    with running(tmp_path, "--camera", "synthetic", *options) as found:
+        found.wait(lambda: sum(len(each["detections"]) for each in found.frames) > 10)
+        found.stop()
+    (event,) = [each for each in found.events if each["event"] == "not recorded"]
+    assert "Not a directory" in event["folder"]
+
+
 def test_the_newest_recording_stays_although_the_clock_was_set_back(tmp_path):
     for name in ("2026-11-27T03-28-20.541", "2026-11-27T03-30-00.000", "1970-01-01T00-01-40.011"):
         (tmp_path / name).mkdir()

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Image
 from ...cameras.image_files import Frame
 from ...cameras.ros.bag_types import bag_types, import_rosbags, typestore
 from ...cameras.ros.images import jpeg_message
@@ -60,11 +59,12 @@ class McapFile:
         self._connections: dict[str, Any] = {}
         self._start = time.time()
 
-    def write(self, frame: Frame, image: Image, lens: Lens, orientation: Orientation, detections: Detections) -> None:
-        """Write a frame with its detections, and the state ok. image: as BGR."""
+    def write(self, frame: Frame, lens: Lens, orientation: Orientation, detections: Detections) -> None:
+        """Write a frame with its detections, and the state ok."""
         types, now = self._types, self._time(frame)
         stamp = stamp_of(types, now)
         in_image, on_plane = header_of(types, stamp, _CAMERA_FRAME), header_of(types, stamp, self._plane_frame)
+        image = detections.observation.pyramid.bgr()
         height, width = image.shape[:2]
         pose = transform_message(types, on_plane, _CAMERA_FRAME, orientation)
         self._add(now, "/tf", "TFMessage", types.TFMessage(transforms=[pose]))
