@@ -74,9 +74,10 @@ class TopicCamera:
         message, captured = taken
         header, age = message.header, time.monotonic() - captured
         if abs(age) > _OTHER_CLOCK:
+            side = "before" if age > 0.0 else "after"
             raise BrokenFrameError(
-                f"stamp of the image is {age:.0f} s before now; if its clock is that of a bag or a simulation, give "
-                "--ros-clock arrival"
+                f"stamp of the image is {abs(age):.0f} s {side} now; if its clock is that of a bag or a simulation, "
+                "give --ros-clock arrival"
             )
         try:
             image: Image = image_of(message, self._raw, self._settings.max_megapixels)

@@ -62,12 +62,15 @@ class Session:
     def run(self, layout: Layout, points: Singles, on_screen: Mask) -> Singles:
         """Probabilities (m, C) of a layout's slots, from its colored `points` and the slots (m,) on screen.
 
-        Raises ModelError, also if the system has no thread left.
+        Raises ModelError, also if the system has no thread left, and for answers that are not finite.
         """
         try:
-            return layout.answers(self.onnx.run, points, on_screen)
+            answers = layout.answers(self.onnx.run, points, on_screen)
         except RuntimeError as error:
             raise ModelError(f"{self.model.path}: can't run it in {self.threads} threads: {error}") from error
+        if not (np.isfinite(answers).all(axis=1) | ~on_screen).all():
+            raise ModelError(f"{self.model.path}: its answers are NaN or infinite")
+        return answers
 
     def answer(self, test: SelfTest) -> Singles:
         """Probabilities (n, C) of an example's points."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -15,7 +15,7 @@ from vm_embedded.geometry.calibrated_lenses import CalibratedLens
 from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.radial_lenses import RadialLens
-from vm_workstation.worker_process import interrupts_blocked, worker_pool
+from vm_workstation.worker_process import results_of
 
 from .classes import Classes, Labels
 from .picture_files import PictureFault, PictureFiles
@@ -110,7 +110,8 @@ def inspect_pictures(
     """
     numbers = [_class_number(name, classes) for name in objects]
     good, facts, faults = [], [], []
-    for files, found in zip(pictures, _results(pictures, classes, numbers, workers), strict=True):
+    make = partial(partial, _inspect_one, classes=classes, objects=numbers)
+    for files, found in zip(pictures, results_of(make, pictures, workers, _CHUNK), strict=True):
         if isinstance(found, FaultyPicture):
             faults.append(found)
         else:
@@ -124,20 +125,6 @@ def _class_number(name: str, classes: Classes) -> int:
     if name not in classes.names:
         raise VisualMeshError(unknown("class", name, classes.names))
     return classes.names.index(name)
-
-
-def _results(
-    pictures: Sequence[PictureFiles], classes: Classes, objects: Sequence[int], workers: int
-) -> Iterator[PictureFacts | FaultyPicture]:
-    inspect_one = partial(_inspect_one, classes=classes, objects=objects)
-    if workers < 2 or len(pictures) <= _CHUNK:
-        yield from map(inspect_one, pictures)
-        return
-    chunks = -(-len(pictures) // _CHUNK)
-    with worker_pool(min(workers, chunks)) as pool:
-        with interrupts_blocked():
-            results = pool.map(inspect_one, pictures, chunksize=_CHUNK)
-        yield from results
 
 
 def _inspect_one(files: PictureFiles, classes: Classes, objects: Sequence[int]) -> PictureFacts | FaultyPicture:

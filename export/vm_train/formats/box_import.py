@@ -10,6 +10,7 @@ from pathlib import Path
 
 import cv2
 
+from vm_embedded.cameras.image_files import read_image
 from vm_embedded.errors import InputError
 from vm_embedded.files import atomic_write, write_file
 from vm_embedded.geometry.lens_files import read_lens_file
@@ -85,10 +86,7 @@ def _write_image(image: Path, to: Path) -> None:
     if image.suffix.lower() in IMAGES:
         _copy(image, to.with_name(to.name + image.suffix.lower()))
         return
-    decoded = cv2.imread(str(image), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
-    if decoded is None:
-        raise InputError(f"can't read image {image}")
-    write_file(to.with_name(f"{to.name}.png"), cv2.imencode(".png", decoded)[1].tobytes())
+    write_file(to.with_name(f"{to.name}.png"), cv2.imencode(".png", read_image(image))[1].tobytes())
 
 
 def _copy(path: Path, to: Path) -> None:

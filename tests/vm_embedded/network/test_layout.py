@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from tests.manifests import ball_manifest
 from vm_embedded.detection.projection import project
+from vm_embedded.errors import ModelError
 from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
@@ -343,3 +344,15 @@ def test_what_feeds_take_is_what_they_leave_but_for_colors_off_screen(model):
             assert feeds["columns"].dtype == np.int64
             assert feeds["columns"].shape == (len(MESH_MODELS[model].groups), m)
             assert 0 <= feeds["columns"].min() <= feeds["columns"].max() < len(MESH_MODELS[model].groups) * (m - 1)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_answers_that_are_not_finite_are_an_error(layout):
+    network = network_of(NetworkShape((Layer("convolution", 4, "elu"), Layer("convolution", 2, "softmax")), 6), 1)
+    mesh = build_mesh(Sphere(0.1), 0.8, 2.0, 1.0, "xmgrid6")
+    session = session_of(network, "xmgrid6", layout)
+    colors, on_screen = np.zeros((len(mesh), 3)), np.arange(len(mesh)) > 0
+    answers(session, mesh, colors, on_screen)
+    colors[1] = np.nan
+    with pytest.raises(ModelError, match="its answers are NaN or infinite"):
+        answers(session, mesh, colors, on_screen)
