@@ -9,13 +9,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from vm_embedded.config.units import parse_angle
+from vm_embedded.config.units import parse_angle, parse_size
 from vm_embedded.errors import InputError
 from vm_embedded.files import check_writable, write_file
 from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.lens_files import format_lens_file, read_lens_file
 from vm_embedded.geometry.orientation import Orientation
-from vm_workstation.option_types import parse_size
 
 from .ball_fit import fit_balls
 from .balls import read_balls

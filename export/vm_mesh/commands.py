@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.cameras.image_files import read_image
+from vm_embedded.config.units import parse_size
 from vm_embedded.detection.projection import project
 from vm_embedded.errors import InputError
 from vm_embedded.files import check_writable, write_file
 from vm_embedded.geometry.lens import Size
 from vm_embedded.geometry.lens_files import LensFile
-from vm_workstation.option_types import parse_size
 from vm_workstation.plots import check_figure_path, save_figure
 
 from .built_mesh import BuiltMesh

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.config.units import parse_angle, parse_length
+from vm_embedded.config.units import parse_angle, parse_length, parse_size
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.lens import Size
@@ -20,7 +20,6 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
-from vm_workstation.option_types import parse_size
 
 from .built_mesh import MeshPlan
 

@@ -1,12 +1,9 @@
-"""Types of options that several programs share, and readers of their texts."""
+"""Types of options that several programs share."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-
-from vm_embedded.errors import InputError
-from vm_embedded.geometry.lens import Size
 
 
 def at_least(least: int) -> Callable[[str], int]:
@@ -18,12 +15,3 @@ def at_least(least: int) -> Callable[[str], int]:
         return int(text)
 
     return parse
-
-
-def parse_size(text: str) -> Size:
-    """Width and height [px] from text such as 640x512. Raises InputError."""
-    width, cross, height = text.partition("x")
-    sides = [int(each) if each.isascii() and each.isdigit() else 0 for each in (width, height)]
-    if not cross or not all(sides):
-        raise InputError(f"size must be WIDTHxHEIGHT in pixels, as 640x512, not {text!r}")
-    return sides[0], sides[1]

@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ..live.prometheus import resident_bytes
 from ..network.onnx_model import RUNTIME_VERSION
 
 _SGEMM = """
@@ -58,5 +59,4 @@ def sgemm_rate() -> float:
 
 def rss_mib() -> float:
     """Resident memory of this process [MiB]."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+    return resident_bytes() / 2**20

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Image
 from ..cameras.image_files import check_read_format, read_image
-from ..config.units import parse_angle, parse_length
+from ..config.units import parse_angle, parse_length, parse_size
 from ..detection.pixel_formats import checked_image
 from ..errors import InputError
 from ..geometry.lens import Lens, Size
@@ -90,7 +90,7 @@ def _image_and_lens(options: argparse.Namespace, given: Configuration) -> tuple[
     format = given.detector.format
     if options.image is None:
         own = given.lens.lens.size if given.lens is not None else None
-        size = _parse_size(options.size) if options.size else (own or _SIZE)
+        size = parse_size(options.size) if options.size else (own or _SIZE)
         return draw_empty_field(size, format), given.lens_for(size) or _wide_lens(size)
     if options.size is not None:
         raise InputError("--size is only for the drawn field; leave it out with --image")
@@ -102,12 +102,3 @@ def _image_and_lens(options: argparse.Namespace, given: Configuration) -> tuple[
 
 def _wide_lens(size: Size) -> Lens:
     return Rectilinear(focal_length=0.5 * size[0], fov=2.0)
-
-
-def _parse_size(text: str) -> Size:
-    parts = text.lower().split("x")
-    if len(parts) != 2 or not all(part.isascii() and part.isdecimal() and 2 <= int(part) <= 20000 for part in parts):
-        raise InputError(
-            f"{text!r} is not a size; write width and height, from 2 to 20000 pixels each, as in 1280x1024"
-        )
-    return int(parts[0]), int(parts[1])

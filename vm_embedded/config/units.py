@@ -1,4 +1,4 @@
-"""Lengths and angles as users write them: numbers, or text such as "0.6" and "20deg"."""
+"""Lengths, angles and sizes as users write them: numbers, or text such as "0.6", "20deg" and "640x512"."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from typing import Any
 
 from ..errors import InputError
 from .entries import Limits, entry
+
+_LARGEST, _DIGITS = 20000, 9
+"""Largest width and height of an image [px], and most digits that are read as a number."""
 
 _DEGREES = re.compile(r"\s*([-+0-9.eE]+)\s*deg\s*")
 
@@ -28,6 +31,17 @@ def parse_angle(value: object, name: str) -> float:
     if abs(radians) > 2.0 * math.pi and not _is_degrees(value):
         raise InputError(f"{name} of {radians:g} rad is more than a full turn; did you mean {radians:g}deg?")
     return radians
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Width and height [px] from text such as "640x512". Raises InputError."""
+    sides = text.lower().split("x")
+    if len(sides) != 2 or not all(each.isascii() and each.isdecimal() and len(each) <= _DIGITS for each in sides):
+        raise InputError(f"size must be WIDTHxHEIGHT in pixels, as 640x512, not {text!r}")
+    width, height = int(sides[0]), int(sides[1])
+    if not (2 <= width <= _LARGEST and 2 <= height <= _LARGEST):
+        raise InputError(f"width and height must be from 2 to {_LARGEST} px, not {text!r}")
+    return width, height
 
 
 def length(default: float | None, help: str) -> Any:

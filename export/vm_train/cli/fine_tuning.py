@@ -44,9 +44,11 @@ def print_tune_config(options: argparse.Namespace) -> int:
 
 def resume_fine_tuning(options: argparse.Namespace) -> int:
     """Resume a fine-tuning and return the exit status. Raises VisualMeshError."""
+    from ..tuning.run_folder import read_tuning
+
     _check_device(options.device)
     with locked(options.run):
-        return _fine_tune(options.run, options.data, options)
+        return _fine_tune(read_tuning(options.run, options.data), options)
 
 
 def begin_fine_tuning(options: argparse.Namespace) -> int:
@@ -78,7 +80,7 @@ def begin_fine_tuning(options: argparse.Namespace) -> int:
             options.threads or 1,
         )
         _describe(run, options.boxes)
-        return _fine_tune(run.folder, None, options)
+        return _fine_tune(run, options)
 
 
 def _check_device(device: str) -> None:
@@ -109,16 +111,14 @@ def _describe(run: TuningRun, boxes: Path) -> None:
         )
 
 
-def _fine_tune(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> int:
-    """Train from the last state of a folder on. moved_to: where the frames are now. Returns the exit status.
+def _fine_tune(run: TuningRun, options: argparse.Namespace) -> int:
+    """Train from the last state of a fine-tuning on, and return the exit status.
 
     Raises KeyboardInterrupt after the step in which Ctrl-C or SIGTERM asked for a stop.
     """
     from ..learning.hardware import set_up_hardware
     from ..tuning.fine_tuning import fine_tune
-    from ..tuning.run_folder import read_tuning
 
-    run = read_tuning(folder, moved_to)
     workers = options.workers or len(os.sched_getaffinity(0))
     with set_up_hardware("cpu", workers, options.threads or run.threads) as hardware:
         if hardware.size > 1:
@@ -127,6 +127,6 @@ def _fine_tune(folder: Path, moved_to: Path | None, options: argparse.Namespace)
             finished = fine_tune(run, workers, stop_requested)
     if not finished:
         raise KeyboardInterrupt
-    print(f"report: {folder / 'report.html'}")
+    print(f"report: {run.folder / 'report.html'}")
     print(f"next: vm-detect --model {run.model_path}")
     return EXIT_OK

@@ -8,6 +8,7 @@ mirrored.
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -79,8 +80,11 @@ def ball_radius(files: PictureFiles) -> float:
     """Radius [m] of the balls in a picture of vm-synth, even if it shows none. Raises InputError."""
     path = files.image.with_name(f"scene{files.number}.json")
     try:
-        return float(json.loads(path.read_text(encoding="utf-8"))["ball_radius"])
+        radius = float(json.loads(path.read_text(encoding="utf-8"))["ball_radius"])
     except OSError as error:
         raise InputError(f"can't read the ball's radius from {path.name}: {error.strerror or error}") from error
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path.name} has no number ball_radius, the ball's radius [m]") from error
+    if not 0.0 < radius < math.inf:
+        raise InputError(f"{path.name}: ball_radius must be a number above 0, the ball's radius [m], not {radius:g}")
+    return radius

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.errors import InputError
+from vm_embedded.output.result_files import make_folder
 
 
 def check_unused(folder: Path, names: Sequence[str]) -> None:
@@ -22,14 +23,6 @@ def check_unused(folder: Path, names: Sequence[str]) -> None:
     present = [name for name in names if (folder / name).exists()]
     if present:
         raise InputError(f"{folder} holds {', '.join(present)}, which a training would overwrite: give a new folder")
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder, unless it is there. Raises InputError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"can't make folder {folder}: {error.strerror or error}") from error
 
 
 def kind_of(folder: Path) -> str | None:

@@ -25,12 +25,13 @@ from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_embedded.files import write_file
+from vm_embedded.output.result_files import make_folder
 
 from ..data.split import read_split, write_split
 from ..graphs.loading import PictureGraphs
 from ..graphs.streamed import StreamedGraphs, StreamSource
 from .configuration import TrainConfiguration
-from .folder_access import check_unused, description, make_folder
+from .folder_access import check_unused, description
 from .selection import class_weights, selection_shares
 from .start import Start
 from .teacher import Teacher

@@ -23,12 +23,13 @@ from vm_embedded.errors import InputError, unknown
 from vm_embedded.field.uprights import KINDS
 from vm_embedded.files import write_file
 from vm_embedded.network.look_contract import MOST_NETWORKS
+from vm_embedded.output.result_files import make_folder
 from vm_export.look_checkpoint import LookCheckpoint
 
 from ..data.split import Split, read_split, write_split
 from ..evaluation.answers import ExactSubject, load_subject
 from ..evaluation.field_truth import CLASSES
-from ..learning.folder_access import check_unused, description, make_folder
+from ..learning.folder_access import check_unused, description
 from .configuration import LookConfiguration
 
 KIND = "look"

@@ -24,13 +24,14 @@ from vm_embedded.files import write_file
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.model_file import ModelFile, read_model
+from vm_embedded.output.result_files import make_folder
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_weights import look_of
 
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.read import read_boxes
 from ..data.split import Split
-from ..learning.folder_access import check_unused, description, make_folder
+from ..learning.folder_access import check_unused, description
 from .boxed_objects import all_objects, boxes_sha256, check_boxes, split_by_recording
 from .candidates import search_radii
 from .configuration import TuningConfiguration

@@ -1,4 +1,4 @@
-"""Lengths and angles from numbers and text."""
+"""Lengths, angles and sizes from numbers and text."""
 
 import math
 import re
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.config.units import parse_angle, parse_length
+from vm_embedded.config.units import parse_angle, parse_length, parse_size
 from vm_embedded.errors import InputError
 
 
@@ -49,3 +49,22 @@ def test_a_length_is_a_number_or_its_text(meters):
 def test_what_is_no_length_is_refused_by_value(value):
     with pytest.raises(InputError, match=rf"height must be .*0\.8, not {re.escape(repr(value)[:20])}"):
         parse_length(value, "height")
+
+
+@given(st.integers(2, 20000), st.integers(2, 20000), st.sampled_from("xX"))
+def test_a_size_is_width_and_height(width, height, cross):
+    assert parse_size(f"{width}{cross}{height}") == (width, height)
+
+
+@pytest.mark.parametrize("text", ["", "x", "640", "640x", "640x-2", "640 x 512", "640x512x3", "²x³", f"{'9' * 5000}x2"])
+def test_what_is_no_size_is_refused_by_value(text):
+    with pytest.raises(
+        InputError, match=rf"size must be WIDTHxHEIGHT in pixels, as 640x512, not {re.escape(repr(text))}"
+    ):
+        parse_size(text)
+
+
+@pytest.mark.parametrize("text", ["1x512", "640x0", "640x20001"])
+def test_a_size_that_no_image_has_is_refused(text):
+    with pytest.raises(InputError, match=rf"width and height must be from 2 to 20000 px, not '{text}'"):
+        parse_size(text)

@@ -24,6 +24,9 @@ from ...poses.buffer import interpolate_rotation
 _KEPT = 3.0
 """How long the transforms of a joint are kept [s]."""
 
+_MOST = 1000
+"""Largest number of joints. A node that always makes new names must not fill the memory."""
+
 
 @dataclass(frozen=True, eq=False)
 class Transform:
@@ -89,11 +92,14 @@ class TransformTree:
     def add(self, message: Any, time: float | None) -> None:
         """Add a geometry_msgs/TransformStamped. time [s]: of any one clock, or None for one of tf_static.
 
-        It ignores a transform that is not newer than the last one of its joint. Raises GeometryError or InputError.
+        It ignores a transform that is not newer than the last one of its joint. Raises GeometryError or InputError,
+        also for a new joint beyond the first _MOST ones.
         """
         parent, child = _plain(message.header.frame_id), _plain(message.child_frame_id)
         transform = Transform.from_message(message.transform)
         joint = self._joints.get(child)
+        if joint is None and len(self._joints) >= _MOST:
+            raise InputError(f"tf has more than {_MOST} frames: {child} is ignored")
         if joint is None or joint.parent != parent or (joint.fixed is None) != (time is not None):
             joint = self._joints[child] = _Joint(parent)
         if time is None:

@@ -141,3 +141,11 @@ def test_a_camera_below_the_plane_is_an_error():
     tree = tree_of(("base_footprint", "camera", (OPTICAL_TO_CAMERA, np.array([0.0, 0.0, -0.7]))))
     with pytest.raises(GeometryError, match="camera height must be a number above 0 m"):
         newest_pose(tree, "base_footprint", "camera", -math.inf, 12.0)
+
+
+def test_names_without_end_do_not_fill_the_memory():
+    tree = tree_of(*[("map", f"leaf{number}", (np.eye(3), np.zeros(3))) for number in range(1000)])
+    with pytest.raises(InputError, match=r"^tf has more than 1000 frames: leaf1000 is ignored$"):
+        tree.add(transform("map", "leaf1000", 0.0, np.eye(3), np.zeros(3)), None)
+    tree.add(transform("map", "leaf7", 0.0, np.eye(3), np.ones(3)), None)
+    assert tree.at("map", "leaf7", 0.0).translation.tolist() == [1.0, 1.0, 1.0]
