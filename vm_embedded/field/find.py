@@ -15,7 +15,7 @@ from .goals import pair_posts
 from .ground_points import GroundPoints
 from .lines import LEAST, LinePoints, Piece, find_pieces, line_points
 from .ridges import Profiles, pieces_on_ridges
-from .uprights import POST, ROBOT, Base, UprightRules, find_uprights
+from .uprights import KINDS, POST, ROBOT, Base, UprightRules, find_uprights
 
 ToPixels = Callable[[Floats], Floats]
 """Pixels (n, 2) of places (n, 2) [m] on the plane; NaN outside of the picture."""
@@ -38,27 +38,28 @@ def find_features(
     profiles: brightness of the frame across lines. bases: of the classes that a close look has judged, by class. Rules
     find the uprights of the others.
     """
-    posts, robots = (
-        list(bases[name]) if name in bases else _by_rules(points, name, rules)
+    found = {
+        name: bases[name] if name in bases else _by_rules(points, name, rules)
         for name, rules in (("goal", POST), ("robot", ROBOT))
-    )
+    }
     near = line_points(points)
     likely = near.part(near.weights > LEAST)
     pieces, circle = _straight_and_round(near, likely)
     pieces = pieces_on_ridges(pieces, points, profiles)
     border = find_border(points) if "field" in points.classes else np.empty((0, 2))
-    places = [each.position[None] for each in posts + robots] + [each.ends for each in pieces] + [border]
+    feet = [each.position[None] for each in (*found["goal"], *found["robot"])]
+    places = [*feet, *(each.ends for each in pieces), border]
     pixels = iter(np.split(to_pixels(np.concatenate(places)), np.cumsum([len(each) for each in places])[:-1]))
-    uprights = [
-        _upright(each, "post" if number < len(posts) else "robot", points.height, next(pixels)[0])
-        for number, each in enumerate(posts + robots)
-    ]
+    posts, robots = (
+        tuple(_upright(each, KINDS[name], points.height, next(pixels)[0]) for each in found[name])
+        for name in ("goal", "robot")
+    )
     lines = tuple(Segment(each.ends, next(pixels), float(likely.weights[each.members].mean())) for each in pieces)
     thinned, confidences = _thinned(likely)
     return FieldFeatures(
-        posts=tuple(uprights[: len(posts)]),
-        goals=pair_posts(uprights[: len(posts)]),
-        robots=tuple(uprights[len(posts) :]),
+        posts=posts,
+        goals=pair_posts(posts),
+        robots=robots,
         lines=lines,
         circle=None if circle is None else _circle(circle, likely),
         crossings=find_crossings(lines, lambda places: np.asarray(np.isfinite(to_pixels(places)).all(axis=1))),

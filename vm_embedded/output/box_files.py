@@ -24,8 +24,7 @@ from ..files import write_file
 from ..geometry.lens import Lens
 from ..geometry.lens_files import format_lens_file
 from ..geometry.orientation import Orientation
-from .recorder import encode_png
-from .result_files import FrameNames, make_folder
+from .result_files import FrameNames, encode_png, make_folder
 
 CLASSES, CANDIDATES = "classes.txt", "candidates.jsonl"
 

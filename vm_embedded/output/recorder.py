@@ -16,7 +16,6 @@ from pathlib import Path
 
 import cv2
 
-from ..arrays import Image
 from ..cameras.camera import Shot
 from ..cameras.image_files import MESSAGES
 from ..config.entries import check_entries, number, text_line
@@ -26,9 +25,8 @@ from ..geometry.lens_files import format_lens_file
 from ..geometry.orientation import Orientation
 from .messages import Message, to_json_line
 from .recordings import PART, delete_oldest_recordings, finish, finish_left_recordings, locked, recording_name
+from .result_files import encode_png
 
-# Smaller and faster than the default strategy for pictures with noise.
-_PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY)
 CONFIGURATION = "vm.toml"
 
 _LAST_FRAME = 0.3
@@ -221,8 +219,3 @@ def _write_moment(folder: Path, index: int, moment: Moment, quick: bool) -> int:
     (folder / f"image{index:07d}.{suffix}").write_bytes(content)
     (folder / f"lens{index:07d}.yaml").write_text(format_lens_file(moment.lens, moment.orientation), encoding="utf-8")
     return len(content)
-
-
-def encode_png(image: Image) -> bytes:
-    """A lossless PNG of an image (height, width[, channels]), which takes little time to compress."""
-    return cv2.imencode(".png", image, _PNG)[1].tobytes()
