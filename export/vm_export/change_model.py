@@ -10,11 +10,11 @@ from vm_embedded.errors import ModelError
 from vm_embedded.files import write_file
 from vm_embedded.network.canary import CANARY_KEY
 from vm_embedded.network.manifest import METADATA_KEY
-from vm_embedded.network.model_file import parse_model, read_model
+from vm_embedded.network.model_file import read_model
 
 from .attach_canary import CanaryPicture, NotFoundError, with_canary
-from .attach_look import attached, detached, tested_contract
-from .export import check_difference
+from .attach_look import detached, tested_contract
+from .export import with_looks
 from .look_checkpoint import LookCheckpoint
 from .look_weights import look_of, upright_looks_of
 from .metadata import with_metadata
@@ -24,10 +24,10 @@ from .strong_self_test import strong_self_test
 
 @dataclass(frozen=True)
 class ChangedLooks:
-    """What became of a model file. difference: largest one to torch of the looks' answers, None without a look.
+    """What became of a model file. difference: largest one to torch of the looks' answers, 0 without a look.
     lost_canary: whether the file had a canary that its networks do not find any more."""
 
-    difference: float | None
+    difference: float
     lost_canary: bool
 
 
@@ -42,11 +42,7 @@ def change_looks(model: str | Path, path: str | Path, looks: Sequence[LookCheckp
     file's classes, or if there is no look to remove. Raises InputError if the file can't be written.
     """
     read = read_model(model)
-    content, differences, lost = read.content, [], False
-    for look in looks:
-        content, difference = attached(content, parse_model(path, content).manifest, look)
-        check_difference(path, "answers of the close look", difference)
-        differences.append(difference)
+    (content, difference), lost = with_looks(path, read.content, looks), False
     if not looks:
         if read.look is None and not read.upright_looks:
             raise ModelError(f"{model} has no close look to remove")
@@ -57,7 +53,7 @@ def change_looks(model: str | Path, path: str | Path, looks: Sequence[LookCheckp
         except NotFoundError:
             content, lost = with_metadata(content, {CANARY_KEY: None}), True
     write_file(Path(path), content)
-    return ChangedLooks(max(differences, default=None), lost)
+    return ChangedLooks(difference, lost)
 
 
 def lost_canary_message(output: Path, model: str | Path) -> str:

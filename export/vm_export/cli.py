@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
 from vm_embedded.errors import InputError, VisualMeshError, not_installed
 from vm_embedded.network.bundled import SHIPPED, model_path
-from vm_embedded.network.manifest import EDGES, LAYOUTS
+from vm_embedded.network.manifest import EDGES, LAYOUTS, Manifest
 from vm_embedded.network.model_file import read_model
 
 if TYPE_CHECKING:
@@ -49,7 +49,8 @@ def parser() -> argparse.ArgumentParser:
         "--look",
         type=Path,
         metavar="LOOK",
-        help="checkpoint (.pt) of a close look to write into the model file, instead of the one for the same class",
+        help="checkpoint (.pt) of a close look to write into the model file, instead of the one for the same class; or "
+        "a model file (.onnx, or the name of a network of the package), whose close looks at these classes are taken",
     )
     looks.add_argument("--no-look", action="store_true", help="copy a model file (.onnx) without its close looks")
     parser.add_argument(
@@ -104,8 +105,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    if str(options.model) in SHIPPED:
-        options.model = model_path(options.model)
+    for name in ("model", "look"):
+        if str(getattr(options, name)) in SHIPPED:
+            setattr(options, name, model_path(getattr(options, name)))
     _check_options(options)
     # Imported here: without torch, --help still works and the error is one clear line.
     import torch
@@ -113,7 +115,6 @@ def _run(options: argparse.Namespace) -> int:
     from .attach_canary import CanaryPicture
     from .change_model import change_canary, change_looks, lost_canary_message
     from .export import export, fastest_layout
-    from .look_checkpoint import LookCheckpoint
     from .reference import write_reference
 
     # These networks are small: one thread is as fast as several, and much faster while other programs use the cores.
@@ -129,17 +130,15 @@ def _run(options: argparse.Namespace) -> int:
     suffixes = (".yaml", ".yml") if options.to_yaml else (".onnx",)
     if output.suffix not in suffixes:
         raise InputError(f"--output must end in {suffixes[0]}, not {output}")
-    look = LookCheckpoint.load(options.look) if options.look else None
-    if look is not None and options.look_above is not None:
-        look = look.for_points_above(options.look_above)
     canary = CanaryPicture.read(*options.canary) if options.canary else None
     if _is_model_file(options.model) and canary is not None:
         change_canary(options.model, output, canary)
-        _print_written(output, f"networks of {options.model} with a new canary", None, None)
+        _print_written(output, f"networks of {options.model} with a new canary", [], None)
         return EXIT_OK
     if _is_model_file(options.model):
-        changed = change_looks(options.model, output, [] if look is None else [look])
-        _print_written(output, f"mesh network of {options.model}", look, changed.difference)
+        looks = _read_looks(options, read_model(options.model).manifest)
+        changed = change_looks(options.model, output, looks)
+        _print_written(output, f"mesh network of {options.model}", looks, changed.difference if looks else None)
         if changed.lost_canary:
             print(f"vm-export: {lost_canary_message(output, options.model)}", file=sys.stderr)
         return EXIT_OK
@@ -149,12 +148,28 @@ def _run(options: argparse.Namespace) -> int:
         write_reference(checkpoint, output)
         print(f"{output}: written in the format of the reference implementation")
         return EXIT_OK
+    looks = _read_looks(options, checkpoint.manifest)
     layout = options.layout or fastest_layout(checkpoint)
     files = {portable: "plain"} if options.layout is None and layout != "plain" else {}
     files[output] = layout
     for path, layout in files.items():
-        _print_written(path, f"layout {layout}", look, export(checkpoint, path, layout, look, canary))
+        _print_written(path, f"layout {layout}", looks, export(checkpoint, path, layout, looks, canary))
     return EXIT_OK
+
+
+def _read_looks(options: argparse.Namespace, manifest: Manifest) -> list[LookCheckpoint]:
+    """The close looks of --look for a network with this manifest. Raises InputError or ModelError."""
+    from .look_checkpoint import LookCheckpoint
+    from .look_weights import looks_for
+
+    if options.look is None:
+        return []
+    if _is_model_file(options.look):
+        looks = looks_for(manifest, read_model(options.look))
+    else:
+        looks = [LookCheckpoint.load(options.look)]
+    above = options.look_above
+    return looks if above is None else [each.for_points_above(above) for each in looks]
 
 
 def _is_model_file(path: Path) -> bool:
@@ -195,12 +210,11 @@ def _check_options(options: argparse.Namespace) -> None:
         raise InputError("a model file gets another close look or another canary; give one of the two options")
 
 
-def _print_written(path: Path, content: str, look: LookCheckpoint | None, difference: float | None) -> None:
+def _print_written(path: Path, content: str, looks: Sequence[LookCheckpoint], difference: float | None) -> None:
     """Print a line about a written file: its networks, its size, and the difference to torch of those that are new."""
     parts = [content]
-    if look is not None:
-        contract = look.contract
-        for name, each in zip(contract.names, contract.chain, strict=True):
+    for look in looks:
+        for name, each in zip(look.contract.names, look.contract.chain, strict=True):
             channels = ", ".join(map(str, each.channels))
             parts.append(f"{name} at {each.object_class} ({each.size} x {each.size}, channels {channels})")
     parts.append(f"{path.stat().st_size / 1000:.1f} kB")

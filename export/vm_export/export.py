@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from vm_embedded.files import write_file
 from vm_embedded.mesh.grids import lattice_neighbors
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
-from vm_embedded.network.model_file import ModelFile
+from vm_embedded.network.model_file import ModelFile, parse_model
 from vm_embedded.network.self_test import SelfTest
 from vm_embedded.network.session import Session
 
@@ -64,14 +65,14 @@ def export(
     checkpoint: Checkpoint,
     path: str | Path,
     layout: str | None = None,
-    look: LookCheckpoint | None = None,
+    looks: Sequence[LookCheckpoint] = (),
     canary: CanaryPicture | None = None,
 ) -> float:
     """Write the model file of a checkpoint and return the largest difference to torch of an answer.
 
-    layout: one of LAYOUTS; default the fastest one. look: a look network to write into the same file. canary: a
+    layout: one of LAYOUTS; default the fastest one. looks: look networks to write into the same file. canary: a
     picture that becomes its canary. ONNX Runtime runs the networks before the file is written. Raises ModelError if an
-    answer differs by more than LARGEST_DIFFERENCE, the layout does not fit the manifest, or the look does not fit its
+    answer differs by more than LARGEST_DIFFERENCE, the layout does not fit the manifest, or a look does not fit its
     classes, and InputError if the picture does not show every class, or the file can't be written.
     """
     layout = layout or fastest_layout(checkpoint)
@@ -89,14 +90,26 @@ def export(
     content = onnx_model(network, manifest)
     difference = largest_difference(content, network, manifest)
     check_difference(path, "probabilities", difference)
-    if look is not None:
-        content, look_difference = attached(content, manifest, look)
-        check_difference(path, "answers of the close look", look_difference)
-        difference = max(difference, look_difference)
+    content, look_difference = with_looks(path, content, looks)
+    difference = max(difference, look_difference)
     if canary is not None:
         content = with_canary(content, canary)
     write_file(Path(path), content)
     return difference
+
+
+def with_looks(path: str | Path, content: bytes, looks: Sequence[LookCheckpoint]) -> tuple[bytes, float]:
+    """A model file's bytes with these look networks, and the largest difference to torch of their answers.
+
+    Each replaces the one for the same class, and others stay. path: of the file that is to be written. Raises
+    ModelError if an answer differs by more than LARGEST_DIFFERENCE, or if a look does not fit the file's classes.
+    """
+    largest = 0.0
+    for look in looks:
+        content, difference = attached(content, parse_model(path, content).manifest, look)
+        check_difference(path, "answers of the close look", difference)
+        largest = max(largest, difference)
+    return content, largest
 
 
 def check_difference(path: str | Path, what: str, difference: float) -> None:

@@ -13,6 +13,7 @@ from onnx import numpy_helper
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.errors import ModelError
 from vm_embedded.network.look_contract import LookContract
+from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import LookFiles, ModelFile
 
 from .look_checkpoint import LookCheckpoint
@@ -34,6 +35,17 @@ def upright_looks_of(model: ModelFile) -> list[LookCheckpoint]:
     """The same for the looks at uprights, in the manifest's order."""
     pairs = zip(model.manifest.upright_looks, model.upright_looks, strict=True)
     return [_look(model, contract, files) for contract, files in pairs]
+
+
+def looks_for(manifest: Manifest, model: ModelFile) -> list[LookCheckpoint]:
+    """The look networks of a model file that judge classes of another manifest, too. Raises ModelError without any."""
+    names = {each.name for each in manifest.classes}
+    found = [look_of(model)] if model.manifest.look is not None else []
+    found = [each for each in (*found, *upright_looks_of(model)) if each.contract.object_class in names]
+    if not found:
+        judged = ", ".join(each.object_class for each in model.manifest.looks) or "nothing"
+        raise ModelError(f"{model.path} has close looks at {judged}, but the classes are {', '.join(sorted(names))}")
+    return found
 
 
 def _look(model: ModelFile, contract: LookContract, files: LookFiles) -> LookCheckpoint:

@@ -179,7 +179,7 @@ def _models() -> dict[str, bytes]:
         for layout in ("plain", "runs"):
             export(_small(), path, layout)
             made[layout] = path.read_bytes()
-        export(Checkpoint(_small().network, manifest()), path, "plain", look_checkpoint())
+        export(Checkpoint(_small().network, manifest()), path, "plain", [look_checkpoint()])
         made["look"] = path.read_bytes()
     return made
 

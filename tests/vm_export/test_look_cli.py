@@ -7,6 +7,7 @@ from tests.vm_export.checkpoints import checkpoint, manifest
 from tests.vm_export.looks import look_checkpoint
 from tests.vm_export.test_cli import names_in, run
 from tests.vm_export.test_reference import reference_file
+from vm_embedded.network.bundled import model_path
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
 from vm_export.checkpoint import Checkpoint
@@ -48,6 +49,18 @@ def test_command_attaches_a_look_to_a_network_of_the_reference(folder):
     reference_file(folder / "model.yaml")
     run(folder / "model.yaml", "--look", folder / "look.pt", "--classes", "ball:object,field:area")
     assert has_look(folder / "model.onnx")
+
+
+def test_command_takes_the_looks_of_a_network_of_the_package(folder):
+    reference_file(folder / "model.yaml")
+    done = run(folder / "model.yaml", "--look", "soccer", "--classes", "ball:object,goal:upright")
+    assert [each.object_class for each in read_model(folder / "model.onnx").manifest.looks] == ["ball", "goal"]
+    for name in ("wide look at ball", "close look at ball", "glance at goal"):
+        assert done.stdout.count(name) == 2
+    run(folder / "model.onnx", "--look", "ball-small", "-o", folder / "small.onnx")
+    (ball, goal), small = (read_model(folder / each).manifest.looks for each in ("small.onnx", "model.onnx"))
+    assert ball.names == read_model(model_path("ball-small")).manifest.look.names
+    assert goal.channels == small[1].channels
 
 
 def test_command_changes_the_probability_from_which_points_count(folder):
@@ -99,6 +112,8 @@ def test_command_attaches_a_look_to_a_network_of_the_package(folder):
         (("given.onnx", "--look", "look.pt", "-o", "new.onnx", "--radius", "0"), "--radius can't change"),
         (("given.onnx", "--to-yaml", "--edge", "same", "--max-distance", "9"), "--to-yaml, --max-distance, --edge"),
         (("missing.onnx", "--look", "look.pt", "-o", "new.onnx"), "No such file"),
+        (("model.pt", "--look", "given.onnx"), "has close looks at nothing, but the classes are ball"),
+        (("model.pt", "--look", "missing.onnx"), "No such file"),
         (("damaged.onnx", "--look", "look.pt", "-o", "new.onnx"), "damaged.onnx: not an ONNX file"),
         (("given.onnx", "--look", "look.pt", "-o", "no/such/new.onnx"), "can't write"),
     ],
