@@ -11,6 +11,7 @@ from typing import Any
 
 from ..cameras.camera import CameraSettings
 from ..cameras.image_files import MESSAGES
+from ..cameras.open_camera import is_live
 from ..cameras.ros.settings import RosSettings
 from ..config.entries import EntryError, checked
 from ..detection.settings import Settings
@@ -178,8 +179,10 @@ def read_options(options: argparse.Namespace) -> Configuration:
 
 def _recording_configuration(source: str | None) -> Path | None:
     """The vm.toml of a recording, if the camera source is one."""
-    folder = Path(source or "")
-    is_recording = source is not None and (folder / MESSAGES).is_file() and (folder / CONFIGURATION).is_file()
+    if source is None or is_live(source):
+        return None
+    folder = Path(source)
+    is_recording = (folder / MESSAGES).is_file() and (folder / CONFIGURATION).is_file()
     return folder / CONFIGURATION if is_recording else None
 
 

@@ -139,7 +139,7 @@ def version(program: str) -> str:
 def program(main: Callable[P, int]) -> Callable[P, int]:
     """A main function that ends quietly if nothing reads its output any more, such as head in a pipe.
 
-    A full disk is one line on standard error, and exit status 1.
+    A full disk, and a path that the system refuses, are one line on standard error, and exit status 1.
     """
 
     @wraps(main)
@@ -154,10 +154,13 @@ def program(main: Callable[P, int]) -> Callable[P, int]:
             discard_output()
             return EXIT_OK
         except OSError as error:
-            if error.errno != errno.ENOSPC:
+            if error.errno == errno.ENOSPC:
+                discard_output()
+                print(f"can't write {error.filename or 'standard output'}: {error.strerror}", file=sys.stderr)
+            elif error.filename is not None:
+                print(f"can't use {error.filename}: {error.strerror}", file=sys.stderr)
+            else:
                 raise
-            discard_output()
-            print(f"can't write {error.filename or 'standard output'}: {error.strerror}", file=sys.stderr)
             return EXIT_FAILED
 
     return run

@@ -95,7 +95,10 @@ class LivePage:
         self._answerer.configuration = replace(self._answerer.configuration, detector=settings)
         value = getattr(settings, name)
         self._use_threshold(name, value)
-        return _text(f"{name} = {value:g} until a restart or reload; to keep it, write it to [detector] in vm.toml")
+        return _text(
+            f"{name} = {value:g} until a restart or reload; to keep it, write it to [detector] in vm.toml. Recordings "
+            "begin with this frame."
+        )
 
 
 def _text(text: str) -> Response:

@@ -109,8 +109,8 @@ def parse_model(path: str | Path, content: bytes) -> ModelFile:
     self-test, and find nothing.
     """
     try:
-        if content.startswith(_ZIP):
-            raise ModelError(f"not an ONNX file; if it is a checkpoint, vm-export {path} writes a model file from it")
+        if content.startswith(_ZIP) or Path(path).suffix.lower() in (".yaml", ".yml"):
+            raise ModelError(f"not an ONNX file; vm-export {path} writes one, if this is a trained network")
         metadata, digest = _read_fields(content)
         if METADATA_KEY not in metadata:
             raise ModelError("no Visual Mesh manifest in its metadata; was it written by vm-export?")

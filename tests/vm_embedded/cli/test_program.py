@@ -155,3 +155,19 @@ def test_a_full_disk_is_one_line():
         done = subprocess.run([BIN / "vm-train", "config"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr == "can't write standard output: No space left on device\n"
+
+
+@pytest.mark.parametrize("command", ["vm-doctor --camera", "vm-bench --image", "vm-train check --boxes", "vm-label"])
+def test_a_name_that_is_too_long_is_one_line(command):
+    program, *options = command.split()
+    done = run(program, *options, "x" * 300)
+    assert done.returncode == 1
+    assert len((done.stdout + done.stderr).splitlines()) == 1
+    assert "File name too long" in done.stderr
+
+
+def test_a_pipeline_may_be_longer_than_a_file_name():
+    pipeline = f"gstreamer:videotestsrc ! {' ! '.join(['identity'] * 40)} ! appsink"
+    done = run("vm-doctor", "--camera", pipeline)
+    assert "Traceback" not in done.stderr
+    assert "this OpenCV was built without GStreamer" in done.stdout

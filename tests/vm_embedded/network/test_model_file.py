@@ -116,8 +116,12 @@ def test_a_folder_is_no_model(folder):
 
 
 def test_a_checkpoint_comes_with_the_command_that_exports_it(write):
-    with pytest.raises(ModelError, match=r"not an ONNX file; if it is a checkpoint, vm-export .*model\.onnx writes"):
+    with pytest.raises(ModelError, match=r"not an ONNX file; vm-export .*model\.onnx writes one, if this is a trained"):
         read_model(write(b"PK\x03\x04 a file of torch"))
+    yaml = write(b"").with_suffix(".yaml")
+    yaml.write_bytes(b"network: []")
+    with pytest.raises(ModelError, match=r"not an ONNX file; vm-export .*model\.yaml writes one"):
+        read_model(yaml)
 
 
 def test_an_empty_file_is_refused(write):
