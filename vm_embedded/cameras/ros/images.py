@@ -50,6 +50,9 @@ _TO_BGR = {
     "yuyv": cv2.COLOR_YUV2BGR_YUY2,
 }
 
+_QUALITY = 90
+"""Of the JPEGs that are published."""
+
 
 def image_of(message: Any, raw: bool = False, max_megapixels: float = MAX_MEGAPIXELS) -> Image:
     """The image of a sensor_msgs/Image or CompressedImage, as BGR, or with `raw` in its own channels.
@@ -84,7 +87,7 @@ def image_of(message: Any, raw: bool = False, max_megapixels: float = MAX_MEGAPI
     return np.asarray(cv2.cvtColor(image, _TO_BGR[encoding]), dtype=np.uint8)
 
 
-def jpeg_message(types: Any, header: Any, image: Image, quality: int = 90) -> Any:
+def jpeg_message(types: Any, header: Any, image: Image) -> Any:
     """A sensor_msgs/CompressedImage of a BGR image."""
-    _, content = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    _, content = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
     return types.CompressedImage(header=header, format="jpeg", data=types.octets(content.tobytes()))

@@ -61,7 +61,7 @@ def test_gray_images_have_equal_channels_or_with_raw_one():
 
 
 def test_a_compressed_image_is_decoded():
-    message = jpeg_message(TYPES, HEADER, SMOOTH, quality=100)
+    message = jpeg_message(TYPES, HEADER, SMOOTH)
     assert message.format == "jpeg"
     assert np.abs(image_of(message).astype(int) - SMOOTH).mean() < 3
     message.data = message.data[:-40]
