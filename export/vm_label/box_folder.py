@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 
 from vm_embedded.cameras.image_files import IMAGE_SUFFIXES
 from vm_embedded.errors import InputError, unknown
-from vm_embedded.output.box_files import CANDIDATES, SAME_PLACE, CandidateBox, Shares, overlap
+from vm_embedded.output.box_files import CANDIDATES, SAME_PLACE, CandidateBox, Shares, edges, overlap
 
 from .crops import Crop
 from .yolo_labels import label_path, parse_label, read_class_names, read_text
@@ -90,8 +90,8 @@ class _Reader:
             known = confidences.get((class_name, shares)) if confidence is None else confidence
             crops.append(Crop(name, class_name, shares, known))
         for each in candidates:
-            places = [crop.shares for crop in crops if crop.class_name == each.class_name]
-            if not each.found and all(overlap(each.shares, place) <= SAME_PLACE for place in places):
+            places = [edges(crop.shares) for crop in crops if crop.class_name == each.class_name]
+            if not each.found and all(overlap(edges(each.shares), place) <= SAME_PLACE for place in places):
                 crops.append(Crop(name, each.class_name, each.shares, each.confidence))
         self.classes |= dict.fromkeys(crop.class_name for crop in crops)
         self.crops += crops

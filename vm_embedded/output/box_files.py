@@ -31,6 +31,9 @@ CLASSES, CANDIDATES = "classes.txt", "candidates.jsonl"
 Shares = tuple[float, float, float, float]
 """Center x and y, width and height of a box, as shares of the image's width and height."""
 
+Edges = tuple[float, float, float, float]
+"""Left, top, right and bottom edge of a box; x points right, y down."""
+
 SAME_PLACE = 0.5
 """Intersection over union above which two boxes of a class show the same object."""
 
@@ -105,8 +108,8 @@ def candidate_boxes(detections: Detections, size: tuple[int, int]) -> list[Candi
         shares, found = bounding_box(each.outline, size), each.reason is None
         if shares is None:
             continue
-        others = (other.shares for other in boxes if other.class_name == each.class_name)
-        if found or all(overlap(shares, other) <= SAME_PLACE for other in others):
+        others = (edges(other.shares) for other in boxes if other.class_name == each.class_name)
+        if found or all(overlap(edges(shares), other) <= SAME_PLACE for other in others):
             boxes.append(CandidateBox(each.class_name, shares, round(each.confidence, 3), found))
     return boxes
 
@@ -126,14 +129,19 @@ def bounding_box(outline: Floats, size: tuple[int, int]) -> Shares | None:
     return x, y, width, height
 
 
-def overlap(a: Shares, b: Shares) -> float:
-    """Intersection over union of two boxes of an image."""
-    sides = [
-        max(min(a[i] + a[i + 2] / 2, b[i] + b[i + 2] / 2) - max(a[i] - a[i + 2] / 2, b[i] - b[i + 2] / 2), 0.0)
-        for i in (0, 1)
-    ]
-    both = sides[0] * sides[1]
-    return both / (a[2] * a[3] + b[2] * b[3] - both)
+def edges(shares: Shares) -> Edges:
+    """The edges of a box, as shares of the image's width and height."""
+    x, y, width, height = shares
+    return x - width / 2, y - height / 2, x + width / 2, y + height / 2
+
+
+def overlap(one: Edges, other: Edges) -> float:
+    """Intersection over union of two boxes with edges of the same unit, from 0 to 1; of boxes without an area 0."""
+    width = min(one[2], other[2]) - max(one[0], other[0])
+    height = min(one[3], other[3]) - max(one[1], other[1])
+    shared = max(width, 0.0) * max(height, 0.0)
+    union = sum((right - left) * (bottom - top) for left, top, right, bottom in (one, other)) - shared
+    return shared / union if union > 0.0 else 0.0
 
 
 def _json_line(image: str, box: CandidateBox) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vm_embedded.geometry.lens import Size
+from vm_embedded.output.box_files import Edges
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class RawBox:
 
     place: str
     name: str
-    edges: tuple[float, float, float, float]
+    edges: Edges
 
 
 @dataclass(frozen=True)

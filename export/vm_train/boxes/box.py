@@ -9,6 +9,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats
 from vm_embedded.geometry.lens import Size
+from vm_embedded.output.box_files import Edges
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,11 @@ class Box:
     top: float
     right: float
     bottom: float
+
+    @property
+    def edges(self) -> Edges:
+        """Left, top, right and bottom edge [px]."""
+        return self.left, self.top, self.right, self.bottom
 
     @property
     def center(self) -> Floats:

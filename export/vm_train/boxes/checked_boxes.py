@@ -7,6 +7,7 @@ from collections.abc import Collection
 
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Size
+from vm_embedded.output.box_files import overlap
 
 from .annotation import RawBox
 from .box import Box
@@ -22,15 +23,6 @@ _NEAR_BORDER = 3.0
 
 _EQUAL = 0.9
 """Intersection over union from which on two boxes of a class are the same."""
-
-
-def overlap(one: Box, other: Box) -> float:
-    """Intersection over union of two boxes, from 0 to 1."""
-    width = min(one.right, other.right) - max(one.left, other.left)
-    height = min(one.bottom, other.bottom) - max(one.top, other.top)
-    shared = max(width, 0.0) * max(height, 0.0)
-    total = one.width * one.height + other.width * other.height - shared
-    return shared / total if total > 0.0 else 0.0
 
 
 def is_cut(box: Box, size: Size) -> bool:
@@ -96,7 +88,7 @@ def _inside(raw: RawBox, size: Size) -> Box:
 
 
 def _same(one: Box, other: Box) -> bool:
-    return one.name == other.name and overlap(one, other) >= _EQUAL
+    return one.name == other.name and overlap(one.edges, other.edges) >= _EQUAL
 
 
 def _by(width: float, height: float) -> str:

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from vm_embedded.output.box_files import overlap
+
 from .box import Box, BoxedPicture
-from .checked_boxes import overlap
 
 
 @dataclass(frozen=True)
@@ -45,4 +46,4 @@ def describe(sighting: Sighting, folder: Path) -> str:
 
 
 def _meet(one: Box, other: Box) -> bool:
-    return one.name == other.name and overlap(one, other) > 0.0
+    return one.name == other.name and overlap(one.edges, other.edges) > 0.0

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from vm_embedded.output.box_files import bounding_box, overlap
+from vm_embedded.output.box_files import bounding_box, edges, overlap
 
 SIZE = 200, 100
 OUTLINES = arrays(float, st.tuples(st.integers(3, 12), st.just(2)), elements=st.floats(-300.0, 300.0))
@@ -34,14 +34,16 @@ def test_an_outline_that_is_none_has_no_box(outline):
 
 @given(SHARES, SHARES, st.floats(-0.5, 0.5))
 def test_overlap_is_symmetric_and_moves_with_both(a, b, shift):
-    both = overlap(a, b)
+    one, other = edges(a), edges(b)
+    both = overlap(one, other)
     assert 0.0 <= both <= 1.0 + 1e-9
-    assert both == pytest.approx(overlap(b, a))
-    moved = [(x + shift, *rest) for x, *rest in (a, b)]
+    assert both == pytest.approx(overlap(other, one))
+    moved = [edges((x + shift, *rest)) for x, *rest in (a, b)]
     assert overlap(*moved) == pytest.approx(both, abs=1e-6)
-    assert overlap(a, a) == pytest.approx(1.0)
+    assert overlap(one, one) == pytest.approx(1.0)
 
 
 def test_half_covered_boxes_overlap_by_a_third():
-    assert overlap((0.3, 0.5, 0.2, 0.4), (0.4, 0.5, 0.2, 0.4)) == pytest.approx(1 / 3)
-    assert overlap((0.2, 0.5, 0.1, 0.4), (0.8, 0.5, 0.1, 0.4)) == 0.0
+    assert overlap((20.0, 3.0, 40.0, 7.0), (30.0, 3.0, 50.0, 7.0)) == pytest.approx(1 / 3)
+    assert overlap((15.0, 3.0, 25.0, 7.0), (75.0, 3.0, 85.0, 7.0)) == 0.0
+    assert overlap((15.0, 3.0, 15.0, 7.0), (15.0, 3.0, 15.0, 7.0)) == 0.0

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
+from vm_embedded.output.box_files import overlap
 from vm_train.boxes.box import Box
-from vm_train.boxes.checked_boxes import overlap
 from vm_train.boxes.read import FORMATS, read_boxes
 
 from .written import SIZE, WRITERS, write_coco, write_image, write_voc, write_yolo
@@ -37,7 +37,7 @@ def as_box(kind, left, top, right, bottom):
 
 def distinct(some):
     made = [as_box(*each) for each in some]
-    return all(overlap(one, other) < 0.8 for at, one in enumerate(made) for other in made[:at])
+    return all(overlap(one.edges, other.edges) < 0.8 for at, one in enumerate(made) for other in made[:at])
 
 
 pictures = st.dictionaries(
