@@ -1,4 +1,4 @@
-"""Writing files without losing the previous content if something fails."""
+"""Reading text files, and writing files without losing the previous content if something fails."""
 
 from __future__ import annotations
 
@@ -35,6 +35,16 @@ def atomic_write(path: Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):  # on a disk that can't be written it was never created, or can't be removed
             part.unlink(missing_ok=True)
+
+
+def read_text(path: Path) -> str:
+    """The text of a file in UTF-8, without a byte order mark. Raises InputError with the file and the reason."""
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"can't read {path}: it is not UTF-8 text") from error
 
 
 def write_file(path: Path, content: str | bytes) -> None:

@@ -13,7 +13,11 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.cameras.image_files import IMAGE_SUFFIXES, read_image
 from vm_embedded.errors import InputError, unknown
+from vm_embedded.files import read_text
 from vm_embedded.geometry.lens import Size
+from vm_embedded.output.box_files import edges
+from vm_workstation.yolo_labels import find_labels, parse_labels
+from vm_workstation.yolo_names import NameTables
 
 _OUTLINE, _BOX = ("cx", "cy", "r_px"), ("x0", "y0", "x1", "y1")
 
@@ -56,10 +60,11 @@ class SeenBall:
 
 
 def read_balls(path: Path, radius: float | None, label: str | None, size: Size | None) -> tuple[list[SeenBall], Size]:
-    """Balls of a JSON file, or of a folder of YOLO text files beside pictures, and the size of the pictures [px].
+    """Balls of a JSON file, or of a folder of pictures with boxes in YOLO format, and the size of the pictures [px].
 
-    radius [m]: of all balls; None if the file has it. label: the class of balls in YOLO files, by number; None takes
-    all boxes. size [px]: of the pictures, for a JSON file. Raises InputError with the file and the entry.
+    radius [m]: of all balls; None if the file has it. label: the class of balls in YOLO files, by its name in the table
+    of names, or by its number without one; None takes all boxes. size [px]: of the pictures, for a JSON file. Raises
+    InputError with the file and the entry.
     """
     if radius is not None and not 0.0 < radius < 10.0:
         raise InputError(f"--radius must be a length above 0 m, as in 0.11, not {radius:g}")
@@ -82,10 +87,8 @@ def read_balls(path: Path, radius: float | None, label: str | None, size: Size |
 
 def _read_json(path: Path, radius: float | None) -> list[SeenBall]:
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"can't read {path}: {error.strerror or error}") from error
-    except ValueError as error:  # also of text that is not UTF-8
+        table = json.loads(read_text(path))
+    except ValueError as error:
         raise InputError(f"{path} is not JSON: {error}") from error
     if not isinstance(table, dict) or not all(isinstance(each, list) for each in table.values()):
         raise InputError(f'{path} must map names of pictures to lists of balls, as in {{"a.jpg": [{{"cx": 1, ...}}]}}')
@@ -123,47 +126,30 @@ def _number(value: Any, what: str) -> float:
 
 
 def _read_yolo(folder: Path, radius: float, label: str | None) -> tuple[list[SeenBall], Size]:
-    """Balls of the files NAME.txt beside pictures in a folder, and the size of the pictures [px]."""
+    """Balls of the label files of the pictures in a folder, and the size of the pictures [px]."""
     pictures = sorted(each for each in folder.iterdir() if each.suffix.lower() in IMAGE_SUFFIXES)
+    names = NameTables(folder)
     size: Size | None = None
     balls: list[SeenBall] = []
     seen: set[str] = set()
     for picture in pictures:
-        text = picture.with_suffix(".txt")
-        if not text.is_file():
+        path = find_labels(picture)
+        if path is None:
             continue
         height, width = read_image(picture).shape[:2]
         if size not in (None, (width, height)):
             raise InputError(f"{picture} has {width} x {height} px, but pictures before it have another size")
         size = (width, height)
-        for line, (name, box) in _yolo_lines(text):
-            seen.add(name)
-            if label is None or name == label:
-                balls.append(SeenBall(f"{text.name}:{line}", radius, box * np.tile(size, 2) - 0.5))
+        boxes, faults = parse_labels(read_text(path), names.of(path.parent))
+        if faults:
+            raise InputError(f"{path} {faults[0]}")
+        for each in boxes:
+            seen.add(each.class_name)
+            if label is None or each.class_name == label:
+                measured = np.array(edges(each.shares)) * np.tile(size, 2) - 0.5
+                balls.append(SeenBall(f"{path.name} line {each.line}", radius, measured))
     if size is None:
-        raise InputError(f"{folder} has no picture with a text file of the same name beside it")
+        raise InputError(f"{folder} has no picture with a label file NAME.txt in YOLO format")
     if label is not None and label not in seen and seen:
         raise InputError(unknown("--label", label, sorted(seen)))
     return balls, size
-
-
-def _yolo_lines(path: Path) -> list[tuple[int, tuple[str, Floats]]]:
-    """Line numbers, classes and boxes (4,) as edges in shares of the picture, of a YOLO file."""
-    found = []
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"can't read {path}: {error}") from error
-    for number, line in enumerate(lines, start=1):
-        name, *rest = line.split() or [""]
-        if not name:
-            continue
-        try:
-            x, y, width, height = (float(each) for each in rest)
-        except ValueError as error:
-            raise InputError(f"{path}:{number} must be `class x y width height`, not {line[:60]!r}") from error
-        box = np.array([x - width / 2.0, y - height / 2.0, x + width / 2.0, y + height / 2.0])
-        if not (np.isfinite(box).all() and width > 0.0 and height > 0.0 and box.min() > -0.1 and box.max() < 1.1):
-            raise InputError(f"{path}:{number} has a box that is empty or outside of the picture: {line[:60]!r}")
-        found.append((number, (name, box)))
-    return found

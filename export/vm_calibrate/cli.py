@@ -60,10 +60,15 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
         "--balls",
         type=Path,
         metavar="PATH",
-        help="folder of pictures with boxes in YOLO text files beside them, or a JSON file of outlines or boxes",
+        help="folder of pictures with boxes in YOLO format, or a JSON file of outlines or boxes",
     )
     balls.add_argument("--radius", type=float, metavar="M", help="radius of the balls [m]; default: from the JSON file")
-    balls.add_argument("--label", metavar="CLASS", help="class of balls in YOLO files, as in 0; default: all boxes")
+    balls.add_argument(
+        "--label",
+        metavar="CLASS",
+        help="class of balls in YOLO files, by its name in the table of names (classes.txt), or by its number without "
+        "a table; default: all boxes",
+    )
     balls.add_argument(
         "--size", metavar="WxH", help="size of the pictures of a JSON file [px]; default: from the lens file"
     )

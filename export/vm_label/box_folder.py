@@ -11,10 +11,12 @@ from pathlib import Path, PurePosixPath
 
 from vm_embedded.cameras.image_files import IMAGE_SUFFIXES
 from vm_embedded.errors import InputError, unknown
+from vm_embedded.files import read_text
 from vm_embedded.output.box_files import CANDIDATES, SAME_PLACE, CandidateBox, Shares, edges, overlap
+from vm_workstation.yolo_labels import LabeledBox, find_labels, parse_labels
+from vm_workstation.yolo_names import NameTables
 
 from .crops import Crop
-from .yolo_labels import label_path, parse_label, read_class_names, read_text
 
 
 @dataclass(frozen=True)
@@ -36,8 +38,8 @@ class BoxFolder:
 def read_box_folder(path: Path, only: Sequence[str] = ()) -> BoxFolder:
     """Read a folder of boxes. only: names of the classes to read; all if empty.
 
-    A box that can't be read is a problem; the rest is used. Raises InputError if the folder has no images, a
-    classes.txt that can't be read, or none of a class of `only`.
+    A box that can't be read is a problem; the rest is used. Raises InputError if the folder has no images, an unusable
+    table of names, or none of a class of `only`.
     """
     reader = _Reader(path)
     images = sorted(_images(path))
@@ -46,7 +48,7 @@ def read_box_folder(path: Path, only: Sequence[str] = ()) -> BoxFolder:
     stems = Counter(image.with_suffix("") for image in images)
     for image in images:
         if stems[image.with_suffix("")] > 1:
-            reader.report(image, f"{image}: another image has the same name, so {label_path(image).name} is ambiguous")
+            reader.report(image, f"{image}: another image has the same name, so {image.stem}.txt is ambiguous")
         else:
             reader.read(image)
     for name in only:
@@ -68,7 +70,7 @@ class _Reader:
 
     def __init__(self, top: Path) -> None:
         self._top = top
-        self._names: dict[Path, tuple[str, ...]] = {}
+        self._names = NameTables(top)
         self._candidates: dict[Path, dict[str, list[CandidateBox]]] = {}
         self.classes: dict[str, None] = {}
         self.crops: list[Crop] = []
@@ -82,13 +84,14 @@ class _Reader:
 
     def read(self, image: Path) -> None:
         """Read the boxes of an image: those of its label file, with their confidences, and the near misses."""
-        labels, name = label_path(image), image.relative_to(self._top).as_posix()
+        name = image.relative_to(self._top).as_posix()
         candidates = self._candidates_of(image)
         confidences = {(each.class_name, each.shares): each.confidence for each in candidates}
         crops = []
-        for class_name, shares, confidence in self._labels(image, labels):
-            known = confidences.get((class_name, shares)) if confidence is None else confidence
-            crops.append(Crop(name, class_name, shares, known))
+        for box in self._labels(image):
+            shares = clipped(box.shares)
+            known = confidences.get((box.class_name, shares)) if box.confidence is None else box.confidence
+            crops.append(Crop(name, box.class_name, shares, known))
         for each in candidates:
             places = [edges(crop.shares) for crop in crops if crop.class_name == each.class_name]
             if not each.found and all(overlap(edges(each.shares), place) <= SAME_PLACE for place in places):
@@ -96,26 +99,19 @@ class _Reader:
         self.classes |= dict.fromkeys(crop.class_name for crop in crops)
         self.crops += crops
 
-    def _labels(self, image: Path, labels: Path) -> Iterator[tuple[str, Shares, float | None]]:
-        """The boxes of a label file; each fault is reported."""
-        classes = self._class_names(labels.parent if labels.exists() else image.parent)
+    def _labels(self, image: Path) -> list[LabeledBox]:
+        """The boxes in the label file of an image; each fault is reported."""
+        path = find_labels(image)
+        names = self._names.of((path or image).parent)
+        self.classes |= dict.fromkeys(names)
         try:
-            lines = read_text(labels).splitlines() if labels.exists() else []
+            boxes, faults = parse_labels(read_text(path), names) if path else ([], [])
         except InputError as error:
             self.report(image, str(error))
-            return
-        for number, line in enumerate(lines, start=1):
-            if line.strip():
-                try:
-                    yield parse_label(line, classes)
-                except InputError as error:
-                    self.report(image, f"{labels}: line {number} {error}")
-
-    def _class_names(self, folder: Path) -> tuple[str, ...]:
-        if folder not in self._names:
-            self._names[folder] = read_class_names(folder, self._top)
-            self.classes |= dict.fromkeys(self._names[folder])
-        return self._names[folder]
+            return []
+        for fault in faults:
+            self.report(image, f"{path} {fault}")
+        return boxes
 
     def _candidates_of(self, image: Path) -> list[CandidateBox]:
         if image.parent not in self._candidates:
@@ -123,6 +119,14 @@ class _Reader:
             self._candidates[image.parent], faults = read_candidates(path) if path.is_file() else ({}, [])
             self.problems += faults
         return self._candidates[image.parent].get(image.name, [])
+
+
+def clipped(shares: Shares) -> Shares:
+    """The part of a box that is in the image."""
+    left, top, right, bottom = (min(max(each, 0.0), 1.0) for each in edges(shares))
+    if (left, top, right, bottom) == edges(shares):
+        return shares  # with its digits, because candidates.jsonl has the same ones
+    return (left + right) / 2, (top + bottom) / 2, right - left, bottom - top
 
 
 def read_candidates(path: Path) -> tuple[dict[str, list[CandidateBox]], list[str]]:

@@ -45,8 +45,8 @@ def parser() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="NAME",
-        help="judge and write only this class, by its name in classes.txt, or by its number without that file; "
-        "repeatable; default all",
+        help="judge and write only this class, by its name in the table of names (classes.txt), or by its number "
+        "without a table; repeatable; default all",
     )
     page = parser.add_argument_group("page")
     page.add_argument("--port", type=_port, default=8090, metavar="N", help="port; 0: any free one; default 8090")

@@ -170,9 +170,20 @@ def test_boxes_of_yolo_files(yolo, tmp_path, capsys):
         capsys, *command, "--label", "1", "-o", tmp_path / "x.yaml", code=1
     )
     (folder / "001.txt").write_text("0 0.5 0.5 0.1\n")
-    assert "001.txt:1 must be `class x y width height`" in run(capsys, *command, "-o", tmp_path / "x.yaml", code=1)
-    (folder / "001.txt").write_text("0 0.5 0.5 320 20\n")
-    assert "001.txt:1 has a box that is empty or outside" in run(capsys, *command, "-o", tmp_path / "x.yaml", code=1)
+    assert "001.txt line 1: '0 0.5 0.5 0.1' has 4 values" in run(capsys, *command, "-o", tmp_path / "x.yaml", code=1)
+
+
+def test_a_table_of_names_and_labels_beside_the_folder_of_images(yolo, tmp_path, capsys):
+    folder, lens = yolo
+    (tmp_path / "labels").mkdir()
+    for text in folder.glob("*.txt"):
+        text.rename(tmp_path / "labels" / text.name)
+    folder = folder.rename(tmp_path / "images")
+    (tmp_path / "classes.txt").write_text("\n".join(["ball", *"123456", "robot"]))
+    command = ("pose", "--lens", lens, "--balls", folder, "--radius", RADIUS, "-o", tmp_path / "lens.yaml")
+    run(capsys, *command, "--label", "ball")
+    check(read_lens_file(tmp_path / "lens.yaml").orientation, CAMERA)
+    assert "unknown --label '0' (allowed: ball, robot)" in run(capsys, *command, "--label", "0", code=1)
 
 
 def test_the_lens_file_may_be_completed_in_place(yolo, capsys):
@@ -220,7 +231,7 @@ def test_options_that_do_not_belong_together_are_errors(tmp_path, capsys):
     assert "--board needs SOURCE" in run(capsys, *pose, "--board", "8x5", code=1)
     assert "--balls needs no SOURCE" in run(capsys, *pose, tmp_path, "--balls", tmp_path, code=1)
     assert "give --radius" in run(capsys, *pose, "--balls", tmp_path, code=1)
-    assert "no picture with a text file" in run(capsys, *pose, "--balls", tmp_path, "--radius", "0.1", code=1)
+    assert "no picture with a label file NAME.txt" in run(capsys, *pose, "--balls", tmp_path, "--radius", "0.1", code=1)
     assert "--radius must be a length" in run(capsys, *pose, "--balls", tmp_path, "--radius", "-1", code=1)
     folder = write(tmp_path / "floor", [np.zeros((480, 640), np.uint8)])
     assert "the size of the board is missing" in run(capsys, *pose, folder, "--board", "8x5", code=1)

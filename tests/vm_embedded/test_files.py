@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from vm_embedded import InputError
-from vm_embedded.files import atomic_write, check_writable, write_file
+from vm_embedded.files import atomic_write, check_writable, read_text, write_file
 
 
 def write(path, text="new"):
@@ -89,3 +89,14 @@ def test_a_file_that_can_not_be_written_is_named_and_stays(tmp_path):
     with pytest.raises(InputError, match=r"can't write .*file"):
         write_file(path, "after")
     assert path.read_text() == "before"
+
+
+def test_a_text_file_is_read_without_its_byte_order_mark_or_named(tmp_path):
+    path = tmp_path / "file"
+    with pytest.raises(InputError, match=r"can't read .*file: No such file"):
+        read_text(path)
+    path.write_text("\ufeffBäll\n", encoding="utf-8")
+    assert read_text(path) == "Bäll\n"
+    path.write_bytes(b"\xff\xfe")
+    with pytest.raises(InputError, match=r"can't read .*file: it is not UTF-8 text"):
+        read_text(path)

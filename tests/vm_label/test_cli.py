@@ -85,7 +85,7 @@ def test_images_with_unreadable_boxes_are_left_out(tmp_path):
     judge(folder, ["yes", "yes"])
     done = run(folder, "--write", tmp_path / "out")
     assert "left out: 1 images with boxes that can't be read" in done.stdout
-    assert "image0001.txt: line 2 has 1 values" in done.stderr
+    assert "image0001.txt line 2: 'broken' has 1 values" in done.stderr
 
 
 def test_nothing_is_overwritten(tmp_path):

@@ -23,8 +23,8 @@ class FolderFiles:
     others: tuple[Path, ...]
 
     def label(self, path: Path) -> str:
-        """The path below the folder, for messages."""
-        return str(path.relative_to(self.folder))
+        """The path as seen from the folder, for messages."""
+        return os.path.relpath(path, self.folder)
 
     def with_suffix(self, suffix: str) -> list[Path]:
         """The files that are not images and end with this suffix, such as .txt."""

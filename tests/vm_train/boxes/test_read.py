@@ -93,45 +93,30 @@ def test_numbers_are_the_names_without_a_table(tmp_path):
     assert read_boxes(tmp_path, names={"0": "ball"}).names == ("1", "ball")
 
 
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("obj.names", "ball\ngoal post\n"),
-        ("data.yaml", "train: images\nnc: 2\nnames: [ball, 'goal post']\n"),
-        ("data.yaml", "names:\n  0: ball\n  1: goal post\ndownload: |\n  some script\n"),
-    ],
-)
-@pytest.mark.parametrize("above", [False, True])
-def test_tables_of_names(name, text, above, tmp_path):
-    folder = tmp_path / "train"
-    write_yolo(folder, {"a": [BALL, GOAL]}, beside=False)
-    (folder / "classes.txt").unlink()
-    (folder.parent if above else folder).joinpath(name).write_text(text)
-    assert read_boxes(folder).names == ("ball", "goal post")
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("names: {0: ball, 2: goal}", "names must have the numbers from 0 to 1"),
-        ("nc: 2", "lacks names"),
-        ("names: [", "while parsing"),
-        ("names: []", "must give a name for each class number"),
-    ],
-)
-def test_unusable_tables_of_names_are_named(text, said, tmp_path):
-    write_yolo(tmp_path, {"a": [BALL]})
-    (tmp_path / "classes.txt").unlink()
-    (tmp_path / "data.yaml").write_text(text)
-    with pytest.raises(InputError, match=f"data.yaml: .*{said}"):
-        read_boxes(tmp_path)
-
-
-def test_tables_of_names_that_differ_are_refused(tmp_path):
+def test_an_unusable_table_of_names_is_named(tmp_path):
     write_yolo(tmp_path, {"a": [BALL]})
     (tmp_path / "obj.names").write_text("goal\n")
     with pytest.raises(InputError, match=r"classes.txt and .*obj.names name the classes differently"):
         read_boxes(tmp_path)
+
+
+def test_the_folder_of_images_is_enough(tmp_path, monkeypatch):
+    write_yolo(tmp_path, {"a": [BALL], "b": [GOAL]}, beside=False)
+    monkeypatch.chdir(tmp_path / "images")
+    (tmp_path / "labels" / "b.txt").write_text("2 0.5 0.5 0.1 0.1\n")
+    found = read_boxes(Path())
+    assert [(each.image, len(each.boxes)) for each in found.pictures] == [(Path("a.jpg"), 1), (Path("b.jpg"), 0)]
+    assert found.names == ("ball",)
+    assert found.faults == (
+        "../labels/b.txt line 1: class 2 is unknown; the table of names has 0 to 1: ball, goal post; box not used",
+    )
+
+
+def test_a_confidence_is_no_fault(tmp_path):
+    write_yolo(tmp_path, {"a": [BALL]})
+    before = read_boxes(tmp_path)
+    (tmp_path / "a.txt").write_text((tmp_path / "a.txt").read_text().rstrip() + " 0.73\n")
+    assert read_boxes(tmp_path) == before
 
 
 def test_folders_without_use_are_refused(tmp_path):

@@ -57,7 +57,8 @@ def test_faults_are_told_and_the_rest_is_counted(tmp_path):
     done = run("check", tmp_path, "--boxes", code=1)
     lines = done.stderr.splitlines()
     assert lines[0] == (
-        "vm-train: bad.txt line 1: has 4 entries, but a box has 5: class x y width height; box not used"
+        "vm-train: bad.txt line 1: '0 0.5 0.5 0.1' has 4 values; allowed: class x y width height, and perhaps a "
+        "confidence; box not used"
     )
     assert len(lines) == 41
     assert lines[-1] == "vm-train: and 6 more; vm-train check --boxes --json FILE lists all"

@@ -190,7 +190,7 @@ def test_strict_refuses_faults_before_it_writes_anything(frames, tmp_path, tune)
     damaged = shutil.copytree(frames, tmp_path / "damaged")
     next(path for path in sorted(damaged.glob("*.txt")) if path.read_text()).write_text("0 0.5\n")
     error = tune(tmp_path / "run", "--boxes", damaged, "--strict", code=1).stderr
-    assert "has 2 entries" in error
+    assert "has 2 values" in error
     assert "leave out --strict" in error
     assert not (tmp_path / "run").exists()
 

@@ -1,0 +1,105 @@
+"""Label files in YOLO format: where the one of an image lies, and what its lines say.
+
+A line is `class x y width height`: the number of the class in the table of names, then center and size of a box as
+shares of the image. A detector may add a sixth value, its confidence.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vm_embedded.errors import InputError
+from vm_embedded.output.box_files import Shares, edges
+
+_VALUES = ("x", "y", "width", "height", "confidence")
+
+_OUTSIDE = 0.1
+"""How far a box may reach outside of the image, as a share of the image. Boxes in pixels reach farther."""
+
+
+@dataclass(frozen=True)
+class LabeledBox:
+    """A box of a label file.
+
+    line: its number in the file, from 1. shares: a part of the box is in the image, and the rest is near it.
+    confidence: from 0 to 1; None if the line has none.
+    """
+
+    line: int
+    class_name: str
+    shares: Shares
+    confidence: float | None
+
+
+def find_labels(image: Path) -> Path | None:
+    """The label file of an image, as an absolute path, or None.
+
+    It is NAME.txt beside the image, or else in `labels` in the image's folder, or else in a folder `labels` instead of
+    a folder `images` in the image's path; the nearest one counts.
+    """
+    image = image.absolute()
+    places = [image.parent, image.parent / "labels"]
+    above = [folder for folder in image.parents if folder.name == "images"]
+    places += [folder.with_name("labels") / image.parent.relative_to(folder) for folder in above]
+    return next((path for path in (place / f"{image.stem}.txt" for place in places) if path.is_file()), None)
+
+
+def parse_labels(text: str, names: Sequence[str]) -> tuple[list[LabeledBox], list[str]]:
+    """The good boxes of a label file, and a text about each bad line: its number, the value and what is allowed.
+
+    names: of the classes, by number; without names, a class has its number as its name. Empty lines are ignored.
+    """
+    boxes, faults = [], []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.strip():
+            try:
+                boxes.append(_parse(line, number, names))
+            except InputError as error:
+                faults.append(f"line {number}: {error}")
+    return boxes, faults
+
+
+def _parse(line: str, number: int, names: Sequence[str]) -> LabeledBox:
+    words = line.split()
+    if len(words) not in (5, 6):
+        raise InputError(
+            f"{line.strip()[:60]!r} has {len(words)} values; allowed: class x y width height, and perhaps a confidence"
+        )
+    x, y, width, height, *confidence = map(_number, _VALUES, words[1:])
+    for name, value in (("width", width), ("height", height)):
+        if value <= 0.0:
+            raise InputError(f"{name} {value:g} must be above 0")
+    if confidence and not 0.0 <= confidence[0] <= 1.0:
+        raise InputError(f"confidence {confidence[0]:g} must be from 0 to 1")
+    shares = (x, y, width, height)
+    left, top, right, bottom = edges(shares)
+    for axis, low, high in (("x", left, right), ("y", top, bottom)):
+        if low < -_OUTSIDE or high > 1.0 + _OUTSIDE or min(high, 1.0) <= max(low, 0.0):
+            raise InputError(
+                f"the box reaches from {low:g} to {high:g} in {axis}; allowed: shares of the image from 0 to 1, and at "
+                f"most {_OUTSIDE:g} outside"
+            )
+    return LabeledBox(number, _class_name(words[0], names), shares, confidence[0] if confidence else None)
+
+
+def _number(name: str, word: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{name} {word[:20]!r} is not a finite number")
+    return value
+
+
+def _class_name(word: str, names: Sequence[str]) -> str:
+    if not re.fullmatch("[0-9]{1,9}", word):
+        raise InputError(f"class {word[:20]!r} is not a whole number from 0 up")
+    number = int(word)
+    if names and number >= len(names):
+        raise InputError(f"class {number} is unknown; the table of names has 0 to {len(names) - 1}: {', '.join(names)}")
+    return names[number] if names else str(number)
