@@ -1,12 +1,10 @@
 """A network trained on another mesh than rings is exported and run, from commands as a user types them."""
 
 import json
-import os
-import subprocess
-import sys
 
 import pytest
 
+from tests.vm_train.commands import run, run_module
 from tests.vm_train.drawn import CLASSES, draw_set
 
 SMALL = """
@@ -32,18 +30,6 @@ max_distance = 3.0
 KINDS = CLASSES.replace('"object"', '"upright"')
 
 
-def run(program, *arguments):
-    done = subprocess.run(
-        [sys.executable, "-m", program, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=240,
-        env={**os.environ, "CUDA_VISIBLE_DEVICES": ""},
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     return draw_set(tmp_path_factory.mktemp("drawn"), 12)
@@ -62,15 +48,15 @@ def test_trained_exported_and_run(model, layouts, data, tmp_path):
     text = KINDS + UPRIGHT + SMALL[SMALL.index("[network]") :] if model == "wall6" else CLASSES + SMALL
     (tmp_path / "train.toml").write_text(text)
     common = ("--config", tmp_path / "train.toml", "--workers", 1, "--threads", 1, "--set", f"mesh.model={model}")
-    run("vm_train", data, "-o", tmp_path / "run", *common)
+    run(data, "-o", tmp_path / "run", *common)
     answers = []
     for layout in layouts:
         file = tmp_path / f"{layout}.onnx"
-        run("vm_export.cli", tmp_path / "run/model.pt", "-o", file, "--layout", layout)
-        shown = run(
+        run_module("vm_export.cli", tmp_path / "run/model.pt", "-o", file, "--layout", layout)
+        done = run_module(
             "vm_embedded.cli.detect", "--model", file, "--camera", data, "--threshold", 0.2, "--emit-points", "field"
         )
-        answers.append([json.loads(line) for line in shown.splitlines()])
+        answers.append([json.loads(line) for line in done.stdout.splitlines()])
     assert len(answers[0]) == 12
     assert sum(each["points"] for each in answers[0]) > 1000
     for other in answers[1:]:

@@ -8,14 +8,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
 import torch
 
-from tests.vm_train.commands import COMMAND, environment, run
+from tests.vm_train.commands import COMMAND, environment, run, run_and_stop, wait_for_steps
 from vm_export.checkpoint import Checkpoint
 from vm_train.learning.folder_access import locked
 from vm_train.learning.log import read_log
@@ -118,23 +117,7 @@ def test_the_same_command_gives_the_same_weights(whole, data, configuration, tmp
 )
 def test_what_is_stopped_at_any_moment_ends_with_the_same_weights(how, steps, whole, data, configuration, tmp_path):
     folder = tmp_path / "run"
-    arguments = [*COMMAND, data, "-o", folder, "--config", configuration, "--workers", "1", "--threads", "1"]
-    process = subprocess.Popen(
-        [str(each) for each in arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment(),
-        start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
-    wait_for_steps(folder / "log.jsonl", steps, process)
-    process.send_signal(how)
-    error = process.communicate(timeout=60)[1]
-    assert process.returncode == (-signal.SIGKILL if how == signal.SIGKILL else 130)
-    assert "Traceback" not in error
-    if how != signal.SIGKILL:
-        assert f"continue with vm-train resume {folder}" in error
+    run_and_stop(how, folder, "log.jsonl", steps, data, "--config", configuration, "--workers", 1, "--threads", 1)
     run("resume", folder, "--workers", 1, "--threads", 1)
     for name in ("model.pt", "round1.pt", "round2.pt"):
         assert same(folder / name, whole[0] / name)
@@ -157,14 +140,6 @@ def test_a_reader_that_leaves_loses_no_training(data, configuration, tmp_path):
     assert "Traceback" not in error
     run("resume", folder, "--workers", 1, "--threads", 1)
     assert (folder / "model.pt").exists()
-
-
-def wait_for_steps(path, count, process):
-    deadline = time.monotonic() + 120
-    while not path.exists() or path.read_text().count("loss") < count:
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
 
 
 @pytest.mark.long

@@ -4,8 +4,6 @@ import json
 import re
 import shutil
 import signal
-import subprocess
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +11,7 @@ import pytest
 import torch
 
 from tests.drawn_scenes import CHECKPOINT
-from tests.vm_train.commands import COMMAND, environment, run, run_module
+from tests.vm_train.commands import run, run_and_stop, run_module
 from tests.vm_train.drawn import CLASSES, draw_set
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.close_look import CloseLook
@@ -25,8 +23,6 @@ from vm_export.look_checkpoint import LookCheckpoint
 from vm_train.cli.train import main
 from vm_train.learning.folder_access import locked
 from vm_train.learning.log import read_log
-
-STEPS = re.compile(r'"loss"')
 
 
 @pytest.fixture(scope="module")
@@ -142,34 +138,10 @@ def assert_same(folder, expected):
 def test_what_is_stopped_at_any_moment_ends_with_the_same_bytes(how, steps, whole, drawn, tiny, tmp_path):
     """0 steps: while patches are collected, by two workers."""
     folder = tmp_path / "run"
-    arguments = ["look", drawn, "-o", folder, "--from", "ball-small", "--config", tiny, "--workers", 1 if steps else 2]
-    process = subprocess.Popen(
-        [*COMMAND, *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment(),
-        start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
-    wait_for_steps(folder, steps, process)
-    process.send_signal(how)
-    error = process.communicate(timeout=60)[1]
-    assert process.returncode == (-signal.SIGKILL if how == signal.SIGKILL else 130)
-    assert "Traceback" not in error
-    if how != signal.SIGKILL:
-        assert error == f"vm-train: stopped; continue with vm-train resume {folder}\n"
+    arguments = ["look", drawn, "--from", "ball-small", "--config", tiny, "--workers", 1 if steps else 2]
+    run_and_stop(how, folder, "log.jsonl" if steps else "run.json", steps, *arguments)
     run("resume", folder, "--workers", 1)
     assert_same(folder, whole[0])
-
-
-def wait_for_steps(folder, count, process):
-    deadline = time.monotonic() + 120
-    path = folder / ("log.jsonl" if count else "run.json")
-    while not path.exists() or len(STEPS.findall(path.read_text())) < count:
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
 
 
 @pytest.mark.long

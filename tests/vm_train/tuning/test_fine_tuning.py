@@ -4,13 +4,11 @@ import json
 import re
 import shutil
 import signal
-import subprocess
-import time
 
 import numpy as np
 import pytest
 
-from tests.vm_train.commands import COMMAND, environment, run
+from tests.vm_train.commands import run, run_and_stop
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
@@ -118,27 +116,8 @@ def assert_same(folder, expected):
 )
 def test_what_is_stopped_at_any_moment_ends_with_the_same_bytes(how, wait, whole, frames, tiny, tmp_path):
     folder = tmp_path / "run"
-    given = ["--from", "ball-small", "--names", "0=ball", "--config", tiny, "--workers", "1"]
-    process = subprocess.Popen(
-        [*COMMAND, "look", "--boxes", str(frames), "-o", str(folder), *map(str, given)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment(),
-        start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
-    deadline = time.monotonic() + 120
-    while not (folder / wait).exists():
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
-    process.send_signal(how)
-    error = process.communicate(timeout=60)[1]
-    assert process.returncode == (-signal.SIGKILL if how == signal.SIGKILL else 130)
-    assert "Traceback" not in error
-    if how != signal.SIGKILL:
-        assert error.endswith(f"vm-train: stopped; continue with vm-train resume {folder}\n")
+    given = ["--from", "ball-small", "--names", "0=ball", "--config", tiny, "--workers", 1]
+    run_and_stop(how, folder, wait, 0, "look", "--boxes", frames, *given)
     run("resume", folder, "--workers", 2)
     assert_same(folder, whole[0])
 
