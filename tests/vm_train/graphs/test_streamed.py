@@ -12,6 +12,7 @@ from threading import Thread
 import pytest
 import torch
 
+from tests.vm_train.commands import SMALL
 from tests.vm_train.drawn import CLASSES, draw_set
 from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError
@@ -28,18 +29,6 @@ from vm_train.learning.rounds import train
 from vm_train.learning.run_folder import begin_run, read_run
 from vm_train.learning.training_data import TrainingData
 
-SMALL = """
-[mesh]
-radius = 0.07
-max_distance = 4.0
-[network]
-depth = 3
-width = 4
-[training]
-epochs = 2
-batch = 4
-selection = "balanced"
-"""
 EPOCH, SHARDS = 14, 5
 
 
@@ -57,7 +46,7 @@ def place(tmp_path_factory):
     draw_set(made / "data", 4)
     pictures = find_pictures(draw_set(made / "training", 20, seed=1))
     write_shards(pictures, made / "shards", 4, lambda: None)
-    (made / "train.toml").write_text(CLASSES + SMALL)
+    (made / "train.toml").write_text(CLASSES + SMALL.replace('"hard"', '"balanced"'))
     return made
 
 
