@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Floats, Singles
+from ..arrays import Singles
 from ..field.uprights import Base
 from ..geometry.circle import Circle
 from .looking import Look, look_closely
@@ -30,9 +30,6 @@ _JUMP = 0.12
 
 _LEVELS = (0.1, 0.3, 0.6, 0.9)
 """Probabilities at which points are sought again, so that a less probable point in front does not hide a base."""
-
-_NEAR = 0.04
-"""Judged places nearer to a base than this share of its distance were meant to be the same one."""
 
 _SAME = 0.12
 """Two bases nearer to each other than this share of their distance are those of one upright: far away, a small error in
@@ -77,26 +74,11 @@ def find_bases(observation: Observation, look: Look, settings: Settings) -> list
     probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
     nearest = nearest_points(observation, probabilities, contract.above)
     circles = around_bases(observation, contract.upright_radius)
-    judged = look_closely(circles, look, nearest, settings, Stopwatch(), explain=True)
-    if not judged:
-        return []
-    places = np.stack([each.center for each in judged]) @ observation.view.heading[:2].T
-    confidences, width = np.array([each.confidence for each in judged]), 2.0 * contract.upright_radius
-    found = [
-        Base(mean_place(place, places, confidences), width * each.scale, each.confidence)
-        for place, each in zip(places, judged, strict=True)
-        if each.reason is None
-    ]
+    judged = look_closely(circles, look, nearest, settings, Stopwatch())
+    heading = observation.view.heading[:2]
+    width = 2.0 * contract.upright_radius
+    found = [Base(heading @ each.center, width * each.scale, each.confidence) for each in judged]
     return sorted(_apart(found), key=lambda each: float(np.hypot(*each.position)))
-
-
-def mean_place(place: Floats, places: Floats, confidences: Floats) -> Floats:
-    """The base (2,) [m] at a judged place (2,): the mean of all judged places (n, 2) near it, weighted by confidence.
-
-    Several proposals move to the same base, each with an error of its own.
-    """
-    near = np.hypot(*(places - place).T) <= _NEAR * np.hypot(*place)
-    return np.asarray(confidences[near] @ places[near] / confidences[near].sum())
 
 
 def _apart(bases: Sequence[Base]) -> list[Base]:

@@ -13,7 +13,7 @@ from vm_embedded import Detector, Orientation, read_lens_file
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.field_points import locate_features
 from vm_embedded.detection.settings import Settings
-from vm_embedded.detection.upright_looks import around_bases, find_bases, mean_place, nearest_points
+from vm_embedded.detection.upright_looks import around_bases, find_bases, nearest_points
 from vm_embedded.network.manifest import ObjectClass
 
 from ..strategies import seeds
@@ -136,17 +136,6 @@ def test_a_base_is_where_the_look_sees_it(detector):
     down = find_bases(seen, Sure(down=0.2), SETTINGS)[0].position - still
     assert right[1] == pytest.approx(-0.5 * RADIUS, abs=0.03)  # y is to the left
     assert np.hypot(*(still + down)) < np.hypot(*still) - 0.05  # lower in the picture is nearer
-
-
-@given(seed=seeds)
-def test_a_base_is_the_mean_of_the_places_that_are_meant_to_be_it(seed):
-    random = np.random.default_rng(seed)
-    base, others = np.array([3.0, 1.0]), np.array([5.0, -1.0]) + random.uniform(-0.5, 0.5, (5, 2))
-    meant = base + random.normal(0.0, 0.01, (6, 2))
-    places, confidences = np.concatenate([meant, others]), random.uniform(0.1, 1.0, 11)
-    found = mean_place(meant[0], places, confidences)
-    assert found == pytest.approx(np.average(meant, axis=0, weights=confidences[:6]))
-    assert mean_place(meant[0], meant[:1], confidences[:1]) == pytest.approx(meant[0])
 
 
 def test_a_doubtful_look_reports_nothing(detector):
