@@ -195,7 +195,7 @@ def _movable(model: str) -> str:
 def _socket_in(config: Path | None) -> str:
     """[status] socket of a vm.toml that has errors elsewhere; empty if it can't be read."""
     try:
-        socket = parse_toml((config or Path()).read_text(encoding="utf-8"))["status"]["socket"]
+        socket = parse_toml((config or Path()).read_text(encoding="utf-8-sig"))["status"]["socket"]
     except (OSError, ValueError, InputError, KeyError, TypeError):
         return ""
     return socket if isinstance(socket, str) else ""
