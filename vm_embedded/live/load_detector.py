@@ -6,7 +6,9 @@ from ..cameras.camera import without_password
 from ..cameras.image_files import check_read_format
 from ..cameras.open_camera import ROS, brings_lens_and_pose, camera_opener, is_live
 from ..detection.detector import Detector
-from ..errors import InputError
+from ..detection.settings import Settings
+from ..errors import GeometryError, InputError
+from ..geometry.orientation import Orientation
 from ..network.bundled import model_path
 from ..network.model_file import ModelFile, parse_model, read_content
 from .configuration import Configuration
@@ -19,7 +21,11 @@ async def prove_model(configuration: Configuration) -> tuple[ModelFile, str]:
     Raises VisualMeshError for the first thing that is missing or invalid.
     """
     check_camera(configuration)
-    return await prove_network(configuration)
+    model, proved = await prove_network(configuration)
+    orientation = configuration.fixed_orientation()
+    if orientation is not None and configuration.pose.source == "fixed":
+        check_height(orientation, configuration.detector, model)
+    return model, proved
 
 
 async def prove_network(configuration: Configuration) -> tuple[ModelFile, str]:
@@ -45,6 +51,17 @@ async def load_checked_detector(configuration: Configuration) -> tuple[Detector,
     """Load the configured network after `prove_model`, whose errors it raises; return also what was proved."""
     model, proved = await prove_model(configuration)
     return Detector(model, configuration.detector), proved
+
+
+def check_height(orientation: Orientation, settings: Settings, model: ModelFile) -> None:
+    """Raise InputError for a camera that is too low for the object: no mesh exists for such a pair."""
+    manifest = model.manifest.used_for(settings.object_radius, settings.max_distance)
+    try:
+        manifest.rings_across(orientation.height, orientation.height)
+    except GeometryError as error:
+        raise InputError(
+            f"{error}: check the camera's height (--height, or Hoc of the lens) and --object-radius, both in meters"
+        ) from error
 
 
 def check_camera(configuration: Configuration) -> None:
