@@ -35,6 +35,7 @@ from .bridge import Bridge
 from .configuration import Configuration, recording_files
 from .control import REFUSED, ControlServer, control_path
 from .counters import Counters
+from .frame_remarks import FrameRemarks
 from .frame_watchdog import FrameWatchdog
 from .health import Health
 from .live_page import LivePage
@@ -118,6 +119,7 @@ class Daemon:
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
         self._watchdog = FrameWatchdog(self._end_hanging)
         self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health, self._watchdog)
+        self._remarks = FrameRemarks()
         self._recording_files = recording_files(configuration, detector.session.model)
         self.outputs = Channels(configuration.output)
         self.page = LivePage(self.answerer, self._status, self.record, self.metrics, self._use_threshold)
@@ -255,6 +257,8 @@ class Daemon:
         shot, detections = answer.shot, answer.detections
         self.last = live_message(self.counters.outcomes.frames, self.state, shot, detections, answer.time)
         self._send(self.last, answer)
+        for event, reason in self._remarks.about(answer):
+            self._log(event, "warning", reason=reason)
         self.page.show(answer)
         self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._recording_files)
 
@@ -344,6 +348,7 @@ class Daemon:
             return
         self.recorder.clear()
         self.answerer.reload(new.configuration, new.detector)
+        self._remarks = FrameRemarks()
         self._recording_files = new.recording_files
         self._log("reloaded", model=new.configuration.model, proved=new.proved, needs_restart=new.needs_restart)
 
