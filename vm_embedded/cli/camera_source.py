@@ -1,4 +1,4 @@
-"""Whether the configured camera can work, as far as a program can tell before it runs."""
+"""Whether the configured camera and its poses can work, as far as a program can tell before it runs."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from ..cameras.ros.bags import is_bag
 from ..geometry.lens import Size
 from ..geometry.lens_files import LensFile, read_lens_file
 from ..live.configuration import Configuration
+from ..poses.settings import check_without_ros
 
 
 @dataclass(frozen=True)
@@ -38,3 +39,10 @@ def check_source(configuration: Configuration) -> SourceFacts:
     if camera.source not in ("", ROS):  # vm-ros opens a topic itself
         camera_opener(camera, raw)
     return SourceFacts((camera.width, camera.height) if camera.width and camera.height else None)
+
+
+def check_pose_source(configuration: Configuration) -> None:
+    """Raise InputError for poses that vm-detect can't get. A camera of ROS, or none, is for vm-ros."""
+    camera = configuration.camera.source
+    if camera not in ("", ROS) and not is_bag(camera):
+        check_without_ros(configuration.pose.source)

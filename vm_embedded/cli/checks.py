@@ -9,10 +9,8 @@ import math
 import os
 import socket
 import struct
-import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -25,12 +23,11 @@ from ..errors import InputError, VisualMeshError, one_line
 from ..geometry.lens_doubt import lens_doubt
 from ..geometry.orientation import Orientation
 from ..live.configuration import Configuration
-from ..live.control import control_path
 from ..live.load_detector import check_height, prove_network
 from ..network.model_file import ModelFile
-from .camera_source import SourceFacts, check_source
-
-GOOD, WARNING, BAD = "ok", "warning", "failure"
+from .camera_source import SourceFacts, check_pose_source, check_source
+from .finding import BAD, GOOD, WARNING, Finding
+from .openings import check_openings
 
 OPENCV_PACKAGES = ("opencv-python", "opencv-python-headless", "opencv-contrib-python", "opencv-contrib-python-headless")
 
@@ -51,19 +48,6 @@ _PATIENCE = 3.0
 """How long to wait for the host of a camera [s]."""
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Result of a check.
-
-    about: the checked part. state: GOOD, WARNING or BAD. seen: description. mend: command that fixes it, if any.
-    """
-
-    about: str
-    state: str
-    seen: str
-    mend: str = ""
-
-
 def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator[Finding]:
     """Run all checks, one finding after another. root: folder with proc, sys and dev."""
     try:
@@ -82,9 +66,7 @@ def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator
         yield check_lens(configuration, source)
         yield check_pose(configuration, source, model)
         yield check_clock(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", time.time())
-        yield check_status_socket(configuration)
-        if configuration.recorder.folder:
-            yield check_recorder(Path(configuration.recorder.folder))
+        yield from check_openings(configuration)
     except OSError as error:
         yield Finding("machine", WARNING, one_line(error))
 
@@ -292,6 +274,10 @@ def check_pose(configuration: Configuration, source: SourceFacts, model: ModelFi
     """
     camera = configuration.camera.source
     if configuration.pose.source != "fixed":
+        try:
+            check_pose_source(configuration)
+        except InputError as error:
+            return Finding("pose", WARNING, str(error), "start vm-ros, or choose another --pose-source")
         return Finding("pose", GOOD, f"from {configuration.pose.source}")
     try:
         orientation = configuration.fixed_orientation()
@@ -347,28 +333,3 @@ def check_clock(source: Path, now: float) -> Finding:
     if name in ("hpet", "acpi_pm"):
         return Finding("clock", WARNING, f"{name} is slow to read", "boot with clocksource=tsc")
     return Finding("clock", GOOD, f"clock source {name}")
-
-
-def check_status_socket(configuration: Configuration) -> Finding:
-    """Whether the status socket can be created."""
-    try:
-        path = control_path(configuration.status.socket)
-    except InputError as error:
-        return Finding("status socket", BAD, str(error), "ls -ld /tmp/vm-detect-$(id -u)")
-    if not path.parent.exists() and path.parent == Path(os.environ.get("RUNTIME_DIRECTORY", "")):
-        return Finding("status socket", GOOD, f"{path}; systemd creates its folder")
-    if not os.access(path.parent, os.W_OK):
-        return Finding("status socket", BAD, f"can't write to {path.parent}", f"sudo install -d -o $USER {path.parent}")
-    return Finding("status socket", GOOD, str(path))
-
-
-def check_recorder(folder: Path) -> Finding:
-    """Whether recordings can be written to their folder, which may not exist yet."""
-    existing = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
-    try:
-        with tempfile.TemporaryDirectory(dir=existing):
-            pass
-    except OSError as error:
-        seen = f"can't write to {existing}: {error.strerror or error}"
-        return Finding("recorder", BAD, seen, f"sudo install -d -o $USER {folder}")
-    return Finding("recorder", GOOD, str(folder))

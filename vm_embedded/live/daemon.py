@@ -27,7 +27,7 @@ from ..errors import InputError, NetworkError, VisualMeshError, one_line
 from ..output.channels import Channels
 from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
-from ..poses.settings import is_of_ros
+from ..poses.settings import check_without_ros
 from ..poses.stream import PoseStream
 from ..sockets import is_open_to_network
 from .answering import Answer, Answerer
@@ -134,8 +134,8 @@ class Daemon:
     ) -> Daemon:
         """A daemon whose configuration was read and whose detector was proved. Raises VisualMeshError."""
         configuration = configure()
-        if bridge is None and is_of_ros(configuration.pose.source):
-            raise InputError(f"pose source {configuration.pose.source} works only with vm-ros and bags")
+        if bridge is None:
+            check_without_ros(configuration.pose.source)
         detector, proved = await load_checked_detector(configuration)
         return cls(configure, configuration, detector, proved, log, bridge)
 
