@@ -1,8 +1,9 @@
-"""Reading text files, and writing files without losing the previous content if something fails."""
+"""Reading text files, and writing files without losing the previous content or waiting for a pipe's reader."""
 
 from __future__ import annotations
 
 import os
+import select
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -59,3 +60,10 @@ def check_writable(path: Path) -> None:
         raise InputError(f"can't write {path}: there is no folder {path.parent}")
     if path.is_dir():
         raise InputError(f"can't write {path}: this is a folder")
+
+
+def takes_more(descriptor: int) -> bool:
+    """Whether a descriptor takes select.PIPE_BUF bytes without waiting: a full pipe does not. Raises OSError."""
+    poll = select.poll()
+    poll.register(descriptor, select.POLLOUT)
+    return bool(poll.poll(0))
