@@ -61,8 +61,6 @@ class EventLog:
 
 def _copy_of_standard_error() -> TextIO:
     """Standard error under another descriptor: while an image is decoded, descriptor 2 is a file in memory."""
-    if sys.stderr is None:
-        return open(os.devnull, "w")  # noqa: PTH123
     try:
         return open(os.dup(sys.stderr.fileno()), "w", errors="backslashreplace")  # noqa: PTH123
     except OSError:  # it is in memory
