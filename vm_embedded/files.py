@@ -1,8 +1,10 @@
-"""Reading text files, and writing files without losing the previous content if something fails."""
+"""Reading text files, and writing files without losing the previous content or waiting for a pipe's reader."""
 
 from __future__ import annotations
 
+import errno
 import os
+import select
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -37,9 +39,17 @@ def atomic_write(path: Path) -> Iterator[Path]:
             part.unlink(missing_ok=True)
 
 
+def check_regular(path: Path) -> None:
+    """Raise OSError for a pipe, socket or device: reading it may wait forever, or never end."""
+    mode = path.stat().st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # reading a folder has an error of its own
+        raise OSError(errno.EINVAL, "not a regular file", str(path))
+
+
 def read_text(path: Path) -> str:
     """The text of a file in UTF-8, without a byte order mark. Raises InputError with the file and the reason."""
     try:
+        check_regular(path)
         return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
@@ -59,3 +69,10 @@ def check_writable(path: Path) -> None:
         raise InputError(f"can't write {path}: there is no folder {path.parent}")
     if path.is_dir():
         raise InputError(f"can't write {path}: this is a folder")
+
+
+def takes_more(descriptor: int) -> bool:
+    """Whether a descriptor takes select.PIPE_BUF bytes without waiting: a full pipe does not. Raises OSError."""
+    poll = select.poll()
+    poll.register(descriptor, select.POLLOUT)
+    return bool(poll.poll(0))

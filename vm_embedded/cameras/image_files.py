@@ -17,6 +17,7 @@ import numpy as np
 from ..arrays import Image
 from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
+from ..files import check_regular
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from .decoding import decode
@@ -154,6 +155,7 @@ def _recorded_times(messages: Path) -> dict[str, float]:
     """
     times: list[float] = []
     with suppress(OSError, ValueError, KeyError, TypeError):
+        check_regular(messages)
         lines = messages.read_text(encoding="utf-8").splitlines()
         times.extend(float(json.loads(line)["t"]) for line in lines)
     return {f"image{index:07d}": time - times[0] for index, time in enumerate(times)}
@@ -171,6 +173,7 @@ def read_image(path: str | Path, raw: bool = False, max_megapixels: float = MAX_
     """
     path = Path(path)
     try:
+        check_regular(path)
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error

@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import os
 import re
+import select
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import cv2
+
+from ..files import takes_more
 
 _STDERR = 2
 
@@ -29,7 +32,7 @@ _LOCK = threading.Lock()
 def library_messages() -> Iterator[list[str]]:
     """Collect the lines that libjpeg and libpng print in this block; the list is complete after the block.
 
-    Lines of other threads go to standard error when the block ends.
+    Lines of other threads go to standard error when the block ends; they are lost if nobody reads it.
     """
     found: list[str] = []
     with _LOCK:
@@ -52,8 +55,15 @@ def library_messages() -> Iterator[list[str]]:
         lines = written.decode("utf-8", "replace").splitlines(keepends=True)
         found += [line.strip() for line in lines if _WARNING.match(line)]
         others = "".join(line for line in lines if line.strip() and not _WARNING.match(line))
-        if others and before is not None:
-            os.write(_STDERR, others.encode())
+        if before is not None:
+            _pass_on(others.encode())
+
+
+def _pass_on(content: bytes) -> None:
+    """Write to standard error as much as it takes without waiting."""
+    with suppress(OSError):
+        while content and takes_more(_STDERR):
+            content = content[os.write(_STDERR, content[: select.PIPE_BUF]) :]
 
 
 def _duplicate() -> int | None:

@@ -43,6 +43,10 @@ class TimedStream(io.RawIOBase):
         self._socket.settimeout(min(left, self.pause))
         return self._socket.recv_into(buffer)
 
+    def readall(self) -> bytes:
+        """Refuse to read until the end, which http.client does for a chunk of the length -1."""
+        raise io.UnsupportedOperation("the length of a chunk is negative")
+
     def close(self) -> None:
         """Keep the socket open."""
 

@@ -18,6 +18,7 @@ from ..cameras.ros.bags import is_bag
 from ..config.toml_reader import parse_toml
 from ..config.toml_writer import to_commented_toml
 from ..errors import InputError, VisualMeshError
+from ..files import read_text
 from ..live.configuration import HEADER, Configuration
 from ..live.control import REFUSED, ask, control_path
 from ..live.daemon import Daemon
@@ -197,8 +198,8 @@ def _movable(model: str) -> str:
 def _socket_in(config: Path | None) -> str:
     """[status] socket of a vm.toml that has errors elsewhere; empty if it can't be read."""
     try:
-        socket = parse_toml((config or Path()).read_text(encoding="utf-8-sig"))["status"]["socket"]
-    except (OSError, ValueError, InputError, KeyError, TypeError):
+        socket = parse_toml(read_text(config or Path()))["status"]["socket"]
+    except (ValueError, InputError, KeyError, TypeError):
         return ""
     return socket if isinstance(socket, str) else ""
 

@@ -144,6 +144,7 @@ def program(main: Callable[P, int]) -> Callable[P, int]:
 
     @wraps(main)
     def run(*arguments: P.args, **more: P.kwargs) -> int:
+        _open_standard_error()
         try:
             try:
                 return main(*arguments, **more)
@@ -169,3 +170,14 @@ def program(main: Callable[P, int]) -> Callable[P, int]:
 def discard_output() -> None:
     """Send standard output to nowhere once it can't be written; else the interpreter complains when it flushes."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _open_standard_error() -> None:
+    """Send standard error to nowhere if it is closed.
+
+    Otherwise, errors would be printed on standard output, and libraries would print into the file that is opened next.
+    """
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115, PTH123
+        os.dup2(sys.stderr.fileno(), 2)
+        os.set_inheritable(2, True)

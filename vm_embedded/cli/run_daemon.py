@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import signal
+import threading
 from collections.abc import Awaitable, Callable
 
 from ..errors import NetworkError, VisualMeshError
@@ -17,7 +19,7 @@ def run_daemon(log: EventLog, prepare: Callable[[], Awaitable[Daemon]]) -> int:
     for number in (signal.SIGHUP, signal.SIGUSR1):
         signal.signal(number, signal.SIG_IGN)  # the daemon handles them once it runs
     try:
-        return asyncio.run(_prepare_and_run(prepare))
+        return _end(asyncio.run(_prepare_and_run(prepare)))
     except VisualMeshError as error:
         return report_failed_start(log, error)
     except KeyboardInterrupt:  # before the daemon handles signals
@@ -27,6 +29,16 @@ def run_daemon(log: EventLog, prepare: Callable[[], Awaitable[Daemon]]) -> int:
 async def _prepare_and_run(prepare: Callable[[], Awaitable[Daemon]]) -> int:
     daemon = await prepare()
     return await daemon.run()
+
+
+def _end(status: int) -> int:
+    """Return the exit status, or end the process with it if a thread still works, for example reads the camera.
+
+    Python's own end would abort the process as soon as such a thread returns from a library like FFmpeg.
+    """
+    if any(each.daemon for each in threading.enumerate()):
+        os._exit(status)
+    return status
 
 
 def report_failed_start(log: EventLog, error: VisualMeshError) -> int:

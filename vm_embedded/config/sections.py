@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import InputError, VisualMeshError, unknown
+from ..files import check_regular
 from .entries import EntryError
 from .toml_reader import parse_toml
 
@@ -110,6 +111,7 @@ def parse_overrides(given: Sequence[str], example: str) -> dict[str, dict[str, A
 
 def _read_text(path: Path, noun: str) -> str:
     try:
+        check_regular(path)
         return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise InputError(f"can't read {noun} {path}: {error.strerror or error}") from error

@@ -14,6 +14,7 @@ from ..config.toml_reader import parse_toml
 from ..config.units import parse_angle
 from ..config.yaml_reader import read_yaml
 from ..errors import InputError, VisualMeshError, unknown
+from ..files import check_regular
 from .calibrated_lenses import BrownLens, CalibratedLens, FisheyeLens
 from .lens import Lens
 from .orientation import Orientation
@@ -61,6 +62,7 @@ def read_lens_file(path: str | Path) -> LensFile:
     """Reads a lens file: TOML if its name ends in .toml, else YAML. Raises InputError with the file and the reason."""
     path = Path(path)
     try:
+        check_regular(path)
         if path.stat().st_size > _LARGEST:
             raise InputError(f"{path} is too large for a lens file; at most {_LARGEST} bytes are allowed")
         text = path.read_text(encoding="utf-8-sig")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import select
 import sys
 import threading
 import time
 from dataclasses import dataclass
 from typing import Any, TextIO
+
+from ..files import takes_more
 
 _MOST_LINES, _PERIOD = 50, 10.0
 """Most lines about one kind of event in a period [s]."""
@@ -25,7 +26,7 @@ class EventLog:
 
     def __init__(self, program: str, stream: TextIO | None = None) -> None:
         self.program = program
-        self._stream = stream or sys.stderr or open(os.devnull, "w")  # noqa: SIM115, PTH123
+        self._stream = stream or _copy_of_standard_error()
         self._text = self._stream.isatty()
         self._recent: dict[str, _Recent] = {}
         self._lock = threading.Lock()
@@ -58,12 +59,18 @@ class EventLog:
             self._stream = open(os.devnull, "w")  # noqa: SIM115, PTH123
 
 
+def _copy_of_standard_error() -> TextIO:
+    """Standard error under another descriptor: while an image is decoded, descriptor 2 is a file in memory."""
+    try:
+        return open(os.dup(sys.stderr.fileno()), "w", errors="backslashreplace")  # noqa: PTH123
+    except OSError:  # it is in memory
+        return sys.stderr
+
+
 def _takes_more(stream: TextIO) -> bool:
     """Whether a stream takes a line without waiting: a full pipe does not."""
     try:
-        poll = select.poll()
-        poll.register(stream.fileno(), select.POLLOUT)
-        return bool(poll.poll(0))
+        return takes_more(stream.fileno())
     except (OSError, ValueError):  # it is in memory, or closed
         return True
 

@@ -16,6 +16,7 @@ from functools import cached_property
 from pathlib import Path
 
 from ..errors import ModelError
+from ..files import check_regular
 from .canary import CANARY_KEY, Canary
 from .look_contract import GLANCE_KEY, LOOK_KEY, LookContract
 from .manifest import METADATA_KEY, Manifest
@@ -93,6 +94,7 @@ def read_content(path: str | Path, max_mib: float = 64.0) -> bytes:
     """The bytes of a model file. Raises ModelError if it is missing, or larger than `max_mib` [MiB]."""
     path = Path(path)
     try:
+        check_regular(path)
         size = path.stat().st_size
         if size > max_mib * 2**20:
             raise ModelError(f"{path}: {size / 2**20:.1f} MiB is too large for a model (allowed: {max_mib:g} MiB)")

@@ -5,6 +5,7 @@ import signal
 import socket
 import threading
 import time
+import tracemalloc
 from contextlib import suppress
 
 import cv2
@@ -144,19 +145,29 @@ def test_passwords_of_cameras_are_not_shown(tmp_path):
     assert "no response from http://127.0.0.1:9/x" in json.dumps(found.messages)
 
 
-@pytest.mark.parametrize("length", [b"f" * 16, b"7" + b"f" * 15, b"-5", b"x", b"9" * 5000])
-def test_attack_8_a_chunk_of_any_length_is_a_camera_error(length):
-    """The server sends its stream in chunks; the length of the second one is hostile."""
+@pytest.fixture
+def traced_memory():
+    """The most memory that was in use since the test began [bytes]."""
+    tracemalloc.start()
+    yield lambda: tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+
+
+@pytest.mark.parametrize("length", [b"f" * 16, b"7" + b"f" * 15, b"-1", b"-5", b"x", b"9" * 5000])
+def test_attack_8_a_chunk_of_any_length_is_a_camera_error(length, traced_memory):
+    """The server sends its stream in chunks; the length of the second one is hostile, and its content is large."""
     listening = socket.create_server(("127.0.0.1", 0))
 
     def serve():
         connection, _ = listening.accept()
-        with connection:
+        with connection, suppress(OSError):
             connection.recv(4096)
             head = b"HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\n"
             connection.sendall(
                 head + b"Transfer-Encoding: chunked\r\n\r\n9\r\n--frame\r\n\r\n" + length + b"\r\nab\r\n"
             )
+            for _ in range(64):
+                connection.sendall(bytes(2**20))
 
     threading.Thread(target=serve, daemon=True).start()
     settings = CameraSettings(source=f"http://127.0.0.1:{listening.getsockname()[1]}/", lost_ms=500)
@@ -165,6 +176,7 @@ def test_attack_8_a_chunk_of_any_length_is_a_camera_error(length):
         with pytest.raises(CameraError, match=r"http://127\.0\.0\.1"):
             camera.read()
         camera.close()
+    assert traced_memory() < 96 * 2**20  # an image may have 64 MiB
 
 
 STAMPS = pytest.mark.parametrize("stamps", [None, 5000.0], ids=["without stamps", "X-Timestamp"])

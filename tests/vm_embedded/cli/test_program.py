@@ -157,6 +157,20 @@ def test_a_full_disk_is_one_line():
     assert done.stderr == "can't write standard output: No space left on device\n"
 
 
+@pytest.mark.parametrize("command", ["vm-detect none.jpg", "vm-bench --image none.jpg", "vm-train check none"])
+def test_errors_are_not_printed_on_standard_output(command):
+    shell = ["sh", "-c", f"{BIN / command} 2>&-"]
+    done = subprocess.run(shell, stdout=subprocess.PIPE, timeout=120, check=False)
+    assert (done.returncode, done.stdout) == (1, b"")
+
+
+def test_without_standard_error_no_other_file_takes_its_place():
+    code = "import os; from vm_embedded.cli.program import program; print(program(lambda: os.open('/', os.O_RDONLY))())"
+    shell = ["sh", "-c", f"{sys.executable} -c {shlex.quote(code)} 2>&-"]
+    done = subprocess.run(shell, stdout=subprocess.PIPE, timeout=120, check=False)
+    assert int(done.stdout) > 2
+
+
 @pytest.mark.parametrize("command", ["vm-doctor --camera", "vm-bench --image", "vm-train check --boxes", "vm-label"])
 def test_a_name_that_is_too_long_is_one_line(command):
     program, *options = command.split()

@@ -1,5 +1,6 @@
 """vm-detect on a live camera: a real process, its messages, states and signals."""
 
+import os
 import signal
 import socket
 import stat
@@ -13,6 +14,7 @@ from tests.messages import read_message
 from tests.vm_embedded.live.running import DEMO, arguments, running
 from vm_embedded.cameras.synthetic import Motion
 from vm_embedded.live.control import ask
+from vm_embedded.network.bundled import model_path
 
 
 def counts(tmp_path):
@@ -112,6 +114,22 @@ def test_hangup_reads_the_configuration_again_and_keeps_the_old_one_if_it_is_bad
         found.wait(lambda: len(found.frames) > before + 5)
         found.wait(lambda: any("track" in each for each in found.frames[-1]["detections"]))
         found.stop()
+
+
+def test_hangup_refuses_files_that_may_never_end(tmp_path):
+    path, model, pipe = (tmp_path / each for each in ("vm.toml", "model.onnx", "pipe"))
+    model.symlink_to(model_path("ball-small"))
+    path.write_text(f'model = "{model}"\n[camera]\nsource = "synthetic"\n')
+    os.mkfifo(pipe)
+    with running(tmp_path, "--config", path) as found:
+        found.wait_for_state("ok")
+        for name in (model, path):
+            name.unlink()
+            name.symlink_to(pipe)
+            found.process.send_signal(signal.SIGHUP)
+            says = f"{name}: not a regular file"
+            found.wait(lambda says=says: any(says in each.get("reason", "") for each in list(found.events)))
+        assert found.stop()[0] == 0
 
 
 def test_a_second_signal_ends_it_at_once(tmp_path):
