@@ -135,7 +135,7 @@ class PoseStream:
         if self.settings.clock == "arrival" or t is None:
             return now - 1e-3 * self.settings.latency_ms
         if self.settings.clock == "wall":
-            t += now - time.time()
+            t += time.monotonic() - time.time()  # read together: `now` is from before the parsing
         if not now - _OLDEST < t < now + _EARLY:
             raise InputError(
                 f"t of the pose is {t - now:+.3g} s from now on the {self.settings.clock} clock; "

@@ -15,6 +15,8 @@ from tests.vm_embedded.live.running import arguments, running
 from tests.vm_embedded.poses.test_parsing import quaternion
 from vm_embedded.cameras.synthetic import Motion
 from vm_embedded.live.control import ask
+from vm_embedded.poses import stream
+from vm_embedded.poses.settings import PoseSettings
 
 TURN = 3.0
 MOTION = Motion(TURN)
@@ -207,3 +209,20 @@ def test_attack_12_a_pose_in_the_future_is_refused_and_blocks_no_good_one(tmp_pa
         sender.on = False
         sender.join()
         found.stop()
+
+
+def test_a_wait_before_a_pose_is_read_does_not_move_its_wall_time(monkeypatch):
+    """The other processes of a busy robot take the processor from the daemon at any place."""
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "time", lambda: now[0] + 1000.0)
+    read = stream.parse_pose_line
+
+    def read_late(*given):
+        now[0] += 0.03
+        return read(*given)
+
+    monkeypatch.setattr(stream, "parse_pose_line", read_late)
+    poses = stream.PoseStream(PoseSettings(source="stdin", clock="wall"), lambda reason: None)
+    assert poses.take(pose_line(MOTION, 1100.0))
+    assert poses.poses.newest == pytest.approx(100.0, abs=1e-6)
