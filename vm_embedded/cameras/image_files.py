@@ -17,6 +17,7 @@ import numpy as np
 from ..arrays import Image
 from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
+from ..files import is_file
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from .decoding import decode
@@ -81,7 +82,7 @@ def open_sources(names: Sequence[str], raw: bool = False, max_megapixels: float 
     paths = _without_companions([Path(each) for each in names])
     kept = set(paths)
     names = [each for each in names if Path(each) in kept]
-    if len(names) > 1 and all(each.is_file() and each.suffix.lower() in IMAGE_SUFFIXES for each in paths):
+    if len(names) > 1 and all(is_file(each) and each.suffix.lower() in IMAGE_SUFFIXES for each in paths):
         return _images(paths, partial(read_image, raw=raw, max_megapixels=max_megapixels))
     return joined([open_source(each, raw, max_megapixels) for each in names])
 

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from ..errors import InputError
+from ..files import exists
 from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, without_password
 from .decoding import decode_frame
 from .frame_clock import FrameClock
@@ -59,7 +60,7 @@ class OpenCvCamera:
         self._last = -np.inf  # the last timestamp that was trusted
         source = settings.source
         if self._device is not None:
-            if not self._device.exists():
+            if not exists(self._device):
                 raise CameraError(f"there is no camera at {self._device}")
             self._capture = cv2.VideoCapture(str(self._device.resolve()), cv2.CAP_V4L2)
         elif source.startswith("gstreamer:"):
@@ -100,7 +101,7 @@ class OpenCvCamera:
         arrived = time.monotonic()
         if not good or image is None:
             raise CameraError(f"camera {without_password(self.settings.source)} delivers no frames")
-        if self._device is not None and not self._device.exists():
+        if self._device is not None and not exists(self._device):
             # Some drivers repeat the last frame after the camera was unplugged.
             raise CameraError(f"camera {self._device} was unplugged")
         captured = self._captured(arrived)
@@ -132,10 +133,23 @@ def device_path(source: str) -> Path | None:
     return Path(source) if source.startswith("/dev/") else None
 
 
+def _check_can_be_found(device: Path) -> None:
+    """Raise InputError for a path that is too long or that this user may not look at; it may be missing yet."""
+    try:
+        device.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except OSError as error:
+        raise InputError(f"can't open camera {device}: {error.strerror}") from error
+
+
 def check_opencv_settings(settings: CameraSettings) -> None:
     """Raise InputError for settings that OpenCV can never use."""
     if settings.pixel_format and (len(settings.pixel_format) != 4 or not settings.pixel_format.isascii()):
         raise InputError(f"pixel_format must be four letters such as MJPG, not {settings.pixel_format!r}")
+    device = device_path(settings.source)
+    if device is not None:
+        _check_can_be_found(device)
     if settings.source.startswith("gstreamer:"):
         registry = cv2.videoio_registry  # lists backends that this OpenCV lacks, too
         backends = [registry.getBackendName(each) for each in registry.getBackends() if registry.hasBackend(each)]
