@@ -19,6 +19,7 @@ from ..files import exists
 from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, without_password
 from .decoding import decode_frame
 from .frame_clock import FrameClock
+from .video_size import check_frame, check_video
 
 _OLDEST = 1.0
 """Largest age of a device's own timestamp that is trusted [s]."""
@@ -74,6 +75,11 @@ class OpenCvCamera:
             self._capture.release()
             raise CameraError(f"can't open camera {without_password(source)}")
         self._motion_jpeg = self._device is not None and self._configure()
+        try:
+            check_video(self._capture, settings.max_megapixels)
+        except InputError as error:
+            self._capture.release()
+            raise CameraError(f"camera {without_password(source)} {error}") from error
 
     def _configure(self) -> bool:
         """Request the configured settings from the device; return whether it delivers undecoded JPEGs."""
@@ -110,7 +116,12 @@ class OpenCvCamera:
             return Shot(decode_frame(content, self._raw, self.settings.max_megapixels), captured, content)
         if image.dtype != np.uint8 or image.size == 0:
             raise BrokenFrameError(f"frame has {image.dtype} values of shape {image.shape}, not an 8-bit image")
-        return Shot(np.asarray(image), captured)
+        frame = np.asarray(image, dtype=np.uint8)
+        try:
+            check_frame(frame, self.settings.max_megapixels)
+        except InputError as error:
+            raise BrokenFrameError(f"frame {error}") from error
+        return Shot(frame, captured)
 
     def _captured(self, arrived: float) -> float:
         """When the frame was taken, in monotonic time [s]: V4L2's timestamp if it is plausible, else what the
