@@ -34,6 +34,7 @@ from .configuration import Configuration, recording_files
 from .control import REFUSED, ControlServer, control_path
 from .counters import Counters
 from .frame_watchdog import FrameWatchdog
+from .free_memory import give_back_memory
 from .health import Health
 from .live_page import LivePage
 from .load_detector import find_opener, load_checked_detector
@@ -342,6 +343,7 @@ class Daemon:
         self.recorder.clear()
         self.answerer.reload(new.configuration, new.detector)
         self._recording_files = new.recording_files
+        give_back_memory()
         self._log("reloaded", model=new.configuration.model, proved=new.proved, needs_restart=new.needs_restart)
 
     def _stop(self) -> None:

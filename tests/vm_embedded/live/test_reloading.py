@@ -2,15 +2,18 @@
 
 import asyncio
 import os
+import platform
 import signal
 from dataclasses import replace
 
 import pytest
 
+from tests.messages import read_message
 from tests.vm_embedded.live.running import running
 from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.errors import InputError
 from vm_embedded.live.configuration import Configuration, FixedPose
+from vm_embedded.live.control import ask
 from vm_embedded.live.reloading import read_again
 from vm_embedded.output.recorder import RecorderSettings
 from vm_embedded.poses.settings import PoseSettings
@@ -80,3 +83,20 @@ def test_a_reload_that_fails_in_an_unknown_way_says_so(tmp_path):
         found.process.send_signal(signal.SIGHUP)
         found.wait(lambda: [each for each in found.events if each["event"] == "reloaded"])
         assert found.stop()[0] == 0
+
+
+@pytest.mark.long
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries have no malloc_trim")
+def test_a_network_that_was_replaced_leaves_no_memory_behind(tmp_path):
+    def memory_after_reload(number):
+        found.process.send_signal(signal.SIGHUP)
+        found.wait(lambda: sum(each["event"] == "reloaded" for each in found.events) == number)
+        frames = len(found.frames)
+        found.wait(lambda: len(found.frames) > frames + 10)
+        return read_message(ask(tmp_path / "control", "status"))["memory_mib"]
+
+    with running(tmp_path, "--camera", "synthetic", "--model", "soccer") as found:
+        found.wait_for_state("ok")
+        mib = [memory_after_reload(number) for number in range(1, 9)]
+        found.stop()
+    assert mib[-1] < mib[0] + 50.0
