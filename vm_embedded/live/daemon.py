@@ -21,13 +21,11 @@ from typing import Any, Protocol
 
 from ..cameras.camera import without_password
 from ..cameras.grabber import MOST_HANGING, Grabber
-from ..cameras.open_camera import camera_opener
 from ..detection.detector import Detector
 from ..errors import InputError, NetworkError, VisualMeshError, one_line
 from ..output.channels import Channels
 from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
-from ..poses.settings import check_without_ros
 from ..poses.stream import PoseStream
 from ..sockets import is_open_to_network
 from .answering import Answer, Answerer
@@ -37,9 +35,10 @@ from .control import REFUSED, ControlServer, control_path
 from .counters import Counters
 from .frame_remarks import FrameRemarks
 from .frame_watchdog import FrameWatchdog
+from .free_memory import give_back_memory
 from .health import Health
 from .live_page import LivePage
-from .load_detector import load_checked_detector
+from .load_detector import find_opener, load_checked_detector
 from .log import EventLog
 from .prometheus import resident_bytes
 from .reloading import read_again
@@ -114,8 +113,7 @@ class Daemon:
         self._hung = False  # whether so many reads of the camera hang that only a new process helps
         self._wakeup = asyncio.Event()
         self._reloading: asyncio.Task[None] | None = None
-        opener = (bridge.opener if bridge else camera_opener)(camera, configuration.detector.format != "bgr")
-        self.grabber = Grabber(opener, camera, self._wake)
+        self.grabber = Grabber(find_opener(configuration, bridge), camera, self._wake)
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
         self._watchdog = FrameWatchdog(self._end_hanging)
         self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health, self._watchdog)
@@ -134,8 +132,7 @@ class Daemon:
     ) -> Daemon:
         """A daemon whose configuration was read and whose detector was proved. Raises VisualMeshError."""
         configuration = configure()
-        if bridge is None:
-            check_without_ros(configuration.pose.source)
+        find_opener(configuration, bridge)  # only for its checks, before the longer ones
         detector, proved = await load_checked_detector(configuration)
         return cls(configure, configuration, detector, proved, log, bridge)
 
@@ -342,14 +339,16 @@ class Daemon:
     async def _reload(self) -> None:
         """Read the configuration and the model again. If anything is wrong, nothing changes."""
         try:
-            new = await read_again(self._configure, self.configuration)
-        except VisualMeshError as error:
-            self._log("reload refused", "error", reason=str(error))
+            new = await read_again(self._configure, self.configuration, self._bridge)
+        except Exception as error:  # noqa: BLE001 (nobody else would hear of it)
+            reason = str(error) if isinstance(error, VisualMeshError) else one_line(error)
+            self._log("reload refused", "error", reason=reason)
             return
         self.recorder.clear()
         self.answerer.reload(new.configuration, new.detector)
         self._remarks = FrameRemarks()
         self._recording_files = new.recording_files
+        give_back_memory()
         self._log("reloaded", model=new.configuration.model, proved=new.proved, needs_restart=new.needs_restart)
 
     def _stop(self) -> None:
