@@ -12,6 +12,7 @@ import asyncio
 import json
 import math
 import os
+import re
 import signal
 import sys
 import time
@@ -103,6 +104,7 @@ class Daemon:
         self.last: Message | None = None
         self.counters = Counters()
         self.state, self.reason = "", ""
+        self._logged = ""  # the reason in the log
         self.health = Health(1e-3 * camera.lost_ms, (1e-3 * status.budget_ms) or math.inf)
         self._rejected = 0  # frames of the camera that were rejected
         self._sent = 0.0  # when the last message was sent
@@ -259,7 +261,7 @@ class Daemon:
         self.health.add_trouble(time.monotonic(), reason)
 
     def _update_state(self) -> None:
-        """Determine the state; if it has changed, log and send it."""
+        """Determine the state; if it has changed, log and send it. Log another reason of a bad state, too."""
         now = time.monotonic()
         lost = self.grabber.supervise(now)
         if self.outputs.failure:
@@ -270,12 +272,17 @@ class Daemon:
             self.health.add_trouble(now, self.grabber.trouble)
         state, reason = self.health.state(now, lost, self.grabber.trouble)
         self.reason = reason
+        is_bad = state not in ("ok", "starting", "stopping")
         if state != self.state:
-            level = "info" if state in ("ok", "starting", "stopping") else "warning"
-            self._log("state", level, state=state, was=self.state, reason=reason)
+            self._log("state", "warning" if is_bad else "info", state=state, was=self.state, reason=reason)
             self.state = state
             self._send(state_message(state, reason))
-            self._notifier.send(STATUS=f"{state}{': ' if reason else ''}{reason}")
+        elif is_bad and _without_numbers(reason) != _without_numbers(self._logged):
+            self._log("reason", "warning", state=state, reason=reason)
+        else:
+            return
+        self._logged = reason
+        self._notifier.send(STATUS=f"{state}{': ' if reason else ''}{reason}")
 
     def _send(self, message: Message, answer: Answer | None = None) -> None:
         self._sent = time.monotonic()
@@ -377,3 +384,8 @@ class Daemon:
         await asyncio.to_thread(self.recorder.close, _RECORDING_S)
         self.grabber.stop(0.3)
         self._notifier.close()
+
+
+def _without_numbers(reason: str) -> str:
+    """What a reason says, whatever its times and sizes."""
+    return re.sub(r"\d", "", reason)
