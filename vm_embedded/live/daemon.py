@@ -252,7 +252,9 @@ class Daemon:
         """Send an answer to the outputs, and hand it to the status page and the recorder."""
         self._update_state()
         shot, detections = answer.shot, answer.detections
-        self.last = live_message(self.counters.outcomes.frames, self.state, shot, detections, answer.time)
+        # The camera may be lost while its last frame is processed; a frame that says so would contradict itself.
+        state = "degraded" if self.state == "camera_lost" else self.state
+        self.last = live_message(self.counters.outcomes.frames, state, shot, detections, answer.time)
         self._send(self.last, answer)
         self.page.show(answer)
         self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._recording_files)
