@@ -12,6 +12,7 @@ import asyncio
 import json
 import math
 import os
+import re
 import signal
 import sys
 import time
@@ -104,6 +105,7 @@ class Daemon:
         self.last: Message | None = None
         self.counters = Counters()
         self.state, self.reason = "", ""
+        self._logged = ""  # the reason in the log
         self.health = Health(1e-3 * camera.lost_ms, (1e-3 * status.budget_ms) or math.inf)
         self._rejected = 0  # frames of the camera that were rejected
         self._sent = 0.0  # when the last message was sent
@@ -252,7 +254,9 @@ class Daemon:
         """Send an answer to the outputs, and hand it to the status page and the recorder."""
         self._update_state()
         shot, detections = answer.shot, answer.detections
-        self.last = live_message(self.counters.outcomes.frames, self.state, shot, detections, answer.time)
+        # The camera may be lost while its last frame is processed; a frame that says so would contradict itself.
+        state = "degraded" if self.state == "camera_lost" else self.state
+        self.last = live_message(self.counters.outcomes.frames, state, shot, detections, answer.time)
         self._send(self.last, answer)
         for event, reason in self._remarks.about(answer):
             self._log(event, "warning", reason=reason)
@@ -263,7 +267,7 @@ class Daemon:
         self.health.add_trouble(time.monotonic(), reason)
 
     def _update_state(self) -> None:
-        """Determine the state; if it has changed, log and send it."""
+        """Determine the state; if it has changed, log and send it. Log another reason of a bad state, too."""
         now = time.monotonic()
         lost = self.grabber.supervise(now)
         if self.outputs.failure:
@@ -274,12 +278,17 @@ class Daemon:
             self.health.add_trouble(now, self.grabber.trouble)
         state, reason = self.health.state(now, lost, self.grabber.trouble)
         self.reason = reason
+        is_bad = state not in ("ok", "starting", "stopping")
         if state != self.state:
-            level = "info" if state in ("ok", "starting", "stopping") else "warning"
-            self._log("state", level, state=state, was=self.state, reason=reason)
+            self._log("state", "warning" if is_bad else "info", state=state, was=self.state, reason=reason)
             self.state = state
             self._send(state_message(state, reason))
-            self._notifier.send(STATUS=f"{state}{': ' if reason else ''}{reason}")
+        elif is_bad and _without_numbers(reason) != _without_numbers(self._logged):
+            self._log("reason", "warning", state=state, reason=reason)
+        else:
+            return
+        self._logged = reason
+        self._notifier.send(STATUS=f"{state}{': ' if reason else ''}{reason}")
 
     def _send(self, message: Message, answer: Answer | None = None) -> None:
         self._sent = time.monotonic()
@@ -331,7 +340,11 @@ class Daemon:
             self._loop.call_soon_threadsafe(self._wakeup.set)
 
     def _start_reload(self) -> None:
-        """Begin a reload, instead of one that has not ended."""
+        """Begin a reload, instead of one that has not ended, and open the output file again."""
+        try:
+            self.outputs.reopen_file()
+        except InputError as error:
+            self._log("output file not opened again", "warning", reason=str(error))
         if self._reloading is not None:
             self._reloading.cancel()
         self._reloading = self._loop.create_task(self._reload())
@@ -378,3 +391,8 @@ class Daemon:
         await asyncio.to_thread(self.recorder.close, _RECORDING_S)
         self.grabber.stop(0.3)
         self._notifier.close()
+
+
+def _without_numbers(reason: str) -> str:
+    """What a reason says, whatever its times and sizes."""
+    return re.sub(r"\d", "", reason)

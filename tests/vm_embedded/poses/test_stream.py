@@ -271,3 +271,24 @@ def test_a_datagram_of_many_lines_is_cut_off(tmp_path):
         found.wait(lambda: counted()["poses"] == 1)
         assert counted()["poses_bad"] == 64 + 64 + 1
         found.stop()
+
+
+def test_another_reason_of_the_same_state_is_logged_but_not_another_number_in_it(tmp_path):
+    path = tmp_path / "poses"
+
+    def reasons():
+        return [each["reason"] for each in found.events if each["event"] == "reason"]
+
+    with running(tmp_path, "--camera", "synthetic", "--pose-source", f"unix:{path}") as found:
+        found.wait_for_state("pose_stale")
+        with socket.socket(socket.AF_UNIX) as connection:
+            connection.connect(str(path))
+            for digit in "123":
+                connection.sendall(f"{digit}\n".encode())
+                shown = f"'{digit}"
+                found.wait(lambda shown=shown: shown in found.messages[-1].get("reason", ""))
+            connection.sendall(b'{"height": 0.8, "quaternion": [1, 0, 0, 0]}\n')
+            found.wait(lambda: reasons() and "pose lacks t" in reasons()[-1])
+        found.stop()
+    assert len(reasons()) == 2
+    assert found.states == ["starting", "pose_stale", "stopping"]
