@@ -66,8 +66,8 @@ def test_tuned_settings_are_written_and_read_by_vm_detect(tmp_path):
     [
         (("--model", "ball-smaller"), "did you mean 'ball-small'"),
         (("--model", "nowhere.onnx"), "nowhere.onnx"),
-        (("--model", MODEL, "--size", "640"), "1280x1024"),
-        (("--model", MODEL, "--size", "\u00b2x\u00b2"), "1280x1024"),
+        (("--model", MODEL, "--size", "640"), "640x512"),
+        (("--model", MODEL, "--size", "\u00b2x\u00b2"), "640x512"),
         (("--model", MODEL, "--size", "640x480", "--image", IMAGES[0]), "--size"),
         (("--model", MODEL, "--height", "0.5", "--sway", "0.6"), "--sway"),
         (("--model", MODEL, "--frames", "5", "--tune", "vm.toml"), "at least 300"),

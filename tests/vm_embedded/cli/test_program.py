@@ -171,13 +171,19 @@ def test_without_standard_error_no_other_file_takes_its_place():
     assert int(done.stdout) > 2
 
 
-@pytest.mark.parametrize("command", ["vm-doctor --camera", "vm-bench --image", "vm-train check --boxes", "vm-label"])
+@pytest.mark.parametrize("command", ["vm-bench --image", "vm-train check --boxes", "vm-label"])
 def test_a_name_that_is_too_long_is_one_line(command):
     program, *options = command.split()
     done = run(program, *options, "x" * 300)
     assert done.returncode == 1
     assert len((done.stdout + done.stderr).splitlines()) == 1
     assert "File name too long" in done.stderr
+
+
+def test_vm_doctor_reports_a_name_that_is_too_long():
+    done = run("vm-doctor", "--camera", "x" * 300)
+    assert (done.returncode, done.stderr) == (1, "")
+    assert "failure   camera: can't open xxx" in done.stdout
 
 
 def test_a_pipeline_may_be_longer_than_a_file_name():
