@@ -185,7 +185,7 @@ def configuration_files(configuration: Path | None, model: str | None) -> dict[s
         )
         return {CONFIGURATION: to_commented_toml(shown).encode(), MODEL: _model(model or DEFAULT)}
     given = read_configuration(configuration)
-    text = configuration.read_text(encoding="utf-8")
+    text = configuration.read_text(encoding="utf-8-sig")
     table = tomllib.loads(text)
     files = {MODEL: _model(model or given.model)}
     text = _with_entry(text, "model", MODEL)

@@ -30,6 +30,10 @@ class NetworkError(InputError):
     """An address that this machine can't use yet: its network may still be starting."""
 
 
+class InUseError(InputError):
+    """A socket or port at which another process listens."""
+
+
 class ModelError(VisualMeshError):
     """A damaged or unusable model file."""
 

@@ -13,6 +13,16 @@ from pathlib import Path
 from .errors import InputError
 
 
+def exists(path: Path) -> bool:
+    """Whether a path exists. False for one that can't be looked at, where Path.exists raises OSError."""
+    return os.path.exists(path)  # noqa: PTH110
+
+
+def is_file(path: Path) -> bool:
+    """Whether a path is a file. False for one that can't be looked at, where Path.is_file raises OSError."""
+    return os.path.isfile(path)  # noqa: PTH113
+
+
 @contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
     """A temporary path beside `path`, which replaces `path` when the block ends without an error.

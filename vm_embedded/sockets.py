@@ -13,7 +13,7 @@ from dataclasses import Field
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError, NetworkError
+from .errors import InputError, InUseError, NetworkError
 
 _MAX_PATH_BYTES = 107
 """Longest path of a Unix socket on Linux [bytes]."""
@@ -62,6 +62,41 @@ def private_folder(folder: Path) -> Path:
     return folder
 
 
+def is_listening(path: Path) -> bool:
+    """Whether a process listens at a Unix socket; also true for one to which this user may not connect."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as other:
+        other.settimeout(1.0)
+        try:
+            other.connect(str(path))
+        except (FileNotFoundError, NotADirectoryError, ConnectionRefusedError):
+            return False
+        except OSError:
+            return True
+    return True
+
+
+def check_free(path: Path, option: str) -> bool:
+    """Raise InputError if no Unix socket can be created at a path because of its length or of what is there.
+
+    Return whether a socket file is there on which no process listens anymore. Raises InUseError if one does. option: of
+    vm-detect that gives another path.
+    """
+    if len(os.fsencode(path)) > _MAX_PATH_BYTES:
+        raise InputError(f"the path of a socket must have at most {_MAX_PATH_BYTES} bytes: {path}")
+    try:
+        mode = path.lstat().st_mode
+    except OSError:
+        return False  # there is no such file, or `bind` says what is wrong
+    if not stat.S_ISSOCK(mode):
+        raise InputError(f"can't listen at {path}: this file exists and is not a socket")
+    if is_listening(path):
+        raise InUseError(
+            f"can't listen at {path}: another process already does; stop the other vm-detect, or give another path "
+            f"with {option}"
+        )
+    return True
+
+
 class UnixListener:
     """A Unix stream socket that listens at a path; a relative one is in the runtime folder.
 
@@ -70,12 +105,12 @@ class UnixListener:
     """
 
     def __init__(self, path: str | Path, option: str) -> None:
-        self.path, self._option = socket_path(path), option
-        if len(os.fsencode(self.path)) > _MAX_PATH_BYTES:
-            raise InputError(f"the path of a socket must have at most {_MAX_PATH_BYTES} bytes: {self.path}")
+        self.path = socket_path(path)
+        is_left = check_free(self.path, option)
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
         try:
-            self._remove_stale_file()
+            if is_left:
+                self.path.unlink(missing_ok=True)
             mask = os.umask(_UMASK)
             try:
                 self.socket.bind(str(self.path))
@@ -90,29 +125,6 @@ class UnixListener:
                 f"can't listen at {self.path}: {error.strerror or error}; give a path in a folder that you can write "
                 f"to with {option}"
             ) from error
-        except InputError:
-            self.socket.close()
-            raise
-
-    def _remove_stale_file(self) -> None:
-        """Remove a socket file on which no process listens. Raises InputError for any other file."""
-        try:
-            mode = self.path.lstat().st_mode
-        except FileNotFoundError:
-            return
-        if not stat.S_ISSOCK(mode):
-            raise InputError(f"can't listen at {self.path}: this file exists and is not a socket")
-        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as other:
-            other.settimeout(1.0)
-            try:
-                other.connect(str(self.path))
-            except ConnectionRefusedError:
-                self.path.unlink(missing_ok=True)
-                return
-        raise InputError(
-            f"can't listen at {self.path}: another process already does; stop the other vm-detect, or give another "
-            f"path with {self._option}"
-        )
 
     def close(self) -> None:
         """Stop listening, and remove the file unless another process replaced it."""
@@ -206,6 +218,29 @@ def is_open_to_network(address: str) -> bool:
 def may_work_later(error: OSError) -> bool:
     """Whether an address fails because the network is not up: it has no such address, no route, or no name server."""
     return isinstance(error, socket.gaierror) or error.errno in _NO_NETWORK
+
+
+def cant_listen(where: str, error: OSError | UnicodeError) -> InputError:
+    """Why no server can listen at ADDRESS:PORT; a NetworkError for what may work later."""
+    if isinstance(error, UnicodeError):
+        return InputError(f"can't listen at {where}: this can't be the name of a host")
+    # asyncio's own text repeats the address. An unknown host name has a negative errno.
+    reason = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror or error
+    kind = NetworkError if may_work_later(error) else InUseError if error.errno == errno.EADDRINUSE else InputError
+    return kind(f"can't listen at {where}: {reason}")
+
+
+def check_port(where: str, kind: socket.SocketKind) -> None:
+    """Raise InputError as `cant_listen` if no server can listen at ADDRESS:PORT: bind sockets to it for a moment."""
+    host, port = parse_address(where, "address", "127.0.0.1:8080")
+    try:
+        for family, _, protocol, _, address in socket.getaddrinfo(host, port, type=kind):
+            with socket.socket(family, kind, protocol) as tried:
+                if kind == socket.SOCK_STREAM:  # as servers do: connections that have just ended do not count
+                    tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                tried.bind(address)
+    except (OSError, UnicodeError) as error:
+        raise cant_listen(where, error) from error
 
 
 def datagram_socket(

@@ -77,7 +77,7 @@ def read_balls(path: Path, radius: float | None, label: str | None, size: Size |
             raise InputError(
                 "the lens file does not have the size of its pictures; add an entry `size: [width, height]`"
             )
-        balls = _read_json(path, radius)
+        balls = _read_json(path, radius, label)
     if not balls:
         raise InputError(f"{path} has no balls" + (f" of class {label}" if label is not None else ""))
     if len({each.is_box for each in balls}) > 1:
@@ -85,17 +85,27 @@ def read_balls(path: Path, radius: float | None, label: str | None, size: Size |
     return balls, size
 
 
-def _read_json(path: Path, radius: float | None) -> list[SeenBall]:
+def _read_json(path: Path, radius: float | None, label: str | None) -> list[SeenBall]:
     try:
         table = json.loads(read_text(path))
     except ValueError as error:
         raise InputError(f"{path} is not JSON: {error}") from error
     if not isinstance(table, dict) or not all(isinstance(each, list) for each in table.values()):
         raise InputError(f'{path} must map names of pictures to lists of balls, as in {{"a.jpg": [{{"cx": 1, ...}}]}}')
-    return [
-        _ball(entry, f"{picture}, ball {index}", radius, path)
+    found = {
+        f"{picture}, ball {index}": entry
         for picture, entries in table.items()
         for index, entry in enumerate(entries, start=1)
+    }
+    classes = sorted({str(each["class"]) for each in found.values() if isinstance(each, dict) and "class" in each})
+    if label is None and len(classes) > 1:
+        raise InputError(f"{path} has the classes {', '.join(classes)}; choose one with --label")
+    if label is not None and label not in classes:
+        raise InputError(unknown("--label", label, classes) if classes else f"{path} has no classes; leave out --label")
+    return [
+        _ball(entry, name, radius, path)
+        for name, entry in found.items()
+        if label is None or (isinstance(entry, dict) and str(entry.get("class")) == label)
     ]
 
 

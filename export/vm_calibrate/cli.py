@@ -66,8 +66,8 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
     balls.add_argument(
         "--label",
         metavar="CLASS",
-        help="class of balls in YOLO files, by its name in the table of names (classes.txt), or by its number without "
-        "a table; default: all boxes",
+        help="class of the balls: in YOLO files its name in the table of names (classes.txt), or its number without a "
+        "table; in a JSON file the entry class; default: all boxes",
     )
     balls.add_argument(
         "--size", metavar="WxH", help="size of the pictures of a JSON file [px]; default: from the lens file"

@@ -28,7 +28,7 @@ def read_kalibr(path: Path, camera: str | None) -> tuple[str, CalibratedLens]:
     try:
         if path.stat().st_size > _LARGEST:
             raise InputError(f"{path} is too large for a Kalibr file; at most {_LARGEST} bytes are allowed")
-        table = read_yaml(path.read_text(encoding="utf-8"))
+        table = read_yaml(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
     except UnicodeDecodeError as error:

@@ -127,7 +127,7 @@ def test_what_is_wrong_is_said(tmp_path, options, words):
 def test_a_lens_does_not_take_the_place_of_the_configuration(tmp_path):
     (tmp_path / "lenses").mkdir()
     (tmp_path / "lenses" / "vm.toml").write_text('projection = "rectilinear"\nfocal_length = 420.0\nfov = 2.0\n')
-    (tmp_path / "robot.toml").write_text('lens = "lenses/vm.toml"\n')
+    (tmp_path / "robot.toml").write_text('lens = "lenses/vm.toml"\n', encoding="utf-8-sig")
     ran = bundle_command("--dist", tmp_path / "dist", "--config", tmp_path / "robot.toml")
     assert ran.returncode == 1
     assert "can't be called vm.toml" in ran.stderr

@@ -68,6 +68,7 @@ def test_equidistant_is_a_fisheye_lens(convert):
 def test_a_file_of_one_camera_needs_no_name(convert):
     one = CAMCHAIN.split("cam1:")[0]
     assert convert(one)[0] == convert(CAMCHAIN, "--camera", "cam0")[0]
+    assert convert("\ufeff" + one)[0] == convert(one)[0]  # as some editors of Windows begin a file
     without_name = "\n".join(line.removeprefix("  ") for line in one.splitlines()[6:])
     assert convert(without_name)[0] == convert(one)[0]
 

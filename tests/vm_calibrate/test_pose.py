@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.vm_embedded.strategies import lenses, reals, seeds
 from vm_calibrate.ball_fit import fit_balls
-from vm_calibrate.balls import SeenBall
+from vm_calibrate.balls import SeenBall, read_balls
 from vm_embedded.cli import detect
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens_files import format_lens_file, read_lens_file
@@ -212,6 +212,10 @@ def test_the_lens_file_may_be_completed_in_place(yolo, capsys):
             "outlines and boxes",
         ),
         ('{"a.jpg": []}', "has no balls"),
+        (
+            '{"a.jpg": [{"cx": 1, "cy": 2, "r_px": 3, "radius": 1, "class": "ball"}, {"class": "robot"}]}',
+            "has the classes ball, robot; choose one with --label",
+        ),
     ],
 )
 def test_a_wrong_file_of_balls_is_one_line(content, problem, tmp_path, capsys):
@@ -222,6 +226,19 @@ def test_a_wrong_file_of_balls_is_one_line(content, problem, tmp_path, capsys):
     assert problem in printed
     assert printed.count("\n") == 1
     assert not (tmp_path / "lens.yaml").exists()
+
+
+def test_the_label_chooses_the_balls_of_a_json_file(tmp_path):
+    ball = {"cx": 1, "cy": 2, "r_px": 3, "radius": 0.1}
+    path = tmp_path / "balls.json"
+    path.write_text(json.dumps({"a.jpg": [{**ball, "class": "ball"}, {"class": "robot"}], "b.jpg": [ball]}))
+    balls, _ = read_balls(path, None, "ball", (640, 480))
+    assert [each.name for each in balls] == ["a.jpg, ball 1"]
+    with pytest.raises(InputError, match=r"unknown --label 'cup' .*ball, robot"):
+        read_balls(path, None, "cup", (640, 480))
+    path.write_text(json.dumps({"a.jpg": [ball]}))
+    with pytest.raises(InputError, match="has no classes; leave out --label"):
+        read_balls(path, None, "ball", (640, 480))
 
 
 def test_options_that_do_not_belong_together_are_errors(tmp_path, capsys):

@@ -64,9 +64,10 @@ def test_images_come_from_ros_and_poses_from_tf_unless_given(words, camera, pose
 
 def test_vm_detect_names_vm_ros_for_topics():
     command = [COMMAND.with_name("vm-detect"), "--camera"]
+    tf = "pose source tf works only with vm-ros and bags; give fixed, stdin, udp: or unix:"
     for words, expected in (
         (["ros"], "camera ros, a topic of ROS, works only with vm-ros"),
-        (["synthetic", "--pose-source", "tf"], "pose source tf works only with vm-ros and bags"),
+        (["synthetic", "--pose-source", "tf"], tf),
     ):
         done = subprocess.run([*command, *words], capture_output=True, text=True, timeout=120, check=False)
         assert reason(done) == expected

@@ -82,7 +82,10 @@ class CameraSettings:
     )
     loop: bool = switch(False, "restart files at their end")
     max_megapixels: float = number(
-        MAX_MEGAPIXELS, "larger images, of a camera or a file, are not decoded", "Mpx", (0.01, 1000)
+        MAX_MEGAPIXELS,
+        "larger images, of a camera or a file, are not decoded; larger frames of videos and streams are rejected",
+        "Mpx",
+        (0.01, 1000),
     )
     max_age_ms: float = number(250.0, "frames older than this are not reported", "ms", (1, 10000))
     lost_ms: float = number(

@@ -17,11 +17,12 @@ import numpy as np
 from ..arrays import Image
 from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
-from ..files import check_regular
+from ..files import check_regular, is_file
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from .decoding import decode
 from .image_header import MAX_MEGAPIXELS
+from .video_size import check_frame, check_video
 
 MESSAGES = "recording.jsonl"
 """The file with the messages of a recording, one line for each image."""
@@ -82,7 +83,7 @@ def open_sources(names: Sequence[str], raw: bool = False, max_megapixels: float 
     paths = _without_companions([Path(each) for each in names])
     kept = set(paths)
     names = [each for each in names if Path(each) in kept]
-    if len(names) > 1 and all(each.is_file() and each.suffix.lower() in IMAGE_SUFFIXES for each in paths):
+    if len(names) > 1 and all(is_file(each) and each.suffix.lower() in IMAGE_SUFFIXES for each in paths):
         return _images(paths, partial(read_image, raw=raw, max_megapixels=max_megapixels))
     return joined([open_source(each, raw, max_megapixels) for each in names])
 
@@ -103,12 +104,13 @@ def open_source(name: str, raw: bool = False, max_megapixels: float = MAX_MEGAPI
     Raises InputError if the source does not exist, contains no images or can't be opened.
     """
     try:
-        return _open(name, Path(name), partial(read_image, raw=raw, max_megapixels=max_megapixels))
+        return _open(name, Path(name), raw, max_megapixels)
     except OSError as error:
         raise InputError(f"can't open {name[:200]}: {error.strerror or error}") from error
 
 
-def _open(name: str, path: Path, read: Callable[[Path], Image]) -> Source:
+def _open(name: str, path: Path, raw: bool, max_megapixels: float) -> Source:
+    read = partial(read_image, raw=raw, max_megapixels=max_megapixels)
     if path.is_dir():
         found = [each for each in path.iterdir() if each.suffix.lower() in IMAGE_SUFFIXES]
         if not found:
@@ -117,7 +119,7 @@ def _open(name: str, path: Path, read: Callable[[Path], Image]) -> Source:
     if path.is_file() and path.suffix.lower() in IMAGE_SUFFIXES:
         return _images([path], read)
     if path.exists() or name.isdigit():
-        return _video(name)
+        return _video(name, max_megapixels)
     if glob.has_magic(name):
         matches = glob.glob(name, recursive=True)  # noqa: PTH207 (the pattern may begin anywhere, at / too)
         found = [Path(each) for each in matches if Path(each).suffix.lower() in IMAGE_SUFFIXES]
@@ -202,7 +204,7 @@ def lens_file_of(image: Path) -> Path | None:
     return next((each for each in beside if each is not None and each.is_file()), None)
 
 
-def _video(name: str) -> Source:
+def _video(name: str, max_megapixels: float) -> Source:
     """The frames of a video file; or of a camera, by number or device path."""
     capture = cv2.VideoCapture(int(name) if name.isdigit() else name)
     live = name.isdigit() or Path(name).is_char_device()
@@ -210,27 +212,40 @@ def _video(name: str) -> Source:
         if live:
             raise InputError(f"can't open camera {name}")
         raise InputError(f"{name} is neither an image ({', '.join(IMAGE_SUFFIXES)}) nor a video that OpenCV can read")
+    try:
+        check_video(capture, max_megapixels)
+    except InputError as error:
+        raise InputError(f"{name} {error}") from error
     count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
     first = _next_image(capture)
     if first is None:
         raise InputError(f"{'camera' if live else 'video'} {name} contains no frames that can be read")
     rate = capture.get(cv2.CAP_PROP_FPS)
     return Source(
-        _frames(capture, first, Path(name)),
+        _frames(capture, first, Path(name), max_megapixels),
         None if live or count <= 0 else count,
         rate if 0.0 < rate < 1e4 else None,
     )
 
 
-def _frames(capture: cv2.VideoCapture, first: Image, path: Path) -> Iterator[Frame]:
+def _frames(capture: cv2.VideoCapture, first: Image, path: Path, max_megapixels: float) -> Iterator[Frame]:
     image: Image | None = first
     index = 0
     while image is not None:
         stamp = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
-        yield Frame(index, path.name, path.stem, partial(np.asarray, image), None, stamp)
+        yield Frame(index, path.name, path.stem, partial(_of_video, image, path.name, max_megapixels), None, stamp)
         image = _next_image(capture)
         index += 1
     capture.release()
+
+
+def _of_video(image: Image, name: str, max_megapixels: float) -> Image:
+    """A frame of a video. Raises InputError if it is too large."""
+    try:
+        check_frame(image, max_megapixels)
+    except InputError as error:
+        raise InputError(f"frame of {name} {error}") from error
+    return image
 
 
 def _next_image(capture: cv2.VideoCapture) -> Image | None:

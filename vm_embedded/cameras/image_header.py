@@ -24,7 +24,11 @@ _NOT_FRAMES = {0xC4, 0xC8, 0xCC}
 
 def check_size(content: bytes, max_megapixels: float = MAX_MEGAPIXELS) -> None:
     """Raise InputError for an image larger than this [Mpx], before it is decoded, and for other content."""
-    width, height = image_size(content)
+    check_pixels(*image_size(content), max_megapixels)
+
+
+def check_pixels(width: int, height: int, max_megapixels: float) -> None:
+    """Raise InputError for more pixels than this [Mpx]."""
     if width * height > 1e6 * max_megapixels:
         raise InputError(
             f"has {width} x {height} px, {1e-6 * width * height:.0f} Mpx; at most {max_megapixels:g} Mpx are decoded"

@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from ..errors import InputError, unknown
+from ..files import exists, is_file
 from .camera import Camera, CameraSettings, without_password
 from .fault import FaultCamera, Faults, FaultScript
 from .files import FileCamera
@@ -32,7 +33,7 @@ def is_live(source: str) -> bool:
     return (
         prefix in ("synthetic", "fault", "gstreamer", ROS)
         or "://" in source
-        or (node is not None and not node.is_file())
+        or (node is not None and not is_file(node))
     )
 
 
@@ -70,7 +71,7 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
         if raw and device_path(source) is None and not source.startswith("gstreamer:"):
             raise InputError(f"camera {without_password(source)} delivers colors: it supports only --format bgr")
         return lambda: OpenCvCamera(settings, raw)
-    if not Path(source).exists():
+    if not exists(Path(source)):
         raise InputError(
             f"no such camera: {without_password(source)!r}; give a device, an address, an existing file or folder, "
             "synthetic, fault:SCRIPT or gstreamer:PIPELINE"

@@ -15,9 +15,11 @@ import cv2
 import numpy as np
 
 from ..errors import InputError
+from ..files import exists
 from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, without_password
 from .decoding import decode_frame
 from .frame_clock import FrameClock
+from .video_size import check_frame, check_video
 
 _OLDEST = 1.0
 """Largest age of a device's own timestamp that is trusted [s]."""
@@ -59,7 +61,7 @@ class OpenCvCamera:
         self._last = -np.inf  # the last timestamp that was trusted
         source = settings.source
         if self._device is not None:
-            if not self._device.exists():
+            if not exists(self._device):
                 raise CameraError(f"there is no camera at {self._device}")
             self._capture = cv2.VideoCapture(str(self._device.resolve()), cv2.CAP_V4L2)
         elif source.startswith("gstreamer:"):
@@ -73,6 +75,11 @@ class OpenCvCamera:
             self._capture.release()
             raise CameraError(f"can't open camera {without_password(source)}")
         self._motion_jpeg = self._device is not None and self._configure()
+        try:
+            check_video(self._capture, settings.max_megapixels)
+        except InputError as error:
+            self._capture.release()
+            raise CameraError(f"camera {without_password(source)} {error}") from error
 
     def _configure(self) -> bool:
         """Request the configured settings from the device; return whether it delivers undecoded JPEGs."""
@@ -100,7 +107,7 @@ class OpenCvCamera:
         arrived = time.monotonic()
         if not good or image is None:
             raise CameraError(f"camera {without_password(self.settings.source)} delivers no frames")
-        if self._device is not None and not self._device.exists():
+        if self._device is not None and not exists(self._device):
             # Some drivers repeat the last frame after the camera was unplugged.
             raise CameraError(f"camera {self._device} was unplugged")
         captured = self._captured(arrived)
@@ -109,7 +116,12 @@ class OpenCvCamera:
             return Shot(decode_frame(content, self._raw, self.settings.max_megapixels), captured, content)
         if image.dtype != np.uint8 or image.size == 0:
             raise BrokenFrameError(f"frame has {image.dtype} values of shape {image.shape}, not an 8-bit image")
-        return Shot(np.asarray(image), captured)
+        frame = np.asarray(image, dtype=np.uint8)
+        try:
+            check_frame(frame, self.settings.max_megapixels)
+        except InputError as error:
+            raise BrokenFrameError(f"frame {error}") from error
+        return Shot(frame, captured)
 
     def _captured(self, arrived: float) -> float:
         """When the frame was taken, in monotonic time [s]: V4L2's timestamp if it is plausible, else what the
@@ -132,10 +144,23 @@ def device_path(source: str) -> Path | None:
     return Path(source) if source.startswith("/dev/") else None
 
 
+def _check_can_be_found(device: Path) -> None:
+    """Raise InputError for a path that is too long or that this user may not look at; it may be missing yet."""
+    try:
+        device.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except OSError as error:
+        raise InputError(f"can't open camera {device}: {error.strerror}") from error
+
+
 def check_opencv_settings(settings: CameraSettings) -> None:
     """Raise InputError for settings that OpenCV can never use."""
     if settings.pixel_format and (len(settings.pixel_format) != 4 or not settings.pixel_format.isascii()):
         raise InputError(f"pixel_format must be four letters such as MJPG, not {settings.pixel_format!r}")
+    device = device_path(settings.source)
+    if device is not None:
+        _check_can_be_found(device)
     if settings.source.startswith("gstreamer:"):
         registry = cv2.videoio_registry  # lists backends that this OpenCV lacks, too
         backends = [registry.getBackendName(each) for each in registry.getBackends() if registry.hasBackend(each)]

@@ -9,10 +9,8 @@ import math
 import os
 import socket
 import struct
-import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -20,15 +18,16 @@ from urllib.parse import urlsplit
 from ..cameras.camera import without_password
 from ..cameras.open_camera import brings_lens_and_pose, is_live
 from ..cameras.opencv import device_path
+from ..cameras.ros.bags import is_bag
 from ..errors import InputError, VisualMeshError, one_line
-from ..geometry.lens import Size
-from ..geometry.radial_lenses import RadialLens
+from ..geometry.lens_doubt import lens_doubt
+from ..geometry.orientation import Orientation
 from ..live.configuration import Configuration
-from ..live.control import control_path
-from ..live.load_detector import prove_network
-from .camera_source import check_source
-
-GOOD, WARNING, BAD = "ok", "warning", "failure"
+from ..live.load_detector import check_height, prove_network
+from ..network.model_file import ModelFile
+from .camera_source import SourceFacts, check_pose_source, check_source
+from .finding import BAD, GOOD, WARNING, Finding
+from .openings import check_openings
 
 OPENCV_PACKAGES = ("opencv-python", "opencv-python-headless", "opencv-contrib-python", "opencv-contrib-python-headless")
 
@@ -49,19 +48,6 @@ _PATIENCE = 3.0
 """How long to wait for the host of a camera [s]."""
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Result of a check.
-
-    about: the checked part. state: GOOD, WARNING or BAD. seen: description. mend: command that fixes it, if any.
-    """
-
-    about: str
-    state: str
-    seen: str
-    mend: str = ""
-
-
 def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator[Finding]:
     """Run all checks, one finding after another. root: folder with proc, sys and dev."""
     try:
@@ -69,19 +55,18 @@ def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator
         yield check_threads(configuration.detector.threads, len(os.sched_getaffinity(0)), os.cpu_count() or 1)
         yield check_governor(root / "sys/devices/system/cpu")
         yield check_opencv({each.name.lower() for each in metadata.distributions() if each.name})
-        yield check_model(configuration)
-        size, fault = None, ""
+        finding, model = check_model(configuration)
+        yield finding
+        source, fault = SourceFacts(), ""
         try:
-            size = check_source(configuration)
+            source = check_source(configuration)
         except VisualMeshError as error:
             fault = str(error)
         yield from check_cameras(configuration, root, fault)
-        yield check_lens(configuration, size)
-        yield check_pose(configuration)
+        yield check_lens(configuration, source)
+        yield check_pose(configuration, source, model)
         yield check_clock(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", time.time())
-        yield check_status_socket(configuration)
-        if configuration.recorder.folder:
-            yield check_recorder(Path(configuration.recorder.folder))
+        yield from check_openings(configuration)
     except OSError as error:
         yield Finding("machine", WARNING, one_line(error))
 
@@ -149,16 +134,19 @@ def check_opencv(installed: set[str]) -> Finding:
     )
 
 
-def check_model(configuration: Configuration) -> Finding:
-    """Whether the model loads, passes its self-tests and finds its canary, in another process."""
+def check_model(configuration: Configuration) -> tuple[Finding, ModelFile | None]:
+    """Whether the model loads, passes its self-tests and finds its canary, in another process; and the model if so."""
     try:
         model, proved = asyncio.run(prove_network(configuration))
     except VisualMeshError as error:
-        return Finding("model", BAD, str(error), "vm-detect --check-config tells whether it works after a change")
+        mend = "vm-detect --check-config tells whether it works after a change"
+        return Finding("model", BAD, str(error), mend), None
     seen = f"{configuration.model}: {proved}, sha256 {model.sha256[:16]}..."
     if model.canary is None:
-        return Finding("model", WARNING, seen, "vm-export --canary IMAGE LENS writes a picture that it must find")
-    return Finding("model", GOOD, seen)
+        return Finding(
+            "model", WARNING, seen, "vm-export --canary IMAGE LENS writes a picture that it must find"
+        ), model
+    return Finding("model", GOOD, seen), model
 
 
 def check_cameras(configuration: Configuration, root: Path, fault: str) -> Iterator[Finding]:
@@ -243,17 +231,31 @@ def pixel_formats(node: Path) -> list[str]:
         os.close(descriptor)
 
 
-def check_lens(configuration: Configuration, size: Size | None) -> Finding:
-    """Whether the lens fits the images. size: of them [px], None if it is not known."""
-    lens, camera = configuration.lens, configuration.camera
-    if configuration.fov is not None:
+def check_lens(configuration: Configuration, source: SourceFacts) -> Finding:
+    """Whether the lens fits the images. source: what is known about them."""
+    camera = configuration.camera.source
+    file = source.lens_file or configuration.lens
+    if source.lens_file is None and configuration.fov is not None:
         return Finding("lens", GOOD, f"{math.degrees(configuration.fov):g} degrees wide, without distortion")
-    if lens is None:
-        if brings_lens_and_pose(camera.source):
-            return Finding("lens", GOOD, f"{camera.source} has its own")
-        state = BAD if is_live(camera.source) else WARNING
+    if file is None:
+        if _brings_lens_and_pose(camera):
+            return Finding("lens", GOOD, f"{camera} has its own")
+        state = BAD if is_live(camera) else WARNING
         return Finding("lens", state, "no lens is configured", "vm-detect --lens FILE, or set lens in vm.toml")
-    if lens.lens.size is None:
+    lens = file.lens
+    size = lens.size or source.size
+    doubt = None if size is None else lens_doubt(lens, size)
+    if doubt is not None:
+        return Finding("lens", WARNING, doubt.seen, doubt.remedy)
+    if source.size is not None:
+        try:
+            lens.for_image(source.size)
+        except VisualMeshError as error:
+            mend = "calibrate at the camera's size, or set [camera] width and height to the lens size"
+            return Finding("lens", BAD, str(error), mend)
+    if source.lens_file is not None:
+        return Finding("lens", GOOD, f"{source.lens_file.path} belongs to the first image")
+    if lens.size is None:
         return Finding(
             "lens",
             WARNING,
@@ -261,57 +263,58 @@ def check_lens(configuration: Configuration, size: Size | None) -> Finding:
             "add it to the lens: size: [width, height] in YAML, size = [width, height] in TOML, image_width and "
             "image_height in a calibration",
         )
-    if isinstance(lens.lens, RadialLens) and _is_position(lens.lens.center, lens.lens.size):
-        return Finding(
-            "lens",
-            WARNING,
-            f"center {list(lens.lens.center)} px is far from the middle of the picture",
-            "center is the picture's middle minus the optical center, [0, 0] if they are the same; correct the lens",
-        )
-    if size is None:
-        return Finding(
-            "lens", GOOD, f"for {lens.lens.size[0]} x {lens.lens.size[1]} px; the camera chooses its own size"
-        )
-    try:
-        lens.lens.for_image(size)
-    except VisualMeshError as error:
-        return Finding(
-            "lens",
-            BAD,
-            str(error),
-            "calibrate at the camera's size, or set [camera] width and height to the lens size",
-        )
-    return Finding("lens", GOOD, f"for {lens.lens.size[0]} x {lens.lens.size[1]} px; fits the camera")
+    fits = "the camera chooses its own size" if source.size is None else "fits the camera"
+    return Finding("lens", GOOD, f"for {lens.size[0]} x {lens.size[1]} px; {fits}")
 
 
-def _is_position(center: tuple[float, float], size: Size) -> bool:
-    """Whether a lens center [px] looks like a position in a picture of a size [px], and not like an offset."""
-    return min(abs(offset) / side for offset, side in zip(center, size, strict=True)) > 0.25
+def check_pose(configuration: Configuration, source: SourceFacts, model: ModelFile | None) -> Finding:
+    """Whether the detector gets the pose of the camera, and whether the object is not too large for it.
 
-
-def check_pose(configuration: Configuration) -> Finding:
-    """Whether the detector gets the pose of the camera."""
-    source = configuration.camera.source
+    source: what is known about the images. model: the network; None if it can't be used.
+    """
+    camera = configuration.camera.source
     if configuration.pose.source != "fixed":
+        try:
+            check_pose_source(configuration)
+        except InputError as error:
+            return Finding("pose", WARNING, str(error), "start vm-ros, or choose another --pose-source")
         return Finding("pose", GOOD, f"from {configuration.pose.source}")
     try:
         orientation = configuration.fixed_orientation()
     except VisualMeshError as error:
         return Finding("pose", BAD, str(error), "vm-detect --height M, or set height in [orientation] of vm.toml")
+    if source.lens_file is not None and source.lens_file.orientation is not None:
+        orientation = source.lens_file.orientation
     if orientation is not None:
-        pitch, roll = (round(math.degrees(each), 1) + 0.0 for each in (orientation.pitch, orientation.roll))
-        seen = f"height {orientation.height:g} m, pitch {pitch:g} deg, roll {roll:g} deg"
-        if orientation.height > _HIGHEST:
-            return Finding("pose", WARNING, f"{seen}: few objects are visible from there", "heights are in meters")
-        return Finding("pose", GOOD, seen)
-    if brings_lens_and_pose(source):
-        return Finding("pose", GOOD, f"{source} has its own")
+        return _check_orientation(orientation, configuration, model)
+    if _brings_lens_and_pose(camera):
+        return Finding("pose", GOOD, f"{camera} has its own")
     return Finding(
         "pose",
-        BAD if is_live(source) else WARNING,
+        BAD if is_live(camera) else WARNING,
         "no pose of the camera is configured",
         "vm-detect --height M --pitch ANGLE, or --pose-source; or set them in vm.toml",
     )
+
+
+def _check_orientation(orientation: Orientation, configuration: Configuration, model: ModelFile | None) -> Finding:
+    pitch, roll = (round(math.degrees(each), 1) + 0.0 for each in (orientation.pitch, orientation.roll))
+    seen = f"height {orientation.height:g} m, pitch {pitch:g} deg, roll {roll:g} deg"
+    if orientation.height > _HIGHEST:
+        return Finding("pose", WARNING, f"{seen}: few objects are visible from there", "heights are in meters")
+    try:
+        if model is not None:
+            check_height(orientation, configuration.detector, model)
+    except InputError as error:
+        return Finding(
+            "pose", BAD, str(error), "measure the height of the camera, and the radius (not the diameter) of the object"
+        )
+    return Finding("pose", GOOD, seen)
+
+
+def _brings_lens_and_pose(source: str) -> bool:
+    """Whether a source, live or not, needs no configured lens and pose."""
+    return brings_lens_and_pose(source) or is_bag(source)
 
 
 def check_clock(source: Path, now: float) -> Finding:
@@ -330,28 +333,3 @@ def check_clock(source: Path, now: float) -> Finding:
     if name in ("hpet", "acpi_pm"):
         return Finding("clock", WARNING, f"{name} is slow to read", "boot with clocksource=tsc")
     return Finding("clock", GOOD, f"clock source {name}")
-
-
-def check_status_socket(configuration: Configuration) -> Finding:
-    """Whether the status socket can be created."""
-    try:
-        path = control_path(configuration.status.socket)
-    except InputError as error:
-        return Finding("status socket", BAD, str(error), "ls -ld /tmp/vm-detect-$(id -u)")
-    if not path.parent.exists() and path.parent == Path(os.environ.get("RUNTIME_DIRECTORY", "")):
-        return Finding("status socket", GOOD, f"{path}; systemd creates its folder")
-    if not os.access(path.parent, os.W_OK):
-        return Finding("status socket", BAD, f"can't write to {path.parent}", f"sudo install -d -o $USER {path.parent}")
-    return Finding("status socket", GOOD, str(path))
-
-
-def check_recorder(folder: Path) -> Finding:
-    """Whether recordings can be written to their folder, which may not exist yet."""
-    existing = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
-    try:
-        with tempfile.TemporaryDirectory(dir=existing):
-            pass
-    except OSError as error:
-        seen = f"can't write to {existing}: {error.strerror or error}"
-        return Finding("recorder", BAD, seen, f"sudo install -d -o $USER {folder}")
-    return Finding("recorder", GOOD, str(folder))

@@ -25,8 +25,10 @@ from ..live.daemon import Daemon
 from ..live.load_detector import prove_model
 from ..live.log import EventLog
 from ..network.bundled import SHIPPED, shipped_name
-from .camera_source import check_source
+from .camera_source import check_pose_source, check_source
 from .detect_files import complain, detect_in_files
+from .finding import BAD
+from .openings import check_openings
 from .options import ANGLES, LIVE, add_live, add_model, add_pose, add_settings, add_track, read_options
 from .program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
 from .run_daemon import report_failed_start, run_daemon
@@ -216,8 +218,12 @@ def _ask(socket: str, command: str) -> int:
 
 
 def _check_configuration(given: Configuration) -> int:
-    """Check the configuration, the source of its camera, and the model. Raises VisualMeshError."""
+    """Check the configuration, the source of its camera, what it opens, and the model. Raises VisualMeshError."""
     check_source(given)
+    check_pose_source(given)
+    for finding in check_openings(given):
+        if finding.state == BAD:
+            raise InputError(f"{finding.about}: {finding.seen}")
     model, proved = asyncio.run(prove_model(given))
     print(f"{given.model}: {len(model.manifest.classes)} classes, {proved}; the configuration is good")
     return EXIT_OK

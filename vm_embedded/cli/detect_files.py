@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 
@@ -33,8 +33,8 @@ from ..output.messages import file_message
 from ..output.result_files import FrameNames, make_folder, save_overlay, save_points
 from ..output.ros.mcap_file import McapFile
 from ..output.video_file import VideoFile
+from .closing_remarks import ClosingRemarks
 from .progress import ProgressBar
-from .size_hint import size_hint, size_ratios
 
 _IMAGES_RATE = 10.0
 """Frame rate of a video of images [1/s]."""
@@ -66,9 +66,9 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
             mcap = stack.enter_context(McapFile(options.save_mcap, given.ros.plane_frame))
         if options.save_video is not None:
             video = stack.enter_context(VideoFile(options.save_video, source.rate or _IMAGES_RATE))
-        work = _Pass(detector, pose, follow, options, emit_points, boxes, mcap, video)
+        work = _Pass(detector, pose, follow, options, emit_points, boxes, mcap, video, ClosingRemarks(detector))
         _process_all(source, work)
-    for remark in work.remarks():
+    for remark in filter(None, (work.replaced, *work.remarks.lines())):
         complain(remark)
     return work.processed
 
@@ -167,9 +167,8 @@ def _object_classes(detector: Detector) -> tuple[str, ...]:
 class _Pass:
     """All that a pass over the frames needs.
 
-    boxes, mcap, video: the files that the options ask for. processed: number of frames so far. points: number of mesh
-    points in them. sizes: of the objects in them, relative to the expected size. replaced: the first remark about what
-    a lens file replaces.
+    boxes, mcap, video: the files that the options ask for. remarks: collects what is strange. processed: number of
+    frames so far. replaced: the first remark about what a lens file replaces.
     """
 
     detector: Detector
@@ -180,10 +179,9 @@ class _Pass:
     boxes: BoxWriter | None
     mcap: McapFile | None
     video: VideoFile | None
+    remarks: ClosingRemarks
     names: FrameNames = field(default_factory=FrameNames)
     processed: int = 0
-    points: int = 0
-    sizes: list[float] = field(default_factory=list)
     replaced: str = ""
 
     def process(self, frame: Frame) -> str:
@@ -200,22 +198,13 @@ class _Pass:
         self.processed += 1
         return line
 
-    def remarks(self) -> Iterator[str]:
-        """What the user should know after the last frame."""
-        if self.replaced:
-            yield self.replaced
-        if self.detector.look is not None:  # without one, sizes are as coarse as the mesh
-            yield from filter(None, [size_hint(self.sizes, self.detector.manifest.object_radius)])
-        if self.processed and not self.points:
-            yield "no frame shows a near part of the plane: check --height [m], --pitch (down is above 0), and lens"
-
     def _detect(self, image: Image, frame: Frame) -> str:
         options, name = self.options, self.names.of(frame)
-        lens, orientation = self.pose.of(frame, (image.shape[1], image.shape[0]))
+        size = image.shape[1], image.shape[0]
+        lens, orientation = self.pose.of(frame, size)
         explain = options.explain or self.boxes is not None
         detections = self.detector.detect(image, orientation, lens, explain=explain)
-        self.points += len(detections.pixels)
-        self.sizes += size_ratios(detections)
+        self.remarks.add(frame.source, lens, size, detections)
         if self.follow is not None:
             detections = self.follow.tracker.update(detections, self.follow.time(frame))
         if self.boxes is not None:

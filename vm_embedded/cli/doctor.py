@@ -10,7 +10,8 @@ from dataclasses import asdict
 
 from ..cameras.library_messages import silence_opencv
 from ..errors import VisualMeshError
-from .checks import BAD, Finding, run_checks
+from .checks import run_checks
+from .finding import BAD, Finding
 from .options import add_live, add_model, add_pose, add_settings, read_options
 from .program import EXIT_FAILED, EXIT_OK, Parser, program
 
@@ -19,7 +20,8 @@ def parser() -> argparse.ArgumentParser:
     """The command line of vm-doctor; it has the options of vm-detect, whose configuration it checks."""
     parser = Parser(
         prog="vm-doctor",
-        description="Check processor, packages, model, camera, lens and clock, and say how to fix problems.",
+        description="Check processor, packages, model, camera, lens, pose, outputs and clock, and say how to fix "
+        "problems.",
         epilog="Exit status: 0 no failure (there may be warnings), 1 at least one failure, 2 wrong usage.",
     )
     parser.add_argument("--camera", metavar="SOURCE", help="as for vm-detect")

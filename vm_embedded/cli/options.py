@@ -16,6 +16,7 @@ from ..cameras.ros.settings import RosSettings
 from ..config.entries import EntryError, checked
 from ..detection.settings import Settings
 from ..errors import InputError
+from ..files import is_file
 from ..geometry.lens_files import read_lens_file
 from ..live.configuration import (
     Configuration,
@@ -182,7 +183,7 @@ def _recording_configuration(source: str | None) -> Path | None:
     if source is None or is_live(source):
         return None
     folder = Path(source)
-    is_recording = (folder / MESSAGES).is_file() and (folder / CONFIGURATION).is_file()
+    is_recording = is_file(folder / MESSAGES) and is_file(folder / CONFIGURATION)
     return folder / CONFIGURATION if is_recording else None
 
 

@@ -112,7 +112,7 @@ def parse_overrides(given: Sequence[str], example: str) -> dict[str, dict[str, A
 def _read_text(path: Path, noun: str) -> str:
     try:
         check_regular(path)
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise InputError(f"can't read {noun} {path}: {error.strerror or error}") from error
     except UnicodeDecodeError as error:

@@ -30,7 +30,7 @@ def write_entries(path: Path, section: str, entries: Mapping[str, Any]) -> None:
 def _edited_file(path: Path, section: str, entries: Mapping[str, Any]) -> str:
     """The new text of a file, checked to have the new entries and to keep all others."""
     try:
-        text = path.read_bytes().decode("utf-8") if path.exists() else ""
+        text = path.read_bytes().decode("utf-8-sig") if path.exists() else ""
         before = parse_toml(text)
     except UnicodeDecodeError as error:
         raise InputError(f"configuration {path} is not a text file") from error

@@ -21,6 +21,7 @@ from ..network.look_contract import LookContract
 from .judging import repeated
 from .observation import Observation
 from .patches import Tangents, apparent_radii, cut_patches, patch_nodes
+from .prepared_view import PreparedView
 from .proposals import propose_places
 from .settings import Settings
 from .stopwatch import Stopwatch
@@ -59,6 +60,9 @@ _EARLIER = 0.3
 
 _SUREST = 1.0 - 1e-6
 """Limit of a probability: one that is rounded to 1 would outvote all others in a mean, and pass a threshold of 1."""
+
+_NEAR = 0.3
+"""Places within this share of an object's radius around its center were meant to be its center."""
 
 _LARGEST_SIZE = 3.0
 """Limit of the logarithm of a size: with a bad network, math.exp would overflow, and JSON has no infinity."""
@@ -272,7 +276,20 @@ def _judged(
             reason = repeated(view, center, kept)
         if reason is None:
             kept.append(center)
+            center = mean_center(view, centers, answers[:, 0], number)
         if reason is None or explain:
             scale = math.exp(min(max(log_size, -_LARGEST_SIZE), _LARGEST_SIZE))
             judged.append(Judgment(center, probability, scale, reason))
     return judged
+
+
+def mean_center(view: PreparedView, centers: Floats, probabilities: Singles, number: int) -> Floats:
+    """The center (3,) [m] of an object at a place: the mean of all places (c, 3) [m] near it, weighted by their
+    probabilities (c,).
+
+    Several proposals move to the same object, each with an error of its own. number: of the place.
+    """
+    rays = centers / np.linalg.norm(centers, axis=1, keepdims=True)
+    near = view.shape.covers(rays, centers[[number]], view.height, _NEAR)[0]
+    near[number] = True  # also where it is too far away to tell by digits
+    return np.asarray(view.shape.center_along(((near * probabilities) @ rays)[None], view.height)[0])

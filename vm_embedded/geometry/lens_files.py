@@ -65,7 +65,7 @@ def read_lens_file(path: str | Path) -> LensFile:
         check_regular(path)
         if path.stat().st_size > _LARGEST:
             raise InputError(f"{path} is too large for a lens file; at most {_LARGEST} bytes are allowed")
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"lens file {path} is not a text file") from error
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte

@@ -79,6 +79,7 @@ class Answerer:
             return None
         if self._refuse_late(shot):
             return None
+        self._report_height(orientation, detections)
         now = time.monotonic()
         self._health.add_answer(now, now - shot.arrived)
         self._counters.add_answer(detections, time.perf_counter() - started, now - shot.captured)
@@ -97,6 +98,16 @@ class Answerer:
         self._counters.outcomes.late += 1
         self._health.add_trouble(time.monotonic(), f"frame is {1e3 * age:.0f} ms old, allowed are {limit:g} ms")
         return True
+
+    def _report_height(self, orientation: Orientation, detections: Detections) -> None:
+        """Report a height that keeps the whole mesh out of view."""
+        reach = self.detector.manifest.max_distance
+        if not len(detections.pixels) and orientation.height > reach:
+            self._health.add_trouble(
+                time.monotonic(),
+                f"the camera's height is {orientation.height:g} m, but the mesh ends at a distance of {reach:g} m: "
+                "heights are in meters",
+            )
 
     def _lens(self, shot: Shot) -> Lens:
         """The shot's own lens, or the configured one. Raises InputError."""

@@ -12,6 +12,7 @@ import asyncio
 import json
 import math
 import os
+import re
 import signal
 import sys
 import time
@@ -21,13 +22,11 @@ from typing import Any, Protocol
 
 from ..cameras.camera import without_password
 from ..cameras.grabber import Grabber
-from ..cameras.open_camera import camera_opener
 from ..detection.detector import Detector
 from ..errors import InputError, NetworkError, VisualMeshError, one_line
 from ..output.channels import Channels
 from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
-from ..poses.settings import is_of_ros
 from ..poses.stream import PoseStream
 from ..sockets import is_open_to_network
 from .answering import Answer, Answerer
@@ -35,10 +34,12 @@ from .bridge import Bridge
 from .configuration import Configuration, recording_files
 from .control import REFUSED, ControlServer, control_path
 from .counters import Counters
+from .frame_remarks import FrameRemarks
 from .frame_watchdog import FrameWatchdog
+from .free_memory import give_back_memory
 from .health import Health
 from .live_page import LivePage
-from .load_detector import load_checked_detector
+from .load_detector import find_opener, load_checked_detector
 from .log import EventLog
 from .prometheus import resident_bytes
 from .reloading import read_again
@@ -104,6 +105,7 @@ class Daemon:
         self.last: Message | None = None
         self.counters = Counters()
         self.state, self.reason = "", ""
+        self._logged = ""  # the reason in the log
         self.health = Health(1e-3 * camera.lost_ms, (1e-3 * status.budget_ms) or math.inf)
         self._rejected = 0  # frames of the camera that were rejected
         self._sent = 0.0  # when the last message was sent
@@ -113,11 +115,11 @@ class Daemon:
         self._stuck = ""  # why only a new process helps; empty if none is needed
         self._wakeup = asyncio.Event()
         self._reloading: asyncio.Task[None] | None = None
-        opener = (bridge.opener if bridge else camera_opener)(camera, configuration.detector.format != "bgr")
-        self.grabber = Grabber(opener, camera, self._wake)
+        self.grabber = Grabber(find_opener(configuration, bridge), camera, self._wake)
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
         self._watchdog = FrameWatchdog(self._end_hanging)
         self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health, self._watchdog)
+        self._remarks = FrameRemarks()
         self._recording_files = recording_files(configuration, detector.session.model)
         self.outputs = Channels(configuration.output)
         self.page = LivePage(self.answerer, self._status, self.record, self.metrics, self._use_threshold)
@@ -132,8 +134,7 @@ class Daemon:
     ) -> Daemon:
         """A daemon whose configuration was read and whose detector was proved. Raises VisualMeshError."""
         configuration = configure()
-        if bridge is None and is_of_ros(configuration.pose.source):
-            raise InputError(f"pose source {configuration.pose.source} works only with vm-ros and bags")
+        find_opener(configuration, bridge)  # only for its checks, before the longer ones
         detector, proved = await load_checked_detector(configuration)
         return cls(configure, configuration, detector, proved, log, bridge)
 
@@ -253,8 +254,12 @@ class Daemon:
         """Send an answer to the outputs, and hand it to the status page and the recorder."""
         self._update_state()
         shot, detections = answer.shot, answer.detections
-        self.last = live_message(self.counters.outcomes.frames, self.state, shot, detections, answer.time)
+        # The camera may be lost while its last frame is processed; a frame that says so would contradict itself.
+        state = "degraded" if self.state == "camera_lost" else self.state
+        self.last = live_message(self.counters.outcomes.frames, state, shot, detections, answer.time)
         self._send(self.last, answer)
+        for event, reason in self._remarks.about(answer):
+            self._log(event, "warning", reason=reason)
         self.page.show(answer)
         self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._recording_files)
 
@@ -262,7 +267,7 @@ class Daemon:
         self.health.add_trouble(time.monotonic(), reason)
 
     def _update_state(self) -> None:
-        """Determine the state; if it has changed, log and send it."""
+        """Determine the state; if it has changed, log and send it. Log another reason of a bad state, too."""
         now = time.monotonic()
         lost = self.grabber.supervise(now)
         if self.outputs.failure:
@@ -273,12 +278,17 @@ class Daemon:
             self.health.add_trouble(now, self.grabber.trouble)
         state, reason = self.health.state(now, lost, self.grabber.trouble)
         self.reason = reason
+        is_bad = state not in ("ok", "starting", "stopping")
         if state != self.state:
-            level = "info" if state in ("ok", "starting", "stopping") else "warning"
-            self._log("state", level, state=state, was=self.state, reason=reason)
+            self._log("state", "warning" if is_bad else "info", state=state, was=self.state, reason=reason)
             self.state = state
             self._send(state_message(state, reason))
-            self._notifier.send(STATUS=f"{state}{': ' if reason else ''}{reason}")
+        elif is_bad and _without_numbers(reason) != _without_numbers(self._logged):
+            self._log("reason", "warning", state=state, reason=reason)
+        else:
+            return
+        self._logged = reason
+        self._notifier.send(STATUS=f"{state}{': ' if reason else ''}{reason}")
 
     def _send(self, message: Message, answer: Answer | None = None) -> None:
         self._sent = time.monotonic()
@@ -330,7 +340,11 @@ class Daemon:
             self._loop.call_soon_threadsafe(self._wakeup.set)
 
     def _start_reload(self) -> None:
-        """Begin a reload, instead of one that has not ended."""
+        """Begin a reload, instead of one that has not ended, and open the output file again."""
+        try:
+            self.outputs.reopen_file()
+        except InputError as error:
+            self._log("output file not opened again", "warning", reason=str(error))
         if self._reloading is not None:
             self._reloading.cancel()
         self._reloading = self._loop.create_task(self._reload())
@@ -338,13 +352,16 @@ class Daemon:
     async def _reload(self) -> None:
         """Read the configuration and the model again. If anything is wrong, nothing changes."""
         try:
-            new = await read_again(self._configure, self.configuration)
-        except VisualMeshError as error:
-            self._log("reload refused", "error", reason=str(error))
+            new = await read_again(self._configure, self.configuration, self._bridge)
+        except Exception as error:  # noqa: BLE001 (nobody else would hear of it)
+            reason = str(error) if isinstance(error, VisualMeshError) else one_line(error)
+            self._log("reload refused", "error", reason=reason)
             return
         self.recorder.clear()
         self.answerer.reload(new.configuration, new.detector)
+        self._remarks = FrameRemarks()
         self._recording_files = new.recording_files
+        give_back_memory()
         self._log("reloaded", model=new.configuration.model, proved=new.proved, needs_restart=new.needs_restart)
 
     def _stop(self) -> None:
@@ -373,3 +390,8 @@ class Daemon:
         await self.recorder.close(_RECORDING_S)
         self.grabber.stop(0.3)
         self._notifier.close()
+
+
+def _without_numbers(reason: str) -> str:
+    """What a reason says, whatever its times and sizes."""
+    return re.sub(r"\d", "", reason)

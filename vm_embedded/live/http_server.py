@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import asyncio
 import hmac
-import os
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from ipaddress import ip_address
 from urllib.parse import parse_qsl
 
-from ..errors import InputError, NetworkError, VisualMeshError
-from ..sockets import BACKLOG, Connections, UnixListener, may_work_later, parse_address
+from ..errors import VisualMeshError
+from ..sockets import BACKLOG, Connections, UnixListener, cant_listen, parse_address
 
 _TIMEOUT = 5.0
 """How long a browser may take to send its request, and to receive each part of the response [s]."""
@@ -80,13 +79,8 @@ class HttpServer:
         host, port = parse_address(self._where, self._option, "127.0.0.1:8080")
         try:
             self._server = await asyncio.start_server(self._serve, host, port, limit=8192)
-        except OSError as error:
-            # asyncio's own text repeats the address. An unknown host name has a negative errno.
-            reason = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror or error
-            kind = NetworkError if may_work_later(error) else InputError
-            raise kind(f"can't listen at {self._where}: {reason}") from error
-        except UnicodeError as error:
-            raise InputError(f"can't listen at {self._where}: {host!r} can't be the name of a host") from error
+        except (OSError, UnicodeError) as error:
+            raise cant_listen(self._where, error) from error
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if not self._connections.admit(writer):

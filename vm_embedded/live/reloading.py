@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 from ..detection.detector import Detector
 from ..errors import InputError
+from .bridge import Bridge
 from .configuration import Configuration, recording_files
-from .load_detector import check_camera, load_checked_detector
+from .load_detector import check_camera, check_trigger_class, find_opener, prove_model
 
 _NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder", "ros")
 """Sections that a reload does not change."""
@@ -30,10 +31,13 @@ class Reloaded:
     needs_restart: list[str]
 
 
-async def read_again(configure: Callable[[], Configuration], running: Configuration) -> Reloaded:
+async def read_again(
+    configure: Callable[[], Configuration], running: Configuration, bridge: Bridge | None = None
+) -> Reloaded:
     """Read the configuration and load its network. running: the current configuration. Raises VisualMeshError.
 
-    The running detector waits only while the network is loaded, after another process has proved it.
+    What was read must work with the sections of the running one, and also at the next start. The running detector waits
+    only while the network is loaded, after another process has proved it.
     """
     wanted = configure()
     kept = {name: getattr(running, name) for name in _NEEDS_RESTART}
@@ -43,13 +47,14 @@ async def read_again(configure: Callable[[], Configuration], running: Configurat
     if wanted.detector.format != running.detector.format:
         needs_restart.append("detector.format")
     configuration = replace(wanted, detector=detector_settings, **kept)
+    find_opener(wanted, bridge)
     check_camera(wanted)
     try:
-        detector, proved = await load_checked_detector(configuration)
+        model, proved = await prove_model(configuration)
     except InputError as error:
         if not needs_restart:
             raise
         raise InputError(f"{error} (only a restart changes {', '.join(needs_restart)})") from error
-    return Reloaded(
-        configuration, detector, proved, recording_files(configuration, detector.session.model), needs_restart
-    )
+    check_trigger_class(wanted, model)
+    detector = Detector(model, configuration.detector)
+    return Reloaded(configuration, detector, proved, recording_files(configuration, model), needs_restart)

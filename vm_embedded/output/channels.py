@@ -78,6 +78,7 @@ class Channels:
         self.settings = settings
         self._line_channels: list[Channel] = []
         self._binary_channels: list[Channel] = []
+        self._file: DescriptorChannel | None = None
 
     async def open(self) -> None:
         """Create sockets and open files. Raises InputError."""
@@ -88,7 +89,8 @@ class Channels:
                     raise InputError("standard output is closed; use --no-output-stdout")
                 self._line_channels.append(DescriptorChannel(os.dup(sys.stdout.fileno()), backlog))
             if settings.file:
-                self._line_channels.append(DescriptorChannel(_open_to_append(settings.file), backlog))
+                self._file = DescriptorChannel(_open_to_append(settings.file), backlog)
+                self._line_channels.append(self._file)
             for each in filter(None, settings.udp.split(",")):
                 self._line_channels.append(DatagramChannel(each))
             if settings.unix:
@@ -122,6 +124,11 @@ class Channels:
             encoded = to_binary(message)
             for each in self._binary_channels:
                 each.send(encoded)
+
+    def reopen_file(self) -> None:
+        """Open the file again, after another program has moved or deleted it. Raises InputError; the old one stays."""
+        if self._file is not None:
+            self._file.replace(_open_to_append(self.settings.file))
 
     async def close(self) -> None:
         """Close all channels."""
@@ -161,6 +168,11 @@ class DescriptorChannel:
             return
         self._accepted += len(line)
         self._lines.put(line)
+
+    def replace(self, descriptor: int) -> None:
+        """Write to another file from now on; its descriptor is closed."""
+        os.dup2(descriptor, self._descriptor, inheritable=False)  # at once, although the thread may be writing
+        os.close(descriptor)
 
     def _write(self) -> None:
         torn = False

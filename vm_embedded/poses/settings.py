@@ -16,9 +16,10 @@ UDP_EXAMPLE = "0.0.0.0:5600"
 """Address to receive poses at, for error messages."""
 
 
-def is_of_ros(source: str) -> bool:
-    """Whether poses come from ROS: from tf, or from a topic."""
-    return source == "tf" or source.startswith("topic:")
+def check_without_ros(source: str) -> None:
+    """Raise InputError for poses from ROS: from tf, or from a topic."""
+    if source == "tf" or source.startswith("topic:"):
+        raise InputError(f"pose source {source} works only with vm-ros and bags; give fixed, stdin, udp: or unix:")
 
 
 def _checked_source(field: Field[Any], value: object) -> str:

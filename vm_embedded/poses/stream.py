@@ -20,6 +20,9 @@ from .settings import UDP_EXAMPLE, PoseSettings
 _OLDEST, _EARLY = 10.0, 0.05
 """Largest age of a pose, and how far in the future it may be [s]: until then, it would keep out all good poses."""
 
+_MOST_LINES = 64
+"""Lines of a datagram that are read: it may have 32,000, and frames wait meanwhile."""
+
 Report = Callable[[str], None]
 """Gets the reason why a pose was rejected."""
 
@@ -57,7 +60,7 @@ class PoseStream:
         elif kind == "udp":
             host, port = parse_address(rest, "pose source", UDP_EXAMPLE)
             listening, _ = datagram_socket(host, port, "can't receive poses at", listen=True)
-            transport, _ = await loop.create_datagram_endpoint(lambda: _Datagrams(self.take), sock=listening)
+            transport, _ = await loop.create_datagram_endpoint(lambda: _Datagrams(self), sock=listening)
             self._transports.append(transport)
         elif self.settings.source == "stdin":
             if sys.stdin is None or not _is_waitable(sys.stdin.fileno()):
@@ -90,6 +93,7 @@ class PoseStream:
             while line := await self._read_line(reader):
                 if self.take(line):
                     at_pose()
+                await asyncio.sleep(0)  # readline only yields if its buffer has no line: a flood would stop the frames
 
     async def _read_line(self, reader: asyncio.StreamReader) -> bytes:
         try:
@@ -135,7 +139,7 @@ class PoseStream:
         if self.settings.clock == "arrival" or t is None:
             return now - 1e-3 * self.settings.latency_ms
         if self.settings.clock == "wall":
-            t += now - time.time()
+            t += time.monotonic() - time.time()  # read together: `now` is from before the parsing
         if not now - _OLDEST < t < now + _EARLY:
             raise InputError(
                 f"t of the pose is {t - now:+.3g} s from now on the {self.settings.clock} clock; "
@@ -164,11 +168,14 @@ def _is_waitable(descriptor: int) -> bool:
 
 
 class _Datagrams(asyncio.DatagramProtocol):
-    """Passes on each line of each datagram."""
+    """Passes on the lines of each datagram."""
 
-    def __init__(self, take: Callable[[bytes], bool]) -> None:
-        self._take = take
+    def __init__(self, stream: PoseStream) -> None:
+        self._stream = stream
 
     def datagram_received(self, data: bytes, _: object) -> None:
-        for line in data.splitlines():
-            self._take(line)
+        lines = data.split(b"\n", _MOST_LINES)
+        for line in lines[:_MOST_LINES]:
+            self._stream.take(line)
+        if any(lines[_MOST_LINES:]):
+            self._stream.reject(f"datagram has more than {_MOST_LINES} lines")

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from tests.messages import read_message
-from tests.vm_embedded.live.running import DEMO, LENS, arguments, running
+from tests.vm_embedded.live.running import COMMAND, DEMO, LENS, arguments, running
+from vm_embedded.cameras import image_files
 from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cameras.grabber import same_image
 from vm_embedded.cameras.open_camera import camera_opener
 from vm_embedded.cameras.synthetic import SIZE, SyntheticCamera
+from vm_embedded.errors import InputError
 
 
 @pytest.mark.long
@@ -38,6 +40,39 @@ def test_a_video_is_played_at_its_rate_again_and_again(tmp_path):
     with running(tmp_path, "--config", tmp_path / "vm.toml", "--camera", path, "--live") as found:
         assert found.process.wait(60) == 0
     assert 0 < len(found.frames) <= 10
+
+
+@pytest.fixture
+def video(tmp_path):
+    """A video of three frames."""
+    path = tmp_path / "field.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
+    for at in range(3):
+        writer.write(SyntheticCamera(CameraSettings()).draw(at / 25.0))
+    writer.release()
+    return path
+
+
+def test_attack_2_a_video_of_large_frames_is_refused(video, tmp_path):
+    options = (video, "--camera-max-megapixels", "0.1", "--fov", "70deg", "--height", "0.6")
+    done = subprocess.run([COMMAND, *options], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert f"{video} has 640 x 512 px" in done.stderr
+    assert done.stderr.count("\n") == 1
+    with running(tmp_path, *options, "--live") as found:
+        found.wait_for_state("camera_lost")
+        found.wait(lambda: any("has 640 x 512 px" in each.get("reason", "") for each in found.messages))
+        found.stop()
+    assert found.frames == []
+
+
+def test_attack_2_a_frame_larger_than_the_video_said_is_left_out(monkeypatch, video):
+    monkeypatch.setattr(image_files, "check_video", lambda *given: None)
+    frames = list(image_files.open_source(str(video), max_megapixels=0.1).frames)
+    assert len(frames) == 3
+    with pytest.raises(InputError, match=r"frame of field\.avi has 640 x 512 px"):
+        frames[0].read()
 
 
 def test_files_may_be_played_as_a_camera_gives_them_and_end(tmp_path):

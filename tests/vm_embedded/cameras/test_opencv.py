@@ -32,7 +32,8 @@ class Capture:
         return True
 
     def get(self, name):
-        return cv2.VideoWriter.fourcc(*"MJPG") if name == cv2.CAP_PROP_FOURCC else 1e3 * self.stamp
+        known = {cv2.CAP_PROP_FOURCC: cv2.VideoWriter.fourcc(*"MJPG"), cv2.CAP_PROP_POS_MSEC: 1e3 * self.stamp}
+        return known.get(name, 0.0)
 
     def read(self):
         frame = next(self.frames, None)
@@ -134,6 +135,26 @@ def test_an_address_is_read_through_ffmpeg(tmp_path):
     camera.close()
     with pytest.raises(CameraError, match="can't open"):
         OpenCvCamera(CameraSettings(source=f"file://{tmp_path / 'none.avi'}"))
+
+
+def test_attack_2_a_stream_of_large_frames_is_not_decoded(tmp_path):
+    path = tmp_path / "field.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
+    writer.write(SyntheticCamera(CameraSettings()).draw(0.0))
+    writer.release()
+    with pytest.raises(CameraError, match=r"field\.avi has 640 x 512 px.*at most 0\.1 Mpx"):
+        OpenCvCamera(CameraSettings(source=f"file://{path}", max_megapixels=0.1))
+
+
+def test_attack_2_a_frame_larger_than_the_stream_said_is_rejected(monkeypatch):
+    monkeypatch.setattr(camera_opencv.cv2, "VideoCapture", Capture)
+    camera = OpenCvCamera(CameraSettings(source="rtsp://a/b", max_megapixels=0.1))
+    small, large = (np.zeros((side, side, 3), np.uint8) for side in (300, 400))
+    Capture.made.frames = iter([small, large, small])
+    camera.read()
+    with pytest.raises(BrokenFrameError, match="frame has 400 x 400 px"):
+        camera.read()
+    camera.read()
 
 
 def test_names_of_devices():

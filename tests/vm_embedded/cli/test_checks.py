@@ -8,11 +8,26 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.drawn_scenes import FOLDER
 from vm_embedded.cameras.camera import CameraSettings
-from vm_embedded.cli.checks import BAD, GOOD, WARNING, check_clock, check_opencv, check_threads, run_checks
-from vm_embedded.geometry.lens_files import LensFile
-from vm_embedded.geometry.radial_lenses import Equisolid
+from vm_embedded.cli.camera_source import SourceFacts, check_source
+from vm_embedded.cli.checks import (
+    BAD,
+    GOOD,
+    WARNING,
+    check_clock,
+    check_lens,
+    check_opencv,
+    check_pose,
+    check_threads,
+    run_checks,
+)
+from vm_embedded.detection.settings import Settings
+from vm_embedded.geometry.lens_files import LensFile, format_lens_file
+from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.live.configuration import Configuration, FixedPose, StatusSettings
+from vm_embedded.network.bundled import model_path
+from vm_embedded.network.model_file import read_model
 from vm_embedded.output.recorder import RecorderSettings
 from vm_embedded.poses.settings import PoseSettings
 
@@ -153,6 +168,51 @@ def test_a_lens_center_that_is_a_position_is_seen(root):
     finding = found(replace(HEALTHY, lens=LensFile(lens, None)), root)["lens"]
     assert finding.state == WARNING
     assert "center [650.0, 500.0] px is far from the middle" in finding.seen
+
+
+def test_a_lens_in_other_units_is_seen():
+    millimeters = Rectilinear(focal_length=3.6, fov=1.66, size=(1280, 1024))
+    for lens in (millimeters, replace(millimeters, size=None)):
+        finding = check_lens(replace(HEALTHY, lens=LensFile(lens, None)), SourceFacts((640, 512)))
+        assert (finding.state, "a circle of 7.8" in finding.seen, "not in mm" in finding.mend) == (WARNING, True, True)
+
+
+def test_pictures_with_lens_files_bring_lens_and_pose(root):
+    seen = found(Configuration(camera=CameraSettings(source=str(FOLDER))), root)
+    assert [seen[name].state for name in ("camera", "lens", "pose")] == [GOOD, GOOD, GOOD]
+    assert "lens0000000.yaml belongs to the first image" in seen["lens"].seen
+    assert seen["pose"].seen.startswith("height 0.")
+
+
+def test_lens_files_without_a_pose_need_one(root, tmp_path):
+    cv2.imwrite(str(tmp_path / "image7.png"), np.zeros((512, 640, 3), dtype=np.uint8))
+    (tmp_path / "lens7.yaml").write_text(format_lens_file(HEALTHY.lens.lens, None))
+    given = Configuration(camera=CameraSettings(source=str(tmp_path)))
+    source = check_source(given)
+    assert (check_lens(given, source).state, check_pose(given, source, None).state) == (GOOD, WARNING)
+    assert check_pose(replace(given, orientation=FixedPose(height=0.6)), source, None).state == GOOD
+    (tmp_path / "lens7.yaml").write_text("projection: EQUISOLDI\n")
+    assert "lens7.yaml" in found(given, root)["camera"].seen
+
+
+def test_a_bag_brings_lens_and_pose(tmp_path):
+    (tmp_path / "game.mcap").touch()
+    given = Configuration(camera=CameraSettings(source=str(tmp_path / "game.mcap")))
+    source = check_source(given)
+    assert (check_lens(given, source).state, check_pose(given, source, None).state) == (GOOD, GOOD)
+
+
+@pytest.mark.parametrize(("height", "radius"), [(0.9, 7.5), (0.075, 0.6), (0.15, None)])
+def test_an_object_that_is_too_large_for_the_height_of_the_camera_is_seen(height, radius):
+    given = replace(HEALTHY, orientation=FixedPose(height=height), detector=Settings(object_radius=radius))
+    model = read_model(model_path(given.model))
+    pose = check_pose(given, SourceFacts(), model)
+    assert (pose.state, "camera height must be above the ball's diameter" in pose.seen) == (BAD, True)
+    for allowed in (
+        replace(given, pose=PoseSettings(source="udp:0.0.0.0:5600")),
+        replace(given, orientation=FixedPose(height=16.0)),
+    ):
+        assert check_pose(allowed, SourceFacts(), model).state == GOOD
 
 
 def test_a_live_camera_without_lens_or_pose_is_a_failure_of_these_and_not_of_the_model(root):

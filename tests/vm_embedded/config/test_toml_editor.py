@@ -31,6 +31,13 @@ def test_a_binary_file_is_refused(tmp_path):
         check_editable(path, "detector", ["threads"])
 
 
+def test_a_byte_order_mark_is_left_out(tmp_path):
+    path = tmp_path / "vm.toml"
+    path.write_text("[detector]\nthreads = 2\n", encoding="utf-8-sig")
+    write_entries(path, "detector", {"threads": 1})
+    assert path.read_bytes() == b"[detector]\nthreads = 1\n"
+
+
 def test_line_endings_are_kept():
     text = "# a\u2028b\r\n[detector]\r\nthreads = 2\r\n"
     assert edit_section(text, "detector", {"threads": 1}) == text.replace("2\r", "1\r")

@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.detection.looking import PlanePlaces, look_at
+from vm_embedded.detection.looking import PlanePlaces, look_at, mean_center
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.network.look_contract import LookContract
 
+from ..strategies import seeds
 from .views import center_at, observation_of, view_at
 
 EXTENT = 1.75
@@ -356,6 +357,19 @@ def test_an_object_that_is_seen_from_two_proposals_is_one(scene):
     found, rejected = found_in(background, Everywhere(passes=3))
     assert len(found) == 2
     assert any(each.reason.startswith("the same object as the one at ") for each in rejected)
+
+
+@given(seed=seeds)
+def test_a_center_is_the_mean_of_the_places_that_were_meant_to_be_it(scene, seed):
+    random, view = np.random.default_rng(seed), scene.view
+    meant = np.array([200.0, 380.0]) + random.uniform(-1.0, 1.0, (6, 2))
+    others = np.array([430.0, 260.0]) + random.uniform(-1.0, 1.0, (5, 2))
+    centers = np.array([center_at(view, each) for each in (*meant, *others)])
+    probabilities = random.uniform(0.1, 1.0, 11).astype(np.float32)
+    found = mean_center(view, centers, probabilities, 2)
+    expected = center_at(view, np.average(meant, axis=0, weights=probabilities[:6]))
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+    np.testing.assert_allclose(mean_center(view, centers[:1], probabilities[:1], 0), centers[0])
 
 
 def test_reasons_are_only_collected_when_asked_for(scene):

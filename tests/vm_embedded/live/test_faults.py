@@ -1,5 +1,6 @@
 """Everything that cameras do wrong, over and over: the detector says so, reports nothing stale, and is well again."""
 
+import os
 import threading
 
 import pytest
@@ -55,3 +56,36 @@ def test_threads_that_hang_too_often_end_it_with_a_status_that_asks_for_a_new_st
     with running(tmp_path, *source, *QUICK, *SMALL) as found:
         assert found.process.wait(60.0) == 75
         assert threading.active_count() < 50
+
+
+SLOW = """
+import sys
+
+if sys.orig_argv[1].endswith("vm-detect"):
+    import time
+    from vm_embedded.detection.detector import Detector
+
+    detect = Detector.detect
+
+    def detect_slowly(*given):
+        time.sleep(0.2)
+        return detect(*given)
+
+    Detector.detect = detect_slowly
+"""
+"""A module that Python imports at its start."""
+
+
+def test_no_frame_says_that_there_is_no_camera(tmp_path):
+    """The camera is lost while its last frame is processed."""
+    (tmp_path / "sitecustomize.py").write_text(SLOW)
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    faults = ", ".join(f'{{ kind = "hang", at = {at}.0, seconds = 0.5 }}' for at in (1, 3, 5))
+    source = script(tmp_path / "script.toml", f"faults = [{faults}]\n")
+    options = ("--camera-lost-ms", 60, "--camera-retry-ms", 20, "--camera-max-age-ms", 2000)
+    with running(tmp_path, *source, *options, env={"PYTHONPATH": path}) as found:
+        for _ in range(3):
+            found.wait_for_state("camera_lost")
+        found.stop()
+    assert found.frames
+    assert {each["state"] for each in found.frames} <= {"starting", "ok", "degraded"}

@@ -106,6 +106,14 @@ def test_the_printed_configuration_is_one_and_says_what_the_defaults_are(tmp_pat
         assert (done.returncode, fault in done.stderr) == (1, True), done.stderr
 
 
+@pytest.mark.parametrize(("more", "status"), [(["--check-config"], 1), ([], 78)])
+def test_an_object_that_is_too_large_for_the_camera_s_height_is_refused(tmp_path, more, status):
+    """Swapped, for example."""
+    (tmp_path / "vm.toml").write_text("[orientation]\nheight = 0.075\n[detector]\nobject_radius = 0.6\n")
+    options = ("--config", tmp_path / "vm.toml", "--camera", "http://127.0.0.1:9/", "--fov", "70deg", *more)
+    check_refusal(tmp_path, options, status, "ball's diameter, 1.2 m, not 0.075 m: check the camera's height")
+
+
 @pytest.mark.parametrize("format", ["rgb", "bgra", "rgba"])
 def test_a_pixel_format_that_no_camera_delivers_is_refused(tmp_path, format):
     command = arguments(tmp_path, "--live", "--check-config", "--camera", DEMO, "--format", format)

@@ -85,3 +85,23 @@ def test_a_named_pipe_needs_a_reader(tmp_path):
 def test_datagrams_have_no_unix_socket():
     with pytest.raises(InputError, match=r"udp must be ADDRESS:PORT, as in .*, not 'unix:lines\.sock'"):
         OutputSettings(udp="127.0.0.1:5600,unix:lines.sock")
+
+
+def test_hangup_opens_the_file_again_after_it_was_moved_or_deleted(tmp_path):
+    path = tmp_path / "lines.jsonl"
+    with running(tmp_path, "--camera", "synthetic", "--output-file", path) as found:
+        found.wait(path.exists)
+        found.wait(lambda: path.stat().st_size > 0)
+        moved = path.rename(tmp_path / "lines.jsonl.1")
+        found.process.send_signal(signal.SIGHUP)
+        found.wait(lambda: path.exists() and path.read_bytes().count(b"\n") > 3)
+        path.unlink()
+        path.mkdir()
+        found.process.send_signal(signal.SIGHUP)
+        found.wait(lambda: any(each["event"] == "output file not opened again" for each in found.events))
+        path.rmdir()
+        found.process.send_signal(signal.SIGHUP)
+        found.wait(lambda: path.exists() and path.read_bytes().count(b"\n") > 3)
+        assert found.stop()[0] == 0
+    for each in (moved, path):
+        assert all(read_message(line) for line in each.read_text().splitlines())

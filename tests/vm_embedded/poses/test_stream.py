@@ -6,6 +6,7 @@ import socket
 import subprocess
 import threading
 import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from tests.vm_embedded.live.running import arguments, running
 from tests.vm_embedded.poses.test_parsing import quaternion
 from vm_embedded.cameras.synthetic import Motion
 from vm_embedded.live.control import ask
+from vm_embedded.poses import stream
+from vm_embedded.poses.settings import PoseSettings
 
 TURN = 3.0
 MOTION = Motion(TURN)
@@ -207,3 +210,85 @@ def test_attack_12_a_pose_in_the_future_is_refused_and_blocks_no_good_one(tmp_pa
         sender.on = False
         sender.join()
         found.stop()
+
+
+def test_a_wait_before_a_pose_is_read_does_not_move_its_wall_time(monkeypatch):
+    """The other processes of a busy robot take the processor from the daemon at any place."""
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "time", lambda: now[0] + 1000.0)
+    read = stream.parse_pose_line
+
+    def read_late(*given):
+        now[0] += 0.03
+        return read(*given)
+
+    monkeypatch.setattr(stream, "parse_pose_line", read_late)
+    poses = stream.PoseStream(PoseSettings(source="stdin", clock="wall"), lambda reason: None)
+    assert poses.take(pose_line(MOTION, 1100.0))
+    assert poses.poses.newest == pytest.approx(100.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("flood", [b"x\n", b"\n", b'{"t": 1.0, "height": 0.8, "quaternion": [1, 0, 0, 0]}\n'])
+def test_a_client_that_floods_the_pose_socket_stops_nothing(flood, tmp_path):
+    path = tmp_path / "poses"
+    with running(tmp_path, "--camera", "synthetic", "--pose-source", f"unix:{path}") as found:
+        found.wait_for_state("pose_stale")
+        with socket.socket(socket.AF_UNIX) as good, socket.socket(socket.AF_UNIX) as bad:
+            good.connect(str(path))
+            bad.connect(str(path))
+            sender = Sender(good.sendall, Motion())
+            sender.start()
+            found.wait_for_state("ok")
+            threading.Thread(target=send_until_closed, args=(bad, 10000 * flood), daemon=True).start()
+            found.wait(lambda: len(found.frames) > 10)
+            before = len(found.frames)
+            found.wait(lambda: len(found.frames) > before + 10)
+            assert read_message(ask(tmp_path / "control", "status"))["counts"]["frames"] > before
+            assert found.stop()[0] == 0
+            sender.on = False
+            sender.join()
+
+
+def send_until_closed(connection, block):
+    with suppress(OSError):
+        while True:
+            connection.sendall(block)
+
+
+def test_a_datagram_of_many_lines_is_cut_off(tmp_path):
+    port = free_port()
+    with running(tmp_path, "--camera", "synthetic", "--pose-source", f"udp:127.0.0.1:{port}") as found:
+        found.wait_for_state("pose_stale")
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
+            sending.sendto(64 * b"x\n", ("127.0.0.1", port))
+            sending.sendto(30000 * b"x\n", ("127.0.0.1", port))
+            sending.sendto(pose_line(Motion(), time.monotonic()), ("127.0.0.1", port))
+
+        def counted():
+            return read_message(ask(tmp_path / "control", "status"))["counts"]
+
+        found.wait(lambda: counted()["poses"] == 1)
+        assert counted()["poses_bad"] == 64 + 64 + 1
+        found.stop()
+
+
+def test_another_reason_of_the_same_state_is_logged_but_not_another_number_in_it(tmp_path):
+    path = tmp_path / "poses"
+
+    def reasons():
+        return [each["reason"] for each in found.events if each["event"] == "reason"]
+
+    with running(tmp_path, "--camera", "synthetic", "--pose-source", f"unix:{path}") as found:
+        found.wait_for_state("pose_stale")
+        with socket.socket(socket.AF_UNIX) as connection:
+            connection.connect(str(path))
+            for digit in "123":
+                connection.sendall(f"{digit}\n".encode())
+                shown = f"'{digit}"
+                found.wait(lambda shown=shown: shown in found.messages[-1].get("reason", ""))
+            connection.sendall(b'{"height": 0.8, "quaternion": [1, 0, 0, 0]}\n')
+            found.wait(lambda: reasons() and "pose lacks t" in reasons()[-1])
+        found.stop()
+    assert len(reasons()) == 2
+    assert found.states == ["starting", "pose_stale", "stopping"]

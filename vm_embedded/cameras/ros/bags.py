@@ -14,6 +14,7 @@ from typing import Any
 
 from ...arrays import Image
 from ...errors import InputError, VisualMeshError, one_line, unknown
+from ...files import exists, is_file
 from ...geometry.lens import Lens
 from ...geometry.orientation import Orientation
 from ...poses.buffer import PoseBuffer, StalePoseError
@@ -39,7 +40,7 @@ _AHEAD = 1.0
 def is_bag(name: str) -> bool:
     """Whether a source is a bag: a file, or the folder that `ros2 bag record` makes."""
     path = Path(name)
-    return path.suffix.lower() in SUFFIXES or (path / "metadata.yaml").is_file()
+    return path.suffix.lower() in SUFFIXES or is_file(path / "metadata.yaml")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +63,7 @@ class BagReading:
 def open_bag(name: str, reading: BagReading) -> Source:
     """The frames of a bag. Raises InputError if it can't be read, or if it is not clear which topic to take."""
     rosbags = import_rosbags()
-    if not Path(name).exists():
+    if not exists(Path(name)):
         raise InputError(f"no such bag: {name}")
     try:
         reader = rosbags.highlevel.AnyReader([Path(name)], default_typestore=typestore())

@@ -1,0 +1,41 @@
+"""What the log says once about the frames: signs of a mistake that leave the state as it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..geometry.lens_doubt import lens_doubt
+from .answering import Answer
+
+_PATIENCE = 5.0
+"""How long frames may show no part of the plane [s]."""
+
+
+class FrameRemarks:
+    """Looks at the first lens, and at whether the plane comes into view.
+
+    A robot may look up for a while: once it has seen the plane, there is nothing to remark.
+    """
+
+    def __init__(self) -> None:
+        self._began: float | None = None  # time of the first answer [s]
+        self._is_done = False  # whether the plane was seen, or missed for long enough
+
+    def about(self, answer: Answer) -> Iterator[tuple[str, str]]:
+        """An event and its reason for each remark that an answer gives rise to."""
+        if self._began is None:
+            self._began = answer.time
+            height, width = answer.shot.image.shape[:2]
+            doubt = lens_doubt(answer.lens, (width, height))
+            if doubt is not None:
+                yield "doubtful lens", str(doubt)
+        if self._is_done:
+            return
+        is_seen = len(answer.detections.pixels) > 0
+        self._is_done = is_seen or answer.time - self._began > _PATIENCE
+        if self._is_done and not is_seen:
+            yield (
+                "plane not in view",
+                f"no frame of the first {_PATIENCE:g} s shows a near part of the plane: check the camera's height [m], "
+                "pitch (down is above 0) or poses, and lens",
+            )
