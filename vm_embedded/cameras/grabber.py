@@ -79,13 +79,17 @@ class Grabber:
         self._pause = 1e-3 * settings.retry_ms
         self._reader: _Reader | None = None
         self._abandoned: list[_Reader] = []
+        self._refused = ""  # why the system gives no thread; empty if it does
         _share_arenas()
 
     def start(self) -> None:
-        """Open the camera."""
+        """Open the camera, unless the system gives no thread: see `stuck`."""
         self._opened = time.monotonic()
         self._reader = _Reader(self, self._opener)
-        self._reader.start()
+        try:
+            self._reader.start()
+        except RuntimeError as error:
+            self._refused, self._reader = str(error), None
 
     def take(self) -> Shot | None:
         """Return the newest shot, or None if it was taken before."""
@@ -97,6 +101,13 @@ class Grabber:
     def has_shot(self) -> bool:
         """Whether there is a shot to take."""
         return self._newest is not None
+
+    @property
+    def stuck(self) -> str:
+        """Why the camera needs a new process; empty if it does not."""
+        if self._refused:
+            return f"the camera can't be opened: {self._refused}"
+        return f"{MOST_HANGING} reads of the camera hang" if self.hanging >= MOST_HANGING else ""
 
     @property
     def hanging(self) -> int:

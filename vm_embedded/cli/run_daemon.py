@@ -22,6 +22,11 @@ def run_daemon(log: EventLog, prepare: Callable[[], Awaitable[Daemon]]) -> int:
         return _end(asyncio.run(_prepare_and_run(prepare)))
     except VisualMeshError as error:
         return report_failed_start(log, error)
+    except RuntimeError as error:
+        if "can't start new thread" not in str(error):
+            raise
+        log("stopped", "error", reason=str(error))
+        return _end(EXIT_RESTART)
     except KeyboardInterrupt:  # before the daemon handles signals
         return EXIT_INTERRUPTED
 

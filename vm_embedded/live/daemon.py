@@ -21,7 +21,7 @@ from contextlib import suppress
 from typing import Any, Protocol
 
 from ..cameras.camera import without_password
-from ..cameras.grabber import MOST_HANGING, Grabber
+from ..cameras.grabber import Grabber
 from ..detection.detector import Detector
 from ..errors import InputError, NetworkError, VisualMeshError, one_line
 from ..output.channels import Channels
@@ -112,7 +112,7 @@ class Daemon:
         self._fed = 0.0  # when the watchdog was last notified
         self._stops = 0  # how often a signal has asked to stop
         self._notifier = SystemdNotifier()
-        self._hung = False  # whether so many reads of the camera hang that only a new process helps
+        self._stuck = ""  # why only a new process helps; empty if none is needed
         self._wakeup = asyncio.Event()
         self._reloading: asyncio.Task[None] | None = None
         self.grabber = Grabber(find_opener(configuration, bridge), camera, self._wake)
@@ -179,7 +179,7 @@ class Daemon:
         if self.configuration.status.page:
             self._log("status page", address=self.configuration.status.page, token=self.page.token)
         clock_offset = time.time() - time.monotonic()
-        while not (self._stops or self._hung or self._camera_ended()):
+        while not (self._stops or self._stuck or self._camera_ended()):
             await self._step()
             drift = time.time() - time.monotonic() - clock_offset
             if abs(drift) > _CLOCK_JUMP:
@@ -214,8 +214,8 @@ class Daemon:
 
     def _exit_status(self) -> tuple[int, str]:
         """The exit status, and the reason why the daemon stops."""
-        if self._hung:
-            return EXIT_RESTART, f"{MOST_HANGING} reads of the camera hang"
+        if self._stuck:
+            return EXIT_RESTART, self._stuck
         if self._stops:
             return EXIT_OK, "signal"
         return EXIT_OK if self.counters.outcomes.frames else EXIT_FAILED, "the camera has ended"
@@ -241,7 +241,7 @@ class Daemon:
         if time.monotonic() - self._sent > _HEARTBEAT:
             self._send(state_message(self.state, self.reason))
         # A signal during this step goes first: it ends the daemon with EXIT_OK.
-        self._hung = not self._stops and self.grabber.hanging >= MOST_HANGING
+        self._stuck = "" if self._stops else self.grabber.stuck
 
     def _feed_watchdog(self) -> None:
         """Notify systemd's watchdog that the loop runs, four times per period."""
@@ -387,8 +387,7 @@ class Daemon:
             await self._bridge.close()
         for part in self._parts:
             await part.close()
-        # In a thread, so that a second signal still ends the process at once.
-        await asyncio.to_thread(self.recorder.close, _RECORDING_S)
+        await self.recorder.close(_RECORDING_S)
         self.grabber.stop(0.3)
         self._notifier.close()
 

@@ -20,6 +20,7 @@ from ..config.entries import check_entries, entry, number, one_of, switch, text_
 from ..errors import InputError
 from ..sockets import BACKLOG, MOST_CONNECTIONS, UnixListener, checked_addresses, datagram_socket, parse_address
 from .binary_form import to_binary
+from .ended import ended
 from .messages import Message, to_json_line, to_ros
 
 FORMATS = ("json", "ros")
@@ -198,7 +199,7 @@ class DescriptorChannel:
     async def close(self) -> None:
         """Give the thread a moment to finish; one that blocks in a write ends with the process."""
         self._lines.put(None)
-        await asyncio.to_thread(self._thread.join, 0.3)
+        await ended(self._thread, 0.3)
 
 
 class DatagramChannel:

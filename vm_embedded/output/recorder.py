@@ -23,6 +23,7 @@ from ..errors import InputError
 from ..geometry.lens import Lens
 from ..geometry.lens_files import format_lens_file
 from ..geometry.orientation import Orientation
+from .ended import ended
 from .messages import Message, to_json_line
 from .recordings import PART, delete_oldest_recordings, finish, finish_left_recordings, locked, recording_name
 from .result_files import encode_png
@@ -125,7 +126,11 @@ class Recorder:
         moments = list(self._moments)
         arguments = (folder, part, moments, files)
         self._writer = threading.Thread(target=self._write, args=arguments, name="recorder", daemon=True)
-        self._writer.start()
+        try:
+            self._writer.start()
+        except RuntimeError as error:  # the system gives no thread
+            part.rmdir()
+            raise InputError(f"can't write a recording: {error}") from error
         return f"recording {len(moments)} frames to {folder}"
 
     def _write(self, folder: Path, part: Path, moments: Sequence[Moment], files: Mapping[str, bytes]) -> None:
@@ -195,13 +200,13 @@ class Recorder:
         self._moments.clear()
         self._nbytes = 0
 
-    def close(self, seconds: float) -> None:
+    async def close(self, seconds: float) -> None:
         """Finish a recording in progress, without compression. After `seconds`, keep the frames that are written."""
         self._closing = True
         if self._writer is not None:
-            self._writer.join(seconds)
+            await ended(self._writer, seconds)
             self._closed = True
-            self._writer.join(_LAST_FRAME)
+            await ended(self._writer, _LAST_FRAME)
 
 
 def _write_moment(folder: Path, index: int, moment: Moment, quick: bool) -> int:

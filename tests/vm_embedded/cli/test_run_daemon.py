@@ -16,11 +16,18 @@ def own_signals():
         signal.signal(number, handler)
 
 
+@pytest.fixture(autouse=True)
+def no_other_threads(monkeypatch):
+    """Those of pytest would end its process."""
+    monkeypatch.setattr("threading.enumerate", list)
+
+
 @pytest.mark.parametrize(
     ("error", "status", "logged"),
     [
         (InputError("no camera"), 78, [("can't start", "error", "no camera")]),
         (NetworkError("no such host"), 75, [("can't start", "error", "no such host")]),
+        (RuntimeError("can't start new thread"), 75, [("stopped", "error", "can't start new thread")]),
         (KeyboardInterrupt(), 130, []),
     ],
 )

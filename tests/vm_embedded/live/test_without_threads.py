@@ -1,0 +1,64 @@
+"""A system that gives no more threads, as with `ulimit -u`: the daemon ends in order."""
+
+import subprocess
+import sys
+
+import pytest
+
+from tests.soak.faults import QUICK, SMALL
+from tests.vm_embedded.live.running import Running
+
+NO_THREADS = """
+import os, sys, threading
+
+start = threading.Thread.start
+
+def refused(thread):
+    if os.path.exists(sys.argv[1]):
+        raise RuntimeError("can't start new thread")
+    start(thread)
+
+threading.Thread.start = refused
+from vm_embedded.cli.detect import main
+sys.exit(main(sys.argv[2:]))
+"""
+"""vm-detect that gets no more threads once a file exists."""
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Starts vm-detect with options; its file is tmp_path/full."""
+    processes = []
+
+    def start(*options):
+        options = ("--status-socket", tmp_path / "control", "--max-distance", "6", *options)
+        command = [sys.executable, "-c", NO_THREADS, str(tmp_path / "full"), *map(str, options)]
+        processes.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE))
+        return Running(processes[-1])
+
+    yield start
+    for each in processes:
+        each.kill()
+        each.wait()
+
+
+def test_it_ends_in_order(start, tmp_path):
+    found = start("--camera", "synthetic", "--recorder-folder", tmp_path / "recordings")
+    found.wait_for_state("ok")
+    (tmp_path / "full").touch()
+    assert found.stop()[0] == 0
+    assert found.errors == []
+    assert found.events[-1]["event"] == "stopped"
+    assert found.messages[-1]["state"] == "stopping"
+
+
+def test_a_camera_that_can_not_be_opened_again_ends_it_with_a_status_that_asks_for_a_new_start(start, tmp_path):
+    script = tmp_path / "script.toml"
+    script.write_text('faults = [{ kind = "hang", at = 3.0, seconds = 600.0 }]\n')
+    found = start("--camera", f"fault:{script}", *QUICK, *SMALL)
+    found.wait_for_state("ok")
+    (tmp_path / "full").touch()
+    assert found.process.wait(60.0) == 75
+    found.stop()
+    assert found.errors == []
+    assert found.events[-1]["reason"] == "the camera can't be opened: can't start new thread"
