@@ -12,11 +12,27 @@ import numpy as np
 import pytest
 
 from tests.drawn_scenes import FOLDER, IMAGES, MODEL, TRUTH
+from tests.programs import heed_permissions
 
 from .commands import COMMAND, detect, lines, one_complaint, run
 
 DEMO = Path(__file__).parents[2] / "fixtures" / "demo" / "image0000002.jpg"
 STAGES = ["mesh", "project", "sample", "infer", "cluster", "field", "total"]
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def film(path, count, rate=10.0):
+    """Write a film of the first drawn frame, with noise in a corner, so that no frame equals the one before."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), rate, (640, 512))
+    image = cv2.imread(str(IMAGES[0]))
+    for index in range(count):
+        image[:128, :128] = np.random.default_rng(index).integers(0, 256, (128, 128, 3))
+        writer.write(image)
+    writer.release()
+    return path
 
 
 def test_the_balls_of_the_drawn_frames_are_found():
@@ -104,11 +120,7 @@ def test_frames_are_in_natural_order(folder, lens):
 
 
 def test_a_video_is_read_to_its_end(tmp_path, lens):
-    path = tmp_path / "clip.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, (640, 512))
-    for _ in range(5):
-        writer.write(cv2.imread(str(IMAGES[0])))
-    writer.release()
+    path = film(tmp_path / "clip.avi", 5)
     found = lines(detect(path, "--lens", lens, "--height", 0.8, "--pitch", "30deg", "--save-points", tmp_path))
     assert [line["frame"] for line in found] == list(range(5))
     assert [line["stamp"] for line in found] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4], abs=0.01)
@@ -121,11 +133,8 @@ def beside(image):
 
 def test_a_given_lens_file_with_hoc_gives_the_orientation(tmp_path):
     """Of a picture without a lens file beside it, and of the frames of a video."""
-    photo, clip = tmp_path / "photo.jpg", tmp_path / "clip.avi"
+    photo, clip = tmp_path / "photo.jpg", film(tmp_path / "clip.avi", 1)
     shutil.copy(IMAGES[0], photo)
-    writer = cv2.VideoWriter(str(clip), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, (640, 512))
-    writer.write(cv2.imread(str(IMAGES[0])))
-    writer.release()
     (expected,) = lines(detect(IMAGES[0]))
     (found,) = lines(detect(photo, "--lens", beside(IMAGES[0])))
     assert found["detections"] == expected["detections"]
@@ -213,11 +222,7 @@ def test_a_video_has_every_frame_with_what_was_found(suffix, folder, tmp_path):
 
 
 def test_a_video_of_a_video_has_its_rate(tmp_path, lens):
-    path = tmp_path / "clip.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 25.0, (640, 512))
-    for _ in range(3):
-        writer.write(cv2.imread(str(IMAGES[0])))
-    writer.release()
+    path = film(tmp_path / "clip.avi", 3, rate=25.0)
     detect(path, "--lens", lens, "--height", 0.8, "--pitch", "30deg", "--save-video", tmp_path / "found.mp4")
     assert cv2.VideoCapture(str(tmp_path / "found.mp4")).get(cv2.CAP_PROP_FPS) == pytest.approx(25.0)
 
@@ -346,6 +351,31 @@ def test_a_broken_image_is_named(tmp_path, content, lens):
 @pytest.mark.parametrize("name", ["missing.jpg", "missing/", "none*.jpg"])
 def test_a_missing_source_is_named(name, tmp_path):
     one_complaint(detect(name, code=1, cwd=tmp_path), name)
+
+
+@pytest.mark.parametrize("name", ["", "image0000000.jpg", "*.jpg", "clip.avi", "bag.mcap"])
+@pytest.mark.parametrize("locked", ["folder", "files"])
+def test_a_source_without_permission_is_named_as_unreadable(name, locked, folder):
+    film(folder / "clip.avi", 1)
+    (folder / "bag.mcap").write_bytes(b"")
+    for each in [folder] if locked == "folder" else folder.iterdir():
+        each.chmod(0)
+    done = detect(folder / name, code=1, preexec_fn=heed_permissions)
+    folder.chmod(0o755)
+    assert "can't read" in done.stderr
+    assert str(folder) in done.stderr
+    assert "Permission denied" in done.stderr
+    assert "write" not in done.stderr
+
+
+@pytest.mark.parametrize("option", ["--save-overlay", "--save-points", "--save-boxes", "--save-video"])
+def test_an_output_without_permission_is_named(option, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir(mode=0)
+    path = out / "a.mp4" if option == "--save-video" else out
+    done = detect(IMAGES[0], option, path, code=1, preexec_fn=heed_permissions)
+    out.chmod(0o755)
+    one_complaint(done, str(out), "Permission denied", "can't read" if option == "--save-boxes" else "can't write")
 
 
 def test_a_directory_without_images_is_named(tmp_path):
