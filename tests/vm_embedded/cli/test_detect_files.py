@@ -5,6 +5,7 @@ import math
 import os
 import shutil
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -12,7 +13,8 @@ import numpy as np
 import pytest
 
 from tests.drawn_scenes import FOLDER, IMAGES, MODEL, TRUTH
-from tests.programs import heed_permissions
+from tests.programs import heed_permissions, limit_files
+from vm_embedded.output.video_file import VideoFile
 
 from .commands import COMMAND, detect, lines, one_complaint, run
 
@@ -208,7 +210,7 @@ def test_overlays_and_points_of_images_with_one_name_stay_apart(folder, lens, tm
 def test_a_video_has_every_frame_with_what_was_found(suffix, folder, tmp_path):
     path = tmp_path / f"found{suffix}"
     path.write_text("an older file")
-    detect(folder, "--save-video", path, "--save-overlay", tmp_path)
+    assert detect(folder, "--save-video", path, "--save-overlay", tmp_path).stderr == ""
     capture = cv2.VideoCapture(str(path))
     assert capture.get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
     for each in IMAGES[:2]:
@@ -225,6 +227,26 @@ def test_a_video_of_a_video_has_its_rate(tmp_path, lens):
     path = film(tmp_path / "clip.avi", 3, rate=25.0)
     detect(path, "--lens", lens, "--height", 0.8, "--pitch", "30deg", "--save-video", tmp_path / "found.mp4")
     assert cv2.VideoCapture(str(tmp_path / "found.mp4")).get(cv2.CAP_PROP_FPS) == pytest.approx(25.0)
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".avi", ".webm"])
+def test_a_video_that_a_full_disk_cuts_short_is_an_error_and_the_old_one_stays(suffix, tmp_path, lens):
+    """A limit on the size of files lets writes fail as a full disk does."""
+    source, path = film(tmp_path / "clip.avi", 8), tmp_path / f"found{suffix}"
+    options = ("--lens", lens, "--height", 0.8, "--pitch", "30deg", "--save-video", path)
+    detect(source, *options)
+    before = contents(tmp_path)
+    done = detect(source, *options, code=1, preexec_fn=partial(limit_files, int(0.6 * path.stat().st_size)))
+    one_complaint(done, f"can't write the video {path}: only ", " of 8 frames were written; is the disk full?")
+    assert len(lines(done)) == 8
+    assert contents(tmp_path) == before
+
+
+def test_a_video_of_a_very_fast_one_has_every_frame(tmp_path):
+    with VideoFile(tmp_path / "fast.avi", 5000.0) as video:
+        for _ in range(9):
+            video.write(cv2.imread(str(IMAGES[0])))
+    assert cv2.VideoCapture(str(tmp_path / "fast.avi")).get(cv2.CAP_PROP_FRAME_COUNT) == 9
 
 
 def test_a_video_that_can_not_be_written_is_named(folder, tmp_path):
