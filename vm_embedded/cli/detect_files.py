@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -74,8 +75,11 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
 
 
 def _process_all(source: Source, work: _Pass) -> None:
-    """Process each frame, and print its line or what is wrong with it."""
-    bar = ProgressBar(source.count)
+    """Process each frame, and print its line or what is wrong with it.
+
+    What is wrong with several frames is printed for the first one, and at the end with their number.
+    """
+    bar, reasons = ProgressBar(source.count), Counter[str]()
     for frame in source.frames:
         if work.follow is not None and frame.index == 0:
             work.follow.time(frame)  # without times, no frame can be processed
@@ -83,7 +87,10 @@ def _process_all(source: Source, work: _Pass) -> None:
             line = work.process(frame)
         except VisualMeshError as error:
             bar.clear()
-            complain(str(error))
+            reason = str(error).removeprefix(f"{frame.source}: ")
+            if reason not in reasons:
+                complain(str(error))
+            reasons[reason] += 1
             if work.mcap is not None:
                 work.mcap.write_state(frame, "degraded", str(error))
             continue
@@ -91,6 +98,9 @@ def _process_all(source: Source, work: _Pass) -> None:
         print(line, flush=True)
         bar.show(frame.index + 1)
     bar.clear()
+    for reason, count in reasons.items():
+        if count > 1:
+            complain(f"{count} frames could not be processed: {reason}")
 
 
 def _open(names: Sequence[str], given: Configuration) -> Source:
