@@ -16,7 +16,7 @@ import cv2
 from ..config.toml_editor import check_editable, write_entries
 from ..detection.detector import Detector
 from ..errors import InputError, VisualMeshError
-from ..files import check_writable, is_file, write_file
+from ..files import check_not_input, check_writable, is_file, write_file
 from ..live.configuration import Configuration
 from ..network.bundled import model_path
 from ..network.model_file import ModelFile, read_model
@@ -100,11 +100,14 @@ def _run(options: argparse.Namespace) -> int:
         raise InputError(f"--up-to must be at least 1, not {options.up_to}")
     work = make_workload(options, given)
     json_to_stdout = str(options.json) == "-"
+    network = model_path(given.model)
+    inputs = (options.image, options.lens, network)
     if options.json is not None and not json_to_stdout:
-        check_writable(options.json)
+        check_writable(options.json, (*inputs, options.config))
     if options.tune is not None:
+        check_not_input(options.tune, inputs)
         _check_tuning(options, given)
-    model = read_model(model_path(given.model))
+    model = read_model(network)
     if options.threads is None:
         cores = len(os.sched_getaffinity(0))
         settings = [replace(given.detector, threads=count + 1) for count in range(min(options.up_to or cores, cores))]

@@ -189,11 +189,43 @@ def test_overlays_are_pictures_of_the_frame_s_size(tmp_path):
     assert (np.abs(drawn.astype(int) - frame).max(axis=2) > 60).sum() > 500
 
 
-def test_an_overlay_never_replaces_an_image(folder, tmp_path):
-    before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    done = detect(folder, "--save-overlay", folder, code=1)
-    assert done.stderr.count("would replace") == len(list(folder.glob("image*.jpg")))
-    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+def test_an_overlay_never_replaces_an_image_of_any_source(folder, tmp_path):
+    twin = shutil.copytree(folder, tmp_path / "twin")
+    for image in IMAGES[:2]:
+        shutil.copy(DEMO, twin / image.name)
+    before = contents(tmp_path)
+    for sources in ((folder,), (twin, folder), (folder, twin)):
+        done = run(*sources, "--model", MODEL, "--save-overlay", folder, code=1)
+        one_complaint(done, str(folder / IMAGES[0].name), "is an input and would be overwritten; give another output")
+        assert done.stdout == ""
+    assert contents(tmp_path) == before
+
+
+def test_an_overlay_does_not_replace_another_image_beside_the_frame(folder, lens):
+    cv2.imwrite(str(folder / "photo.png"), cv2.imread(str(IMAGES[0])))
+    shutil.copy(IMAGES[1], folder / "photo.jpg")
+    before = contents(folder)
+    done = detect(folder / "photo.png", "--lens", lens, "--height", 0.8, "--save-overlay", folder, code=1)
+    one_complaint(done, "would replace")
+    assert contents(folder) == before
+
+
+def test_overlays_do_not_draw_into_the_images_with_boxes(folder, tmp_path):
+    out = tmp_path / "out"
+    done = detect(folder, "--save-overlay", out, "--save-boxes", folder / ".." / "out", code=1)
+    one_complaint(done, "--save-overlay would draw into the images of --save-boxes", "give another folder")
+    assert not out.exists()
+
+
+def test_a_video_never_replaces_a_source(tmp_path, lens):
+    """Neither by its name nor by that of the file that it is written to first."""
+    film(tmp_path / "clip.part.avi", 2)
+    shutil.copy(tmp_path / "clip.part.avi", tmp_path / "clip.avi")
+    before = contents(tmp_path)
+    for source in ("clip.avi", "clip.part.avi"):
+        done = detect(source, "--lens", lens, "--height", 0.8, "--save-video", "clip.avi", cwd=tmp_path, code=1)
+        one_complaint(done, f"vm-detect: {source} is an input and would be overwritten")
+    assert contents(tmp_path) == before
 
 
 def test_overlays_and_points_of_images_with_one_name_stay_apart(folder, lens, tmp_path):
