@@ -1,5 +1,7 @@
 """The installed programs as a user starts them: real processes, whose output is read back."""
 
+import ctypes
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -13,3 +15,15 @@ def run_program(name, *arguments, code=0, **more):
     assert done.returncode == code, (done.returncode, done.stderr)
     assert "Traceback" not in done.stderr
     return done
+
+
+def limit_files(size):
+    """Let writes beyond a size of a file [bytes] fail, as on a full disk; for `preexec_fn`."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+def heed_permissions():
+    """Take from a program of root the right to read and write all files; for `preexec_fn`."""
+    drop_from_bounding_set, override, read_search = 24, 1, 2
+    for capability in (override, read_search):
+        ctypes.CDLL(None).prctl(drop_from_bounding_set, capability, 0, 0, 0)

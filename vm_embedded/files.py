@@ -6,7 +6,7 @@ import errno
 import os
 import select
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -73,12 +73,29 @@ def write_file(path: Path, content: str | bytes) -> None:
         part.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
-def check_writable(path: Path) -> None:
-    """Raise InputError if a file can't be created because of its folder; check this before long work."""
-    if not path.resolve().parent.is_dir():
-        raise InputError(f"can't write {path}: there is no folder {path.parent}")
-    if path.is_dir():
-        raise InputError(f"can't write {path}: this is a folder")
+def check_writable(path: Path, inputs: Iterable[Path | None] = ()) -> None:
+    """Check an output before long work. Raise InputError if its folder is missing, or if it would replace an input.
+
+    inputs: as for `check_not_input`.
+    """
+    try:
+        if not path.resolve().parent.is_dir():
+            raise InputError(f"can't write {path}: there is no folder {path.parent}")
+        if path.is_dir():
+            raise InputError(f"can't write {path}: this is a folder")
+    except OSError as error:
+        raise InputError(f"can't write {path}: {error.strerror or error}") from error
+    check_not_input(path, inputs)
+
+
+def check_not_input(path: Path, inputs: Iterable[Path | None]) -> None:
+    """Raise InputError if a file that will be written is one of the inputs, under this name or another.
+
+    inputs: files that the program reads; None for those that were not given. They are iterated over only if there is
+    such a file already.
+    """
+    if is_file(path) and any(each is not None and is_file(each) and path.samefile(each) for each in inputs):
+        raise InputError(f"{path} is an input and would be overwritten; give another output")
 
 
 def takes_more(descriptor: int) -> bool:

@@ -16,7 +16,7 @@ from vm_embedded.errors import InputError, unknown
 from vm_embedded.files import read_text
 from vm_embedded.geometry.lens import Size
 from vm_embedded.output.box_files import edges
-from vm_workstation.yolo_labels import find_labels, parse_labels
+from vm_workstation.yolo_labels import find_labels, parse_labels, yolo_files
 from vm_workstation.yolo_names import NameTables
 
 _OUTLINE, _BOX = ("cx", "cy", "r_px"), ("x0", "y0", "x1", "y1")
@@ -85,6 +85,11 @@ def read_balls(path: Path, radius: float | None, label: str | None, size: Size |
     return balls, size
 
 
+def ball_files(path: Path) -> list[Path]:
+    """The files that `read_balls` may read: the JSON file, or pictures, label files and tables of names."""
+    return [*_pictures(path), *yolo_files(_pictures(path))] if path.is_dir() else [path]
+
+
 def _read_json(path: Path, radius: float | None, label: str | None) -> list[SeenBall]:
     try:
         table = json.loads(read_text(path))
@@ -137,7 +142,7 @@ def _number(value: Any, what: str) -> float:
 
 def _read_yolo(folder: Path, radius: float, label: str | None) -> tuple[list[SeenBall], Size]:
     """Balls of the label files of the pictures in a folder, and the size of the pictures [px]."""
-    pictures = sorted(each for each in folder.iterdir() if each.suffix.lower() in IMAGE_SUFFIXES)
+    pictures = _pictures(folder)
     names = NameTables(folder)
     size: Size | None = None
     balls: list[SeenBall] = []
@@ -163,3 +168,11 @@ def _read_yolo(folder: Path, radius: float, label: str | None) -> tuple[list[See
     if label is not None and label not in seen and seen:
         raise InputError(unknown("--label", label, sorted(seen)))
     return balls, size
+
+
+def _pictures(folder: Path) -> list[Path]:
+    """The pictures in a folder. Raises InputError if it can't be read."""
+    try:
+        return sorted(each for each in folder.iterdir() if each.suffix.lower() in IMAGE_SUFFIXES)
+    except OSError as error:
+        raise InputError(f"can't read {folder}: {error.strerror or error}") from error

@@ -9,15 +9,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from vm_embedded.cameras.image_files import open_source
 from vm_embedded.config.units import parse_angle, parse_size
 from vm_embedded.errors import InputError
-from vm_embedded.files import check_writable, write_file
+from vm_embedded.files import check_not_input, check_writable, write_file
 from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.lens_files import format_lens_file, read_lens_file
 from vm_embedded.geometry.orientation import Orientation
 
 from .ball_fit import fit_balls
-from .balls import read_balls
+from .balls import ball_files, read_balls
 from .board_drawing import board_svg
 from .board_on_floor import fit_board_on_floor
 from .boards import Board, board_from
@@ -46,6 +47,7 @@ def board(options: argparse.Namespace) -> None:
 def lens(options: argparse.Namespace) -> None:
     """Estimate a lens and write it."""
     _check_lens_path(options.output)
+    check_not_input(options.output, open_source(options.source).files)
     fov = None if options.fov is None else parse_angle(options.fov, "--fov")
     if fov is not None and options.lens in ("auto", "pinhole", "fisheye"):
         raise InputError("--fov is for a radial lens; files of pinhole and fisheye lenses have no field of view")
@@ -64,12 +66,13 @@ def lens(options: argparse.Namespace) -> None:
 def kalibr(options: argparse.Namespace) -> None:
     """Convert a lens of Kalibr."""
     _check_lens_path(options.output)
+    check_not_input(options.output, [options.source])
     name, found = read_kalibr(options.source, options.camera)
     _write(options.output, found, None, [f"lens            {name} of {options.source.name}, from Kalibr"])
 
 
 def pose(options: argparse.Namespace) -> None:
-    """Estimate a pose and write it with the lens."""
+    """Estimate a pose and write it with the lens; the lens file may be completed in place."""
     _check_lens_path(options.output)
     if (options.balls is None) == (options.board is None):
         raise InputError("give either --balls, or --board with a video or pictures of the board on the floor")
@@ -108,6 +111,7 @@ def _fit(kind: str, sightings: list[Sighting], size: Size) -> LensFit:
 def _pose_from_balls(options: argparse.Namespace, lens: Lens) -> PoseFit:
     if options.source is not None:
         raise InputError(f"--balls needs no SOURCE; remove {options.source}")
+    check_not_input(options.output, ball_files(options.balls))
     size = parse_size(options.size) if options.size is not None else lens.size
     balls, size = read_balls(options.balls, options.radius, options.label, size)
     return fit_balls(balls, lens.for_image(size), size)
@@ -118,6 +122,7 @@ def _pose_from_board(options: argparse.Namespace, lens: Lens) -> PoseFit:
         raise InputError("--board needs SOURCE: a video, folder or picture of the board on the floor")
     if not 0.0 <= options.thickness < 1.0:
         raise InputError(f"--thickness must be a length from 0 to 1 m, not {options.thickness:g}")
+    check_not_input(options.output, open_source(options.source).files)
     search = find_boards(options.source, _board(options, None))
     sightings = choose(search, _MOST_PLACES)
     return fit_board_on_floor(sightings, lens.for_image(search.size), search.size, options.thickness)

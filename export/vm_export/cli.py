@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
 from vm_embedded.errors import InputError, VisualMeshError, not_installed
+from vm_embedded.files import check_writable
 from vm_embedded.network.bundled import SHIPPED, model_path
 from vm_embedded.network.manifest import EDGES, LAYOUTS, Manifest
 from vm_embedded.network.model_file import read_model
@@ -124,9 +125,7 @@ def _run(options: argparse.Namespace) -> int:
     portable = output.with_suffix(".plain" + output.suffix)
     one_file = options.to_yaml or options.layout or _is_model_file(options.model)
     for path in (output,) if one_file else (output, portable):
-        for given in filter(None, (options.model, options.look, *(options.canary or ()))):
-            if path.resolve() == given.resolve():
-                raise InputError(f"{path} is the input and would be overwritten; give another file with --output")
+        check_writable(path, (options.model, options.look, *(options.canary or ())))
     suffixes = (".yaml", ".yml") if options.to_yaml else (".onnx",)
     if output.suffix not in suffixes:
         raise InputError(f"--output must end in {suffixes[0]}, not {output}")

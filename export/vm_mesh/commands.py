@@ -18,6 +18,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.files import check_writable, write_file
 from vm_embedded.geometry.lens import Size
 from vm_embedded.geometry.lens_files import LensFile
+from vm_embedded.network.bundled import model_path
 from vm_workstation.plots import check_figure_path, save_figure
 
 from .built_mesh import BuiltMesh
@@ -39,7 +40,7 @@ from .useful_range import UsefulRange, useful_range
 
 def show(options: argparse.Namespace) -> None:
     """Draw a mesh into a file."""
-    _check_figure(options.output)
+    _check_figure(options.output, options)
     if options.model and len(options.model) > 1:
         raise InputError("vm-mesh show draws one mesh; give one --model")
     file = lens_file(options)
@@ -67,9 +68,9 @@ def show(options: argparse.Namespace) -> None:
 def quality(options: argparse.Namespace) -> None:
     """Print, plot and write how evenly meshes sample."""
     if options.output is not None:
-        _check_figure(options.output)
+        _check_figure(options.output, options)
     if options.json is not None:
-        check_writable(options.json)
+        check_writable(options.json, _inputs(options))
     plan, _ = plan_and_model(options, None)
     # Not evenly spaced, so that they do not fall on rings; closer together near the camera's foot, where meshes differ.
     distances = distances_or(options.distance, plan.max_distance * 0.8 * np.linspace(0.0, 1.0, 60) ** 2)
@@ -88,7 +89,7 @@ def quality(options: argparse.Namespace) -> None:
 def range_(options: argparse.Namespace) -> None:
     """Print and plot pixels and points on an object, and the largest useful distance."""
     if options.output is not None:
-        _check_figure(options.output)
+        _check_figure(options.output, options)
     file = lens_file(options)
     if file is None:
         raise InputError("vm-mesh range needs a lens; give --lens")
@@ -112,7 +113,7 @@ def compare(options: argparse.Namespace) -> None:
     distances = 0.8 * plan.max_distance * np.linspace(0.0, 1.0, 25) ** 2
     size = None if file is None else image_size(options, file)
     if options.json is not None:
-        check_writable(options.json)
+        check_writable(options.json, _inputs(options))
     print(plan)
     print("model       points  on screen  build [ms]  k from    to  spread  link lengths  angles [deg]")
     found: dict[str, Any] = {}
@@ -180,9 +181,15 @@ def _points_on_screen(built: BuiltMesh, options: argparse.Namespace, file: LensF
     return int(project(built.mesh, orientation.level, file.lens.for_image(size), size).on_screen.sum())
 
 
-def _check_figure(path: Path) -> None:
+def _check_figure(path: Path, options: argparse.Namespace) -> None:
     check_figure_path(path)
-    check_writable(path)
+    check_writable(path, _inputs(options))
+
+
+def _inputs(options: argparse.Namespace) -> list[Path | None]:
+    """The files that a command reads. Raises InputError for an unknown network."""
+    network = None if options.network is None else model_path(options.network)
+    return [network, getattr(options, "lens", None), getattr(options, "image", None)]
 
 
 def _write_json(path: Path | None, content: Any) -> None:

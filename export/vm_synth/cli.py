@@ -24,7 +24,7 @@ from vm_workstation.stopping import stoppable
 
 from .dataset.assets import asset_files, read_assets
 from .dataset.contact_sheet import cell, object_name, read_labeled, sheet
-from .dataset.files import indices_in, is_done
+from .dataset.files import files_in, indices_in, is_done
 from .dataset.inspection import inspect, read_checked_plan
 from .dataset.plan import Plan, digest, shard_of
 from .dataset.plots import load_matplotlib, plot
@@ -286,7 +286,7 @@ def _preview(options: argparse.Namespace) -> int:
     check_sheet_path(output)
     if not options.out.is_dir():
         raise InputError(f"there is no folder {options.out}")
-    check_writable(output)
+    check_writable(output, files_in(options.out))
     there = indices_in(options.out)
     check_sheet_size(options.width * min(options.columns, options.count), options.width)
     cells, name = [], "ball"
@@ -309,7 +309,7 @@ def _preview(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> int:
     for path in (options.plots, options.json):
         if path is not None:
-            check_writable(path)
+            check_writable(path, files_in(options.out))
     if options.plots is not None:
         load_matplotlib(options.plots)
     bar = ProgressBar(len(read_checked_plan(options.out)[2]), "vm-synth")

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from vm_embedded.errors import InputError
 from vm_embedded.output.box_files import Shares, edges
+
+from .yolo_names import tables_in
 
 _VALUES = ("x", "y", "width", "height", "confidence")
 
@@ -46,6 +48,16 @@ def find_labels(image: Path) -> Path | None:
     above = [folder for folder in image.parents if folder.name == "images"]
     places += [folder.with_name("labels") / image.parent.relative_to(folder) for folder in above]
     return next((path for path in (place / f"{image.stem}.txt" for place in places) if path.is_file()), None)
+
+
+def yolo_files(images: Iterable[Path]) -> Iterator[Path]:
+    """The files that boxes of images are read from: their label files, and the tables of names in all folders above."""
+    folders: set[Path] = set()
+    for labels in filter(None, map(find_labels, images)):
+        yield labels
+        folders.update(labels.parents)
+    for folder in folders:
+        yield from tables_in(folder)
 
 
 def parse_labels(text: str, names: Sequence[str]) -> tuple[list[LabeledBox], list[str]]:

@@ -35,8 +35,13 @@ class NameTables:
         return self._names[folder]
 
 
+def tables_in(folder: Path) -> list[Path]:
+    """The tables of names directly in a folder."""
+    return [path for path in (folder / name for name in _TABLES) if path.is_file()]
+
+
 def _read_tables(folder: Path) -> tuple[str, ...]:
-    tables = {path: _read(path) for path in (folder / name for name in _TABLES) if path.is_file()}
+    tables = {path: _read(path) for path in tables_in(folder)}
     for path, names in tables.items():
         first = next(iter(tables))
         if names != tables[first]:

@@ -3,6 +3,7 @@
 import os
 import stat
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -71,6 +72,27 @@ def test_what_can_not_be_written_is_said_before_the_work_and_after(tmp_path, nam
         check_writable(tmp_path / name)
     with pytest.raises(InputError, match="can't write"):
         write(tmp_path / name)
+
+
+def test_an_output_that_is_an_input_is_refused_under_every_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    given, link, twin = tmp_path / "given.yaml", tmp_path / "link.yaml", tmp_path / "twin.yaml"
+    given.write_text("lens")
+    link.symlink_to(given)
+    twin.hardlink_to(given)
+    for output in (given, Path("given.yaml"), tmp_path / ".." / tmp_path.name / "given.yaml", link, twin):
+        with pytest.raises(InputError, match=r"(given|link|twin).yaml is an input and would be overwritten; give an"):
+            check_writable(output, [None, tmp_path / "missing", given])
+
+
+def test_an_output_that_replaces_no_input_passes(tmp_path):
+    given, other = tmp_path / "given.yaml", tmp_path / "other.yaml"
+    given.write_text("lens")
+    other.write_text("lens")
+    check_writable(other, [None, given, tmp_path])
+    check_writable(given)
+    check_writable(tmp_path / "new.yaml", iter([given]))
+    check_writable(Path(os.devnull), [Path(os.devnull)])
 
 
 @pytest.mark.parametrize(("content", "written"), [("Bäll\n", "Bäll\n".encode()), (b"\x00\xff", b"\x00\xff"), ("", b"")])

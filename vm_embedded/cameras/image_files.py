@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Image
 from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
-from ..files import check_regular, is_file
+from ..files import check_regular, exists, is_file
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from .decoding import decode
@@ -67,11 +67,15 @@ class Frame:
 
 @dataclass(frozen=True)
 class Source:
-    """Frames to iterate over. count: number of frames, if known. rate: frames per second [1/s], if known."""
+    """Frames to iterate over.
+
+    count: number of frames, if known. rate: frames per second [1/s], if known. files: that the frames are read from.
+    """
 
     frames: Iterator[Frame]
     count: int | None
     rate: float | None = None
+    files: tuple[Path, ...] = ()
 
 
 def open_sources(names: Sequence[str], raw: bool = False, max_megapixels: float = MAX_MEGAPIXELS) -> Source:
@@ -95,7 +99,8 @@ def joined(opened: Sequence[Source]) -> Source:
     frames = (frame for source in opened for frame in source.frames)
     numbered = (replace(frame, index=index) for index, frame in enumerate(frames))
     counts = [source.count for source in opened]
-    return Source(numbered, None if None in counts else sum(each or 0 for each in counts))
+    files = tuple(each for source in opened for each in source.files)
+    return Source(numbered, None if None in counts else sum(each or 0 for each in counts), files=files)
 
 
 def open_source(name: str, raw: bool = False, max_megapixels: float = MAX_MEGAPIXELS) -> Source:
@@ -106,7 +111,7 @@ def open_source(name: str, raw: bool = False, max_megapixels: float = MAX_MEGAPI
     try:
         return _open(name, Path(name), raw, max_megapixels)
     except OSError as error:
-        raise InputError(f"can't open {name[:200]}: {error.strerror or error}") from error
+        raise InputError(f"can't read {name[:200]}: {error.strerror or error}") from error
 
 
 def _open(name: str, path: Path, raw: bool, max_megapixels: float) -> Source:
@@ -147,7 +152,7 @@ def _images(paths: list[Path], read: Callable[[Path], Image], times: Mapping[str
         Frame(index, path.name, path.stem, partial(read, path), path, times.get(path.stem))
         for index, path in enumerate(paths)
     )
-    return Source(frames, len(paths))
+    return Source(frames, len(paths), files=tuple(paths))
 
 
 def _recorded_times(messages: Path) -> dict[str, float]:
@@ -195,17 +200,20 @@ def lens_place(path: Path | None) -> Path | None:
 def lens_beside(path: Path | None) -> Path | None:
     """The file lensNAME.yaml beside imageNAME.jpg, or None if it does not exist."""
     place = lens_place(path)
-    return place if place is not None and place.exists() else None
+    return place if place is not None and exists(place) else None
 
 
 def lens_file_of(image: Path) -> Path | None:
     """The lens file of a frame of any tool: NAME.yaml, lensNAME.yaml, or for imageNAME lensNAME.yaml; None without."""
     beside = (image.with_suffix(".yaml"), image.with_name(f"lens{image.stem}.yaml"), lens_beside(image))
-    return next((each for each in beside if each is not None and each.is_file()), None)
+    return next((each for each in beside if each is not None and is_file(each)), None)
 
 
 def _video(name: str, max_megapixels: float) -> Source:
-    """The frames of a video file; or of a camera, by number or device path."""
+    """The frames of a video file; or of a camera, by number or device path. Raises OSError for an unreadable file."""
+    files = (Path(name),) if is_file(Path(name)) else ()
+    for path in files:
+        path.open("rb").close()  # OpenCV does not say why it can't read a file
     capture = cv2.VideoCapture(int(name) if name.isdigit() else name)
     live = name.isdigit() or Path(name).is_char_device()
     if not capture.isOpened():
@@ -225,6 +233,7 @@ def _video(name: str, max_megapixels: float) -> Source:
         _frames(capture, first, Path(name), max_megapixels),
         None if live or count <= 0 else count,
         rate if 0.0 < rate < 1e4 else None,
+        files,
     )
 
 

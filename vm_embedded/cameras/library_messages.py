@@ -1,4 +1,4 @@
-"""What other libraries print: the lines of libjpeg and libpng are collected while they decode; OpenCV is silenced.
+"""What other libraries print: lines of libjpeg, libpng and OpenCV's FFmpeg are collected; OpenCV's log is silenced.
 
 Damage is reported only there: libjpeg fills the rest of the picture with gray, and OpenCV reports success.
 """
@@ -20,7 +20,7 @@ _STDERR = 2
 
 _WARNING = re.compile(
     r"Corrupt JPEG data|Premature end of JPEG|Invalid SOS parameters|Inconsistent progression|Unknown Adobe|"
-    r"Warning: unknown JFIF|libpng (?:error|warning): "
+    r"Warning: unknown JFIF|libpng (?:error|warning): |OpenCV: FFMPEG: "
 )
 """First words of the warnings. libjpeg prints the first warning about each image."""
 
@@ -30,7 +30,7 @@ _LOCK = threading.Lock()
 
 @contextmanager
 def library_messages() -> Iterator[list[str]]:
-    """Collect the lines that libjpeg and libpng print in this block; the list is complete after the block.
+    """Collect the lines that these libraries print in this block; the list is complete after the block.
 
     Lines of other threads go to standard error when the block ends; they are lost if nobody reads it.
     """

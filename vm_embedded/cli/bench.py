@@ -16,7 +16,7 @@ import cv2
 from ..config.toml_editor import check_editable, write_entries
 from ..detection.detector import Detector
 from ..errors import InputError, VisualMeshError
-from ..files import check_writable, write_file
+from ..files import check_not_input, check_writable, is_file, write_file
 from ..live.configuration import Configuration
 from ..network.bundled import model_path
 from ..network.model_file import ModelFile, read_model
@@ -24,7 +24,7 @@ from .bench_table import bench_table
 from .machine import describe_machine, rss_mib, sgemm_rate
 from .measuring import Run, measure, measure_cold
 from .options import ANGLES, add_model, add_pose, add_settings, read_options
-from .program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
+from .program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program, system_error
 from .progress import ProgressBar
 from .tuning import TUNED, fastest_settings
 from .workload import Workload, make_workload
@@ -85,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         raise
     except OSError as error:
-        print(f"vm-bench: can't write results: {error.strerror or error}", file=sys.stderr)
+        print(f"vm-bench: {system_error(error)}", file=sys.stderr)
         return EXIT_FAILED
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
@@ -93,18 +93,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     """Check all options, measure, print the figures, and tune if asked to."""
-    if options.tune is not None and options.config is None and options.tune.is_file():
+    if options.tune is not None and options.config is None and is_file(options.tune):
         options.config = options.tune
     given = read_options(options)
     if options.up_to is not None and options.up_to < 1:
         raise InputError(f"--up-to must be at least 1, not {options.up_to}")
     work = make_workload(options, given)
     json_to_stdout = str(options.json) == "-"
+    network = model_path(given.model)
+    inputs = (options.image, options.lens, network)
     if options.json is not None and not json_to_stdout:
-        check_writable(options.json)
+        check_writable(options.json, (*inputs, options.config))
     if options.tune is not None:
+        check_not_input(options.tune, inputs)
         _check_tuning(options, given)
-    model = read_model(model_path(given.model))
+    model = read_model(network)
     if options.threads is None:
         cores = len(os.sched_getaffinity(0))
         settings = [replace(given.detector, threads=count + 1) for count in range(min(options.up_to or cores, cores))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -24,6 +25,7 @@ from ..cameras.ros.bags import BagReading, is_bag, open_bag
 from ..detection.detector import Detector
 from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError
+from ..files import check_not_input
 from ..geometry.lens import Lens, Size
 from ..geometry.lens_files import read_lens_file
 from ..geometry.orientation import Orientation
@@ -54,18 +56,20 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
         detector.manifest.column(name)
     check_read_format(format)
     source = _open(options.files or [given.camera.source], given)
+    _check_overlays(options, source)
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:
             make_folder(folder)
     follow = _Follow(Tracker(given.track), given.camera.fps) if given.track.on else None
-    boxes = BoxWriter(options.save_boxes, _object_classes(detector)) if options.save_boxes is not None else None
 
     with ExitStack() as stack:
-        mcap = video = None
+        mcap = video = boxes = None
         if options.save_mcap is not None:
-            mcap = stack.enter_context(McapFile(options.save_mcap, given.ros.plane_frame))
+            mcap = stack.enter_context(McapFile(options.save_mcap, given.ros.plane_frame, source.files))
         if options.save_video is not None:
-            video = stack.enter_context(VideoFile(options.save_video, source.rate or _IMAGES_RATE))
+            video = stack.enter_context(VideoFile(options.save_video, source.rate or _IMAGES_RATE, source.files))
+        if options.save_boxes is not None:
+            boxes = BoxWriter(options.save_boxes, _object_classes(detector))
         work = _Pass(detector, pose, follow, options, emit_points, boxes, mcap, video, ClosingRemarks(detector))
         _process_all(source, work)
     for remark in filter(None, (work.replaced, *work.remarks.lines())):
@@ -73,9 +77,24 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     return work.processed
 
 
+def _check_overlays(options: argparse.Namespace, source: Source) -> None:
+    """Raise InputError if an overlay would replace an image that is read, or one of --save-boxes."""
+    if options.save_overlay is None:
+        return
+    for each in source.files:
+        check_not_input(options.save_overlay / f"{each.stem}.jpg", [each])
+    if options.save_boxes is not None and options.save_boxes.resolve() == options.save_overlay.resolve():
+        raise InputError(
+            f"--save-overlay would draw into the images of --save-boxes {options.save_boxes}: give another folder"
+        )
+
+
 def _process_all(source: Source, work: _Pass) -> None:
-    """Process each frame, and print its line or what is wrong with it."""
-    bar = ProgressBar(source.count)
+    """Process each frame, and print its line or what is wrong with it.
+
+    What is wrong with several frames is printed for the first one, and at the end with their number.
+    """
+    bar, reasons = ProgressBar(source.count), Counter[str]()
     for frame in source.frames:
         if work.follow is not None and frame.index == 0:
             work.follow.time(frame)  # without times, no frame can be processed
@@ -83,7 +102,10 @@ def _process_all(source: Source, work: _Pass) -> None:
             line = work.process(frame)
         except VisualMeshError as error:
             bar.clear()
-            complain(str(error))
+            reason = str(error).removeprefix(f"{frame.source}: ")
+            if reason not in reasons:
+                complain(str(error))
+            reasons[reason] += 1
             if work.mcap is not None:
                 work.mcap.write_state(frame, "degraded", str(error))
             continue
@@ -91,6 +113,9 @@ def _process_all(source: Source, work: _Pass) -> None:
         print(line, flush=True)
         bar.show(frame.index + 1)
     bar.clear()
+    for reason, count in reasons.items():
+        if count > 1:
+            complain(f"{count} frames could not be processed: {reason}")
 
 
 def _open(names: Sequence[str], given: Configuration) -> Source:

@@ -157,14 +157,18 @@ def program(main: Callable[P, int]) -> Callable[P, int]:
         except OSError as error:
             if error.errno == errno.ENOSPC:
                 discard_output()
-                print(f"can't write {error.filename or 'standard output'}: {error.strerror}", file=sys.stderr)
-            elif error.filename is not None:
-                print(f"can't use {error.filename}: {error.strerror}", file=sys.stderr)
-            else:
+            elif error.filename is None:
                 raise
+            print(system_error(error), file=sys.stderr)
             return EXIT_FAILED
 
     return run
+
+
+def system_error(error: OSError) -> str:
+    """The message for an error of the system that nothing else explains; without a path, it is of standard output."""
+    doing = "use" if error.filename is not None and error.errno != errno.ENOSPC else "write"
+    return f"can't {doing} {error.filename or 'standard output'}: {error.strerror or error}"
 
 
 def discard_output() -> None:

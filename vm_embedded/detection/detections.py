@@ -21,7 +21,8 @@ from .observation import Observation
 from .overlay import draw_overlay
 
 _PICTURES = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff")
-_JPEG_QUALITY = 92
+_ENCODING = dict.fromkeys((".jpg", ".jpeg"), (cv2.IMWRITE_JPEG_QUALITY, 92))
+"""Parameters of OpenCV by suffix; other formats know no quality of JPEG."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +108,7 @@ class Detections:
         if suffix == ".json":
             content = self.to_json().encode() + b"\n"
         elif suffix in _PICTURES:
-            encoded = cv2.imencode(suffix, self.draw(), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1]
-            content = encoded.tobytes()
+            content = cv2.imencode(suffix, self.draw(), _ENCODING.get(suffix, ()))[1].tobytes()
         else:
             raise InputError(f"can't write {path}: {unknown('suffix', suffix, (*_PICTURES, '.json'))}")
         write_file(path, content)

@@ -62,7 +62,11 @@ class BoxWriter:
     """
 
     def __init__(self, folder: Path, classes: tuple[str, ...]) -> None:
-        if any(make_folder(folder).iterdir()):
+        try:
+            is_empty = not any(make_folder(folder).iterdir())
+        except OSError as error:
+            raise InputError(f"can't read folder {folder}: {error.strerror or error}") from error
+        if not is_empty:
             raise InputError(f"--save-boxes {folder}: the folder is not empty; give a new one, to keep its labels")
         self._folder, self._classes = folder, classes
         self._names = FrameNames("image")  # so that the lens file belongs to the image
@@ -77,7 +81,7 @@ class BoxWriter:
         """
         name, boxes = self._names.of(frame), candidate_boxes(detections, (image.shape[1], image.shape[0]))
         path = self._folder / f"{name}{'.png' if frame.path is None else frame.path.suffix}"
-        write_file(path, encode_png(image) if frame.path is None else frame.path.read_bytes())
+        write_file(path, encode_png(image) if frame.path is None else _content_of(frame.path))
         lens_file = format_lens_file(lens, orientation)
         write_file(self._folder / f"lens{name.removeprefix('image')}.yaml", lens_file)
         labels = [self._yolo_line(each) for each in boxes if each.found]
@@ -95,6 +99,14 @@ class BoxWriter:
 
     def _yolo_line(self, box: CandidateBox) -> str:
         return f"{self._classes.index(box.class_name)} {' '.join(f'{each:.6f}' for each in box.shares)}\n"
+
+
+def _content_of(image: Path) -> bytes:
+    """The bytes of an image file. Raises InputError."""
+    try:
+        return image.read_bytes()
+    except OSError as error:
+        raise InputError(f"can't read {image}: {error.strerror or error}") from error
 
 
 def candidate_boxes(detections: Detections, size: tuple[int, int]) -> list[CandidateBox]:

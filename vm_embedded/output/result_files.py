@@ -11,7 +11,7 @@ from ..arrays import Image
 from ..cameras.image_files import Frame
 from ..detection.detections import Detections
 from ..errors import InputError
-from ..files import atomic_write
+from ..files import atomic_write, is_file
 
 # Smaller and faster than the default strategy for pictures with noise.
 _PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY)
@@ -28,7 +28,7 @@ def save_overlay(path: Path, frame: Frame, detections: Detections) -> None:
 
     Raises InputError instead of replacing a file in the folder of the frame's own image.
     """
-    if frame.path is not None and path.exists() and path.resolve().parent == frame.path.resolve().parent:
+    if frame.path is not None and is_file(path) and path.resolve().parent == frame.path.resolve().parent:
         raise InputError(f"--save-overlay would replace {path}: give another folder")
     detections.save(path)
 

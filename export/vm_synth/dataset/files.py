@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,9 @@ CLASS_COLORS = {
     "robot": (0, 0, 255),
 }
 """RGB colors of the classes in masks; unlabeled pixels are transparent."""
+
+SET = "set.json"
+"""The file that defines a set."""
 
 PARTS = {"image": ".jpg", "mask": ".png", "coverage": ".png", "lens": ".yaml", "scene": ".json"}
 """The parts of a picture and the suffixes of their files, in the order of writing."""
@@ -56,6 +60,13 @@ def _is_whole(path: Path) -> bool:
             return file.read() == end
     except OSError:  # it is missing, or shorter than its end
         return False
+
+
+def files_in(folder: Path) -> Iterator[Path]:
+    """The files of a set that are in a folder: set.json, and the parts of all pictures."""
+    yield from folder.glob(SET)
+    for part, suffix in PARTS.items():
+        yield from folder.glob(f"{part}*{suffix}")
 
 
 def indices_in(folder: Path) -> list[int]:

@@ -13,7 +13,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.files import write_file
 
 from ..scene.configuration import SceneConfiguration
-from .files import FORMAT, PARTS, read_table
+from .files import FORMAT, SET, files_in, read_table
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Plan:
 
         Raises InputError that names the difference, or a picture in a folder without set.json.
         """
-        path = folder / "set.json"
+        path = folder / SET
         wanted = json.loads(self.as_json())
         if path.exists():
             found = read_plan(folder)
@@ -51,7 +51,7 @@ class Plan:
                     )
             if found.get("count", 0) >= self.count:
                 return
-        elif others := sorted(each for part, suffix in PARTS.items() for each in folder.glob(f"{part}*{suffix}")):
+        elif others := sorted(files_in(folder)):
             raise InputError(
                 f"{folder} contains {others[0].name} but no set.json, so its pictures are not from vm-synth; "
                 "write to another folder"
@@ -61,7 +61,7 @@ class Plan:
 
 def read_plan(folder: Path) -> dict[str, Any]:
     """The content of a folder's set.json. Raises InputError."""
-    path = folder / "set.json"
+    path = folder / SET
     try:
         return read_table(path)
     except OSError as error:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from vm_embedded.cameras.image_files import lens_file_of
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.geometry.lens_files import read_lens_file
+from vm_workstation.yolo_labels import yolo_files
 
 from .annotation import Annotation, Annotations
 from .box import Box, BoxedPicture, BoxedSet
 from .checked_boxes import checked_boxes
 from .coco import is_coco, read_coco
+from .coco_file import coco_files
 from .fit import fit
 from .folder_files import FolderFiles, find_files
 from .image_facts import UPRIGHT, ImageFacts, image_facts
@@ -43,6 +45,18 @@ def read_boxes(
     faults += _unmapped(annotations, names or {})
     found = sorted({box.name for picture in pictures for box in picture.boxes})
     return BoxedSet(tuple(pictures), tuple(faults), tuple(found))
+
+
+def files_in(folder: Path) -> Iterator[Path]:
+    """The files that `read_boxes` may read: all below a folder but JSON files of other programs, and labels beside it.
+
+    Raises InputError as `find_files` does.
+    """
+    files = find_files(folder)
+    yield from files.images
+    yield from (each for each in files.others if each.suffix.lower() != ".json")
+    yield from coco_files(files)
+    yield from yolo_files(files.images)
 
 
 def _format(files: FolderFiles, format: str | None) -> str:

@@ -24,6 +24,7 @@ from vm_workstation.text_tables import aligned, summary
 
 from ..data.classes import Classes
 from ..data.inspection import Inspection, inspect_pictures
+from ..data.picture_files import paths_of
 from ..data.pictures import find_pictures
 from .check_boxes import add_check_boxes
 
@@ -68,9 +69,9 @@ def run_check(options: argparse.Namespace, classes: Classes, objects: Sequence[s
 
     Raises InputError if there are no pictures, or if the results can't be written.
     """
-    if options.json is not None:
-        check_writable(options.json)
     pictures = find_pictures(options.data)
+    if options.json is not None:
+        check_writable(options.json, (options.config, *paths_of(pictures)))
     workers = len(os.sched_getaffinity(0)) if options.workers is None else options.workers
     bar = ProgressBar(len(pictures), "vm-train")
     try:

@@ -7,6 +7,7 @@ import json
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from vm_workstation.option_types import at_least
 from vm_workstation.shortened import shortened
 
 from ..boxes.box import BoxedSet
-from ..boxes.read import read_boxes
+from ..boxes.read import files_in, read_boxes
 from ..boxes.sheet import box_sheet, unusual_first
 from ..boxes.summary import classes_of, name_faults, summary_lines
 from ..boxes.unlabeled import describe, unlabeled
@@ -85,11 +86,11 @@ def run_check_boxes(options: argparse.Namespace) -> int:
 
     Raises InputError if the folder has no boxes, or if the results can't be written.
     """
+    network = model_path(options.network or DEFAULT)
     for path in filter(None, (options.json, options.sheet)):
-        check_writable(path)
+        check_writable(path, chain([network], files_in(options.data)))
     if options.sheet is not None:
         check_sheet_path(options.sheet)
-    network = model_path(options.network or DEFAULT)
     objects, round_names = _objects(network)
     found = read_boxes(options.data, options.format, parse_names(options.names), round_names)
     faults = [*found.faults, *name_faults(found, objects)]

@@ -58,7 +58,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     from vm_workstation.plots import new_figure
 
     from ..evaluation.evaluation import Rules
-    from ..evaluation.files import write_evaluation
+    from ..evaluation.files import check_evaluation_folder, write_evaluation
     from ..evaluation.mask_colors import classes_with_colors, default_colors
     from ..evaluation.picture_selection import select_pictures
     from ..evaluation.points_on_ball_plot import median_camera_figure
@@ -69,8 +69,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     settings = _settings(options)
     pictures = select_pictures(options.data, options.list, options.part)
     rules = Rules(options.radius_of, options.min_radius, options.strict)
-    if options.output.exists() and not options.output.is_dir():
-        raise InputError(f"can't write to {options.output}: it is not a folder")
+    check_evaluation_folder(options.output, (options.model, options.list, options.config))
     new_figure(1.0, 1.0)  # fails now, not after an hour, if matplotlib is missing
     subject = _subject(options, settings)
     classes = classes_with_colors(subject.manifest, default_colors(options.model, options.list), options.color)

@@ -50,9 +50,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
     path = model_path(options.model)
     if options.output.suffix != ".onnx":
         raise InputError(f"{options.output} must end in .onnx: it becomes a model file")
-    if path.resolve() == options.output.resolve():
-        raise InputError(f"{path} is the input and would be overwritten; give another file with --output")
-    check_writable(options.output)
+    check_writable(options.output, (path, options.list))
     model = read_model(path)
     looks = upright_looks_of(model)
     if model.look is not None or not looks:

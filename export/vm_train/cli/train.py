@@ -14,6 +14,7 @@ from vm_embedded.errors import VisualMeshError, not_installed
 from vm_embedded.files import check_writable
 from vm_workstation.stopping import stoppable
 
+from ..data.picture_files import paths_of
 from ..data.pictures import find_pictures
 from ..learning.configuration import HEADER, TrainConfiguration
 from ..learning.folder_access import kind_of
@@ -117,8 +118,8 @@ def _preview(options: argparse.Namespace) -> int:
     from .preview import sheet
 
     configuration = read_configuration(options)
-    check_writable(options.output)
     pictures = find_pictures(options.data)
+    check_writable(options.output, (options.config, *paths_of(pictures)))
     classes = configuration.classes.mask_classes()
     picked = [pictures[each] for each in choose_indices(range(len(pictures)), options.count, None, options.seed)]
     shown = [read_picture(each, classes) for each in picked]
@@ -152,7 +153,7 @@ def _rate(options: argparse.Namespace) -> int:
 
     configuration = read_configuration(options)
     if options.plot is not None:
-        check_plot(options.plot)
+        check_plot(options.plot, (options.config, *paths_of(find_pictures(options.data))))
     with set_up_hardware(options.device, options.workers, options.threads) as hardware, TemporaryDirectory() as folder:
         good = find_good_pictures(options.data, configuration, hardware, strict=False)
         data = TrainingData(options.data, Split(tuple(each.number for each in good), (), ()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -88,3 +89,9 @@ class PictureFiles:
             return RawPicture(self.number, image, mask, lens.decode("utf-8"))
         except UnicodeDecodeError as error:
             raise PictureFault(f"{self.lens.name}: is not UTF-8 text", "lens") from error
+
+
+def paths_of(pictures: Iterable[PictureFiles]) -> Iterator[Path]:
+    """The files that hold pictures: shards, or image, mask and lens of each."""
+    for each in pictures:
+        yield from (each.path(part) for part in PARTS) if each.shard is None else (each.shard,)

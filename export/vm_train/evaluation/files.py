@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import cv2
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import write_file
+from vm_embedded.files import check_not_input, write_file
 from vm_workstation.plots import save_figure
 
 from .evaluation import Evaluation
@@ -30,7 +30,17 @@ _PLOTS = (
     *("points_curves", "points_over_distance", "confusion", "points_on_object"),
     *("objects_curves", "objects_over_distance", "distance_error", "reliability", "proposals"),
 )
+_TEXTS = ("scores.json", "report.html")
 _QUALITY = 85  # of the small JPEG pictures
+
+
+def check_evaluation_folder(out: Path, inputs: Iterable[Path | None]) -> None:
+    """Raise InputError unless the files of an evaluation can be written to a folder without replacing an input."""
+    if out.exists() and not out.is_dir():
+        raise InputError(f"can't write to {out}: it is not a folder")
+    given = list(inputs)
+    for name in (*(f"{each}.csv" for each in _TABLES), *_TEXTS, *(f"plots/{each}.svg" for each in _PLOTS)):
+        check_not_input(out / name, given)
 
 
 def write_evaluation(

@@ -17,7 +17,7 @@ from typing import Any
 from vm_embedded.errors import InputError, VisualMeshError, unknown
 from vm_embedded.files import write_file
 
-from ..data.picture_files import IMAGES
+from ..data.picture_files import IMAGES, PARTS
 from .picture_example import KEYS, SUFFIXES, ExamplePicture, WrongUnitError, picture_of
 from .tfrecord import Record, read_records
 
@@ -126,8 +126,9 @@ def _prepared(out: Path, plan: dict[str, Any]) -> str | None:
     try:
         out.mkdir(parents=True, exist_ok=True)
         if not path.exists():
-            if any(each.name.startswith("image") and each.suffix.lower() in IMAGES for each in out.iterdir()):
-                raise InputError(f"{out} holds pictures that no import wrote: write to another folder")
+            others = [each.name for each in out.iterdir() if _is_of_picture(each)]
+            if others:
+                raise InputError(f"{out} holds {min(others)}, which no import wrote: write to another folder")
             return _text(plan)
         found = json.loads(path.read_text(encoding="utf-8"))
         same = all(found[key] == plan[key] for key in ("format", "renaming", "normalized"))
@@ -143,6 +144,10 @@ def _prepared(out: Path, plan: dict[str, Any]) -> str | None:
             "import.json, or write to another folder"
         )
     return _text(plan) if longer else None
+
+
+def _is_of_picture(path: Path) -> bool:
+    return path.name.startswith(PARTS) and path.suffix.lower() in (*IMAGES, ".yaml")
 
 
 def _text(plan: dict[str, Any]) -> str:

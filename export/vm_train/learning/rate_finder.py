@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -67,11 +68,11 @@ def find_rate(run: TrainingRun, hardware: Hardware, network: Network, steps: int
     return RateSearch(rates[: len(losses)][kept], np.array(losses)[kept])
 
 
-def check_plot(path: Path) -> None:
-    """Raise InputError unless the file is a .png or .svg that can be written."""
+def check_plot(path: Path, inputs: Iterable[Path | None]) -> None:
+    """Raise InputError unless the file is a .png or .svg that can be written, and none of the inputs."""
     if path.suffix.lower() not in (".png", ".svg"):
         raise InputError(f"can't plot to {path}: its suffix must be .png or .svg")
-    check_writable(path)
+    check_writable(path, inputs)
 
 
 def plot_rates(found: RateSearch, path: Path) -> None:

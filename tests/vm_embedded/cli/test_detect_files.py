@@ -5,6 +5,7 @@ import math
 import os
 import shutil
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -12,11 +13,28 @@ import numpy as np
 import pytest
 
 from tests.drawn_scenes import FOLDER, IMAGES, MODEL, TRUTH
+from tests.programs import heed_permissions, limit_files
+from vm_embedded.output.video_file import VideoFile
 
 from .commands import COMMAND, detect, lines, one_complaint, run
 
 DEMO = Path(__file__).parents[2] / "fixtures" / "demo" / "image0000002.jpg"
 STAGES = ["mesh", "project", "sample", "infer", "cluster", "field", "total"]
+
+
+def contents(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def film(path, count, rate=10.0):
+    """Write a film of the first drawn frame, with noise in a corner, so that no frame equals the one before."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), rate, (640, 512))
+    image = cv2.imread(str(IMAGES[0]))
+    for index in range(count):
+        image[:128, :128] = np.random.default_rng(index).integers(0, 256, (128, 128, 3))
+        writer.write(image)
+    writer.release()
+    return path
 
 
 def test_the_balls_of_the_drawn_frames_are_found():
@@ -104,11 +122,7 @@ def test_frames_are_in_natural_order(folder, lens):
 
 
 def test_a_video_is_read_to_its_end(tmp_path, lens):
-    path = tmp_path / "clip.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, (640, 512))
-    for _ in range(5):
-        writer.write(cv2.imread(str(IMAGES[0])))
-    writer.release()
+    path = film(tmp_path / "clip.avi", 5)
     found = lines(detect(path, "--lens", lens, "--height", 0.8, "--pitch", "30deg", "--save-points", tmp_path))
     assert [line["frame"] for line in found] == list(range(5))
     assert [line["stamp"] for line in found] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4], abs=0.01)
@@ -121,11 +135,8 @@ def beside(image):
 
 def test_a_given_lens_file_with_hoc_gives_the_orientation(tmp_path):
     """Of a picture without a lens file beside it, and of the frames of a video."""
-    photo, clip = tmp_path / "photo.jpg", tmp_path / "clip.avi"
+    photo, clip = tmp_path / "photo.jpg", film(tmp_path / "clip.avi", 1)
     shutil.copy(IMAGES[0], photo)
-    writer = cv2.VideoWriter(str(clip), cv2.VideoWriter_fourcc(*"MJPG"), 10.0, (640, 512))
-    writer.write(cv2.imread(str(IMAGES[0])))
-    writer.release()
     (expected,) = lines(detect(IMAGES[0]))
     (found,) = lines(detect(photo, "--lens", beside(IMAGES[0])))
     assert found["detections"] == expected["detections"]
@@ -178,11 +189,43 @@ def test_overlays_are_pictures_of_the_frame_s_size(tmp_path):
     assert (np.abs(drawn.astype(int) - frame).max(axis=2) > 60).sum() > 500
 
 
-def test_an_overlay_never_replaces_an_image(folder, tmp_path):
-    before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    done = detect(folder, "--save-overlay", folder, code=1)
-    assert done.stderr.count("would replace") == len(list(folder.glob("image*.jpg")))
-    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+def test_an_overlay_never_replaces_an_image_of_any_source(folder, tmp_path):
+    twin = shutil.copytree(folder, tmp_path / "twin")
+    for image in IMAGES[:2]:
+        shutil.copy(DEMO, twin / image.name)
+    before = contents(tmp_path)
+    for sources in ((folder,), (twin, folder), (folder, twin)):
+        done = run(*sources, "--model", MODEL, "--save-overlay", folder, code=1)
+        one_complaint(done, str(folder / IMAGES[0].name), "is an input and would be overwritten; give another output")
+        assert done.stdout == ""
+    assert contents(tmp_path) == before
+
+
+def test_an_overlay_does_not_replace_another_image_beside_the_frame(folder, lens):
+    cv2.imwrite(str(folder / "photo.png"), cv2.imread(str(IMAGES[0])))
+    shutil.copy(IMAGES[1], folder / "photo.jpg")
+    before = contents(folder)
+    done = detect(folder / "photo.png", "--lens", lens, "--height", 0.8, "--save-overlay", folder, code=1)
+    one_complaint(done, "would replace")
+    assert contents(folder) == before
+
+
+def test_overlays_do_not_draw_into_the_images_with_boxes(folder, tmp_path):
+    out = tmp_path / "out"
+    done = detect(folder, "--save-overlay", out, "--save-boxes", folder / ".." / "out", code=1)
+    one_complaint(done, "--save-overlay would draw into the images of --save-boxes", "give another folder")
+    assert not out.exists()
+
+
+def test_a_video_never_replaces_a_source(tmp_path, lens):
+    """Neither by its name nor by that of the file that it is written to first."""
+    film(tmp_path / "clip.part.avi", 2)
+    shutil.copy(tmp_path / "clip.part.avi", tmp_path / "clip.avi")
+    before = contents(tmp_path)
+    for source in ("clip.avi", "clip.part.avi"):
+        done = detect(source, "--lens", lens, "--height", 0.8, "--save-video", "clip.avi", cwd=tmp_path, code=1)
+        one_complaint(done, f"vm-detect: {source} is an input and would be overwritten")
+    assert contents(tmp_path) == before
 
 
 def test_overlays_and_points_of_images_with_one_name_stay_apart(folder, lens, tmp_path):
@@ -199,7 +242,7 @@ def test_overlays_and_points_of_images_with_one_name_stay_apart(folder, lens, tm
 def test_a_video_has_every_frame_with_what_was_found(suffix, folder, tmp_path):
     path = tmp_path / f"found{suffix}"
     path.write_text("an older file")
-    detect(folder, "--save-video", path, "--save-overlay", tmp_path)
+    assert detect(folder, "--save-video", path, "--save-overlay", tmp_path).stderr == ""
     capture = cv2.VideoCapture(str(path))
     assert capture.get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
     for each in IMAGES[:2]:
@@ -213,13 +256,29 @@ def test_a_video_has_every_frame_with_what_was_found(suffix, folder, tmp_path):
 
 
 def test_a_video_of_a_video_has_its_rate(tmp_path, lens):
-    path = tmp_path / "clip.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 25.0, (640, 512))
-    for _ in range(3):
-        writer.write(cv2.imread(str(IMAGES[0])))
-    writer.release()
+    path = film(tmp_path / "clip.avi", 3, rate=25.0)
     detect(path, "--lens", lens, "--height", 0.8, "--pitch", "30deg", "--save-video", tmp_path / "found.mp4")
     assert cv2.VideoCapture(str(tmp_path / "found.mp4")).get(cv2.CAP_PROP_FPS) == pytest.approx(25.0)
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".avi", ".webm"])
+def test_a_video_that_a_full_disk_cuts_short_is_an_error_and_the_old_one_stays(suffix, tmp_path, lens):
+    """A limit on the size of files lets writes fail as a full disk does."""
+    source, path = film(tmp_path / "clip.avi", 8), tmp_path / f"found{suffix}"
+    options = ("--lens", lens, "--height", 0.8, "--pitch", "30deg", "--save-video", path)
+    detect(source, *options)
+    before = contents(tmp_path)
+    done = detect(source, *options, code=1, preexec_fn=partial(limit_files, int(0.6 * path.stat().st_size)))
+    one_complaint(done, f"can't write the video {path}: only ", " of 8 frames were written; is the disk full?")
+    assert len(lines(done)) == 8
+    assert contents(tmp_path) == before
+
+
+def test_a_video_of_a_very_fast_one_has_every_frame(tmp_path):
+    with VideoFile(tmp_path / "fast.avi", 5000.0) as video:
+        for _ in range(9):
+            video.write(cv2.imread(str(IMAGES[0])))
+    assert cv2.VideoCapture(str(tmp_path / "fast.avi")).get(cv2.CAP_PROP_FRAME_COUNT) == 9
 
 
 def test_a_video_that_can_not_be_written_is_named(folder, tmp_path):
@@ -238,6 +297,22 @@ def test_the_place_of_a_missing_lens_file_is_named(tmp_path):
         one_complaint(
             detect(tmp_path / name, "--height", 0.8, code=1), f"no lens: give --lens or --fov, or put {place}"
         )
+
+
+def test_what_is_wrong_with_many_frames_is_said_once_and_counted_at_the_end(tmp_path):
+    done = detect(film(tmp_path / "clip.avi", 7), code=1)
+    reason = "no lens: give --lens or --fov, or put lensNAME.yaml beside imageNAME"
+    assert done.stderr.splitlines() == [
+        f"vm-detect: clip.avi: {reason}",
+        f"vm-detect: 7 frames could not be processed: {reason}",
+    ]
+    for number in range(3):
+        shutil.copy(IMAGES[0], tmp_path / f"photo{number}.jpg")
+    (tmp_path / "photo3.jpg").write_bytes(b"no picture")
+    first, second, last = detect(tmp_path / "photo*.jpg", code=1).stderr.splitlines()
+    assert first == f"vm-detect: photo0.jpg: {reason}"
+    assert "photo3.jpg" in second
+    assert last == f"vm-detect: 3 frames could not be processed: {reason}"
 
 
 def test_a_photo_needs_no_lens_file(tmp_path):
@@ -346,6 +421,31 @@ def test_a_broken_image_is_named(tmp_path, content, lens):
 @pytest.mark.parametrize("name", ["missing.jpg", "missing/", "none*.jpg"])
 def test_a_missing_source_is_named(name, tmp_path):
     one_complaint(detect(name, code=1, cwd=tmp_path), name)
+
+
+@pytest.mark.parametrize("name", ["", "image0000000.jpg", "*.jpg", "clip.avi", "bag.mcap"])
+@pytest.mark.parametrize("locked", ["folder", "files"])
+def test_a_source_without_permission_is_named_as_unreadable(name, locked, folder):
+    film(folder / "clip.avi", 1)
+    (folder / "bag.mcap").write_bytes(b"")
+    for each in [folder] if locked == "folder" else folder.iterdir():
+        each.chmod(0)
+    done = detect(folder / name, code=1, preexec_fn=heed_permissions)
+    folder.chmod(0o755)
+    assert "can't read" in done.stderr
+    assert str(folder) in done.stderr
+    assert "Permission denied" in done.stderr
+    assert "write" not in done.stderr
+
+
+@pytest.mark.parametrize("option", ["--save-overlay", "--save-points", "--save-boxes", "--save-video"])
+def test_an_output_without_permission_is_named(option, tmp_path):
+    out = tmp_path / "out"
+    out.mkdir(mode=0)
+    path = out / "a.mp4" if option == "--save-video" else out
+    done = detect(IMAGES[0], option, path, code=1, preexec_fn=heed_permissions)
+    out.chmod(0o755)
+    one_complaint(done, str(out), "Permission denied", "can't read" if option == "--save-boxes" else "can't write")
 
 
 def test_a_directory_without_images_is_named(tmp_path):

@@ -1,6 +1,8 @@
 """Results as a user of the Python interface meets them: printed, as JSON, drawn and saved."""
 
 import json
+import subprocess
+import sys
 
 import cv2
 import pytest
@@ -49,6 +51,27 @@ def test_detections_are_drawn_and_saved(image, detections, tmp_path):
     assert (cv2.imread(str(tmp_path / "found.png")) == drawn).all()
     detections.save(str(tmp_path / "found.json"))
     assert json.loads((tmp_path / "found.json").read_text()) == json.loads(detections.to_json()) == detections.as_dict()
+
+
+SCRIPT = """
+import sys, cv2
+from vm_embedded import Detector, read_lens_file
+model, image, lens, *outputs = sys.argv[1:]
+camera = read_lens_file(lens)
+detections = Detector.from_file(model).detect(cv2.imread(image), camera.orientation, camera.lens)
+for each in outputs:
+    detections.save(each)
+"""
+
+
+def test_pictures_of_all_formats_are_saved_without_a_warning_of_opencv(tmp_path):
+    """In a process of its own, because vm-detect silences OpenCV in that of the tests."""
+    outputs = [tmp_path / f"found{suffix}" for suffix in (".jpg", ".JPEG", ".png", ".webp", ".bmp", ".tif", ".tiff")]
+    command = [sys.executable, "-c", SCRIPT, MODEL, IMAGES[0], LENS, *outputs]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert {cv2.imread(str(each)).shape for each in outputs} == {(512, 640, 3)}
+    assert outputs[0].read_bytes() == outputs[1].read_bytes()
 
 
 def test_what_can_not_be_drawn_or_saved_is_refused(image, detections, tmp_path):

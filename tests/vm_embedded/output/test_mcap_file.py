@@ -2,12 +2,14 @@
 
 import signal
 import subprocess
+from functools import partial
 
 import cv2
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
+from tests.programs import limit_files
 from tests.vm_embedded.cameras.ros.rolling_ball import Scene
 from tests.vm_embedded.cli.commands import COMMAND, lines, one_complaint, run
 
@@ -117,6 +119,29 @@ def test_frames_before_an_interrupt_are_in_the_file(tmp_path):
     count = 3 + len(rest.splitlines())
     assert count < 40
     assert count <= len(messages_of(path)["/vm_ros/detections_3d"]) <= count + 1
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.999])
+def test_a_full_disk_is_named_and_the_old_file_stays(share, tmp_path, scene_folder):
+    """At the start, in a frame, and at the end, when the index is written."""
+    path = tmp_path / "out.mcap"
+    run(scene_folder, "--save-mcap", path)
+    before = path.read_bytes()
+    limit = partial(limit_files, int(share * len(before)))
+    done = run(scene_folder, "--save-mcap", path, code=1, preexec_fn=limit)
+    one_complaint(done, f"can't write {path}: File too large")
+    assert sorted(tmp_path.iterdir()) == [scene_folder, path]
+    assert path.read_bytes() == before
+
+
+def test_without_a_frame_the_old_file_stays(tmp_path, scene_folder):
+    path, boxes = tmp_path / "out.mcap", tmp_path / "boxes"
+    path.write_bytes(b"old")
+    boxes.mkdir()
+    (boxes / "image.txt").write_text("")
+    one_complaint(run(scene_folder, "--save-mcap", path, "--save-boxes", boxes, code=1), "is not empty")
+    assert path.read_bytes() == b"old"
+    assert sorted(tmp_path.iterdir()) == [boxes, scene_folder, path]
 
 
 @pytest.mark.parametrize(

@@ -73,7 +73,7 @@ def test_what_can_not_be_calibrated_is_one_line(data, tmp_path, capsys):
     for arguments, said in (
         ((MODEL, data, "-o", tmp_path / "a.onnx"), "has no close look; vm-export --look attaches one"),
         (("bal", data, "-o", tmp_path / "a.onnx"), "unknown network 'bal'; did you mean 'ball'?"),
-        ((MODEL, data, "-o", MODEL), "is the input and would be overwritten"),
+        ((MODEL, data, "-o", MODEL), "is an input and would be overwritten"),
         (("ball-small", data, "-o", "/nowhere/a.onnx"), "/nowhere"),
         (("ball-small", data, "-o", tmp_path / "a.pt"), "a.pt must end in .onnx"),
         (("ball-small", draw_set(tmp_path / "few", 2), "-o", tmp_path / "a.onnx"), "which needs 10 of each"),

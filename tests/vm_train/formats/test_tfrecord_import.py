@@ -107,9 +107,10 @@ def test_files_may_be_appended_to_an_import_but_others_not_put_in_their_place(tm
             imported(files, out, **options)
 
 
-def test_a_folder_of_other_pictures_is_left_alone(tmp_path):
-    (tmp_path / "image0000000.jpg").write_bytes(IMAGE)
-    with pytest.raises(InputError, match="holds pictures that no import wrote"):
+@pytest.mark.parametrize("name", ["image0000000.jpg", "mask0000000.png", "lens0000000.yaml"])
+def test_a_folder_of_other_pictures_is_left_alone(name, tmp_path):
+    (tmp_path / name).write_bytes(IMAGE)
+    with pytest.raises(InputError, match=f"holds {name}, which no import wrote"):
         imported([written(tmp_path / "a", reference_example())], tmp_path)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from ...arrays import Image
 from ...errors import InputError, VisualMeshError, one_line, unknown
-from ...files import exists, is_file
+from ...files import is_file
 from ...geometry.lens import Lens
 from ...geometry.orientation import Orientation
 from ...poses.buffer import PoseBuffer, StalePoseError
@@ -63,13 +63,15 @@ class BagReading:
 def open_bag(name: str, reading: BagReading) -> Source:
     """The frames of a bag. Raises InputError if it can't be read, or if it is not clear which topic to take."""
     rosbags = import_rosbags()
-    if not exists(Path(name)):
-        raise InputError(f"no such bag: {name}")
+    path = Path(name)
     try:
-        reader = rosbags.highlevel.AnyReader([Path(name)], default_typestore=typestore())
+        if not path.exists():
+            raise InputError(f"no such bag: {name}")
+        files = tuple(sorted(path.iterdir())) if path.is_dir() else (path,)
+        reader = rosbags.highlevel.AnyReader([path], default_typestore=typestore())
         reader.open()
     except damage_errors() as error:
-        raise InputError(f"can't read bag {name}: {one_line(error)}") from error
+        raise InputError(f"can't read bag {name}: {getattr(error, 'strerror', None) or one_line(error)}") from error
     try:
         images = _image_topic(name, reader, reading.ros.image)
         info = reading.ros.camera_info or camera_info_beside(images)
@@ -80,7 +82,7 @@ def open_bag(name: str, reading: BagReading) -> Source:
     count = reader.topics[images].msgcount
     rate = (count - 1) / (1e-9 * reader.duration) if count > 1 and reader.duration > 0 else None
     settings = replace(reading, ros=replace(reading.ros, image=images, camera_info=info))
-    return Source(_BagFrames(Path(name).name, reader, settings).frames(), count, rate)
+    return Source(_BagFrames(path.name, reader, settings).frames(), count, rate, files)
 
 
 def _image_topic(name: str, reader: Any, chosen: str) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import shutil
 import time
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -37,13 +39,14 @@ class McapFile:
     """An MCAP file that frames are written into; a context manager.
 
     The file appears when it is closed; until then, its content is in the folder PATH.part. plane_frame: name of the
-    frame of the observation plane. Raises InputError if rosbags is missing, or the file can't be written.
+    frame of the observation plane. inputs: files that it must not replace. Raises InputError if rosbags is missing, or
+    the file can't be written.
     """
 
-    def __init__(self, path: Path, plane_frame: str) -> None:
+    def __init__(self, path: Path, plane_frame: str, inputs: Sequence[Path] = ()) -> None:
         if path.suffix.lower() != ".mcap":
             raise InputError(f"an MCAP file must end in .mcap, not {path.name!r}")
-        check_writable(path)
+        check_writable(path, inputs)
         self._path, self._plane_frame = path, plane_frame
         self._part = path.with_name(path.name + ".part")
         rosbags = import_rosbags()
@@ -52,15 +55,20 @@ class McapFile:
         self._store, self._types = typestore(), bag_types()
         mcap = rosbags.rosbag2.StoragePlugin.MCAP
         self._writer = rosbags.rosbag2.Writer(self._part, version=9, storage_plugin=mcap)
+        self._failure: OSError | None = None
         try:
             self._writer.open()
         except OSError as error:
+            self._discard()
             raise InputError(f"can't write {path}: {error.strerror or error}") from error
         self._connections: dict[str, Any] = {}
         self._start = time.time()
 
     def write(self, frame: Frame, lens: Lens, orientation: Orientation, detections: Detections) -> None:
-        """Write a frame with its detections, and the state ok."""
+        """Write a frame with its detections, and the state ok.
+
+        Raises OSError on a full disk; as the context ends, an InputError with the file takes its place.
+        """
         types, now = self._types, self._time(frame)
         stamp = stamp_of(types, now)
         in_image, on_plane = header_of(types, stamp, _CAMERA_FRAME), header_of(types, stamp, self._plane_frame)
@@ -81,7 +89,10 @@ class McapFile:
         self.write_state(frame, "ok", "")
 
     def write_state(self, frame: Frame, state: str, reason: str) -> None:
-        """Write the state at a frame: ok, or degraded with the reason why it was not processed."""
+        """Write the state at a frame: ok, or degraded with the reason why it was not processed.
+
+        Raises OSError as `write` does.
+        """
         now = self._time(frame)
         message = diagnostic_array(
             self._types,
@@ -104,7 +115,11 @@ class McapFile:
         if topic not in self._connections:
             self._connections[topic] = self._writer.add_connection(topic, MESSAGES[kind], typestore=self._store)
         data = self._store.serialize_cdr(message, MESSAGES[kind])
-        self._writer.write(self._connections[topic], round(1e9 * now), data)
+        try:
+            self._writer.write(self._connections[topic], round(1e9 * now), data)
+        except OSError as error:
+            self._failure = error
+            raise
 
     def __enter__(self) -> McapFile:
         return self
@@ -112,8 +127,32 @@ class McapFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Complete the file, also after an error: it has the frames until then."""
-        self._writer.close()
-        written = next(self._part.glob("*.mcap"))
-        written.replace(self._path)
-        shutil.rmtree(self._part)
+        """Complete the file, also after an error: it has the frames until then. Without any frame, no file is written.
+
+        Raises InputError if it could not be written as a whole, for example on a full disk. Without its end it would be
+        unreadable, so nothing of it stays.
+        """
+        if not self._connections:
+            self._discard()
+            return
+        try:
+            if self._failure is not None:
+                raise self._failure
+            self._writer.close()
+            written = next(self._part.glob("*.mcap"))
+        except OSError as failure:
+            self._discard()
+            raise InputError(f"can't write {self._path}: {failure.strerror or failure}") from failure
+        try:
+            written.replace(self._path)
+        except OSError as failure:
+            raise InputError(
+                f"can't write {self._path}: {failure.strerror or failure}; it is in {written}"
+            ) from failure
+        shutil.rmtree(self._part, ignore_errors=True)
+
+    def _discard(self) -> None:
+        """Remove what was written."""
+        with suppress(OSError):  # the disk may still be full
+            self._writer.abort()
+        shutil.rmtree(self._part, ignore_errors=True)
