@@ -19,7 +19,7 @@ from vm_embedded.live.control import ask
 PATIENCE = 120.0
 """Seconds after which a detector that does not become what it should is given up."""
 
-EXPECTED_EVENTS = ("ready", "status page", "state", "stopped")
+EXPECTED_EVENTS = ("ready", "status page", "state", "reason", "stopped")
 """Events that may be logged, whatever the camera does."""
 
 

@@ -47,9 +47,9 @@ LONG = 300 * "x"
     [
         (("--live", "--camera", LONG), 78, "no such camera"),
         (("--camera", f"/dev/{LONG}"), 78, "File name too long"),
-        (("--camera", LONG), 1, "can't open xxx"),
-        ((LONG, LONG), 1, "can't open xxx"),
-        ((f"{LONG}.mcap",), 1, "no such bag"),
+        (("--camera", LONG), 1, "can't read xxx"),
+        ((LONG, LONG), 1, "can't read xxx"),
+        ((f"{LONG}.mcap",), 1, "can't read bag xxx"),
     ],
 )
 def test_a_name_that_is_too_long_is_one_line(options, status, says):

@@ -183,7 +183,7 @@ def test_a_name_that_is_too_long_is_one_line(command):
 def test_vm_doctor_reports_a_name_that_is_too_long():
     done = run("vm-doctor", "--camera", "x" * 300)
     assert (done.returncode, done.stderr) == (1, "")
-    assert "failure   camera: can't open xxx" in done.stdout
+    assert "failure   camera: can't read xxx" in done.stdout
 
 
 def test_a_pipeline_may_be_longer_than_a_file_name():
