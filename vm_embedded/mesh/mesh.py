@@ -141,7 +141,7 @@ def check_size(points: float) -> None:
         number = f"{points:,.0f}" if points < 1e12 else "far too many"
         raise GeometryError(
             f"the mesh would have {number} points, and at most {MOST_POINTS:,} are allowed; choose fewer "
-            "intersections, a smaller max_distance or larger objects (with vm-export: --radius, that of the mesh)"
+            "intersections, a smaller max_distance or a larger object_radius (with vm-export: --radius)"
         )
 
 
