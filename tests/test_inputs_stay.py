@@ -84,6 +84,7 @@ def contents(folder):
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_program_does_not_replace_its_input(command, folder):
     before = contents(folder)
