@@ -56,15 +56,21 @@ def check_regular(path: Path) -> None:
         raise OSError(errno.EINVAL, "not a regular file", str(path))
 
 
-def read_text(path: Path) -> str:
-    """The text of a file in UTF-8, without a byte order mark. Raises InputError with the file and the reason."""
+def read_text(path: Path, noun: str = "") -> str:
+    """The text of a file in UTF-8, without a byte order mark. noun: the kind of file, for messages.
+
+    Raises InputError with the file and the reason.
+    """
+    name = f"{noun} {path}" if noun else str(path)
     try:
         check_regular(path)
         return path.read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+        raise InputError(f"can't read {name}: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
-        raise InputError(f"can't read {path}: it is not UTF-8 text") from error
+        raise InputError(f"can't read {name}: it is not UTF-8 text") from error
+    except ValueError as error:  # a path with a zero byte
+        raise InputError(f"can't read {name}: {error}") from error
 
 
 def write_file(path: Path, content: str | bytes) -> None:

@@ -20,7 +20,6 @@ _LARGEST_PART = 64 * 2**20
 _MOST_HEADERS = 64
 """Most header lines of a part."""
 
-
 _ALLOWED = "/?%:@!$&'()*+,;="
 """Characters besides letters and digits that may be in a path or query as they are, and "%", which escapes others."""
 

@@ -46,8 +46,9 @@ class ClosingRemarks:
         """One line for each remark."""
         if self._doubt:
             yield self._doubt
+        # Without a close look, sizes are as coarse as the mesh.
         hint = size_hint(self._sizes, self._radius) if self._has_look else ""
-        if hint:  # without a close look, sizes are as coarse as the mesh
+        if hint:
             yield hint
         if self._frames and not self._shown:
             yield "no frame shows a near part of the plane: check --height [m], --pitch (down is above 0), and lens"

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import InputError, VisualMeshError, unknown
-from ..files import check_regular
+from ..files import read_text
 from .entries import EntryError
 from .toml_reader import parse_toml
 
@@ -33,7 +33,7 @@ def read_sections(
     entries by section that replace the defaults; a section with a `read` of its own is taken whole. Raises InputError
     naming the file, line, section and entry, and the allowed values.
     """
-    text = _read_text(path, noun) if path else ""
+    text = read_text(path, noun) if path else ""
     where = f"{noun} {path}" if path else noun
     try:
         table = parse_toml(text)
@@ -107,18 +107,6 @@ def parse_overrides(given: Sequence[str], example: str) -> dict[str, dict[str, A
             value = text.strip()
         sections.setdefault(section, {})[entry] = value
     return sections
-
-
-def _read_text(path: Path, noun: str) -> str:
-    try:
-        check_regular(path)
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"can't read {noun} {path}: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{noun} {path} is not a text file") from error
-    except ValueError as error:  # a path with a zero byte
-        raise InputError(f"{noun} {path}: {error}") from error
 
 
 def _checked_section(name: str, value: Any) -> Mapping[str, Any]:

@@ -291,5 +291,5 @@ def mean_center(view: PreparedView, centers: Floats, probabilities: Singles, num
     """
     rays = centers / np.linalg.norm(centers, axis=1, keepdims=True)
     near = view.shape.covers(rays, centers[[number]], view.height, _NEAR)[0]
-    near[number] = True  # also where it is too far away to tell by digits
+    near[number] = True  # far away, rounding may leave out the place itself
     return np.asarray(view.shape.center_along(((near * probabilities) @ rays)[None], view.height)[0])

@@ -274,7 +274,7 @@ def test_what_is_no_file_is_named(tmp_path):
 def test_a_binary_file_is_refused(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_bytes(bytes(range(256)))
-    with pytest.raises(InputError, match=r"scene\.toml is not a text file"):
+    with pytest.raises(InputError, match=r"scene\.toml: it is not UTF-8 text"):
         read_sections(SceneConfiguration, path)
 
 
