@@ -1,4 +1,4 @@
-"""Tables and plots of docs/results.md from benchmarks/choices.json: `python -m benchmarks.choices_report`."""
+"""Tables and plots of docs/experiments.md from benchmarks/choices.json: `python -m benchmarks.choices_report`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.choices import HEIGHTS, LENSES, RESULTS
-from benchmarks.report import DOCS, fill, spread, table
-from benchmarks.shipped_report import PAGE
+from benchmarks.report import DOCS, EXPERIMENTS, fill, spread, table
 from vm_workstation.plots import new_figure, save_figure
 
 GROUPS = {
@@ -124,7 +123,7 @@ def main() -> None:
     results = json.loads(RESULTS.read_text())
     made = {name: group(results, name) for name in GROUPS}
     made |= {"lenses": transfer(results, LENSES), "heights": transfer(results, HEIGHTS)}
-    fill(PAGE, made)
+    fill(EXPERIMENTS, made)
     plot(results)
 
 

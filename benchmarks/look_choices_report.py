@@ -1,4 +1,4 @@
-"""Table and plot from benchmarks/look_choices.json: `python -m benchmarks.look_choices_report`."""
+"""The table and plot of docs/experiments.md on close looks: `python -m benchmarks.look_choices_report`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.look_choices import RESULTS
-from benchmarks.report import DOCS, fill, spread, table
-from benchmarks.shipped_report import PAGE
+from benchmarks.report import DOCS, EXPERIMENTS, fill, spread, table
 from vm_workstation.plots import new_figure, save_figure
 
 NEAR, FAR = "0.5 to 6 m", "6 to 10 m"
@@ -58,7 +57,7 @@ def plot(found: dict[str, Any]) -> None:
 
 def main() -> None:
     found = json.loads(RESULTS.read_text())
-    fill(PAGE, {"look choices": choices(found)})
+    fill(EXPERIMENTS, {"look choices": choices(found)})
     plot(found)
 
 

@@ -17,6 +17,7 @@ RESULTS = Path(__file__).with_name("results.json")
 PEER_TIMES = Path(__file__).with_name("peer_times.json")
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "performance.md"
+EXPERIMENTS = DOCS / "experiments.md"
 README = DOCS.parent / "README.md"
 
 

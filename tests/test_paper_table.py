@@ -1,4 +1,4 @@
-"""The section "From paper to code" of docs/design.md: rows lead to code, and every label of the paper has a row."""
+"""The page docs/paper.md: rows lead to code, and every label of the paper has a row."""
 
 import ast
 import os
@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 TOP = Path(__file__).resolve().parent.parent
-DESIGN = TOP / "docs" / "design.md"
+PAGE = TOP / "docs" / "paper.md"
 PAPER = Path(os.environ.get("VM_SHARED", TOP.parent / "shared")) / "paper" / "visual_mesh_paper.tex"
 
 EQUATIONS = {"eqn:circle_phi1", "eqn:circle_dtheta", "eqn:sphere_phi_1"}
@@ -28,8 +28,7 @@ ELSEWHERE = re.compile(rf"not here: [^`]+\.|(?:measured|see): {LINK}(?:, {LINK})
 
 def rows():
     """(label or section of the paper, claim, code) of each row."""
-    section = re.search(r"^## From paper to code\n(.*?)^## ", DESIGN.read_text(), re.MULTILINE | re.DOTALL)
-    cells = [line.strip("| ").split(" | ") for line in section[1].splitlines() if line.startswith("| ")]
+    cells = [line.strip("| ").split(" | ") for line in PAGE.read_text().splitlines() if line.startswith("| ")]
     assert all(len(row) == 3 for row in cells)
     return [tuple(row) for row in cells if row[0] not in ("in the paper", "---")]
 
