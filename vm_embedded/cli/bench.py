@@ -24,7 +24,7 @@ from .bench_table import bench_table
 from .machine import describe_machine, rss_mib, sgemm_rate
 from .measuring import Run, measure, measure_cold
 from .options import ANGLES, add_model, add_pose, add_settings, read_options
-from .program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program, system_error
+from .program import EXIT_FAILED, EXIT_OK, Parser, program, system_error
 from .progress import ProgressBar
 from .tuning import TUNED, fastest_settings
 from .workload import Workload, make_workload
@@ -87,8 +87,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"vm-bench: {system_error(error)}", file=sys.stderr)
         return EXIT_FAILED
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
 
 
 def _run(options: argparse.Namespace) -> int:

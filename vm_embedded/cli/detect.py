@@ -30,7 +30,7 @@ from .detect_files import complain, detect_in_files
 from .finding import BAD
 from .openings import check_openings
 from .options import ANGLES, LIVE, add_live, add_model, add_pose, add_settings, add_track, read_options
-from .program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program, system_error
+from .program import EXIT_FAILED, EXIT_OK, Parser, program, system_error
 from .run_daemon import report_failed_start, run_daemon
 
 _FILES_ONLY = (
@@ -151,8 +151,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:  # for example a full disk behind standard output
         complain(system_error(error))
         return EXIT_FAILED
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
 
 
 def _run(options: argparse.Namespace) -> int:
