@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import asyncio
 import json
 import sys
 from collections.abc import Sequence
@@ -19,16 +18,13 @@ from ..config.toml_reader import parse_toml
 from ..config.toml_writer import to_commented_toml
 from ..errors import InputError, VisualMeshError
 from ..files import read_text
-from ..live.configuration import HEADER, Configuration
+from ..live.configuration import HEADER
 from ..live.control import REFUSED, ask, control_path
 from ..live.daemon import Daemon
-from ..live.load_detector import prove_model
 from ..live.log import EventLog
 from ..network.bundled import SHIPPED, shipped_name
-from .camera_source import check_pose_source, check_source
+from .check_configuration import check_configuration
 from .detect_files import complain, detect_in_files
-from .finding import BAD
-from .openings import check_openings
 from .options import ANGLES, LIVE, add_live, add_model, add_pose, add_settings, add_track, read_options
 from .program import EXIT_FAILED, EXIT_OK, Parser, program, system_error
 from .run_daemon import report_failed_start, run_daemon
@@ -170,7 +166,8 @@ def _run(options: argparse.Namespace) -> int:
         print(to_commented_toml(replace(given, model=_movable(given.model)), HEADER), end="")
         return EXIT_OK
     if options.check_config:
-        return _check_configuration(given)
+        print(check_configuration(given, with_ros=False))
+        return EXIT_OK
     if not given.camera.source:
         parser().error("no camera: give a file or --camera, or [camera] source in vm.toml")
     if len(options.files) > 1 and (options.live or any(map(is_live, options.files))):
@@ -220,18 +217,6 @@ def _ask(socket: str, command: str) -> int:
         raise InputError(f"unexpected reply; is this vm-detect? {reply[:60]!r}") from error
     print(reply)
     return EXIT_OK if good else EXIT_FAILED
-
-
-def _check_configuration(given: Configuration) -> int:
-    """Check the configuration, the source of its camera, what it opens, and the model. Raises VisualMeshError."""
-    check_source(given)
-    check_pose_source(given)
-    for finding in check_openings(given):
-        if finding.state == BAD:
-            raise InputError(f"{finding.about}: {finding.seen}")
-    model, proved = asyncio.run(prove_model(given))
-    print(f"{given.model}: {len(model.manifest.classes)} classes, {proved}; the configuration is good")
-    return EXIT_OK
 
 
 def _check_file_options(options: argparse.Namespace) -> None:

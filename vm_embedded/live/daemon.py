@@ -22,6 +22,7 @@ from typing import Any, Protocol
 
 from ..cameras.camera import without_password
 from ..cameras.grabber import Grabber
+from ..cameras.open_camera import Opener
 from ..detection.detector import Detector
 from ..errors import InputError, NetworkError, VisualMeshError, one_line
 from ..output.channels import Channels
@@ -83,14 +84,15 @@ class Part(Protocol):
 class Daemon:
     """Runs until a signal stops it, the camera ends, or too many reads of the camera hang.
 
-    configure: reads the configuration for each reload. proved: in words, what shows that the detector works. bridge: to
-    other robot software.
+    configure: reads the configuration for each reload. opener: opens the camera. proved: in words, what shows that the
+    detector works. bridge: to other robot software.
     """
 
     def __init__(
         self,
         configure: Callable[[], Configuration],
         configuration: Configuration,
+        opener: Opener,
         detector: Detector,
         proved: str,
         log: EventLog,
@@ -115,7 +117,7 @@ class Daemon:
         self._stuck = ""  # why only a new process helps; empty if none is needed
         self._wakeup = asyncio.Event()
         self._reloading: asyncio.Task[None] | None = None
-        self.grabber = Grabber(find_opener(configuration, bridge), camera, self._wake)
+        self.grabber = Grabber(opener, camera, self._wake)
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
         self._watchdog = FrameWatchdog(self._end_hanging)
         self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health, self._watchdog)
@@ -134,9 +136,9 @@ class Daemon:
     ) -> Daemon:
         """A daemon whose configuration was read and whose detector was proved. Raises VisualMeshError."""
         configuration = configure()
-        find_opener(configuration, bridge)  # only for its checks, before the longer ones
+        opener = find_opener(configuration, bridge)  # its checks are quick, so they are the first
         detector, proved = await load_checked_detector(configuration)
-        return cls(configure, configuration, detector, proved, log, bridge)
+        return cls(configure, configuration, opener, detector, proved, log, bridge)
 
     @property
     def configuration(self) -> Configuration:
