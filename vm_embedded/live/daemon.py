@@ -342,11 +342,7 @@ class Daemon:
             self._loop.call_soon_threadsafe(self._wakeup.set)
 
     def _start_reload(self) -> None:
-        """Begin a reload, instead of one that has not ended, and open the output file again."""
-        try:
-            self.outputs.reopen_file()
-        except InputError as error:
-            self._log("output file not opened again", "warning", reason=str(error))
+        """Begin a reload, instead of one that has not ended."""
         if self._reloading is not None:
             self._reloading.cancel()
         self._reloading = self._loop.create_task(self._reload())
