@@ -43,10 +43,10 @@ from vm_embedded.output.channels import OutputSettings  # noqa: E402
 NAME = "vm-embedded-robot"
 LOCK = TOP / "deploy" / "robot.txt"
 SCRIPTS = TOP / "deploy" / "robot"
-ROOMS = ("vm_embedded", "vm_ros")
-"""Packages of this project that run on robots; the others are for a workstation."""
+PROGRAMS = ("vm-detect", "vm-doctor", "vm-bench", "vm-ros")
+"""Programs of this project that run on robots; the others are for a workstation."""
 
-OWN = ("vm_embedded", "export/vm_ros", "pyproject.toml", "README.md", "LICENSE")
+OWN = ("vm_embedded", "export/vm_ros", "export/vm_programs", "pyproject.toml", "README.md", "LICENSE")
 PACKED = (*OWN, "deploy")
 """Paths of the checkout in the project's wheel (OWN) and in the bundle."""
 
@@ -153,17 +153,17 @@ def project_wheel(top: Path, origin: Origin, folder: Path) -> Path:
                 copy.write_bytes((top / each).read_bytes())
                 copy.chmod(0o644)
         project = source / "pyproject.toml"
-        project.write_text(_with_programs_of(ROOMS, project.read_text()))
+        project.write_text(_with_programs(PROGRAMS, project.read_text()))
         words: list[str | Path] = ["wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, source]
         _pip("the project's own wheel can't be built", *words, env={"SOURCE_DATE_EPOCH": str(origin.time)})
     (wheel,) = folder.glob("vm_embedded-*.whl")
     return wheel
 
 
-def _with_programs_of(packages: tuple[str, ...], project: str) -> str:
-    """A pyproject.toml without the programs of other packages, which would only print a traceback."""
-    programs = re.compile(r'^vm-\w+ = "(\w+)\..*\n', re.MULTILINE)
-    return programs.sub(lambda found: found[0] if found[1] in packages else "", project)
+def _with_programs(names: tuple[str, ...], project: str) -> str:
+    """A pyproject.toml without the other programs, which would only print a traceback."""
+    programs = re.compile(r"^(vm-\w+) = .*\n", re.MULTILINE)
+    return programs.sub(lambda found: found[0] if found[1] in names else "", project)
 
 
 def _pip(what: str, *words: str | Path, env: Mapping[str, str] | None = None) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 CHECKOUT = Path(__file__).resolve().parents[1]
 
 ROOMS = {
+    "vm_programs": "",
     "vm_embedded": "cli > live > output > cameras > detection > field > network > mesh > poses > geometry"
     " > config > sockets+files+errors+arrays",
     "vm_workstation": "",
@@ -30,6 +31,7 @@ separates rooms of the same level, which do not import each other; a plus joins 
 package without rooms is flat: all its modules lie directly in its folder."""
 
 PACKAGES = {
+    "vm_programs": set[str](),
     "vm_embedded": set[str](),
     "vm_workstation": {"vm_embedded"},
     "vm_export": {"vm_embedded"},

@@ -16,6 +16,7 @@ from .rooms import CHECKOUT, ROOMS, read_package, read_project, top_names
 PROJECT = read_project()
 
 FEWEST = {
+    "vm_programs": 1,
     "vm_embedded": 70,
     "vm_workstation": 4,
     "vm_export": 12,
@@ -29,6 +30,7 @@ FEWEST = {
 """Fewer modules than these mean that a check below looks in the wrong place."""
 
 OUTSIDE = {
+    "vm_programs": set(),
     "vm_embedded": {"numpy", "cv2", "onnxruntime", "tomli", "typing_extensions", "rosbags"},
     "vm_workstation": {"numpy", "cv2", "matplotlib"},
     "vm_export": {"numpy", "torch", "onnx", "yaml"},

@@ -11,9 +11,11 @@ import cv2
 from vm_embedded.cameras.library_messages import silence_opencv
 from vm_embedded.cameras.open_camera import ROS
 from vm_embedded.cameras.ros.settings import NODE
+from vm_embedded.cli.check_configuration import check_configuration
 from vm_embedded.cli.options import ANGLES, add_live, add_model, add_pose, add_settings, add_track, read_options
-from vm_embedded.cli.program import Parser, program
+from vm_embedded.cli.program import EXIT_FAILED, EXIT_OK, Parser, program
 from vm_embedded.cli.run_daemon import run_daemon
+from vm_embedded.errors import VisualMeshError
 from vm_embedded.live.configuration import Configuration, with_overrides
 from vm_embedded.live.daemon import Daemon
 from vm_embedded.live.log import EventLog
@@ -40,6 +42,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="SOURCE",
         help=f"{ROS}: the images of the topic --ros-image; or another live camera, as for vm-detect; default {ROS}",
     )
+    parser.add_argument("--check-config", action="store_true", help="check the configuration and the model, and exit")
     add_model(parser)
     add_pose(parser, "instead of camera_info and tf")
     add_settings(parser)
@@ -56,8 +59,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(given[:cut])
     silence_opencv()
     cv2.setNumThreads(1)
+    if options.check_config:
+        return _check(options)
     log = EventLog("vm-ros")
     return run_daemon(log, lambda: _prepare(options, given[cut + 1 :], log))
+
+
+def _check(options: argparse.Namespace) -> int:
+    """Check the configuration without connecting to ROS, and return the exit status."""
+    try:
+        print(check_configuration(configuration(options), with_ros=True))
+    except VisualMeshError as error:
+        print(f"vm-ros: {error}", file=sys.stderr)
+        return EXIT_FAILED
+    return EXIT_OK
 
 
 async def _prepare(options: argparse.Namespace, ros_arguments: Sequence[str], log: EventLog) -> Daemon:

@@ -51,7 +51,7 @@ def test_the_runtime_is_small_and_has_only_what_runs_on_robots(bundle):
         (listed,) = (each for each in wheel.namelist() if each.endswith("/entry_points.txt"))
         programs = configparser.ConfigParser()
         programs.read_string(wheel.read(listed).decode())
-    assert {each.split("/")[0] for each in names} == {"vm_embedded", "vm_ros"}
+    assert {each.split("/")[0] for each in names} == {"vm_embedded", "vm_ros", "vm_programs"}
     assert not [each for each in names if each.endswith(".onnx")]
     assert set(programs["console_scripts"]) == {"vm-detect", "vm-doctor", "vm-bench", "vm-ros"}
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from tests.vm_embedded.live.running import DEMO
 from vm_embedded.cameras.camera import CameraSettings, Shot
 from vm_embedded.cameras.image_files import read_image
+from vm_embedded.cameras.open_camera import camera_opener
 from vm_embedded.detection.detector import Detector
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.live.configuration import Configuration, StatusSettings
@@ -46,7 +47,8 @@ def opened_daemon() -> tuple[Daemon, int]:
 
 
 async def _opened(configuration: Configuration, detector: Detector) -> Daemon:
-    daemon = Daemon(lambda: configuration, configuration, detector, "", EventLog("vm-detect", io.StringIO()))
+    opener = camera_opener(configuration.camera)
+    daemon = Daemon(lambda: configuration, configuration, opener, detector, "", EventLog("vm-detect", io.StringIO()))
     for part in daemon._parts:
         await part.open()
     file = read_lens_file(_FRAME.with_name("lens0000000.yaml"))

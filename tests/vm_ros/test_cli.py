@@ -73,6 +73,30 @@ def test_vm_detect_names_vm_ros_for_topics():
         assert reason(done) == expected
 
 
+@pytest.mark.parametrize(
+    "words", [["--camera", "ros"], ["--camera", "/dev/video0", "--fov", "1.0", "--pose-source", "tf"]]
+)
+def test_a_configuration_for_vm_ros_is_checked_by_vm_ros(words, tmp_path):
+    """vm-detect could not run it."""
+    command = ["--status-socket", tmp_path / "control", "--check-config", *words]
+    done = run(*command)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.endswith("; the configuration is good\n")
+    refused = subprocess.run(
+        [COMMAND.with_name("vm-detect"), *command], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert refused.returncode == 1
+    assert "works only with vm-ros" in refused.stderr
+
+
+def test_a_wrong_configuration_for_vm_ros_is_one_line(tmp_path):
+    done = run("--status-socket", tmp_path / "control", "--check-config", "--camera", "/dev/video0")
+    assert (done.returncode, done.stderr) == (
+        1,
+        "vm-ros: camera /dev/video0 needs a lens: give --lens or --fov\n",
+    )
+
+
 def test_the_package_of_ros_has_this_version_and_depends_on_all_messages():
     package = ElementTree.parse(PACKAGE / "package.xml").getroot()
     assert package.findtext("version") == re.sub(r"(a|b|rc)\d+$", "", __version__)

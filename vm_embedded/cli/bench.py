@@ -15,6 +15,7 @@ import cv2
 
 from ..config.toml_editor import check_editable, write_entries
 from ..detection.detector import Detector
+from ..detection.settings import Settings
 from ..errors import InputError, VisualMeshError
 from ..files import check_not_input, check_writable, is_file, write_file
 from ..live.configuration import Configuration
@@ -24,7 +25,7 @@ from .bench_table import bench_table
 from .machine import describe_machine, rss_mib, sgemm_rate
 from .measuring import Run, measure, measure_cold
 from .options import ANGLES, add_model, add_pose, add_settings, read_options
-from .program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program, system_error
+from .program import EXIT_FAILED, EXIT_OK, Parser, program, system_error
 from .progress import ProgressBar
 from .tuning import TUNED, fastest_settings
 from .workload import Workload, make_workload
@@ -87,8 +88,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"vm-bench: {system_error(error)}", file=sys.stderr)
         return EXIT_FAILED
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -99,34 +98,17 @@ def _run(options: argparse.Namespace) -> int:
     if options.up_to is not None and options.up_to < 1:
         raise InputError(f"--up-to must be at least 1, not {options.up_to}")
     work = make_workload(options, given)
-    json_to_stdout = str(options.json) == "-"
     network = model_path(given.model)
-    inputs = (options.image, options.lens, network)
-    if options.json is not None and not json_to_stdout:
-        check_writable(options.json, (*inputs, options.config))
-    if options.tune is not None:
-        check_not_input(options.tune, inputs)
-        _check_tuning(options, given)
+    _check_outputs(options, given, network)
     model = read_model(network)
-    if options.threads is None:
-        cores = len(os.sched_getaffinity(0))
-        settings = [replace(given.detector, threads=count + 1) for count in range(min(options.up_to or cores, cores))]
-    else:
-        settings = [given.detector]
+    settings = _settings_to_measure(options, given.detector)
     detectors = [Detector(model, each) for each in settings]
     bar = ProgressBar(options.frames)
     runs = measure(detectors, work.image, work.lens, work.orientations, bar.show)
     bar.clear()
-    has_lens, has_pose = given.lens_for(work.size) is not None, given.fixed_orientation() is not None
-    assumed = [name for name, is_given in (("lens", has_lens), ("pose", has_pose)) if not is_given]
-    if assumed:
-        print(
-            f"vm-bench: no {' and no '.join(assumed)} given, so common ones were used; the robot's own decide how many "
-            "points a frame has",
-            file=sys.stderr,
-        )
+    _complain_about_defaults(given, work)
     found = _figures(model, work, detectors, runs)
-    if not json_to_stdout:
+    if not _prints_json(options):
         print(bench_table(found), flush=True)
     if options.tune is not None:
         bar = ProgressBar(options.frames)
@@ -136,24 +118,57 @@ def _run(options: argparse.Namespace) -> int:
         )
         bar.clear()
     text = json.dumps(found, indent=1, allow_nan=False)
-    if json_to_stdout:
+    if _prints_json(options):
         print(text)
     elif options.json is not None:
         write_file(options.json, text + "\n")
     if options.tune is not None:
         write_entries(options.tune, "detector", found["tuned"])
         chosen = ", ".join(f"{name} = {value}" for name, value in found["tuned"].items())
-        print(f"{options.tune}: {chosen}", file=sys.stderr if json_to_stdout else sys.stdout)
+        print(f"{options.tune}: {chosen}", file=sys.stderr if _prints_json(options) else sys.stdout)
     return EXIT_OK
 
 
-def _check_tuning(options: argparse.Namespace, given: Configuration) -> None:
-    """Raise InputError if tuning can't work, before anything is measured."""
+def _prints_json(options: argparse.Namespace) -> bool:
+    return str(options.json) == "-"
+
+
+def _check_outputs(options: argparse.Namespace, given: Configuration, network: Path) -> None:
+    """Raise InputError if a file can't be written or tuning can't work, before anything is measured.
+
+    network: the model file.
+    """
+    inputs = (options.image, options.lens, network)
+    if options.json is not None and not _prints_json(options):
+        check_writable(options.json, (*inputs, options.config))
+    if options.tune is None:
+        return
+    check_not_input(options.tune, inputs)
     check_editable(options.tune, "detector", TUNED)
     if given.detector.height_tolerance == 0.0:
         raise InputError("--tune needs prepared meshes; give a --height-tolerance above 0")
     if options.frames < _TUNING_FRAMES:
         raise InputError(f"--tune needs --frames of at least {_TUNING_FRAMES}, not {options.frames}")
+
+
+def _settings_to_measure(options: argparse.Namespace, given: Settings) -> list[Settings]:
+    """The given settings if they name the number of threads; else with each number from one to all cores."""
+    if options.threads is not None:
+        return [given]
+    cores = len(os.sched_getaffinity(0))
+    return [replace(given, threads=count + 1) for count in range(min(options.up_to or cores, cores))]
+
+
+def _complain_about_defaults(given: Configuration, work: Workload) -> None:
+    """Say that lens or pose are not the user's, because they decide how long a frame takes."""
+    has_lens, has_pose = given.lens_for(work.size) is not None, given.fixed_orientation() is not None
+    assumed = [name for name, is_given in (("lens", has_lens), ("pose", has_pose)) if not is_given]
+    if assumed:
+        print(
+            f"vm-bench: no {' and no '.join(assumed)} given, so common ones were used; the robot's own decide how many "
+            "points a frame has",
+            file=sys.stderr,
+        )
 
 
 def _figures(model: ModelFile, work: Workload, detectors: Sequence[Detector], runs: Sequence[Run]) -> dict[str, Any]:

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import errno
-import fcntl
 import math
 import os
-import socket
-import struct
 import time
 from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
-from urllib.parse import urlsplit
 
-from ..cameras.camera import without_password
 from ..cameras.open_camera import brings_lens_and_pose, is_live
-from ..cameras.opencv import device_path
 from ..cameras.ros.bags import is_bag
 from ..errors import InputError, VisualMeshError, one_line
 from ..geometry.lens_doubt import lens_doubt
@@ -25,27 +18,14 @@ from ..geometry.orientation import Orientation
 from ..live.configuration import Configuration
 from ..live.load_detector import check_height, prove_network
 from ..network.model_file import ModelFile
+from .camera_checks import check_cameras
 from .camera_source import SourceFacts, check_pose_source, check_source
 from .finding import BAD, GOOD, WARNING, Finding
+from .machine_checks import check_clock, check_governor, check_opencv, check_processor, check_threads
 from .openings import check_openings
-
-OPENCV_PACKAGES = ("opencv-python", "opencv-python-headless", "opencv-contrib-python", "opencv-contrib-python-headless")
-
-_VIDIOC_ENUM_FMT = 0xC0405602
-_V4L2_FMTDESC = "=III32sI4I"
-_V4L2_BUF_TYPE_VIDEO_CAPTURE = 1
-
-_EARLIEST_TIME = 1735689600.0
-"""Start of 2025, since 1970 [s]: a clock that shows less is wrong."""
-
-_PORTS = {"http": 80, "https": 443, "rtsp": 554, "rtmp": 1935}
-"""Usual ports of the addresses of cameras."""
 
 _HIGHEST = 20.0
 """Height of a camera from which the pose is probably in other units [m]."""
-
-_PATIENCE = 3.0
-"""How long to wait for the host of a camera [s]."""
 
 
 def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator[Finding]:
@@ -62,76 +42,13 @@ def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator
             source = check_source(configuration)
         except VisualMeshError as error:
             fault = str(error)
-        yield from check_cameras(configuration, root, fault)
+        yield from check_cameras(configuration.camera.source, fault, root / "dev")
         yield check_lens(configuration, source)
         yield check_pose(configuration, source, model)
         yield check_clock(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", time.time())
         yield from check_openings(configuration)
     except OSError as error:
         yield Finding("machine", WARNING, one_line(error))
-
-
-def check_processor(cpuinfo: Path) -> Finding:
-    """Whether the processor has the vector instructions that make ONNX Runtime fast."""
-    try:
-        lines = cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
-        return Finding("processor", WARNING, f"{cpuinfo} can't be read: {error.strerror}")
-    fields = dict(line.split(":", 1) for line in lines if ":" in line)
-    named = {name.strip(): value.strip() for name, value in fields.items()}
-    is_arm = "Features" in named  # there, x86 has "flags"
-    flags = set(named.get("Features" if is_arm else "flags", "").split())
-    model = named.get("model name", "ARM" if is_arm else "unknown")
-    needed = ("asimd",) if is_arm else ("avx2", "fma")
-    missing = [name for name in needed if name not in flags]
-    if missing:
-        return Finding("processor", WARNING, f"{model} has no {' and no '.join(missing)}; detection will be slow")
-    return Finding("processor", GOOD, f"{model}: {', '.join(needed)}{', avx512' if 'avx512f' in flags else ''}")
-
-
-def check_threads(threads: int, allowed: int, cores: int) -> Finding:
-    """Whether the process may use as many cores as it has threads."""
-    if threads > allowed:
-        return Finding(
-            "threads",
-            WARNING,
-            f"{threads} threads are configured, but this process may use only {allowed} of {cores} cores",
-            f"vm-detect --threads {allowed}, or set CPUAffinity= in a drop-in of the systemd unit",
-        )
-    return Finding("threads", GOOD, f"{threads} configured; this process may use {allowed} cores")
-
-
-def check_governor(cpus: Path) -> Finding:
-    """Whether the frequency governor slows cores down between frames."""
-    try:
-        found = {each.read_text().strip() for each in sorted(cpus.glob("cpu[0-9]*/cpufreq/scaling_governor"))}
-    except OSError as error:
-        return Finding("governor", WARNING, f"can't be read: {one_line(error)}")
-    if not found:
-        return Finding("governor", GOOD, "this machine has no frequency governor to set")
-    if found <= {"performance", "schedutil"}:
-        return Finding("governor", GOOD, ", ".join(sorted(found)))
-    return Finding(
-        "governor",
-        WARNING,
-        f"{', '.join(sorted(found))}: cores slow down between frames and speed up late",
-        "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor",
-    )
-
-
-def check_opencv(installed: set[str]) -> Finding:
-    """Whether two packages overwrote each other's cv2."""
-    found = [each for each in OPENCV_PACKAGES if each in installed]
-    if len(found) > 1:
-        return Finding(
-            "OpenCV",
-            BAD,
-            f"{' and '.join(found)} are installed and overwrite each other",
-            f"pip uninstall -y {' '.join(found)} && pip install opencv-python-headless",
-        )
-    return Finding(
-        "OpenCV", GOOD, f"{found[0]} {metadata.version(found[0])}" if found else "not installed from a wheel"
-    )
 
 
 def check_model(configuration: Configuration) -> tuple[Finding, ModelFile | None]:
@@ -147,88 +64,6 @@ def check_model(configuration: Configuration) -> tuple[Finding, ModelFile | None
             "model", WARNING, seen, "vm-export --canary IMAGE LENS writes a picture that it must find"
         ), model
     return Finding("model", GOOD, seen), model
-
-
-def check_cameras(configuration: Configuration, root: Path, fault: str) -> Iterator[Finding]:
-    """Whether each video device can be opened, and whether the configured camera exists.
-
-    fault: why it can never work, empty if it can.
-    """
-    nodes = sorted((root / "dev").glob("video*"))
-    for node in nodes:
-        yield _check_video_device(node)
-    source = configuration.camera.source
-    if not source:
-        yield Finding(
-            "camera", WARNING, "no camera is configured", "vm-detect --camera SOURCE, or set [camera] source in vm.toml"
-        )
-        return
-    device = device_path(source)
-    if fault:
-        yield Finding("camera", BAD, fault, "vm-detect --help lists the allowed cameras")
-        return
-    if device is not None and not (root / device.relative_to("/")).exists():
-        there = ", ".join(str(each) for each in nodes) or "none"
-        yield Finding("camera", BAD, f"{device} does not exist; video devices: {there}", "ls -l /dev/v4l/by-id/")
-        return
-    may_change = device is not None and "by-" not in str(device)
-    shown = without_password(source)
-    refused = _refused_connection(source)
-    if refused:
-        yield Finding("camera", BAD, f"{shown}: {refused}", "ping the host, and compare port and address")
-        return
-    yield Finding(
-        "camera",
-        WARNING if may_change else GOOD,
-        f"{shown}: the number may change when cameras are plugged in again" if may_change else shown,
-        "ls -l /dev/v4l/by-id/ and use one of these paths" if may_change else "",
-    )
-
-
-def _refused_connection(source: str) -> str:
-    """Why the host of a camera's address can't be reached; empty if it can, and for other sources."""
-    try:
-        address = urlsplit(source)
-        if address.scheme not in _PORTS or not address.hostname:
-            return ""
-        with socket.create_connection((address.hostname, address.port or _PORTS[address.scheme]), _PATIENCE):
-            return ""
-    except OSError as error:
-        return error.strerror or str(error)
-    except ValueError as error:  # for example a port that is no number
-        return str(error)
-
-
-def _check_video_device(node: Path) -> Finding:
-    if not os.access(node, os.R_OK | os.W_OK):
-        return Finding(str(node), BAD, "this user may not open it", "sudo usermod -aG video $USER, then log in again")
-    try:
-        formats = pixel_formats(node)
-    except OSError as error:
-        busy = error.errno == errno.EBUSY
-        return Finding(
-            str(node), WARNING, f"can't read its formats: {error.strerror}", f"fuser -v {node}" if busy else ""
-        )
-    if not formats:
-        return Finding(str(node), GOOD, "no images; another device of the same camera delivers them")
-    return Finding(str(node), GOOD, f"delivers {', '.join(formats)}")
-
-
-def pixel_formats(node: Path) -> list[str]:
-    """Pixel formats (FOURCC) of a V4L2 device. Raises OSError."""
-    descriptor = os.open(node, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
-    found: list[str] = []
-    try:
-        while True:
-            request = struct.pack(_V4L2_FMTDESC, len(found), _V4L2_BUF_TYPE_VIDEO_CAPTURE, 0, b"", 0, 0, 0, 0, 0)
-            reply = fcntl.ioctl(descriptor, _VIDIOC_ENUM_FMT, request)
-            found.append(struct.unpack(_V4L2_FMTDESC, reply)[4].to_bytes(4, "little").decode("ascii", "replace"))
-    except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTTY):  # these end the list
-            raise
-        return found
-    finally:
-        os.close(descriptor)
 
 
 def check_lens(configuration: Configuration, source: SourceFacts) -> Finding:
@@ -315,21 +150,3 @@ def _check_orientation(orientation: Orientation, configuration: Configuration, m
 def _brings_lens_and_pose(source: str) -> bool:
     """Whether a source, live or not, needs no configured lens and pose."""
     return brings_lens_and_pose(source) or is_bag(source)
-
-
-def check_clock(source: Path, now: float) -> Finding:
-    """Whether the clock is fast to read and roughly right."""
-    try:
-        name = source.read_text().strip()
-    except OSError:
-        name = "unknown"
-    if now < _EARLIEST_TIME:
-        return Finding(
-            "clock",
-            WARNING,
-            f"the date is wrong: {time.strftime('%Y-%m-%d', time.gmtime(now))}",
-            "sudo timedatectl set-ntp true",
-        )
-    if name in ("hpet", "acpi_pm"):
-        return Finding("clock", WARNING, f"{name} is slow to read", "boot with clocksource=tsc")
-    return Finding("clock", GOOD, f"clock source {name}")

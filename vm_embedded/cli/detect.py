@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import asyncio
 import json
 import sys
 from collections.abc import Sequence
@@ -19,18 +18,15 @@ from ..config.toml_reader import parse_toml
 from ..config.toml_writer import to_commented_toml
 from ..errors import InputError, VisualMeshError
 from ..files import read_text
-from ..live.configuration import HEADER, Configuration
+from ..live.configuration import HEADER
 from ..live.control import REFUSED, ask, control_path
 from ..live.daemon import Daemon
-from ..live.load_detector import prove_model
 from ..live.log import EventLog
 from ..network.bundled import SHIPPED, shipped_name
-from .camera_source import check_pose_source, check_source
+from .check_configuration import check_configuration
 from .detect_files import complain, detect_in_files
-from .finding import BAD
-from .openings import check_openings
 from .options import ANGLES, LIVE, add_live, add_model, add_pose, add_settings, add_track, read_options
-from .program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program, system_error
+from .program import EXIT_FAILED, EXIT_OK, Parser, program, system_error
 from .run_daemon import report_failed_start, run_daemon
 
 _FILES_ONLY = (
@@ -135,9 +131,12 @@ def parser() -> argparse.ArgumentParser:
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-detect and return its exit status."""
-    options = parser().parse_intermixed_args(arguments)
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    end = given.index("--") if "--" in given else len(given)  # argparse rejects it among intermixed arguments
+    options = parser().parse_intermixed_args(given[:end])
     # A shell turns `--camera *.jpg` into the first file and further ones.
-    options.files = [*([options.camera] if options.camera is not None else []), *options.files]
+    first = [] if options.camera is None else [options.camera]
+    options.files = [*first, *options.files, *given[end + 1 :]]
     options.camera = options.files[0] if options.files else None
     silence_opencv()
     cv2.setNumThreads(1)  # a frame has a few thousand points: too little work for more
@@ -151,48 +150,51 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:  # for example a full disk behind standard output
         complain(system_error(error))
         return EXIT_FAILED
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
 
 
 def _run(options: argparse.Namespace) -> int:
     """Do what the options ask for: print or check the configuration, ask a running detector, or detect."""
-    only_asks = options.print_config or options.ask or options.check_config
-    live = options.live or (is_live(options.camera) if options.camera else options.config is not None)
+    if options.ask:
+        return _ask(_status_socket(options), options.ask)
     try:
         given = read_options(options)
     except InputError as error:
-        if options.ask:  # the detector runs with what it has read before
-            complain(str(error))
-            return _ask(options.status_socket or _socket_in(options.config), options.ask)
-        if only_asks or not live:
+        if options.print_config or options.check_config or not _is_for_live(options):
             raise
         return report_failed_start(EventLog("vm-detect"), error)
     if options.print_config:
         print(to_commented_toml(replace(given, model=_movable(given.model)), HEADER), end="")
         return EXIT_OK
-    if options.ask:
-        return _ask(given.status.socket, options.ask)
     if options.check_config:
-        return _check_configuration(given)
+        print(check_configuration(given, with_ros=False))
+        return EXIT_OK
     if not given.camera.source:
         parser().error("no camera: give a file or --camera, or [camera] source in vm.toml")
     if len(options.files) > 1 and (options.live or any(map(is_live, options.files))):
         raise InputError(f"only one live camera at a time is possible, not {', '.join(options.files)}")
     if options.live or is_live(given.camera.source):
         return _detect_live(options)
-    sections = _LIVE_ONLY if any(map(is_bag, options.files)) else (*_LIVE_ONLY, "pose")
-    for name in (f"{section}_{each.name}" for section in sections for each in fields(LIVE[section])):
-        if getattr(options, name) is not None:
-            raise InputError(
-                f"--{name.replace('_', '-')} works only with a live camera; --live plays files like a live camera"
-            )
+    _check_file_options(options)
     return EXIT_OK if detect_in_files(options, given) else EXIT_FAILED
+
+
+def _is_for_live(options: argparse.Namespace) -> bool:
+    """Whether the options ask for a live camera, as far as they tell without vm.toml, which usually names one."""
+    return options.live or (is_live(options.camera) if options.camera else options.config is not None)
 
 
 def _movable(model: str) -> str:
     """A model as a vm.toml in any folder may name it: by its name in the package, else by its absolute path."""
     return model if model in SHIPPED else shipped_name(Path(model)) or str(Path(model).absolute())
+
+
+def _status_socket(options: argparse.Namespace) -> str:
+    """[status] socket of the configuration, also of one with errors elsewhere."""
+    try:
+        return read_options(options).status.socket
+    except InputError as error:  # the detector runs with what it has read before
+        complain(str(error))
+        return options.status_socket or _socket_in(options.config)
 
 
 def _socket_in(config: Path | None) -> str:
@@ -217,16 +219,14 @@ def _ask(socket: str, command: str) -> int:
     return EXIT_OK if good else EXIT_FAILED
 
 
-def _check_configuration(given: Configuration) -> int:
-    """Check the configuration, the source of its camera, what it opens, and the model. Raises VisualMeshError."""
-    check_source(given)
-    check_pose_source(given)
-    for finding in check_openings(given):
-        if finding.state == BAD:
-            raise InputError(f"{finding.about}: {finding.seen}")
-    model, proved = asyncio.run(prove_model(given))
-    print(f"{given.model}: {len(model.manifest.classes)} classes, {proved}; the configuration is good")
-    return EXIT_OK
+def _check_file_options(options: argparse.Namespace) -> None:
+    """Raise InputError for options that files reject."""
+    sections = _LIVE_ONLY if any(map(is_bag, options.files)) else (*_LIVE_ONLY, "pose")
+    for name in (f"{section}_{each.name}" for section in sections for each in fields(LIVE[section])):
+        if getattr(options, name) is not None:
+            raise InputError(
+                f"--{name.replace('_', '-')} works only with a live camera; --live plays files like a live camera"
+            )
 
 
 def _detect_live(options: argparse.Namespace) -> int:

@@ -16,19 +16,15 @@ from ..cameras.image_files import (
     Source,
     check_read_format,
     joined,
-    lens_beside,
-    lens_place,
     open_source,
     open_sources,
 )
 from ..cameras.ros.bags import BagReading, is_bag, open_bag
+from ..detection.detections import Detections
 from ..detection.detector import Detector
 from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError
 from ..files import check_not_input
-from ..geometry.lens import Lens, Size
-from ..geometry.lens_files import read_lens_file
-from ..geometry.orientation import Orientation
 from ..live.configuration import Configuration
 from ..output.box_files import BoxWriter
 from ..output.messages import file_message
@@ -36,6 +32,7 @@ from ..output.result_files import FrameNames, make_folder, save_overlay, save_po
 from ..output.ros.mcap_file import McapFile
 from ..output.video_file import VideoFile
 from .closing_remarks import ClosingRemarks
+from .default_pose import DefaultPose
 from .progress import ProgressBar
 
 _IMAGES_RATE = 10.0
@@ -49,7 +46,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     concern all frames.
     """
     format = given.detector.format
-    pose = _DefaultPose(given, given.fixed_orientation())
+    pose = DefaultPose(given, given.fixed_orientation())
     detector = Detector.from_file(given.model, given.detector)
     emit_points = [name.strip() for name in options.emit_points.split(",")] if options.emit_points else []
     for name in emit_points:
@@ -60,7 +57,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:
             make_folder(folder)
-    follow = _Follow(Tracker(given.track), given.camera.fps) if given.track.on else None
+    tracker = _TimedTracker(Tracker(given.track), given.camera.fps) if given.track.on else None
 
     with ExitStack() as stack:
         mcap = video = boxes = None
@@ -70,7 +67,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
             video = stack.enter_context(VideoFile(options.save_video, source.rate or _IMAGES_RATE, source.files))
         if options.save_boxes is not None:
             boxes = BoxWriter(options.save_boxes, _object_classes(detector))
-        work = _Pass(detector, pose, follow, options, emit_points, boxes, mcap, video, ClosingRemarks(detector))
+        work = _Pass(detector, pose, tracker, options, emit_points, boxes, mcap, video, ClosingRemarks(detector))
         _process_all(source, work)
     for remark in filter(None, (work.replaced, *work.remarks.lines())):
         complain(remark)
@@ -96,8 +93,8 @@ def _process_all(source: Source, work: _Pass) -> None:
     """
     bar, reasons = ProgressBar(source.count), Counter[str]()
     for frame in source.frames:
-        if work.follow is not None and frame.index == 0:
-            work.follow.time(frame)  # without times, no frame can be processed
+        if work.tracker is not None and frame.index == 0:
+            work.tracker.time(frame)  # without times, no frame can be processed
         try:
             line = work.process(frame)
         except VisualMeshError as error:
@@ -135,47 +132,15 @@ def _open(names: Sequence[str], given: Configuration) -> Source:
 
 
 @dataclass(frozen=True)
-class _DefaultPose:
-    """Lens and orientation for frames without a lens file; None if the user gave none."""
-
-    given: Configuration
-    orientation: Orientation | None
-
-    def unused(self, frame: Frame) -> str:
-        """What the lens file beside a frame replaces of what the user gave, as a remark; empty if nothing."""
-        beside = lens_beside(frame.path)
-        if beside is None:
-            return ""
-        lens = self.given.lens is not None or self.given.fov is not None
-        pose = self.orientation is not None and read_lens_file(beside).orientation is not None
-        replaced = [name for name, is_given in (("lens", lens), ("pose", pose)) if is_given]
-        return f"{beside} replaces the given {' and '.join(replaced)}" if replaced else ""
-
-    def of(self, frame: Frame, size: Size) -> tuple[Lens, Orientation]:
-        """Lens and orientation of a frame of a size [px]; the lens file beside it takes precedence. Raises InputError
-        without one."""
-        if frame.lens is not None and frame.orientation is not None:
-            return frame.lens, frame.orientation
-        lens, orientation = frame.lens or self.given.lens_for(size), frame.orientation or self.orientation
-        beside = lens_beside(frame.path)
-        if beside is not None:
-            file = read_lens_file(beside)
-            lens, orientation = file.lens, file.orientation or orientation
-        if lens is None:
-            place = lens_place(frame.path)
-            beside_it = "lensNAME.yaml beside imageNAME" if place is None else f"{place.name} beside it"
-            raise InputError(f"no lens: give --lens or --fov, or put {beside_it}")
-        if orientation is None:
-            raise InputError("no orientation: give --height (and --pitch, --roll), or Hoc in the lens file")
-        return lens, orientation
-
-
-@dataclass(frozen=True)
-class _Follow:
-    """A tracker, and the frame rate of images without times [1/s]; 0: unknown."""
+class _TimedTracker:
+    """A tracker for frames of files. rate: frame rate of images without times [1/s]; 0: unknown."""
 
     tracker: Tracker
     rate: float
+
+    def update(self, detections: Detections, frame: Frame) -> Detections:
+        """The detections of the next frame, with their tracks. Raises InputError if its time is not known."""
+        return self.tracker.update(detections, self.time(frame))
 
     def time(self, frame: Frame) -> float:
         """The time of a frame [s]. Raises InputError if it is not known."""
@@ -197,8 +162,8 @@ class _Pass:
     """
 
     detector: Detector
-    pose: _DefaultPose
-    follow: _Follow | None
+    pose: DefaultPose
+    tracker: _TimedTracker | None
     options: argparse.Namespace
     emit_points: Sequence[str]
     boxes: BoxWriter | None
@@ -219,7 +184,7 @@ class _Pass:
             line = self._detect(image, frame)
         except VisualMeshError as error:
             raise InputError(f"{frame.source}: {error}") from error
-        self.replaced = self.replaced or self.pose.unused(frame)
+        self.replaced = self.replaced or self.pose.replaced_beside(frame)
         self.processed += 1
         return line
 
@@ -230,8 +195,8 @@ class _Pass:
         explain = options.explain or self.boxes is not None
         detections = self.detector.detect(image, orientation, lens, explain=explain)
         self.remarks.add(frame.source, lens, size, detections)
-        if self.follow is not None:
-            detections = self.follow.tracker.update(detections, self.follow.time(frame))
+        if self.tracker is not None:
+            detections = self.tracker.update(detections, frame)
         if self.boxes is not None:
             self.boxes.write(frame, image, lens, orientation, detections)
             if not options.explain:

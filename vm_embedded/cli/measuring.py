@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -107,8 +108,8 @@ def measure_cold(detector: Detector, lens: Lens, size: Size, orientations: Seque
         beside = Orientation.from_roll_pitch(
             orientation.height, orientation.roll, orientation.pitch + 2.0 * detector.settings.pitch_step
         )
-        new_mesh.append(_milliseconds(lambda c=cache, o=beside: c.view(o, lens, size)))  # type: ignore[misc]
-        known_mesh.append(_milliseconds(lambda c=cache, o=orientation: c.view(o, lens, size)))  # type: ignore[misc]
+        new_mesh.append(_milliseconds(partial(cache.view, beside, lens, size)))
+        known_mesh.append(_milliseconds(partial(cache.view, orientation, lens, size)))
     return {"bucket_ms": _quantiles(np.array(known_mesh)), "mesh_and_bucket_ms": _quantiles(np.array(new_mesh))}
 
 

@@ -23,10 +23,10 @@ from ..live.configuration import (
     FixedPose,
     StatusSettings,
     TrackSection,
-    checked_fov,
     read_configuration,
     with_overrides,
 )
+from ..live.top_level_entries import checked_fov
 from ..network.bundled import DEFAULT, SHIPPED
 from ..output.channels import OutputSettings
 from ..output.recorder import CONFIGURATION, RecorderSettings
@@ -115,13 +115,13 @@ def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, skip:
             group.add_argument(option, dest=name, action=argparse.BooleanOptionalAction, default=None, help=help)
         else:
             allowed = each.metadata.get("allowed")
-            letter = "TEXT" if isinstance(each.default, str) else "N" if isinstance(each.default, int) else "X"
+            kind = "TEXT" if isinstance(each.default, str) else "N" if isinstance(each.default, int) else "X"
             group.add_argument(
                 option,
                 dest=name,
                 type=partial(_read, each),
                 choices=allowed,
-                metavar=None if allowed else letter,
+                metavar=None if allowed else kind,
                 help=help,
             )
 

@@ -1,4 +1,4 @@
-"""What all programs share: --version, completion, errors of usage as one line, and a quiet end when a reader leaves."""
+"""What all programs share: --version, completion, errors of usage as one line, and a quiet end after Ctrl-C."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def version(program: str) -> str:
 
 
 def program(main: Callable[P, int]) -> Callable[P, int]:
-    """A main function that ends quietly if nothing reads its output any more, such as head in a pipe.
+    """A main function that ends quietly after Ctrl-C, and if nothing reads its output any more, such as head in a pipe.
 
     A full disk, and a path that the system refuses, are one line on standard error, and exit status 1.
     """
@@ -151,6 +151,8 @@ def program(main: Callable[P, int]) -> Callable[P, int]:
             finally:
                 if sys.stdout is not None:
                     sys.stdout.flush()  # here, because at exit the interpreter would print a traceback
+        except KeyboardInterrupt:
+            return EXIT_INTERRUPTED
         except BrokenPipeError:
             discard_output()
             return EXIT_OK

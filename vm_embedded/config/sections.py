@@ -75,17 +75,21 @@ _ENTRY = re.compile(r"\s*(?:\"([^\"]*)\"|'([^']*)'|([A-Za-z0-9_.-]+))\s*=")
 
 
 def _line_number(text: str, section: str, entry: str | None) -> int | None:
-    """Number, from 1, of the line where an entry of a section begins, or the section itself; None if not found."""
+    """Number, from 1, of the line where an entry of a section begins; None if not found.
+
+    Without an entry: the line of the section's header, or of a top-level value with that name.
+    """
+    wanted = (section, entry) if entry else ("", section)
     current = ""
     for number, line in enumerate(text.splitlines(), 1):
         header, assigned = _HEADER.fullmatch(line), _ENTRY.match(line)
         if header:
             current = header[1].strip("\"'")
-            if (current, None) == (section, entry):
+            if not entry and current == section:
                 return number
         elif assigned:
             key = next(each for each in assigned.groups() if each is not None)
-            if (current, key) == ((section, entry) if entry else ("", section)):
+            if (current, key) == wanted:
                 return number
     return None
 

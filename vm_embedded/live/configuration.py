@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -17,21 +16,29 @@ from ..cameras.ros.settings import RosSettings
 from ..config.entries import EntryError, check_entries, entry, number, switch, text_line
 from ..config.sections import read_sections
 from ..config.toml_writer import to_commented_toml
-from ..config.units import angle, length, parse_angle
+from ..config.units import angle, length
 from ..detection.settings import Settings
 from ..detection.track_settings import TrackSettings
 from ..errors import InputError, VisualMeshError
 from ..geometry.lens import Lens, Size
-from ..geometry.lens_files import LensFile, lens_from_table, read_lens_file
+from ..geometry.lens_files import LensFile, read_lens_file
 from ..geometry.orientation import Orientation
-from ..geometry.radial_lenses import RadialLens, Rectilinear
-from ..network.bundled import DEFAULT, SHIPPED, model_path, shipped_name
+from ..geometry.radial_lenses import Rectilinear
+from ..network.bundled import DEFAULT, model_path, shipped_name
 from ..network.model_file import ModelFile
 from ..output.channels import OutputSettings
 from ..output.recorder import CONFIGURATION, RecorderSettings
 from ..poses.settings import PoseSettings
 from ..sockets import checked_address
 from .deploy_settings import DeploySettings
+from .top_level_entries import (
+    checked_fov,
+    commented_fov,
+    commented_lens,
+    commented_model,
+    read_lens_entry,
+    read_model_entry,
+)
 
 HEADER = """Configuration of vm-detect. `vm-detect --print-config` prints this file.
 Keep only the entries that you change: missing entries have their defaults.
@@ -108,68 +115,13 @@ class StatusSettings:
         check_entries(self)
 
 
-def _read_model(value: object) -> str:
-    if not isinstance(value, str):
-        raise InputError(f"model must be a path, not {value!r}")
-    return value
-
-
-def _commented_model(value: str) -> str:
-    comment = f"# the network: a file written by vm-export, or one that comes with the package: {', '.join(SHIPPED)}"
-    return f"{comment}\nmodel = {json.dumps(value)}"
-
-
-def _read_lens(value: object) -> Path | LensFile:
-    if isinstance(value, str):
-        return Path(value)
-    if not isinstance(value, Mapping):
-        raise InputError(f"lens must be a path or a table, [lens], not {value!r}")
-    return LensFile(lens_from_table(value), None)
-
-
-def checked_fov(value: object) -> float:
-    """A horizontal angle of view [rad] from a number or text in radians, or from text in degrees. Raises InputError."""
-    fov = parse_angle(value, "fov")
-    if not math.radians(1.0) <= fov <= math.radians(150.0):
-        raise InputError(
-            f"fov must be from 1deg to 150deg, not {math.degrees(fov):g}deg: it describes a lens without distortion; "
-            "for a wider lens, give a lens file"
-        )
-    return fov
-
-
-def _commented_fov(value: float | None) -> str:
-    comment = (
-        '# instead of a lens: the horizontal angle of view, in radians or as in "70deg", of a lens without distortion'
-    )
-    return comment + ("\n# fov =" if value is None else f"\nfov = {value!r}")
-
-
-def _commented_lens(value: LensFile | None) -> str:
-    comment = (
-        "# the lens: a calibration file of the Visual Mesh reference, OpenCV or ROS, or a TOML file; or a table,\n"
-        '# [lens], with projection, focal_length [px] and fov [rad, or as in "174deg"], and optionally center,\n'
-        "# distortion and size [px]\n"
-    )
-    if value is not None and value.path is not None:  # absolute, because the new file may be in another folder
-        return comment + f"lens = {json.dumps(str(value.path.absolute()))}"
-    lens = value.lens if value is not None else None
-    if not isinstance(lens, RadialLens):
-        return comment + '# lens = "lens.yaml"'
-    size = "" if lens.size is None else f", size = {list(lens.size)}"
-    return comment + (
-        f'lens = {{ projection = "{type(lens).__name__.lower()}", focal_length = {lens.focal_length!r}, '
-        f"fov = {lens.fov!r}, center = {list(lens.center)}, distortion = {list(lens.distortion)}{size} }}"
-    )
-
-
 @dataclass(frozen=True)
 class Configuration:
     """All sections. model, lens and fov are not sections of entries, so they bring their own reader and writer."""
 
-    model: str = field(default=DEFAULT, metadata={"read": _read_model, "to_commented_toml": _commented_model})
-    lens: LensFile | None = field(default=None, metadata={"read": _read_lens, "to_commented_toml": _commented_lens})
-    fov: float | None = field(default=None, metadata={"read": checked_fov, "to_commented_toml": _commented_fov})
+    model: str = field(default=DEFAULT, metadata={"read": read_model_entry, "to_commented_toml": commented_model})
+    lens: LensFile | None = field(default=None, metadata={"read": read_lens_entry, "to_commented_toml": commented_lens})
+    fov: float | None = field(default=None, metadata={"read": checked_fov, "to_commented_toml": commented_fov})
     orientation: FixedPose = field(default_factory=FixedPose)
     detector: Settings = field(default_factory=Settings)
     track: TrackSection = field(default_factory=TrackSection)

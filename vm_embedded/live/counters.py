@@ -69,7 +69,6 @@ class Counters:
 
     def metrics(self, state: str, camera: CameraCounts, cache: MeshCache, answered: float) -> str:
         """All metrics in Prometheus's text format. answered: monotonic time of the last answered frame [s]."""
-
         now = time.monotonic()
         cached = {"cache_hits": cache.hits, "cache_misses": cache.misses, "cache_prepared": cache.prepared}
         counts = {**self.counts(camera), **cached}

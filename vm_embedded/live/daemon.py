@@ -2,8 +2,8 @@
 
 Other threads read the camera and write files. The event loop waits for the newest shot, a frame with its time. It has
 answering.py detect the objects in it, and sends the result. Between shots it answers the status socket and HTTP, reads
-poses, and notifies systemd's watchdog. This module starts and stops these parts, handles the signals to stop, reload
-and record, and tracks the state.
+poses, and notifies systemd's watchdog. This module starts and stops these parts, and handles the signals to stop,
+reload and record.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import asyncio
 import json
 import math
 import os
-import re
 import signal
 import sys
 import time
@@ -22,6 +21,7 @@ from typing import Any, Protocol
 
 from ..cameras.camera import without_password
 from ..cameras.grabber import Grabber
+from ..cameras.open_camera import Opener
 from ..detection.detector import Detector
 from ..errors import InputError, NetworkError, VisualMeshError, one_line
 from ..output.channels import Channels
@@ -34,6 +34,7 @@ from .bridge import Bridge
 from .configuration import Configuration, recording_files
 from .control import REFUSED, ControlServer, control_path
 from .counters import Counters
+from .daemon_state import DaemonState
 from .frame_remarks import FrameRemarks
 from .frame_watchdog import FrameWatchdog
 from .free_memory import give_back_memory
@@ -83,14 +84,15 @@ class Part(Protocol):
 class Daemon:
     """Runs until a signal stops it, the camera ends, or too many reads of the camera hang.
 
-    configure: reads the configuration for each reload. proved: in words, what shows that the detector works. bridge: to
-    other robot software.
+    configure: reads the configuration for each reload. opener: opens the camera. proved: in words, what shows that the
+    detector works. bridge: to other robot software.
     """
 
     def __init__(
         self,
         configure: Callable[[], Configuration],
         configuration: Configuration,
+        opener: Opener,
         detector: Detector,
         proved: str,
         log: EventLog,
@@ -104,24 +106,21 @@ class Daemon:
         self.recorder = Recorder(configuration.recorder, lambda event, level, folder: log(event, level, folder=folder))
         self.last: Message | None = None
         self.counters = Counters()
-        self.state, self.reason = "", ""
-        self._logged = ""  # the reason in the log
         self.health = Health(1e-3 * camera.lost_ms, (1e-3 * status.budget_ms) or math.inf)
-        self._rejected = 0  # frames of the camera that were rejected
         self._sent = 0.0  # when the last message was sent
-        self._fed = 0.0  # when the watchdog was last notified
         self._stops = 0  # how often a signal has asked to stop
         self._notifier = SystemdNotifier()
         self._stuck = ""  # why only a new process helps; empty if none is needed
         self._wakeup = asyncio.Event()
         self._reloading: asyncio.Task[None] | None = None
-        self.grabber = Grabber(find_opener(configuration, bridge), camera, self._wake)
+        self.grabber = Grabber(opener, camera, self._wake)
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
         self._watchdog = FrameWatchdog(self._end_hanging)
         self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health, self._watchdog)
         self._remarks = FrameRemarks()
         self._recording_files = recording_files(configuration, detector.session.model)
         self.outputs = Channels(configuration.output)
+        self.state = DaemonState(self.health, self.grabber, self.outputs, log, self._notifier)
         self.page = LivePage(self.answerer, self._status, self.record, self.metrics, self._use_threshold)
         commands = {"status": lambda: json.dumps(self._status(), allow_nan=False)}
         commands |= {"record": self.record, "metrics": self.metrics}
@@ -134,9 +133,9 @@ class Daemon:
     ) -> Daemon:
         """A daemon whose configuration was read and whose detector was proved. Raises VisualMeshError."""
         configuration = configure()
-        find_opener(configuration, bridge)  # only for its checks, before the longer ones
+        opener = find_opener(configuration, bridge)  # its checks are quick, so they are the first
         detector, proved = await load_checked_detector(configuration)
-        return cls(configure, configuration, detector, proved, log, bridge)
+        return cls(configure, configuration, opener, detector, proved, log, bridge)
 
     @property
     def configuration(self) -> Configuration:
@@ -144,54 +143,59 @@ class Daemon:
         return self.answerer.configuration
 
     async def run(self) -> int:
-        """Run, and return the exit status."""
-        loop = asyncio.get_running_loop()
+        """Run, and return the exit status. Raises InputError if a part can't be opened."""
+        self._loop = asyncio.get_running_loop()
+        self._loop.set_exception_handler(self._log_loop_error)
+        self._handle_signals()
         sys.setswitchinterval(_SWITCH_INTERVAL)
-        for number in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(number, self._stop)
-        loop.add_signal_handler(signal.SIGHUP, self._start_reload)
-        loop.add_signal_handler(signal.SIGUSR1, self.record)
-        loop.set_exception_handler(self._log_loop_error)
-        self._loop = loop
         try:
-            for part in self._parts:
-                await self._open(part)
-            if self._bridge is not None:
-                await self._bridge.open(self.poses)
+            await self._open_parts()
         except InputError:
             await self._close()
             if not self._stops:
                 raise
-            status, reason = self._exit_status()
-            self._log("stopped", frames=0, reason=reason)
-            return status
-        for name in ("page", "metrics"):
-            address = getattr(self.configuration.status, name)
+        else:
+            self._start()
+            while not (self._stops or self._stuck or self._camera_ended()):
+                await self._step()
+            self.health.stopping = True
+            self._update_state()
+            self._notifier.send(STOPPING=1)
+            await self._close()
+        status, reason = self._exit_status()
+        self._log("stopped", frames=self.counters.outcomes.frames, reason=reason)
+        return status
+
+    def _handle_signals(self) -> None:
+        for number, handle in (
+            (signal.SIGTERM, self._stop),
+            (signal.SIGINT, self._stop),
+            (signal.SIGHUP, self._start_reload),
+            (signal.SIGUSR1, self.record),
+        ):
+            self._loop.add_signal_handler(number, handle)
+
+    async def _open_parts(self) -> None:
+        for part in self._parts:
+            await self._open(part)
+        if self._bridge is not None:
+            await self._bridge.open(self.poses)
+
+    def _start(self) -> None:
+        """Begin to take frames, once all parts are open, and say so."""
+        camera, status = self.configuration.camera, self.configuration.status
+        for entry, address in (("page", status.page), ("metrics", status.metrics)):
             if address and is_open_to_network(address):
-                self._log("open to the network", "warning", entry=f"[status] {name}", address=address)
+                self._log("open to the network", "warning", entry=f"[status] {entry}", address=address)
         self.recorder.finish_left()
         self.grabber.start()
         self._watchdog.start()
         self._update_state()
         self._notifier.send(READY=1)
-        camera = without_password(self.configuration.camera.source)
-        self._log("ready", model=self.configuration.model, proved=self._proved, camera=camera)
-        if self.configuration.status.page:
-            self._log("status page", address=self.configuration.status.page, token=self.page.token)
-        clock_offset = time.time() - time.monotonic()
-        while not (self._stops or self._stuck or self._camera_ended()):
-            await self._step()
-            drift = time.time() - time.monotonic() - clock_offset
-            if abs(drift) > _CLOCK_JUMP:
-                self._log("clock jumped", "warning", seconds=round(drift, 3))
-                clock_offset += drift
-        self.health.stopping = True
-        self._update_state()
-        self._notifier.send(STOPPING=1)
-        await self._close()
-        status, reason = self._exit_status()
-        self._log("stopped", frames=self.counters.outcomes.frames, reason=reason)
-        return status
+        self._log("ready", model=self.configuration.model, proved=self._proved, camera=without_password(camera.source))
+        if status.page:
+            self._log("status page", address=status.page, token=self.page.token)
+        self._clock_offset = _clock_offset()
 
     async def _open(self, part: Part) -> None:
         """Open a part; wait some seconds for the network if that needs it. Raises InputError."""
@@ -229,7 +233,8 @@ class Daemon:
         with suppress(asyncio.TimeoutError):
             await asyncio.wait_for(self._wakeup.wait(), _TICK)
         self._wakeup.clear()
-        self._feed_watchdog()
+        self._notifier.feed_watchdog()
+        self._log_clock_jump()
         self._update_state()
         shot = self.grabber.take()
         if shot is not None:
@@ -239,23 +244,22 @@ class Daemon:
                 if not self.grabber.has_shot:
                     self.answerer.prepare(answer)
         if time.monotonic() - self._sent > _HEARTBEAT:
-            self._send(state_message(self.state, self.reason))
+            self._send(state_message(self.state.name, self.state.reason))
         # A signal during this step goes first: it ends the daemon with EXIT_OK.
         self._stuck = "" if self._stops else self.grabber.stuck
 
-    def _feed_watchdog(self) -> None:
-        """Notify systemd's watchdog that the loop runs, four times per period."""
-        period, now = self._notifier.watchdog, time.monotonic()
-        if period is not None and now - self._fed > 0.25 * period:
-            self._fed = now
-            self._notifier.send(WATCHDOG=1)
+    def _log_clock_jump(self) -> None:
+        jump = _clock_offset() - self._clock_offset
+        if abs(jump) > _CLOCK_JUMP:
+            self._log("clock jumped", "warning", seconds=round(jump, 3))
+            self._clock_offset += jump
 
     def _report(self, answer: Answer) -> None:
         """Send an answer to the outputs, and hand it to the status page and the recorder."""
         self._update_state()
         shot, detections = answer.shot, answer.detections
         # The camera may be lost while its last frame is processed; a frame that says so would contradict itself.
-        state = "degraded" if self.state == "camera_lost" else self.state
+        state = "degraded" if self.state.name == "camera_lost" else self.state.name
         self.last = live_message(self.counters.outcomes.frames, state, shot, detections, answer.time)
         self._send(self.last, answer)
         for event, reason in self._remarks.about(answer):
@@ -267,28 +271,9 @@ class Daemon:
         self.health.add_trouble(time.monotonic(), reason)
 
     def _update_state(self) -> None:
-        """Determine the state; if it has changed, log and send it. Log another reason of a bad state, too."""
-        now = time.monotonic()
-        lost = self.grabber.supervise(now)
-        if self.outputs.failure:
-            self.health.add_trouble(now, f"messages are lost: {self.outputs.failure}")
-        rejected = self.grabber.counts.rejected
-        if rejected != self._rejected:
-            self._rejected = rejected
-            self.health.add_trouble(now, self.grabber.trouble)
-        state, reason = self.health.state(now, lost, self.grabber.trouble)
-        self.reason = reason
-        is_bad = state not in ("ok", "starting", "stopping")
-        if state != self.state:
-            self._log("state", "warning" if is_bad else "info", state=state, was=self.state, reason=reason)
-            self.state = state
-            self._send(state_message(state, reason))
-        elif is_bad and _without_numbers(reason) != _without_numbers(self._logged):
-            self._log("reason", "warning", state=state, reason=reason)
-        else:
-            return
-        self._logged = reason
-        self._notifier.send(STATUS=f"{state}{': ' if reason else ''}{reason}")
+        """Determine the state; if it has changed, send it."""
+        if self.state.update():
+            self._send(state_message(self.state.name, self.state.reason))
 
     def _send(self, message: Message, answer: Answer | None = None) -> None:
         self._sent = time.monotonic()
@@ -299,7 +284,7 @@ class Daemon:
     def _status(self) -> Message:
         """State, counts, and the last frame's message."""
         self._collect_counts()
-        return state_message(self.state, self.reason) | {
+        return state_message(self.state.name, self.state.reason) | {
             "counts": self.counters.counts(self.grabber.counts),
             "memory_mib": round(resident_bytes() / 2**20, 1),
             "model_sha256": self.answerer.detector.session.model.sha256,
@@ -316,7 +301,7 @@ class Daemon:
         """All metrics in Prometheus's text format."""
         self._collect_counts()
         cache = self.answerer.detector.cache
-        return self.counters.metrics(self.state, self.grabber.counts, cache, self.health.answered)
+        return self.counters.metrics(self.state.name, self.grabber.counts, cache, self.health.answered)
 
     def _collect_counts(self) -> None:
         """Copy the counts of poses and outputs into the counters."""
@@ -340,11 +325,7 @@ class Daemon:
             self._loop.call_soon_threadsafe(self._wakeup.set)
 
     def _start_reload(self) -> None:
-        """Begin a reload, instead of one that has not ended, and open the output file again."""
-        try:
-            self.outputs.reopen_file()
-        except InputError as error:
-            self._log("output file not opened again", "warning", reason=str(error))
+        """Begin a reload, instead of one that has not ended."""
         if self._reloading is not None:
             self._reloading.cancel()
         self._reloading = self._loop.create_task(self._reload())
@@ -392,6 +373,6 @@ class Daemon:
         self._notifier.close()
 
 
-def _without_numbers(reason: str) -> str:
-    """What a reason says, whatever its times and sizes."""
-    return re.sub(r"\d", "", reason)
+def _clock_offset() -> float:
+    """The wall clock relative to the monotonic clock [s]."""
+    return time.time() - time.monotonic()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..cameras.camera import without_password
 from ..cameras.image_files import check_read_format
-from ..cameras.open_camera import ROS, Opener, brings_lens_and_pose, camera_opener, is_live
+from ..cameras.open_camera import Opener, brings_lens_and_pose, camera_opener, is_live
 from ..detection.detector import Detector
 from ..detection.settings import Settings
 from ..errors import GeometryError, InputError
@@ -18,11 +18,11 @@ from .proving_process import prove_in_process
 
 
 async def prove_model(configuration: Configuration) -> tuple[ModelFile, str]:
-    """Check camera, lens, poses and trigger class, and prove the configured network as `prove_network` does.
+    """Check lens, pose and trigger class, and prove the configured network as `prove_network` does.
 
-    Raises VisualMeshError for the first thing that is missing or invalid.
+    `find_opener` checks the camera. Raises VisualMeshError for the first thing that is missing or invalid.
     """
-    check_camera(configuration)
+    check_lens_and_pose(configuration)
     model, proved = await prove_network(configuration)
     orientation = configuration.fixed_orientation()
     if orientation is not None and configuration.pose.source == "fixed":
@@ -81,16 +81,12 @@ def find_opener(configuration: Configuration, bridge: Bridge | None) -> Opener:
     return (bridge.opener if bridge else camera_opener)(camera, configuration.detector.format != "bgr")
 
 
-def check_camera(configuration: Configuration) -> None:
-    """Raise InputError for a camera, pixel format, lens or pose that is missing or invalid."""
+def check_lens_and_pose(configuration: Configuration) -> None:
+    """Raise InputError for a pixel format, or a lens or pose of a live camera, that is missing or invalid."""
     camera = configuration.camera.source
     check_read_format(configuration.detector.format)
     orientation = configuration.fixed_orientation()  # raises InputError for angles without a height
-    if not is_live(camera):
-        return
-    if camera != ROS:
-        camera_opener(configuration.camera, raw=configuration.detector.format != "bgr")  # only for its checks
-    if brings_lens_and_pose(camera):
+    if not is_live(camera) or brings_lens_and_pose(camera):
         return
     if configuration.lens is None and configuration.fov is None:
         raise InputError(f"camera {without_password(camera)} needs a lens: give --lens or --fov")

@@ -33,14 +33,14 @@ def overhead_map(detections: Detections) -> Message:
     }
 
 
-def field_of_view(view: PreparedView, reach: float = REACH) -> list[Floats]:
-    """Polygons (m, 2) [m] around the part of the plane on screen, in its frame, up to a distance `reach` [m].
+def field_of_view(view: PreparedView) -> list[Floats]:
+    """Polygons (m, 2) [m] around the part of the plane on screen, in its frame, up to the distance REACH.
 
     Usually there is one. There are two, one inside the other, if the picture shows all around but not the foot point.
     For each direction, the nearest and the farthest visible place count: a gap between them is not shown.
     """
     azimuths = np.linspace(-np.pi, np.pi, _AZIMUTHS, endpoint=False)
-    tilts = np.linspace(0.0, np.arctan2(reach, view.height), _STEPS + 1)  # from straight down [rad]
+    tilts = np.linspace(0.0, np.arctan2(REACH, view.height), _STEPS + 1)  # from straight down [rad]
     grid = [each.ravel() for each in np.meshgrid(azimuths, tilts, indexing="ij")]
     shown = _on_screen(view, *grid).reshape(_AZIMUTHS, _STEPS + 1)
     found = np.asarray(shown.any(axis=1))

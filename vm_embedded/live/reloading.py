@@ -9,7 +9,7 @@ from ..detection.detector import Detector
 from ..errors import InputError
 from .bridge import Bridge
 from .configuration import Configuration, recording_files
-from .load_detector import check_camera, check_trigger_class, find_opener, prove_model
+from .load_detector import check_lens_and_pose, check_trigger_class, find_opener, prove_model
 
 _NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder", "ros")
 """Sections that a reload does not change."""
@@ -47,8 +47,8 @@ async def read_again(
     if wanted.detector.format != running.detector.format:
         needs_restart.append("detector.format")
     configuration = replace(wanted, detector=detector_settings, **kept)
-    find_opener(wanted, bridge)
-    check_camera(wanted)
+    find_opener(wanted, bridge)  # only for its checks
+    check_lens_and_pose(wanted)
     try:
         model, proved = await prove_model(configuration)
     except InputError as error:

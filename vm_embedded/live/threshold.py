@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 from ..detection.detections import Detections
 from ..detection.detector import Detector
@@ -29,9 +30,8 @@ def with_threshold(detector: Detector, text: str) -> Settings:
         value = math.nan
     if not 0.0 <= value <= 1.0:
         raise InputError(f"the threshold must be a number from 0 to 1, not {text[:20]!r}")
-    if threshold_name(detector) == "threshold":
-        return replace(detector.settings, threshold=value)
-    return replace(detector.settings, min_confidence=value)
+    changed: dict[str, Any] = {threshold_name(detector): value}
+    return replace(detector.settings, **changed)
 
 
 def with_settings(detector: Detector, detections: Detections, settings: Settings) -> Detections:

@@ -74,11 +74,21 @@ def to_binary(message: Message) -> bytes:
     text = message.get("reason", "\n".join(each.replace("\n", " ") for each in codes)).encode()[:_MOST]
     body = b"".join([*(each.tobytes() for each in records), text])
     header = HEADER.pack(
-        *(HEADER.size - 4 + len(body), VERSION, message["type"] == "frame", STATES.index(message["state"])),
-        *("field" in message, message["t"], message["wall"]),
-        *(message.get("frame", 0) & 0xFFFFFFFF, message.get("points", 0)),
-        *(message.get("age_ms", 0.0), message.get("latency_ms", 0.0), message.get("timing_ms", {}).get("total", 0.0)),
-        *(*map(len, records), len(text), 0),
+        HEADER.size - 4 + len(body),
+        VERSION,
+        message["type"] == "frame",
+        STATES.index(message["state"]),
+        "field" in message,
+        message["t"],
+        message["wall"],
+        message.get("frame", 0) & 0xFFFFFFFF,
+        message.get("points", 0),
+        message.get("age_ms", 0.0),
+        message.get("latency_ms", 0.0),
+        message.get("timing_ms", {}).get("total", 0.0),
+        *map(len, records),
+        len(text),
+        0,
     )
     return header + body
 

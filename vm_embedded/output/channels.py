@@ -6,12 +6,8 @@ A slow reader never blocks the detector: messages that exceed its backlog are dr
 from __future__ import annotations
 
 import asyncio
-import errno
 import os
-import queue
-import select
 import sys
-import threading
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -20,7 +16,7 @@ from ..config.entries import check_entries, entry, number, one_of, switch, text_
 from ..errors import InputError
 from ..sockets import BACKLOG, MOST_CONNECTIONS, UnixListener, checked_addresses, datagram_socket, parse_address
 from .binary_form import to_binary
-from .ended import ended
+from .file_channel import DescriptorChannel, FileChannel
 from .messages import Message, to_json_line, to_ros
 
 FORMATS = ("json", "ros")
@@ -78,7 +74,6 @@ class Channels:
         self.settings = settings
         self._line_channels: list[Channel] = []
         self._binary_channels: list[Channel] = []
-        self._file: DescriptorChannel | None = None
 
     async def open(self) -> None:
         """Create sockets and open files. Raises InputError."""
@@ -89,8 +84,7 @@ class Channels:
                     raise InputError("standard output is closed; use --no-output-stdout")
                 self._line_channels.append(DescriptorChannel(os.dup(sys.stdout.fileno()), backlog))
             if settings.file:
-                self._file = DescriptorChannel(_open_to_append(settings.file), backlog)
-                self._line_channels.append(self._file)
+                self._line_channels.append(FileChannel(settings.file, backlog))
             for each in filter(None, settings.udp.split(",")):
                 self._line_channels.append(DatagramChannel(each))
             if settings.unix:
@@ -125,81 +119,12 @@ class Channels:
             for each in self._binary_channels:
                 each.send(encoded)
 
-    def reopen_file(self) -> None:
-        """Open the file again, after another program has moved or deleted it. Raises InputError; the old one stays."""
-        if self._file is not None:
-            self._file.replace(_open_to_append(self.settings.file))
-
     async def close(self) -> None:
         """Close all channels."""
         for each in self._all:
             await each.close()
         self._line_channels.clear()
         self._binary_channels.clear()
-
-
-def _open_to_append(path: str) -> int:
-    try:
-        # O_NONBLOCK: a named pipe that nobody reads is an error, and does not wait for a reader.
-        return os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NONBLOCK, 0o644)
-    except OSError as error:
-        if error.errno == errno.ENXIO:
-            raise InputError(f"can't write {path}: no program reads this pipe; start its reader first") from error
-        raise InputError(f"can't write {path}: {error.strerror or error}") from error
-
-
-class DescriptorChannel:
-    """A file, pipe or terminal. A separate thread writes, because a write may block."""
-
-    def __init__(self, descriptor: int, backlog: int) -> None:
-        self.dropped = 0
-        self.failure = ""
-        self._descriptor = descriptor
-        self._backlog = backlog
-        self._accepted = self._written = 0  # bytes; each is changed by one thread only
-        self._lines: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._write, name="output", daemon=True)
-        self._thread.start()
-
-    def send(self, line: bytes) -> None:
-        """Pass a line to the thread, unless its backlog is full."""
-        if self._accepted - self._written + len(line) > self._backlog:
-            self.dropped += 1
-            return
-        self._accepted += len(line)
-        self._lines.put(line)
-
-    def replace(self, descriptor: int) -> None:
-        """Write to another file from now on; its descriptor is closed."""
-        os.dup2(descriptor, self._descriptor, inheritable=False)  # at once, although the thread may be writing
-        os.close(descriptor)
-
-    def _write(self) -> None:
-        torn = False
-        while (line := self._lines.get()) is not None:
-            rest = memoryview(b"\n" + line if torn else line)  # end the torn line before the next
-            try:
-                while rest:
-                    rest = rest[self._write_some(rest) :]
-                self.failure, torn = "", False
-            except OSError as error:  # a full disk, or the reader is gone; other channels go on
-                self.failure, torn = error.strerror or str(error), torn or len(rest) < len(line)
-                self.dropped += 1
-            self._written += len(line)
-        os.close(self._descriptor)
-
-    def _write_some(self, rest: memoryview) -> int:
-        """Write as many bytes as possible, waiting until at least one can be written; return their number."""
-        while True:
-            try:
-                return os.write(self._descriptor, rest)
-            except BlockingIOError:
-                select.select([], [self._descriptor], [])
-
-    async def close(self) -> None:
-        """Give the thread a moment to finish; one that blocks in a write ends with the process."""
-        self._lines.put(None)
-        await ended(self._thread, 0.3)
 
 
 class DatagramChannel:

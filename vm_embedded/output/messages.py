@@ -15,7 +15,7 @@ import numpy as np
 
 from ..cameras.camera import Shot
 from ..cameras.image_files import Frame
-from ..detection.detections import Detections
+from ..detection.detections import ClassPoints, Detections
 
 STATES = ("starting", "ok", "degraded", "camera_lost", "pose_stale", "stopping")
 
@@ -32,22 +32,20 @@ def frame_fields(detections: Detections, emit_points: Sequence[str] = (), explai
     fields: Message = detections.as_dict()
     timing = fields.pop("timing_ms")  # the last entry of a message
     if emit_points:
-        fields["class_points"] = {
-            name: {
-                "bearings": np.round(points.bearings, 4).tolist(),
-                "probabilities": np.round(points.probabilities.astype(float), 3).tolist(),
-            }
-            for name in emit_points
-            for points in [detections.points_of(name)]
-        }
+        fields["class_points"] = {name: _class_points(detections.points_of(name)) for name in emit_points}
     if explain:
         fields["rejected"] = [each.as_dict() for each in detections.rejected]
     return fields | {"timing_ms": timing}
 
 
-def file_message(
-    frame: Frame, detections: Detections, emit_points: Sequence[str] = (), explain: bool = False
-) -> Message:
+def _class_points(points: ClassPoints) -> Message:
+    return {
+        "bearings": np.round(points.bearings, 4).tolist(),
+        "probabilities": np.round(points.probabilities.astype(float), 3).tolist(),
+    }
+
+
+def file_message(frame: Frame, detections: Detections, emit_points: Sequence[str], explain: bool) -> Message:
     """A frame of a file or folder. stamp: time in the video [s]; other fields as in `frame_fields`."""
     stamp = None if frame.stamp is None else round(frame.stamp, 6)
     origin = {"frame": frame.index, "source": frame.source, "stamp": stamp}

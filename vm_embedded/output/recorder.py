@@ -91,20 +91,25 @@ class Recorder:
             return
         self._moments.append(moment)
         self._nbytes += moment.nbytes
-        oldest = moment.shot.captured - self.settings.seconds
-        while self._nbytes > 2**20 * self.settings.memory_mib or self._moments[0].shot.captured < oldest:
+        self._drop_old(moment.shot.captured - self.settings.seconds)
+        if self._moments and self._is_triggered(moment):
+            self._last_trigger = time.monotonic()
+            try:
+                self.record(files)
+            except InputError as error:
+                self._report("not recorded", "warning", str(error))
+
+    def _drop_old(self, oldest: float) -> None:
+        """Drop the moments before a time [s], and more if they take too much memory."""
+        most = 2**20 * self.settings.memory_mib
+        while self._moments and (self._nbytes > most or self._moments[0].shot.captured < oldest):
             self._nbytes -= self._moments.popleft().nbytes
-            if not self._moments:
-                return
-        trigger = self.settings.trigger_class
-        if trigger and any(each["class"] == trigger for each in moment.message["detections"]):
-            now = time.monotonic()
-            if now - self._last_trigger >= self.settings.pause:
-                self._last_trigger = now
-                try:
-                    self.record(files)
-                except InputError as error:
-                    self._report("not recorded", "warning", str(error))
+
+    def _is_triggered(self, moment: Moment) -> bool:
+        """Whether a moment shows the trigger class, after the pause since the last recording that it triggered."""
+        name = self.settings.trigger_class
+        is_shown = bool(name) and any(each["class"] == name for each in moment.message["detections"])
+        return is_shown and time.monotonic() - self._last_trigger >= self.settings.pause
 
     def record(self, files: Mapping[str, bytes]) -> str:
         """Start to write the kept moments, and return a line that says so. Raises InputError if it can't start.

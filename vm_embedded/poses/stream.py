@@ -70,16 +70,16 @@ class PoseStream:
                 lambda: asyncio.StreamReaderProtocol(reader), os.fdopen(os.dup(sys.stdin.fileno()))
             )
             self._transports.append(pipe)
-            self._keep(asyncio.ensure_future(self._take_lines(reader)))
+            self._add_task(asyncio.ensure_future(self._take_lines(reader)))
 
-    def _keep(self, task: asyncio.Task[None]) -> None:
+    def _add_task(self, task: asyncio.Task[None]) -> None:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
-        self._keep(task)
+        self._add_task(task)
         if not self._connections.admit(writer):
             return
         with suppress(asyncio.CancelledError):  # asyncio would report it as a failure

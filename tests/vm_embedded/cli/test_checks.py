@@ -11,17 +11,9 @@ import pytest
 from tests.drawn_scenes import FOLDER
 from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cli.camera_source import SourceFacts, check_source
-from vm_embedded.cli.checks import (
-    BAD,
-    GOOD,
-    WARNING,
-    check_clock,
-    check_lens,
-    check_opencv,
-    check_pose,
-    check_threads,
-    run_checks,
-)
+from vm_embedded.cli.checks import check_lens, check_pose, run_checks
+from vm_embedded.cli.finding import BAD, GOOD, WARNING
+from vm_embedded.cli.machine_checks import check_clock, check_opencv, check_threads
 from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.lens_files import LensFile, format_lens_file
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear

@@ -99,6 +99,12 @@ def test_a_folder_and_a_file_are_processed_one_after_the_other(folder):
     assert found[0]["detections"] == found[2]["detections"]
 
 
+def test_the_name_of_a_file_may_begin_with_a_dash(folder):
+    dashed = (folder / IMAGES[0].name).rename(folder / f"-{IMAGES[0].name}").name
+    done = run(*("--fov", "70deg", IMAGES[1].name, "--height", "0.6", "--model", MODEL, "--", dashed), cwd=folder)
+    assert {each["source"] for each in lines(done)} == {IMAGES[1].name, dashed}
+
+
 def test_of_several_sources_none_may_be_live():
     one_complaint(run("synthetic", IMAGES[0], code=1), "only one live camera")
 

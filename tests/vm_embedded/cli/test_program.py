@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import vm_embedded
+from vm_embedded.cli.program import program
 from vm_embedded.config.toml_reader import parse_toml
 
 TOP = Path(__file__).parents[3]
@@ -191,3 +192,12 @@ def test_a_pipeline_may_be_longer_than_a_file_name():
     done = run("vm-doctor", "--camera", pipeline)
     assert "Traceback" not in done.stderr
     assert "this OpenCV was built without GStreamer" in done.stdout
+
+
+def test_an_interrupt_that_a_program_leaves_to_others_has_a_status_of_its_own(capsys):
+    @program
+    def main():
+        raise KeyboardInterrupt
+
+    assert main() == 130
+    assert capsys.readouterr() == ("", "")

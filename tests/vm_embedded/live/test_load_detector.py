@@ -1,5 +1,7 @@
 """What stops vm-detect at the start, and how it says so."""
 
+import asyncio
+import io
 import json
 import shutil
 import signal
@@ -8,7 +10,11 @@ import subprocess
 import pytest
 
 from tests.vm_embedded.live.running import COMMAND, DEMO, arguments, running
-from vm_embedded.live.configuration import read_configuration
+from vm_embedded.cameras.camera import CameraSettings
+from vm_embedded.cameras.fault import FaultScript
+from vm_embedded.live.configuration import Configuration, StatusSettings, read_configuration
+from vm_embedded.live.daemon import Daemon
+from vm_embedded.live.log import EventLog
 from vm_embedded.network.bundled import model_path
 
 
@@ -157,3 +163,15 @@ def test_a_running_detector_is_asked_although_its_vm_toml_has_got_an_error(tmp_p
     assert done.returncode == 0
     assert json.loads(done.stdout)["state"] == "ok"
     assert "did you mean 'fps'" in done.stderr
+
+
+def test_the_start_reads_the_script_of_a_camera_once(tmp_path, monkeypatch):
+    path = tmp_path / "script.toml"
+    path.write_text('source = "synthetic"\n')
+    read, seen = FaultScript.read, []
+    monkeypatch.setattr(FaultScript, "read", lambda path: seen.append(path) or read(path))
+    configuration = Configuration(
+        camera=CameraSettings(source=f"fault:{path}"), status=StatusSettings(socket=str(tmp_path / "control"))
+    )
+    asyncio.run(Daemon.prepare(lambda: configuration, EventLog("vm-detect", io.StringIO())))
+    assert seen == [path]

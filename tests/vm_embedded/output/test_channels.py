@@ -1,8 +1,10 @@
 """Messages of a real vm-detect on a Unix socket, in a file and by UDP."""
 
+import asyncio
 import os
 import signal
 import socket
+import time
 
 import pytest
 
@@ -11,6 +13,7 @@ from tests.vm_embedded.live.running import running
 from vm_embedded.errors import InputError
 from vm_embedded.live.control import ask
 from vm_embedded.output.channels import OutputSettings
+from vm_embedded.output.file_channel import FileChannel
 
 
 @pytest.mark.long
@@ -87,21 +90,34 @@ def test_datagrams_have_no_unix_socket():
         OutputSettings(udp="127.0.0.1:5600,unix:lines.sock")
 
 
-def test_hangup_opens_the_file_again_after_it_was_moved_or_deleted(tmp_path):
+def test_a_file_that_was_moved_or_deleted_is_begun_anew(tmp_path):
     path = tmp_path / "lines.jsonl"
     with running(tmp_path, "--camera", "synthetic", "--output-file", path) as found:
-        found.wait(path.exists)
-        found.wait(lambda: path.stat().st_size > 0)
+        found.wait_for_state("ok")
         moved = path.rename(tmp_path / "lines.jsonl.1")
-        found.process.send_signal(signal.SIGHUP)
+        found.wait(lambda: path.exists() and path.read_bytes().count(b"\n") > 3)
+        path.unlink()
         found.wait(lambda: path.exists() and path.read_bytes().count(b"\n") > 3)
         path.unlink()
         path.mkdir()
-        found.process.send_signal(signal.SIGHUP)
-        found.wait(lambda: any(each["event"] == "output file not opened again" for each in found.events))
+        found.wait_for_state("degraded")
+        reason = read_message(ask(tmp_path / "control", "status"))["reason"]
         path.rmdir()
-        found.process.send_signal(signal.SIGHUP)
-        found.wait(lambda: path.exists() and path.read_bytes().count(b"\n") > 3)
+        found.wait_for_state("ok")
         assert found.stop()[0] == 0
+    assert reason == f"messages are lost: can't write {path}: Is a directory"
     for each in (moved, path):
         assert all(read_message(line) for line in each.read_text().splitlines())
+
+
+def test_no_line_is_lost_when_a_file_is_moved(tmp_path):
+    path, moved = tmp_path / "lines", tmp_path / "moved"
+    channel = FileChannel(str(path), 1024)
+    channel.send(b"1\n")
+    while path.read_bytes() != b"1\n":
+        time.sleep(0.01)
+    path.rename(moved)
+    channel.send(b"2\n")
+    channel.send(b"3\n")
+    asyncio.run(channel.close())
+    assert (moved.read_bytes(), path.read_bytes(), channel.dropped, channel.failure) == (b"1\n", b"2\n3\n", 0, "")
