@@ -291,4 +291,5 @@ def test_another_reason_of_the_same_state_is_logged_but_not_another_number_in_it
             found.wait(lambda: reasons() and "pose lacks t" in reasons()[-1])
         found.stop()
     assert len(reasons()) == 2
-    assert found.states == ["starting", "pose_stale", "stopping"]
+    # On a busy core, the first frames may be late.
+    assert found.states[found.states.index("pose_stale") :] == ["pose_stale", "stopping"]
