@@ -243,9 +243,7 @@ def _mean_odds(probabilities: Singles, weights: Sequence[float]) -> Floats:
     return np.asarray(yes / (yes + no))
 
 
-def _second_opinion(
-    places: Places, rows: Chosen, look: Look, zooms: tuple[float, ...], answers: Singles
-) -> Singles:
+def _second_opinion(places: Places, rows: Chosen, look: Look, zooms: tuple[float, ...], answers: Singles) -> Singles:
     """Mean of the answers (k, 4) to k patches, and to mirror images of smaller and larger ones.
 
     All show the same object, but the network makes different errors on them. Probabilities are averaged as log-odds.

@@ -75,8 +75,11 @@ class Shape(ABC):
         in one frame whose z is up.
         """
 
-    def covers(self, rays: Floats, centers: Floats, height: float, share: float = 1.0) -> Mask:
-        """Whether the offset of rays (n, 3) from objects at `centers` (m, 3) is less than `share`; (m, n)."""
+    def covers(self, rays: Floats, centers: Floats, height: float, share: Number = 1.0) -> Mask:
+        """Whether the offset of rays (n, 3) from objects at `centers` (m, 3) is less than `share`; (m, n).
+
+        share: a number, or an array (s, 1, 1) of them, which gives (s, m, n).
+        """
         return np.asarray(self.offset(rays, centers, height) < share)
 
     @abstractmethod
