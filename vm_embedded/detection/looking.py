@@ -220,7 +220,8 @@ def look_at(places: Places, look: Look) -> Singles:
         if number and len(doubtful):
             found[doubtful] = _second_opinion(places, worth[doubtful], network, rules.zooms, found[doubtful])
         # A glance, the first of several networks, knows too little for a mean.
-        if number > 1 and (len(chain) == 1 or networks[number - 1] is not chain[0]):
+        was_glance = len(chain) > 1 and networks[number - 1] is chain[0]
+        if number > 1 and not was_glance:
             both = np.stack([answers[worth[last], 0], found[last, 0]])
             found[last, 0] = _mean_odds(both, [_EARLIER, 1.0 - _EARLIER])
         answers[worth] = found
