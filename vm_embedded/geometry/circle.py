@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Floats, Mask, Number
 from ..errors import GeometryError
-from .shape import Shape, all_between
+from .shape import Shape, all_between, rays_to_circle
 
 
 class Circle(Shape):
@@ -60,8 +60,4 @@ class Circle(Shape):
         return right
 
     def outline(self, center: Floats, height: float, count: int = 48) -> Floats:
-        around = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
-        points = np.tile(center, (count, 1))
-        points[:, 0] += self.radius * np.cos(around)
-        points[:, 1] += self.radius * np.sin(around)
-        return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))
+        return rays_to_circle(center, self.radius, np.linspace(0.0, 2.0 * np.pi, count, endpoint=False))

@@ -110,6 +110,14 @@ def all_between(value: Number, low: float, high: float) -> bool:
     return inside if isinstance(inside, bool) else bool(np.all(inside))
 
 
+def rays_to_circle(center: Floats, radius: float, angles: Floats) -> Floats:
+    """Unit rays (m, 3) to a level circle around `center` (3,) [m], relative to the camera, at angles (m,) [rad]."""
+    points = np.tile(center, (len(angles), 1))
+    points[:, 0] += radius * np.cos(angles)
+    points[:, 1] += radius * np.sin(angles)
+    return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))
+
+
 def tangents(axis: Floats) -> Floats:
     """Unit vectors (2, 3), orthogonal to the unit vector `axis` (3,) and to each other: a level one, then upwards."""
     x, y, z = (float(value) for value in axis)
