@@ -70,10 +70,9 @@ def _call(depth, width, model, layout, lens, pose):
     whole = facts.model.build(facts.mesh_shape, HEIGHT, 4.0, 10.0)
     mesh = project(whole, pose.level, lens, SIZE).visible.graph
     arranged = choose_layout(mesh, replace(facts, layout=layout))
-    points = arranged.new_points()
-    arranged.colors_of(points)[:] = np.random.default_rng(0).random((len(arranged.slots), 3))
+    colors = np.random.default_rng(0).random((3, len(arranged.slots)), dtype=np.float32)
     shown = arranged.slots < len(mesh)
-    return lambda: session.run(arranged, points, shown), (len(mesh), len(shown))
+    return lambda: session.run(arranged, colors, shown), (len(mesh), len(shown))
 
 
 if __name__ == "__main__":

@@ -76,9 +76,8 @@ def mesh_on_screen(detector: Detector, frame: Frame) -> Mesh:
 def session_call(detector: Detector, mesh: Mesh) -> Callable[[], object]:
     """A call of the network alone on a mesh, with prepared inputs."""
     layout = choose_layout(mesh, detector.manifest)
-    points = layout.new_points()
-    layout.colors_of(points)[:] = np.random.default_rng(0).random((len(layout.slots), 3), dtype=np.float32)
-    feeds = layout.feeds(points, layout.slots < len(mesh))
+    colors = np.random.default_rng(0).random((3, len(layout.slots)), dtype=np.float32)
+    feeds = layout.feeds(colors, layout.slots < len(mesh))
     model = detector.session.onnx
     return lambda: model.run(feeds)
 

@@ -74,10 +74,10 @@ def test_far_below_zero_no_layer_makes_numbers_that_slow_a_processor_down(layout
     made = [node.output[0] for node in model.graph.node if node.op_type in ("MatMul", "Exp", "Add")]
     model.graph.output.extend(onnx.ValueInfoProto(name=name) for name in made)
     laid = choose_layout(build_mesh(Sphere(0.1), 0.5, 4.0, 10.0, mesh), facts)
-    points, shown = laid.new_points(), np.ones(len(laid.slots), dtype=bool)
-    laid.colors_of(points)[:] = np.random.default_rng(1).random((len(shown), 3))
+    shown = np.ones(len(laid.slots), dtype=bool)
+    colors = np.random.default_rng(1).random((3, len(shown)), dtype=np.float32)
     session = onnxruntime.InferenceSession(model.SerializeToString())
-    for name, values in zip(made, session.run(made, laid.feeds(points, shown)), strict=True):
+    for name, values in zip(made, session.run(made, laid.feeds(colors, shown)), strict=True):
         sizes = np.abs(values[values != 0])
         assert not (sizes < np.finfo(np.float32).tiny).any(), name
 

@@ -15,21 +15,20 @@ _LEAST_DEVIATION = 0.02
 """Deviation of a picture without contrast: its noise must not become a pattern."""
 
 
-def normalize_colors(colors: Singles, kind: str, counted: Mask | None = None) -> None:
-    """Turn colors (n, 3) from 0 to 1 into those that a network takes, in place.
+def normalized(colors: Singles, kind: str, counted: Mask | None = None) -> Singles:
+    """The colors (3, n) that a network takes, from red, green and blue (3, n), each from 0 to 1.
 
     kind: one of manifest.POINT_COLORS. "absolute" leaves them. "relative" subtracts each channel's mean over the points
     that are `counted` (n,), by default all, and divides by its standard deviation.
 
     Sums are in double precision, so the digits don't depend on the order of the points.
     """
-    planes = colors.T
-    seen = planes if counted is None else planes.compress(counted, axis=1)
+    seen = colors if counted is None else colors.compress(counted, axis=1)
     if kind == "absolute" or not seen.size:
-        return
+        return colors
     deviations = seen.astype(np.float64)
     mean = deviations.mean(axis=1, keepdims=True)
     deviations -= mean
     deviation = np.sqrt(np.square(deviations, out=deviations).mean(axis=1, keepdims=True))
-    planes -= mean.astype(np.float32)
-    planes *= (1.0 / np.maximum(deviation, _LEAST_DEVIATION)).astype(np.float32)
+    factor = (1.0 / np.maximum(deviation, _LEAST_DEVIATION)).astype(np.float32)
+    return np.asarray((colors - mean.astype(np.float32)) * factor)

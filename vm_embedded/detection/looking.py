@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from ..arrays import Floats, Image, Mask, Singles
+from ..arrays import Chosen, Floats, Image, Mask, Singles
 from ..network.look_contract import LookContract
 from .judging import repeated
 from .observation import Observation
@@ -90,16 +89,16 @@ class Places(Protocol):
 
     def __len__(self) -> int: ...
 
-    def cut(self, rows: npt.NDArray[np.intp], contract: LookContract, zoom: float = 1.0) -> Image:
+    def cut(self, rows: Chosen, contract: LookContract, zoom: float = 1.0) -> Image:
         """Patches (k, size, size, 3), RGB, of the places with the numbers `rows` (k,), as a contract describes them.
 
         zoom: their sides, as a share of those in the contract.
         """
 
-    def radii(self, rows: npt.NDArray[np.intp]) -> Floats:
+    def radii(self, rows: Chosen) -> Floats:
         """Radii (k,) that the objects expected there would have in the picture [px]."""
 
-    def move(self, rows: npt.NDArray[np.intp], right: Floats, down: Floats) -> Mask:
+    def move(self, rows: Chosen, right: Floats, down: Floats) -> Mask:
         """Move places by shifts (k,) in expected radii. Returns which of them (k,) may hold an object there."""
 
 
@@ -113,27 +112,34 @@ class PlanePlaces:
     def __init__(self, observation: Observation, centers: Floats) -> None:
         self.centers = centers.copy()
         self._observation = observation
+        self._tangents: Tangents | None = None  # of all places, until one moves
 
     def __len__(self) -> int:
         return len(self.centers)
 
-    def cut(self, rows: npt.NDArray[np.intp], contract: LookContract, zoom: float = 1.0) -> Image:
+    def cut(self, rows: Chosen, contract: LookContract, zoom: float = 1.0) -> Image:
         """See Places."""
         view = self._observation.view
-        nodes = patch_nodes(view, Tangents.at(view, self.centers[rows]), zoom * contract.extent)
+        nodes = patch_nodes(view, self._planes(rows), zoom * contract.extent)
         return cut_patches(self._observation.pyramid, nodes, contract.size)
 
-    def radii(self, rows: npt.NDArray[np.intp]) -> Floats:
+    def radii(self, rows: Chosen) -> Floats:
         """See Places."""
-        view = self._observation.view
-        return apparent_radii(view, Tangents.at(view, self.centers[rows]))
+        return apparent_radii(self._observation.view, self._planes(rows))
 
-    def move(self, rows: npt.NDArray[np.intp], right: Floats, down: Floats) -> Mask:
+    def move(self, rows: Chosen, right: Floats, down: Floats) -> Mask:
         """See Places. A place that moves to the horizon or above it can't hold an object."""
         view = self._observation.view
-        rays = Tangents.at(view, self.centers[rows]).rays(right, down)
+        rays = self._planes(rows).rays(right, down)
         self.centers[rows] = view.shape.center_along(rays, view.height)
+        self._tangents = None
         return np.asarray(rays[:, 2] < 0.0)
+
+    def _planes(self, rows: Chosen) -> Tangents:
+        """The planes of the patches around places with the numbers `rows` (k,)."""
+        if self._tangents is None:
+            self._tangents = Tangents.at(self._observation.view, self.centers)
+        return self._tangents.part(rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +220,8 @@ def look_at(places: Places, look: Look) -> Singles:
         if number and len(doubtful):
             found[doubtful] = _second_opinion(places, worth[doubtful], network, rules.zooms, found[doubtful])
         # A glance, the first of several networks, knows too little for a mean.
-        if number > 1 and (len(chain) == 1 or networks[number - 1] is not chain[0]):
+        was_glance = len(chain) > 1 and networks[number - 1] is chain[0]
+        if number > 1 and not was_glance:
             both = np.stack([answers[worth[last], 0], found[last, 0]])
             found[last, 0] = _mean_odds(both, [_EARLIER, 1.0 - _EARLIER])
         answers[worth] = found
@@ -223,7 +230,7 @@ def look_at(places: Places, look: Look) -> Singles:
     return answers
 
 
-def _is_last(places: Places, rows: npt.NDArray[np.intp], following: Sequence[Look]) -> Mask:
+def _is_last(places: Places, rows: Chosen, following: Sequence[Look]) -> Mask:
     """Which places with the numbers `rows` (k,) none of the following passes can judge."""
     if following and following[0].contract.is_wide:
         return places.radii(rows) >= _LARGE
@@ -237,15 +244,13 @@ def _mean_odds(probabilities: Singles, weights: Sequence[float]) -> Floats:
     return np.asarray(yes / (yes + no))
 
 
-def _second_opinion(
-    places: Places, rows: npt.NDArray[np.intp], look: Look, zooms: tuple[float, ...], answers: Singles
-) -> Singles:
+def _second_opinion(places: Places, rows: Chosen, look: Look, zooms: tuple[float, ...], answers: Singles) -> Singles:
     """Mean of the answers (k, 4) to k patches, and to mirror images of smaller and larger ones.
 
     All show the same object, but the network makes different errors on them. Probabilities are averaged as log-odds.
     """
     patches = np.concatenate([places.cut(rows, look.contract, zoom)[:, :, ::-1] for zoom in zooms])
-    mirrored = look.run(np.ascontiguousarray(patches)).reshape(len(zooms), len(rows), 4)
+    mirrored = look.run(patches).reshape(len(zooms), len(rows), 4)
     for zoom, each in zip(zooms, mirrored, strict=True):
         each[:, 1:3] *= -zoom, zoom
         each[:, 3] += math.log(zoom)

@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Floats, Indices, Mask, Singles
 from ..network.layout import Layout
 from ..network.manifest import Manifest
-from .color_normalization import normalize_colors
+from .color_normalization import normalized
 from .prepared_view import PreparedView
 from .projection import Projection, project
 from .pyramid import Pyramid
@@ -24,8 +24,8 @@ from .stopwatch import Stopwatch
 class Network(Protocol):
     """Anything that gives points their probabilities: a Session, or a network in torch."""
 
-    def run(self, layout: Layout, points: Singles, on_screen: Mask) -> Singles:
-        """Probabilities (m, C) of a layout's slots, from its colored `points` and the slots (m,) on screen."""
+    def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
+        """Probabilities (m, C) of a layout's slots, from their colors (3, m) and which slots (m,) are on screen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +100,8 @@ def classify(
     layout = view.layout
     # The network needs the colors of copies, too. They must not count twice in the mean color, nor in an object.
     shown = projected.only(layout.original)
-    points = layout.new_points()
-    colors = layout.colors_of(points)  # a view: writing to it fills `points`
-    sample(pyramid, projected.pixels, view.levels, colors)
-    normalize_colors(colors, manifest.colors, shown.on_screen)
+    colors = normalized(sample(pyramid, projected.pixels, view.levels), manifest.colors, shown.on_screen)
     watch.lap("sample")
-    probabilities = network.run(layout, points, projected.on_screen)
+    probabilities = network.run(layout, colors, projected.on_screen)
     watch.lap("infer")
     return Observation(pyramid, view, manifest, shown, probabilities, watch.stages)

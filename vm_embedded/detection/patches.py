@@ -14,7 +14,7 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from ..arrays import Floats, Image, Singles
+from ..arrays import Chosen, Floats, Image, Singles
 from .prepared_view import PreparedView
 from .pyramid import Pyramid
 
@@ -46,13 +46,18 @@ class Tangents:
         # Straight below the camera no horizontal direction is ahead of another, so the mesh frame's x axis is taken.
         below = horizontal < 1e-9
         length = np.where(below, 1.0, horizontal)
-        right_x, right_y = y / length, np.where(below, -1.0, -x / length)
-        right = np.stack([right_x, right_y, np.zeros_like(x)], axis=1)
-        down = np.stack([-z * right_y, z * right_x, x * right_y - y * right_x], axis=1)  # axes x right
+        right, down = np.zeros_like(axes), np.empty_like(axes)
+        right_x = right[:, 0] = y / length
+        right_y = right[:, 1] = np.where(below, -1.0, -x / length)
+        down[:, 0], down[:, 1], down[:, 2] = -z * right_y, z * right_x, x * right_y - y * right_x  # axes x right
         # The camera may be inside of the object, where no tangent exists.
         size = view.shape.half_size
         radius = size / np.sqrt(np.maximum(distance**2 - size**2, 1e-12))
         return cls(axes, right, down, radius)
+
+    def part(self, rows: Chosen) -> Tangents:
+        """Some of the planes."""
+        return Tangents(self.axes[rows], self.right[rows], self.down[rows], self.radius[rows])
 
     def turned(self, rotation: Floats) -> Tangents:
         """The same planes in another frame; rotation (3, 3) maps that frame to this one."""
@@ -116,18 +121,15 @@ def cut_patches(pyramid: Pyramid, nodes: Singles, size: int) -> Image:
     Each patch is read from the sharpest level of the pyramid with less than two pixels between samples. Outside of the
     frame it repeats the frame's border.
     """
-    count = nodes.shape[1]
     levels = np.floor(np.log2(np.maximum(_spacing(nodes, size), 1.0))).astype(np.intp)
-    order = np.argsort(levels, kind="stable")
-    levels = levels[order]
-    shrunk = (nodes[:, order] + np.float32(0.5)) * np.exp2(-levels, dtype=np.float32)[:, None, None] - np.float32(0.5)
-    x, y = samples(shrunk, size).reshape(2, count, size, size)
-    patches = np.empty((count, size, size, 3), dtype=np.uint8)
+    shrunk = (nodes + np.float32(0.5)) * np.exp2(-levels, dtype=np.float32)[:, None, None] - np.float32(0.5)
+    x, y = samples(shrunk, size)
+    patches = np.empty((len(levels), size, size, 3), dtype=np.uint8)
     for level in np.flatnonzero(np.bincount(levels)).tolist():
-        part = slice(*np.searchsorted(levels, (level, level + 1)))
-        tables = x[part].reshape(-1, size), y[part].reshape(-1, size)
+        rows = np.flatnonzero(levels == level)
+        tables = x[rows].reshape(-1, size), y[rows].reshape(-1, size)
         colors = cv2.remap(pyramid.level(level), *tables, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        patches[order[part]] = _rgb(np.asarray(colors, dtype=np.uint8), pyramid.channels).reshape(-1, size, size, 3)
+        patches[rows] = _rgb(np.asarray(colors, dtype=np.uint8), pyramid.channels).reshape(-1, size, size, 3)
     return patches
 
 

@@ -15,8 +15,8 @@ from .observation import Observation
 _MOST_POINTS = 256
 """Largest number of points that are compared in pairs: a frame of noise must not cost a second."""
 
-_CORE = 0.9
-"""Points within this share of an object's radius count. Those at the outline show both sides."""
+_WHOLE_AND_CORE = np.array([1.0, 0.9])[:, None, None]
+"""Shares of an object's radius. Only points in its core count for its score: those at the outline show both sides."""
 
 
 def propose_places(observation: Observation, probabilities: Singles, above: float, most: int) -> Floats:
@@ -33,8 +33,7 @@ def propose_places(observation: Observation, probabilities: Singles, above: floa
     likely = likely[np.argsort(observation.layout.slots[likely])]  # the same digits for every layout
     rays, p = view.layout.rays[likely], probabilities[likely]
     centers = view.shape.center_along(rays, view.height)
-    near = view.shape.covers(rays, centers, view.height)
-    core = view.shape.covers(rays, centers, view.height, _CORE)
+    near, core = view.shape.covers(rays, centers, view.height, _WHOLE_AND_CORE)
     chosen = _apart(core.astype(np.float32) @ p, near, most)
     # Once only: a second move would lead away to larger things near by, and fewer balls would be found.
     middle = (near[chosen] * p) @ rays
@@ -45,7 +44,7 @@ def _apart(score: Singles, near: Mask, most: int) -> list[int]:
     """At most `most` places by descending score (m,); none is near (m, m) a better one."""
     left, chosen = score.copy(), []
     for _ in range(min(most, len(score))):
-        best = int(np.argmax(left))
+        best = int(left.argmax())
         if left[best] <= 0.0:
             break
         chosen.append(best)

@@ -14,14 +14,15 @@ from .footprint import BLOCK, Levels
 from .pyramid import Pyramid
 
 
-def sample(pyramid: Pyramid, pixels: Floats, levels: Levels, out: Singles) -> None:
-    """Write the RGB colors, from 0 to 1, at pixels (n, 2) of the frame into `out` (n, 3).
+def sample(pyramid: Pyramid, pixels: Floats, levels: Levels) -> Singles:
+    """Red, green and blue (3, n), from 0 to 1, at pixels (n, 2) of the frame.
 
     levels: which picture of the pyramid colors each point. The color is arbitrary where one of the four pixels around a
     point is outside of the image.
     """
-    if not len(levels.order):
-        return
+    colors = np.empty((3, len(pixels)), dtype=np.float32)
+    if not len(pixels):
+        return colors
     with np.errstate(invalid="ignore", over="ignore"):  # pixels outside of the lens's view may be NaN
         places = _in_pictures(pyramid, pixels, levels)
         whole = np.floor(places)
@@ -36,8 +37,9 @@ def sample(pyramid: Pyramid, pixels: Floats, levels: Levels, out: Singles) -> No
     values *= down
     values += upper
     values *= np.float32(1.0 / 255.0)
-    for column, channel in enumerate(pyramid.channels):
-        np.take(values[channel], levels.places, out=out[:, column], mode="clip")
+    for color, channel in zip(colors, pyramid.channels, strict=True):
+        np.take(values[channel], levels.places, out=color, mode="clip")
+    return colors
 
 
 def _in_pictures(pyramid: Pyramid, pixels: Floats, levels: Levels) -> Floats:

@@ -110,8 +110,10 @@ def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, limit: float) 
     """The longest part of a polyline along which the field ends, by the number of places that agree with it."""
     if len(corners) < 2:
         return np.empty((0, 2))
-    agrees = np.concatenate([[0], np.cumsum(ended & (np.abs(_beyond(places, corners)) < limit))])
-    agreeing = agrees[corners[1:] + 1] - agrees[corners[:-1]]
+    beyond = _beyond(places, corners)
+    agrees = ended & (np.abs(beyond) < limit)
+    up_to = np.concatenate([[0], np.cumsum(agrees)])  # how many places agree before each
+    agreeing = up_to[corners[1:] + 1] - up_to[corners[:-1]]
     both = ended[corners[1:]] & ended[corners[:-1]]
     kept = both | (agreeing > 0.5 * (corners[1:] - corners[:-1] + 1))
     run = np.cumsum(np.diff(kept, prepend=False) != 0)
@@ -120,15 +122,17 @@ def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, limit: float) 
         return np.empty((0, 2))
     pieces = np.flatnonzero(run == np.argmax(support))
     part = slice(pieces[0], pieces[-1] + 2)
-    moved = _without_margin(places, corners, ended, limit)[part]
+    moved = _without_margin(places, corners, beyond, agrees)[part]
     outer = _hull(moved)  # each corner moved on its own, so some may point inward now
     return np.asarray(moved[outer] * (1.0 + _beyond(moved, outer).mean())) if len(outer) > 1 else moved[:0]
 
 
-def _without_margin(places: Floats, corners: Chosen, ended: Mask, limit: float) -> Floats:
-    """The corners moved from the outermost places to the middle of the places beside them."""
-    beyond, piece = _beyond(places, corners), _pieces(len(places), corners)
-    agrees = ended & (np.abs(beyond) < limit)
+def _without_margin(places: Floats, corners: Chosen, beyond: Floats, agrees: Mask) -> Floats:
+    """The corners moved from the outermost places to the middle of the places beside them.
+
+    beyond (c,): see _beyond. agrees (c,): which places count.
+    """
+    piece = _pieces(len(places), corners)
     count = np.bincount(piece[agrees], minlength=len(corners) - 1)
     total = np.bincount(piece[agrees], beyond[agrees], minlength=len(corners) - 1)
     beside = np.convolve(total, [1.0, 1.0]) / np.maximum(np.convolve(count, [1.0, 1.0]), 1.0)

@@ -64,8 +64,7 @@ def find_circle(points: LinePoints, free: Chosen) -> CirclePoints | None:
     if not possible.any():
         return None
     centers, radii = centers[possible], radii[possible]
-    away = voters.positions[:, None] - centers
-    off = np.sqrt(away[..., 0] ** 2 + away[..., 1] ** 2) - radii
+    off = np.sqrt(_squares(voters.positions, centers)) - radii
     support = voters.weights @ (np.abs(off) < _tolerance(voters)[:, None])
     around = voters.weights @ (np.abs(off) < 0.5 * radii)
     best = int(np.argmax(2.0 * support - around))
@@ -83,12 +82,18 @@ def _triples(points: LinePoints) -> Chosen:
     """Numbers (t, 3) of points that may be on one circle: each is near the first of its triple."""
     random = np.random.default_rng(0)
     first = random.integers(len(points), size=_TRIES)
-    away = points.positions[first][:, None] - points.positions
-    near = (away**2).sum(axis=2) < (2.0 * _RADII[1]) ** 2
+    squares = _squares(points.positions[first], points.positions)
+    near = squares < (2.0 * _RADII[1]) ** 2
     shares = np.cumsum(near, axis=1)
     chosen = np.ceil(random.random((_TRIES, 2)) * shares[:, -1:])
     others = [(shares < chosen[:, [column]]).sum(axis=1) for column in (0, 1)]
     return np.column_stack([first, *others])
+
+
+def _squares(positions: Floats, others: Floats) -> Floats:
+    """Squares (n, m) of the distances between places (n, 2) and (m, 2)."""
+    x, y = (positions[:, None, axis] - others[:, axis] for axis in (0, 1))
+    return x**2 + y**2
 
 
 def _tolerance(points: LinePoints) -> Floats:

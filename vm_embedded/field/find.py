@@ -47,30 +47,41 @@ def find_features(
     pieces, circle = _straight_and_round(near, likely)
     pieces = pieces_on_ridges(pieces, points, profiles)
     border = find_border(points) if "field" in points.classes else np.empty((0, 2))
-    feet = [each.position[None] for each in (*found["goal"], *found["robot"])]
-    places = [*feet, *(each.ends for each in pieces), border]
-    pixels = iter(np.split(to_pixels(np.concatenate(places)), np.cumsum([len(each) for each in places])[:-1]))
-    posts, robots = (
-        tuple(_upright(each, KINDS[name], points.height, next(pixels)[0]) for each in found[name])
-        for name in ("goal", "robot")
+    feet = {name: np.array([each.position for each in things]).reshape(-1, 2) for name, things in found.items()}
+    ends = np.array([each.ends for each in pieces]).reshape(-1, 2)
+    post_pixels, robot_pixels, end_pixels, border_pixels = _all_pixels(
+        to_pixels, feet["goal"], feet["robot"], ends, border
     )
-    lines = tuple(Segment(each.ends, next(pixels), float(likely.weights[each.members].mean())) for each in pieces)
+    posts = _uprights(found["goal"], KINDS["goal"], points.height, post_pixels)
+    lines = tuple(
+        Segment(piece.ends, pixels, float(likely.weights[piece.members].mean()))
+        for piece, pixels in zip(pieces, end_pixels.reshape(-1, 2, 2), strict=True)
+    )
     thinned, confidences = _thinned(likely)
     return FieldFeatures(
         posts=posts,
         goals=pair_posts(posts),
-        robots=robots,
+        robots=_uprights(found["robot"], KINDS["robot"], points.height, robot_pixels),
         lines=lines,
         circle=None if circle is None else _circle(circle, likely),
         crossings=find_crossings(lines, lambda places: np.asarray(np.isfinite(to_pixels(places)).all(axis=1))),
         line_points=thinned,
         line_confidences=confidences,
-        border=Border(border, next(pixels)) if len(border) else None,
+        border=Border(border, border_pixels) if len(border) else None,
     )
 
 
 def _by_rules(points: GroundPoints, name: str, rules: UprightRules) -> list[Base]:
     return find_uprights(points, points.classes[name], rules) if name in points.classes else []
+
+
+def _all_pixels(to_pixels: ToPixels, *groups: Floats) -> list[Floats]:
+    """The pixels of groups of places (n, 2) [m]. One call for all costs less than one for each."""
+    return np.split(to_pixels(np.concatenate(groups)), np.cumsum([len(each) for each in groups])[:-1])
+
+
+def _uprights(bases: Sequence[Base], name: str, height: float, pixels: Floats) -> tuple[Upright, ...]:
+    return tuple(_upright(base, name, height, pixel) for base, pixel in zip(bases, pixels, strict=True))
 
 
 def _upright(base: Base, name: str, height: float, pixel: Floats) -> Upright:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Floats, Mask, Number
 from ..errors import GeometryError
-from .shape import Shape, all_between
+from .shape import Shape, all_between, rays_to_circle
 
 
 class Circle(Shape):
@@ -45,7 +45,7 @@ class Circle(Shape):
         away = np.sqrt(self._squares(rays, centers, height)) / self.radius
         return np.where(rays[:, 2] < 0, away, np.inf)
 
-    def covers(self, rays: Floats, centers: Floats, height: float, share: float = 1.0) -> Mask:
+    def covers(self, rays: Floats, centers: Floats, height: float, share: Number = 1.0) -> Mask:
         # As `offset`, without a root for each pair.
         near = self._squares(rays, centers, height) < (share * self.radius) ** 2
         return np.asarray(near & (rays[:, 2] < 0))
@@ -54,11 +54,10 @@ class Circle(Shape):
         """Squares (m, n) of the distances [m] of centers from where rays meet the plane."""
         hits = self.center_along(rays, height)
         right, ahead = (hits[:, axis] - centers[:, axis, None] for axis in (0, 1))
-        return right * right + ahead * ahead
+        right *= right
+        ahead *= ahead
+        right += ahead
+        return right
 
     def outline(self, center: Floats, height: float, count: int = 48) -> Floats:
-        around = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
-        points = np.tile(center, (count, 1))
-        points[:, 0] += self.radius * np.cos(around)
-        points[:, 1] += self.radius * np.sin(around)
-        return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))
+        return rays_to_circle(center, self.radius, np.linspace(0.0, 2.0 * np.pi, count, endpoint=False))

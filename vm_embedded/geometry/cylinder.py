@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Floats, Number
 from ..errors import GeometryError
-from .shape import Shape, all_between
+from .shape import Shape, all_between, rays_to_circle
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,5 @@ class Cylinder(Shape):
 
     def _edge(self, center: Floats, angles: Floats, top: bool) -> Floats:
         """Unit rays (m, 3) to points of the upper or lower circle at these angles (m,) [rad]."""
-        points = np.tile(center, (len(angles), 1))
-        points[:, 0] += self.radius * np.cos(angles)
-        points[:, 1] += self.radius * np.sin(angles)
-        points[:, 2] += self.center_height if top else -self.center_height
-        return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))
+        up = self.center_height if top else -self.center_height
+        return rays_to_circle(center + np.array([0.0, 0.0, up]), self.radius, angles)

@@ -75,8 +75,11 @@ class Shape(ABC):
         in one frame whose z is up.
         """
 
-    def covers(self, rays: Floats, centers: Floats, height: float, share: float = 1.0) -> Mask:
-        """Whether the offset of rays (n, 3) from objects at `centers` (m, 3) is less than `share`; (m, n)."""
+    def covers(self, rays: Floats, centers: Floats, height: float, share: Number = 1.0) -> Mask:
+        """Whether the offset of rays (n, 3) from objects at `centers` (m, 3) is less than `share`; (m, n).
+
+        share: a number, or an array (s, 1, 1) of them, which gives (s, m, n).
+        """
         return np.asarray(self.offset(rays, centers, height) < share)
 
     @abstractmethod
@@ -105,6 +108,14 @@ def all_between(value: Number, low: float, high: float) -> bool:
     """Whether a number, or every number of an array, lies between two others, limits excluded."""
     inside = (value > low) & (value < high)
     return inside if isinstance(inside, bool) else bool(np.all(inside))
+
+
+def rays_to_circle(center: Floats, radius: float, angles: Floats) -> Floats:
+    """Unit rays (m, 3) to a level circle around `center` (3,) [m], relative to the camera, at angles (m,) [rad]."""
+    points = np.tile(center, (len(angles), 1))
+    points[:, 0] += radius * np.cos(angles)
+    points[:, 1] += radius * np.sin(angles)
+    return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))
 
 
 def tangents(axis: Floats) -> Floats:

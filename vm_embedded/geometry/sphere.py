@@ -51,7 +51,7 @@ class Sphere(Shape):
         # Chords instead of angles: they are proportional within the few degrees of a ball, and need no trigonometry.
         return np.asarray(np.sqrt(np.maximum(1.0 - (centers / distance) @ rays.T, 0.0) / (1.0 - cosine)))
 
-    def covers(self, rays: Floats, centers: Floats, height: float, share: float = 1.0) -> Mask:
+    def covers(self, rays: Floats, centers: Floats, height: float, share: Number = 1.0) -> Mask:
         # As `offset`, without a root for each pair: the chord's square is compared.
         distance = np.linalg.norm(centers, axis=1, keepdims=True)
         cosine = np.sqrt(np.maximum(1.0 - (self.radius / distance) ** 2, 0.0))

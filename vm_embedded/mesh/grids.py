@@ -29,7 +29,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats, Indices, Mask, frozen
+from ..arrays import Chosen, Floats, Indices, Mask, frozen
 from ..geometry.shape import Shape
 from .mesh import SELF, Groups, Mesh, MeshModel, check_size
 
@@ -142,20 +142,21 @@ def _positions(kind: str, u: Floats, v: Floats, shape: Shape, height: float) -> 
     y = coordinate(v, x)
     if kind == "xm":
         return x, y
-    unsettled = _solve_in_turns(coordinate, u, v, x, y, height - shape.center_height)
+    x, y, unsettled = _solve_in_turns(coordinate, u, v, x, y, height - shape.center_height)
     if len(unsettled):
         x[unsettled], y[unsettled] = _solve_by_halving(coordinate, u[unsettled], v[unsettled])
     return x, y
 
 
 def _solve_in_turns(
-    coordinate: _Coordinate, u: Floats, v: Floats, x: Floats, y: Floats, g: float
-) -> npt.NDArray[np.intp]:
-    """Solves the equations of NM for x and y (n,) in place: computes each from the other until both settle.
+    coordinate: _Coordinate, u: Floats, v: Floats, first_x: Floats, first_y: Floats, g: float
+) -> tuple[Floats, Floats, Chosen]:
+    """x and y (n,) of NM: computes each from the other until both settle, from first values (n,) on.
 
-    A coordinate far out hardly depends on its slice, so nearly all points settle in about ten turns. Returns the
+    A coordinate far out hardly depends on its slice, so nearly all points settle in about ten turns. Also returns the
     indices of the points that still move by more than _SETTLED (g + x + y) after _TURNS turns.
     """
+    x, y = first_x.copy(), first_y.copy()
     moving = np.arange(len(u))
     for _ in range(_TURNS):
         new_x = coordinate(u[moving], y[moving])
@@ -163,7 +164,7 @@ def _solve_in_turns(
         change = np.maximum(np.abs(new_x - x[moving]), np.abs(new_y - y[moving]))
         x[moving], y[moving] = new_x, new_y
         moving = moving[change > _SETTLED * (g + new_x + new_y)]
-    return moving
+    return x, y, moving
 
 
 def _solve_by_halving(coordinate: _Coordinate, u: Floats, v: Floats) -> tuple[Floats, Floats]:

@@ -39,15 +39,8 @@ class LatticeLayout(WholeLayout):
         beside = np.asarray(members, dtype=np.int32)[:, None] + shifts
         return np.where(self.original[beside], beside, np.int32(len(self)))
 
-    def new_points(self) -> Singles:
-        return np.empty((3, len(self)), dtype=np.float32)
-
-    def colors_of(self, points: Singles) -> Singles:
-        return points.T
-
-    def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
-        np.copyto(points, OFF_SCREEN, where=~on_screen)
-        return {"points": points, "shown": on_screen.reshape(self._shape)}
+    def feeds(self, colors: Singles, on_screen: Mask) -> Feeds:
+        return {"points": np.where(on_screen, colors, OFF_SCREEN), "shown": on_screen.reshape(self._shape)}
 
     def probabilities(self, output: Singles) -> Singles:
         return output.T

@@ -53,30 +53,22 @@ class Layout(ABC):
         return self.slots.nbytes + self.places.nbytes + self.original.nbytes + self.rays.nbytes
 
     @abstractmethod
-    def new_points(self) -> Singles:
-        """A new array for the network's input `points`; write the colors into its view `colors_of`."""
-
-    @abstractmethod
-    def colors_of(self, points: Singles) -> Singles:
-        """View (m, 3) of the slots' colors in an array of `new_points`."""
-
-    @abstractmethod
-    def answers(self, network: Run, points: Singles, on_screen: Mask) -> Singles:
+    def answers(self, network: Run, colors: Singles, on_screen: Mask) -> Singles:
         """Probabilities (m, C) of the slots, valid only on screen.
 
-        points: the colored array; it may be changed. on_screen: mask (m,) of the slots.
+        colors (3, m): of the slots, as the network takes them. on_screen (m,): which slots are on screen.
         """
 
 
 class WholeLayout(Layout):
     """A layout that the network takes in one call."""
 
-    def answers(self, network: Run, points: Singles, on_screen: Mask) -> Singles:
-        return self.probabilities(network(self.feeds(points, on_screen)))
+    def answers(self, network: Run, colors: Singles, on_screen: Mask) -> Singles:
+        return self.probabilities(network(self.feeds(colors, on_screen)))
 
     @abstractmethod
-    def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
-        """The network's inputs; see `answers`. Fills in the off-screen point's color, OFF_SCREEN, in place."""
+    def feeds(self, colors: Singles, on_screen: Mask) -> Feeds:
+        """The network's inputs, with the color OFF_SCREEN where it needs the off-screen point; see `answers`."""
 
     @abstractmethod
     def probabilities(self, output: Singles) -> Singles:

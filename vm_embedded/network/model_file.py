@@ -52,6 +52,9 @@ _OP_TYPE = 4
 _LOOK_UPS = (b"ArrayFeatureExtractor", b"Gather")
 """Operators that look up neighbors, in the layouts plain and runs."""
 
+_MOST_MIB = 64
+"""Largest model file [MiB]; the networks of the package have less than two."""
+
 _MOST_FIELDS = 500_000
 """Most fields of a model file; the networks of the package have a few thousand."""
 
@@ -85,19 +88,19 @@ class ModelFile:
         return _look_ups(memoryview(self.content))
 
 
-def read_model(path: str | Path, max_mib: float = 64.0) -> ModelFile:
-    """Read and check a model file of at most `max_mib` [MiB]. Raises ModelError as the two steps do."""
-    return parse_model(path, read_content(path, max_mib))
+def read_model(path: str | Path) -> ModelFile:
+    """Read and check a model file. Raises ModelError as the two steps do."""
+    return parse_model(path, read_content(path))
 
 
-def read_content(path: str | Path, max_mib: float = 64.0) -> bytes:
-    """The bytes of a model file. Raises ModelError if it is missing, or larger than `max_mib` [MiB]."""
+def read_content(path: str | Path) -> bytes:
+    """The bytes of a model file. Raises ModelError if it is missing, or larger than 64 MiB."""
     path = Path(path)
     try:
         check_regular(path)
         size = path.stat().st_size
-        if size > max_mib * 2**20:
-            raise ModelError(f"{path}: {size / 2**20:.1f} MiB is too large for a model (allowed: {max_mib:g} MiB)")
+        if size > _MOST_MIB * 2**20:
+            raise ModelError(f"{path}: {size / 2**20:.1f} MiB is too large for a model (allowed: {_MOST_MIB} MiB)")
         return path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
         raise ModelError(f"can't read the model {path}: {getattr(error, 'strerror', None) or error}") from error

@@ -31,14 +31,9 @@ class PlainLayout(WholeLayout):
     def nbytes(self) -> int:
         return super().nbytes + self._neighbors.nbytes
 
-    def new_points(self) -> Singles:
-        return np.empty((len(self) + 1, 3), dtype=np.float32)
-
-    def colors_of(self, points: Singles) -> Singles:
-        return points[:-1]
-
-    def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
-        points[-1] = OFF_SCREEN
+    def feeds(self, colors: Singles, on_screen: Mask) -> Feeds:
+        points = np.full((len(self) + 1, 3), OFF_SCREEN)
+        points[:-1] = colors.T
         neighbors, missing = self._neighbors, np.int32(len(self))
         shown = np.append(on_screen, False)[neighbors]
         instead = np.arange(missing + 1, dtype=np.int32)[:, None] if self._edge == "same" else missing

@@ -91,18 +91,10 @@ class RunsLayout(WholeLayout):
     def nbytes(self) -> int:
         return super().nbytes + self.columns.nbytes
 
-    def new_points(self) -> Singles:
-        return np.empty((3, len(self)), dtype=np.float32)
-
-    def colors_of(self, points: Singles) -> Singles:
-        return points.T
-
-    def feeds(self, points: Singles, on_screen: Mask) -> Feeds:
-        off_screen = ~on_screen
-        np.copyto(points, OFF_SCREEN, where=off_screen)
+    def feeds(self, colors: Singles, on_screen: Mask) -> Feeds:
         columns = self.columns.astype(np.int64)
-        np.copyto(columns, _GAP + self._first_columns, where=off_screen)
-        return {"points": points, "columns": columns}
+        np.copyto(columns, _GAP + self._first_columns, where=~on_screen)
+        return {"points": np.where(on_screen, colors, OFF_SCREEN), "columns": columns}
 
     def probabilities(self, output: Singles) -> Singles:
         return output.T

@@ -59,13 +59,13 @@ class Session:
             return choose_layout(mesh, manifest)
         return SplitLayout(mesh, sectors, lambda part: choose_layout(part, manifest), self._others)
 
-    def run(self, layout: Layout, points: Singles, on_screen: Mask) -> Singles:
-        """Probabilities (m, C) of a layout's slots, from its colored `points` and the slots (m,) on screen.
+    def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
+        """Probabilities (m, C) of a layout's slots, from their colors (3, m) and which slots (m,) are on screen.
 
         Raises ModelError, also if the system has no thread left, and for answers that are not finite.
         """
         try:
-            answers = layout.answers(self.onnx.run, points, on_screen)
+            answers = layout.answers(self.onnx.run, colors, on_screen)
         except RuntimeError as error:
             raise ModelError(f"{self.model.path}: can't run it in {self.threads} threads: {error}") from error
         if not (np.isfinite(answers).all(axis=1) | ~on_screen).all():
@@ -77,9 +77,8 @@ class Session:
         mesh = Mesh(np.zeros((len(test.points) - 1, 3)), test.neighbors, test.cells)
         # In an example a missing neighbor is always the off-screen point, also for networks with another edge policy.
         layout = choose_layout(mesh, replace(self.model.manifest, edge="hard"))
-        points = layout.new_points()
-        layout.colors_of(points)[:] = test.points[layout.slots]
-        return self.run(layout, points, layout.slots < len(mesh))[layout.places]
+        colors = test.points[layout.slots].T
+        return self.run(layout, colors, layout.slots < len(mesh))[layout.places]
 
     def _check(self, test: SelfTest) -> None:
         """Run the model's own example. Raises ModelError if the answer differs from the exporter's."""

@@ -67,17 +67,9 @@ class SplitLayout(Layout):
     def nbytes(self) -> int:
         return super().nbytes + self._neighbors.nbytes + sum(layout.nbytes for layout, _ in self._parts)
 
-    def new_points(self) -> Singles:
-        return np.empty((3, len(self)), dtype=np.float32)
-
-    def colors_of(self, points: Singles) -> Singles:
-        return points.T
-
-    def answers(self, network: Run, points: Singles, on_screen: Mask) -> Singles:
+    def answers(self, network: Run, colors: Singles, on_screen: Mask) -> Singles:
         def answer(layout: WholeLayout, place: slice) -> Singles:
-            own_points = layout.new_points()
-            layout.colors_of(own_points)[:] = points[:, place].T
-            return layout.answers(network, own_points, on_screen[place])
+            return layout.answers(network, colors[:, place], on_screen[place])
 
         waiting = [self._others.submit(answer, *part) for part in self._parts[1:]]
         found = [answer(*self._parts[0]), *(each.result() for each in waiting)]

@@ -238,8 +238,8 @@ class TorchNetwork:
         torch.set_num_threads(1)
         self._network = checkpoint.network
 
-    def run(self, layout: Layout, points: Singles, on_screen: Mask) -> Singles:
-        """Probabilities (m, C) of the slots of a plain layout, from its colored `points`."""
+    def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
+        """Probabilities (m, C) of the slots of a plain layout, from their colors (3, m)."""
         import torch
 
         def network(feeds: Feeds) -> Singles:
@@ -247,7 +247,7 @@ class TorchNetwork:
                 output = self._network(torch.from_numpy(feeds["points"]), torch.from_numpy(feeds["neighbors"]))
             return np.asarray(output.numpy(), dtype=np.float32)
 
-        return layout.answers(network, points, on_screen)
+        return layout.answers(network, colors, on_screen)
 
 
 def _orientation(picture: Picture) -> Orientation:

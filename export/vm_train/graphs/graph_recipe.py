@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vm_embedded.detection.color_normalization import normalize_colors
+from vm_embedded.detection.color_normalization import normalized
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
@@ -63,7 +63,7 @@ class GraphRecipe:
         """A random window of a view in a random tone, perhaps mirrored."""
         objects = [at for at, each in enumerate(self.manifest.classes) if each.kind == "object"]
         colors = perturb_colors(view.points[:-1], self.augmentation, random)
-        normalize_colors(colors, self.manifest.colors)
+        colors = normalized(colors.T, self.manifest.colors).T
         off_screen = view.points[-1:]  # the last row; its color is fixed
         colored = replace(view, points=np.concatenate([colors, off_screen]))
         seen = random_window(colored, self.window, objects, random)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Indices, Singles
-from vm_embedded.detection.color_normalization import normalize_colors
+from vm_embedded.detection.color_normalization import normalized
 from vm_embedded.detection.footprint import Levels, levels_for, uniform_levels
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.sampling import sample
@@ -56,8 +56,7 @@ def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> Label
     shown = seen_points(picture.lens, (width, height), manifest, grid)
     points = np.full((len(shown) + 1, 3), OFF_SCREEN, dtype=np.float32)
     levels = levels_of(picture, shown.graph.rays, manifest, grid)
-    sample(Pyramid(picture.image, "bgr"), shown.pixels, levels, points[:-1])
-    normalize_colors(points[:-1], manifest.colors)
+    points[:-1] = normalized(sample(Pyramid(picture.image, "bgr"), shown.pixels, levels), manifest.colors).T
     x, y = np.rint(shown.pixels).astype(np.intp).T
     assert picture.lens.orientation is not None
     distances = plane_distances(shown.graph.rays, picture.lens.orientation.height)

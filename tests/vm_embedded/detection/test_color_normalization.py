@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.detection.color_normalization import normalize_colors
+from vm_embedded.detection.color_normalization import normalized
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.lens_files import read_lens_file
@@ -21,57 +21,45 @@ seeds = st.integers(0, 2**31)
 
 
 def colors_of(seed, count=200):
-    return np.random.default_rng(seed).random((count, 3), dtype=np.float32)
+    return np.random.default_rng(seed).random((3, count), dtype=np.float32)
 
 
 @given(seeds, st.floats(0.2, 5.0), st.floats(-0.5, 0.5))
 def test_light_and_haze_make_no_difference(seed, gain, haze):
     colors = colors_of(seed)
     other = np.float32(gain) * colors + np.float32(haze)
-    normalize_colors(colors, "relative")
-    normalize_colors(other, "relative")
-    np.testing.assert_allclose(other, colors, atol=1e-3)
+    np.testing.assert_allclose(normalized(other, "relative"), normalized(colors, "relative"), atol=1e-3)
 
 
 @given(seeds)
 def test_they_have_no_mean_and_a_deviation_of_one(seed):
-    colors = colors_of(seed)
-    normalize_colors(colors, "relative")
-    np.testing.assert_allclose(colors.mean(axis=0), 0.0, atol=1e-5)
-    np.testing.assert_allclose(colors.std(axis=0), 1.0, atol=1e-4)
+    colors = normalized(colors_of(seed), "relative")
+    np.testing.assert_allclose(colors.mean(axis=1), 0.0, atol=1e-5)
+    np.testing.assert_allclose(colors.std(axis=1), 1.0, atol=1e-4)
 
 
 @given(seeds, st.randoms(use_true_random=False))
 def test_only_what_counts_decides_and_its_order_does_not(seed, random):
     colors = colors_of(seed)
     counted = np.arange(200) < 120
-    mixed = np.concatenate([colors[:120], 100.0 * colors[120:]])
+    mixed = np.where(counted, colors, np.float32(100.0) * colors)
     order = list(range(200))
     random.shuffle(order)
-    shuffled = mixed[order]
-    alone = colors[:120].copy()
-    normalize_colors(alone, "relative")
-    normalize_colors(mixed, "relative", counted)
-    normalize_colors(shuffled, "relative", counted[order])
-    np.testing.assert_array_equal(mixed[:120], alone)
-    np.testing.assert_array_equal(shuffled, mixed[order])
+    found = normalized(mixed, "relative", counted)
+    np.testing.assert_array_equal(found[:, :120], normalized(colors[:, :120], "relative"))
+    np.testing.assert_array_equal(normalized(mixed[:, order], "relative", counted[order]), found[:, order])
 
 
 def test_a_picture_of_nothing_keeps_its_noise_small():
-    for colors in (np.full((50, 3), 0.3, dtype=np.float32), np.empty((0, 3), dtype=np.float32)):
-        normalize_colors(colors, "relative")
-        assert np.abs(colors).max(initial=0.0) < 1e-5
+    for colors in (np.full((3, 50), 0.3, dtype=np.float32), np.empty((3, 0), dtype=np.float32)):
+        assert np.abs(normalized(colors, "relative")).max(initial=0.0) < 1e-5
     nothing = colors_of(3)
-    before = nothing.copy()
-    normalize_colors(nothing, "relative", np.zeros(200, dtype=bool))
-    np.testing.assert_array_equal(nothing, before)
+    np.testing.assert_array_equal(normalized(nothing, "relative", np.zeros(200, dtype=bool)), nothing)
 
 
 def test_absolute_colors_stay():
     colors = colors_of(4)
-    before = colors.copy()
-    normalize_colors(colors, "absolute")
-    np.testing.assert_array_equal(colors, before)
+    np.testing.assert_array_equal(normalized(colors, "absolute"), colors)
 
 
 @pytest.mark.parametrize("gain", [1.0, 0.5])

@@ -252,16 +252,16 @@ def test_a_network_with_an_unknown_operator_is_refused(tmp_path):
 class Broken(PlainLayout):
     """A layout that hands out indices which no point has."""
 
-    def feeds(self, points, on_screen):
-        feeds = super().feeds(points, on_screen)
+    def feeds(self, colors, on_screen):
+        feeds = super().feeds(colors, on_screen)
         return feeds | {"neighbors": np.full_like(feeds["neighbors"], 99)}
 
 
 class BrokenRuns(RunsLayout):
     """The same for runs."""
 
-    def feeds(self, points, on_screen):
-        feeds = super().feeds(points, on_screen)
+    def feeds(self, colors, on_screen):
+        feeds = super().feeds(colors, on_screen)
         return feeds | {"columns": np.full_like(feeds["columns"], 9999)}
 
 
@@ -278,10 +278,9 @@ def test_neighbors_out_of_range_are_an_error_and_not_a_crash(models, layout):
     broken = (
         Broken(small_mesh(), "hard") if layout == "plain" else BrokenRuns(small_mesh(), MESH_MODELS["ring6"].groups)
     )
-    points = broken.new_points()
-    points[:] = 0.0
+    colors = np.zeros((3, len(broken)), dtype=np.float32)
     with pytest.raises(ModelError, match="can't run"):
-        session.run(broken, points, broken.slots < 4)
+        session.run(broken, colors, broken.slots < 4)
 
 
 def test_the_edge_policy_same_links_missing_neighbors_to_the_point_itself(models, tmp_path):
@@ -293,9 +292,7 @@ def test_the_edge_policy_same_links_missing_neighbors_to_the_point_itself(models
 
     def answers(session, mesh, shown=(True, True, True, True)):
         layout = choose_layout(mesh, session.model.manifest)
-        points = layout.new_points()
-        layout.colors_of(points)[:] = colors
-        return session.run(layout, points, np.array(shown))
+        return session.run(layout, colors.T, np.array(shown))
 
     np.testing.assert_array_equal(answers(same, mesh), answers(hard, alone))
     assert np.abs(answers(same, mesh) - answers(hard, mesh)).max() > 1e-3

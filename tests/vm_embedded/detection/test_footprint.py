@@ -54,9 +54,7 @@ def test_each_point_is_in_whole_blocks_of_its_level(chosen):
 
 
 def colored(image, pixels, levels, format="bgr"):
-    out = np.empty((len(pixels), 3), dtype=np.float32)
-    sample(Pyramid(checked_image(image, format), format), pixels, levels, out)
-    return out
+    return sample(Pyramid(checked_image(image, format), format), pixels, levels).T
 
 
 def all_from(level, pixels):

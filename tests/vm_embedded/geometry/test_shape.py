@@ -146,6 +146,19 @@ def test_offset_is_0_at_the_center_and_1_on_the_outline(case):
 
 
 @given(centers)
+def test_an_object_covers_the_rays_whose_offset_is_less_than_each_share(case):
+    (shape, height), distance, bearing = case
+    center = center_of(shape, height, distance, bearing)
+    rays = np.concatenate([share * shape.outline(center, height) + center for share in (0.5, 2.0, 20.0)])
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    shares = np.array([1.0, 0.9])
+    together = shape.covers(rays, center[None], height, shares[:, None, None])
+    assert together.shape == (2, 1, len(rays))
+    for covered, share in zip(together, shares, strict=True):
+        np.testing.assert_array_equal(covered, shape.covers(rays, center[None], height, float(share)))
+
+
+@given(centers)
 def test_outline_is_unit_rays_that_touch_the_object(case):
     (shape, height), distance, bearing = case
     center = center_of(shape, height, distance, bearing)

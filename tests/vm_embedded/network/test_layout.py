@@ -135,10 +135,14 @@ def tamed(network, logits):
 def answers(session, mesh, colors, on_screen):
     """Probabilities (m, C) of all slots, and their layout. What is off screen gets no color at all."""
     layout = choose_layout(mesh, session.model.manifest)
-    points = layout.new_points()
     shown = np.append(on_screen, False)[layout.slots]
-    layout.colors_of(points)[:] = np.where(shown[:, None], np.vstack([colors, np.zeros((1, 3))])[layout.slots], np.nan)
-    return session.run(layout, points, shown), layout
+    return session.run(layout, slot_colors(layout, colors, shown), shown), layout
+
+
+def slot_colors(layout, colors, shown):
+    """Colors (3, m) of a layout's slots, from those of points (n, 3); NaN for slots that are not shown (m,)."""
+    padded = np.vstack([colors, np.zeros((1, 3))]).astype(np.float32)
+    return np.where(shown, padded[layout.slots].T, np.float32(np.nan))
 
 
 def session_of(network, model, layout, **changes):
@@ -240,12 +244,10 @@ def test_a_layout_is_used_for_one_frame_after_the_other(data, model, seed):
     for layout in layouts_of(mesh):
         session = session_of(network, model, layout)
         arranged = choose_layout(mesh, session.model.manifest)
-        points = arranged.new_points()
         for each, on_screen in zip(colors, shown, strict=True):
             fresh, _ = answers(session, mesh, each, on_screen)
-            layout_colors = arranged.colors_of(points)
-            layout_colors[:] = np.vstack([each, np.full((1, 3), 7.0)])[arranged.slots]
-            again = session.run(arranged, points, np.append(on_screen, False)[arranged.slots])
+            everywhere = np.vstack([each, np.full((1, 3), 7.0, dtype=np.float32)])[arranged.slots].T
+            again = session.run(arranged, everywhere, np.append(on_screen, False)[arranged.slots])
             where = arranged.places[on_screen]
             np.testing.assert_array_equal(again[where], fresh[where])
 
@@ -314,20 +316,21 @@ def test_every_neighbor_and_the_point_itself_are_in_exactly_one_group(model):
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_what_feeds_take_is_what_they_leave_but_for_colors_off_screen(model):
+def test_feeds_have_the_colors_on_screen_and_change_none_of_what_they_take(model):
     """The network's inputs are contiguous, of the types that its file asks for, and in range whatever is on screen."""
     random = np.random.default_rng(2)
     for layout in layouts_of(WHOLE[model]):
         arranged = choose_layout(WHOLE[model], manifest_of(model, layout))
         m = len(arranged.slots)
         on_screen = np.append(random.random(len(WHOLE[model])) < 0.7, False)[arranged.slots]
-        points = arranged.new_points()
+        colors = random.random((3, m), dtype=np.float32)
+        before = colors.copy()
+        feeds = arranged.feeds(colors, on_screen)
+        np.testing.assert_array_equal(colors, before)
+        points = feeds["points"]
         assert (points.dtype, points.flags.c_contiguous) == (np.float32, True)
-        colors = random.random((m, 3)).astype(np.float32)
-        arranged.colors_of(points)[:] = colors
-        feeds = arranged.feeds(points, on_screen)
-        assert feeds["points"] is points
-        np.testing.assert_array_equal(arranged.colors_of(points)[on_screen], colors[on_screen])
+        found = points[:-1].T if layout == "plain" else points
+        np.testing.assert_array_equal(found[:, on_screen], colors[:, on_screen])
         if layout == "plain":
             assert set(feeds) == {"points", "neighbors"}
             assert feeds["neighbors"].dtype == np.int32
@@ -335,7 +338,7 @@ def test_what_feeds_take_is_what_they_leave_but_for_colors_off_screen(model):
             assert 0 <= feeds["neighbors"].min() <= feeds["neighbors"].max() <= m
             np.testing.assert_array_equal(points[-1], [-1.0] * 3)
             continue
-        np.testing.assert_array_equal(arranged.colors_of(points)[~on_screen], -1.0)
+        np.testing.assert_array_equal(points[:, ~on_screen], -1.0)
         if layout == "lattice":
             assert set(feeds) == {"points", "shown"}
             np.testing.assert_array_equal(feeds["shown"].reshape(-1), on_screen)

@@ -32,6 +32,7 @@ from .test_layout import (
     random_meshes,
     ring_meshes,
     session_of,
+    slot_colors,
 )
 
 DEMO = FOLDER.parent / "demo"
@@ -70,10 +71,7 @@ def test_sectors_give_the_answers_of_the_whole_mesh(others, data, model, count, 
         expected, whole = answers(session, mesh, colors, on_screen)
         parts = split(session, mesh, count, others)
         shown = np.append(on_screen, False)[parts.slots]
-        points = parts.new_points()
-        padded = np.vstack([colors, np.zeros((1, 3))])
-        parts.colors_of(points)[:] = np.where(shown[:, None], padded[parts.slots], np.nan)
-        found = session.run(parts, points, shown)
+        found = session.run(parts, slot_colors(parts, colors, shown), shown)
         assert found.shape == (len(parts), network.shape.classes)
         np.testing.assert_allclose(
             found[parts.places][on_screen], expected[whole.places][on_screen], rtol=0, atol=1e-6, err_msg=layout
@@ -148,10 +146,9 @@ def test_without_a_thread_the_call_ends_in_one_line(monkeypatch):
             raise RuntimeError("can't start new thread")
 
     parts = split(session, WHOLE["ring6"], 2, Full())
-    points = parts.new_points()
-    points[:] = 0.5
+    colors = np.full((3, len(parts)), 0.5, dtype=np.float32)
     with pytest.raises(ModelError, match="can't run it in 1 threads: can't start new thread"):
-        session.run(parts, points, parts.slots < len(WHOLE["ring6"]))
+        session.run(parts, colors, parts.slots < len(WHOLE["ring6"]))
 
 
 def test_a_detector_finds_the_same_with_two_threads(monkeypatch):
@@ -185,11 +182,10 @@ def test_an_error_in_a_sector_is_the_error_of_the_call(others, fails):
             raise ModelError("broken")
         return run(feeds)
 
-    points = parts.new_points()
-    points[:] = 0.5
+    colors = np.full((3, len(parts)), 0.5, dtype=np.float32)
     with pytest.raises(ModelError, match="broken"):
-        parts.answers(failing, points, parts.slots < len(WHOLE["ring6"]))
-    assert np.isfinite(parts.answers(run, points, parts.slots < len(WHOLE["ring6"]))).all()
+        parts.answers(failing, colors, parts.slots < len(WHOLE["ring6"]))
+    assert np.isfinite(parts.answers(run, colors, parts.slots < len(WHOLE["ring6"]))).all()
 
 
 @pytest.mark.parametrize("model", MODELS)
