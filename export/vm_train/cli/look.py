@@ -18,7 +18,6 @@ from vm_workstation.option_types import at_least
 from ..data.pictures import find_pictures
 from ..data.split import split_by_seed
 from ..learning.class_table import ClassTable
-from ..learning.configuration import TrainConfiguration
 from ..learning.folder_access import locked
 from ..look.configuration import LOOK_HEADER, LookConfiguration
 from .box_options import add_box_options
@@ -174,7 +173,7 @@ def _with_classes_of(model: Path, configuration: LookConfiguration) -> LookConfi
     beside = model.with_name("train.toml")
     if configuration.classes != ClassTable.default() or not beside.exists():
         return configuration
-    return replace(configuration, classes=read_sections(TrainConfiguration, beside).classes)
+    return replace(configuration, classes=ClassTable.read(beside))
 
 
 def resume_look(options: argparse.Namespace) -> int:

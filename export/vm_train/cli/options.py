@@ -54,13 +54,6 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
     _add_configuration(made)
     add_start(made)
-    made.add_argument(
-        "--teacher",
-        type=Path,
-        metavar="MODEL",
-        help="checkpoint (.pt) of a larger network. The new network also learns from its probabilities. See "
-        "training.distillation",
-    )
     made.add_argument("--strict", action="store_true", help="fail if a picture is damaged; default: skip it")
     add_stream(made)
     _add_lists(made)
