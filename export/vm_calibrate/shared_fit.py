@@ -12,12 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from vm_embedded.arrays import Floats, Indices
+from vm_embedded.cli.progress import ProgressBar
 
 Residuals = Callable[[Floats, Floats], Floats]
 """Residuals (N,) [px] of shared numbers (p,) and of each group's own numbers (g, q)."""
 
 _STEP = 1e-6
 """Step of the numeric derivatives; all numbers are scaled so that about 1 is a large change."""
+
+_MOST_STEPS = 200
 
 _WORST = 1e4
 """Replaces residuals that are not finite or larger [px], so that a wrong step is expensive and not an error."""
@@ -66,7 +69,11 @@ def fit_shared(
         found = residuals(*split(numbers))
         return np.asarray(np.where(np.isfinite(found), np.clip(found, -_WORST, _WORST), _WORST))
 
+    bar = ProgressBar(_MOST_STEPS, "vm-calibrate")
+    bar.note = "most fits need far fewer steps"
+
     def jacobian(numbers: Floats) -> Floats:
+        bar.advance()
         # A group's own numbers change only its own residuals, so one evaluation moves those of all groups at once.
         matrix = np.zeros((len(groups), len(numbers)))
         at = numbers.copy()
@@ -78,7 +85,8 @@ def fit_shared(
         return matrix
 
     start = np.concatenate([shared, own.ravel()])
-    found = least_squares(value, start, jacobian, loss="soft_l1", f_scale=outlier, x_scale="jac", max_nfev=200)
+    found = least_squares(value, start, jacobian, loss="soft_l1", f_scale=outlier, x_scale="jac", max_nfev=_MOST_STEPS)
+    bar.clear()
     spare = len(groups) - len(start)
     power, weight = assumed
     noise = np.sqrt((2.0 * found.cost + power**2 * weight) / max(spare + weight, 1))
