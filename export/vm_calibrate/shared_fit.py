@@ -74,19 +74,15 @@ def fit_shared(
 
     def jacobian(numbers: Floats) -> Floats:
         bar.advance()
-        # A group's own numbers change only its own residuals, so one evaluation moves those of all groups at once.
-        matrix = np.zeros((len(groups), len(numbers)))
-        at = numbers.copy()
-        for column in range(count):
-            matrix[:, column] = _slope(value, at, slice(column, column + 1))
-        for column in range(width):
-            slope = _slope(value, at, slice(count + column, None, width))
-            matrix[np.arange(len(groups)), count + column + width * groups] = slope
-        return matrix
+        return _jacobian(value, numbers, groups, count, width)
 
     start = np.concatenate([shared, own.ravel()])
-    found = least_squares(value, start, jacobian, loss="soft_l1", f_scale=outlier, x_scale="jac", max_nfev=_MOST_STEPS)
-    bar.clear()
+    try:
+        found = least_squares(
+            value, start, jacobian, loss="soft_l1", f_scale=outlier, x_scale="jac", max_nfev=_MOST_STEPS
+        )
+    finally:
+        bar.clear()
     spare = len(groups) - len(start)
     power, weight = assumed
     noise = np.sqrt((2.0 * found.cost + power**2 * weight) / max(spare + weight, 1))
@@ -94,6 +90,18 @@ def fit_shared(
     return SharedFit(
         best_shared, best_own, noise**2 * _inverse(found.jac)[:count, :count], value(found.x), float(noise)
     )
+
+
+def _jacobian(value: Callable[[Floats], Floats], at: Floats, groups: Indices, count: int, width: int) -> Floats:
+    """Derivatives (N, p) of the residuals by `count` shared numbers and, behind them, `width` numbers of each group."""
+    matrix = np.zeros((len(groups), len(at)))
+    for column in range(count):
+        matrix[:, column] = _slope(value, at, slice(column, column + 1))
+    # A group's own numbers change only its own residuals, so one evaluation moves those of all groups at once.
+    for column in range(width):
+        slope = _slope(value, at, slice(count + column, None, width))
+        matrix[np.arange(len(groups)), count + column + width * groups] = slope
+    return matrix
 
 
 def _slope(value: Callable[[Floats], Floats], at: Floats, columns: slice) -> Floats:
