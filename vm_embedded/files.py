@@ -56,14 +56,17 @@ def check_regular(path: Path) -> None:
         raise OSError(errno.EINVAL, "not a regular file", str(path))
 
 
-def read_text(path: Path, noun: str = "") -> str:
-    """The text of a file in UTF-8, without a byte order mark. noun: the kind of file, for messages.
+def read_text(path: Path, noun: str = "", largest: int | None = None) -> str:
+    """The text of a file in UTF-8, without a byte order mark.
 
-    Raises InputError with the file and the reason.
+    noun: the kind of file, for messages. largest: most bytes that the file may have. Raises InputError with the file
+    and the reason.
     """
     name = f"{noun} {path}" if noun else str(path)
     try:
         check_regular(path)
+        if largest is not None and path.stat().st_size > largest:
+            raise InputError(f"{name} is too large; at most {largest} bytes are allowed")
         return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise InputError(f"can't read {name}: {error.strerror or error}") from error

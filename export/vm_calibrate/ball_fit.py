@@ -30,6 +30,9 @@ _OUTLIER = 1.0
 _WRONG = 5.0
 """A ball whose residual is this multiple of the noise, and above 2 px, is left out."""
 
+_AT_ONCE = 0.05
+"""Largest share of the balls to leave out before the next fit: each fit of hundreds of balls takes seconds."""
+
 _ASSUMED = (1.0, 2)
 """Noise of outlines and boxes [px] as it is expected, which counts as much as this number of residuals."""
 
@@ -54,11 +57,15 @@ def fit_balls(balls: list[SeenBall], lens: Lens, size: Size) -> PoseFit:
         problem = _Problem(usable, lens, size)
         fit = problem.solve()
         errors = np.sqrt((fit.residuals.reshape(len(usable), -1) ** 2).mean(axis=1))
-        worst = int(np.argmax(errors))
-        if len(usable) <= FEWEST_BALLS or errors[worst] < max(_WRONG * float(np.median(errors)), 2.0):
+        limit = max(_WRONG * float(np.median(errors)), 2.0)
+        most = min(max(int(_AT_ONCE * len(usable)), 1), len(usable) - FEWEST_BALLS)
+        wrong = {usable[at].name: errors[at] for at in np.argsort(-errors)[:most] if errors[at] >= limit}
+        if not wrong:
             break
-        left_out[usable[worst].name] = f"{errors[worst]:.1f} px off; not on the floor, hidden, or another ball?"
-        del usable[worst]
+        left_out |= {
+            name: f"{error:.1f} px off; not on the floor, hidden, or another ball?" for name, error in wrong.items()
+        }
+        usable = [each for each in usable if each.name not in wrong]
     residuals = {each.name: float(error) for each, error in zip(usable, errors, strict=True)}
     error = float(np.sqrt((fit.residuals**2).mean()))
     return pose_fit(fit, error, residuals, left_out, problem.advice(fit))

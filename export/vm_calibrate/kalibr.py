@@ -9,6 +9,7 @@ from typing import Any
 
 from vm_embedded.config.yaml_reader import read_yaml
 from vm_embedded.errors import InputError, unknown
+from vm_embedded.files import read_text
 from vm_embedded.geometry.calibrated_lenses import BrownLens, CalibratedLens, FisheyeLens
 
 from .lens_kinds import FLAT_FOV, WIDE_FOV
@@ -25,14 +26,9 @@ def read_kalibr(path: Path, camera: str | None) -> tuple[str, CalibratedLens]:
     Raises InputError with the file and the reason: also for a file of several cameras without a name, and for lens
     models that vm-detect does not have.
     """
+    text = read_text(path, largest=_LARGEST)
     try:
-        if path.stat().st_size > _LARGEST:
-            raise InputError(f"{path} is too large for a Kalibr file; at most {_LARGEST} bytes are allowed")
-        table = read_yaml(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise InputError(f"can't read {path}: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not a text file") from error
+        table = read_yaml(text)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     cameras = {} if not isinstance(table, Mapping) else {k: v for k, v in table.items() if isinstance(v, Mapping)}

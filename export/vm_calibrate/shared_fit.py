@@ -12,12 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from vm_embedded.arrays import Floats, Indices
+from vm_embedded.cli.progress import ProgressBar
 
 Residuals = Callable[[Floats, Floats], Floats]
 """Residuals (N,) [px] of shared numbers (p,) and of each group's own numbers (g, q)."""
 
 _STEP = 1e-6
 """Step of the numeric derivatives; all numbers are scaled so that about 1 is a large change."""
+
+_MOST_STEPS = 200
 
 _WORST = 1e4
 """Replaces residuals that are not finite or larger [px], so that a wrong step is expensive and not an error."""
@@ -66,19 +69,20 @@ def fit_shared(
         found = residuals(*split(numbers))
         return np.asarray(np.where(np.isfinite(found), np.clip(found, -_WORST, _WORST), _WORST))
 
+    bar = ProgressBar(_MOST_STEPS, "vm-calibrate")
+    bar.note = "most fits need far fewer steps"
+
     def jacobian(numbers: Floats) -> Floats:
-        # A group's own numbers change only its own residuals, so one evaluation moves those of all groups at once.
-        matrix = np.zeros((len(groups), len(numbers)))
-        at = numbers.copy()
-        for column in range(count):
-            matrix[:, column] = _slope(value, at, slice(column, column + 1))
-        for column in range(width):
-            slope = _slope(value, at, slice(count + column, None, width))
-            matrix[np.arange(len(groups)), count + column + width * groups] = slope
-        return matrix
+        bar.advance()
+        return _jacobian(value, numbers, groups, count, width)
 
     start = np.concatenate([shared, own.ravel()])
-    found = least_squares(value, start, jacobian, loss="soft_l1", f_scale=outlier, x_scale="jac", max_nfev=200)
+    try:
+        found = least_squares(
+            value, start, jacobian, loss="soft_l1", f_scale=outlier, x_scale="jac", max_nfev=_MOST_STEPS
+        )
+    finally:
+        bar.clear()
     spare = len(groups) - len(start)
     power, weight = assumed
     noise = np.sqrt((2.0 * found.cost + power**2 * weight) / max(spare + weight, 1))
@@ -86,6 +90,18 @@ def fit_shared(
     return SharedFit(
         best_shared, best_own, noise**2 * _inverse(found.jac)[:count, :count], value(found.x), float(noise)
     )
+
+
+def _jacobian(value: Callable[[Floats], Floats], at: Floats, groups: Indices, count: int, width: int) -> Floats:
+    """Derivatives (N, p) of the residuals by `count` shared numbers and, behind them, `width` numbers of each group."""
+    matrix = np.zeros((len(groups), len(at)))
+    for column in range(count):
+        matrix[:, column] = _slope(value, at, slice(column, column + 1))
+    # A group's own numbers change only its own residuals, so one evaluation moves those of all groups at once.
+    for column in range(width):
+        slope = _slope(value, at, slice(count + column, None, width))
+        matrix[np.arange(len(groups)), count + column + width * groups] = slope
+    return matrix
 
 
 def _slope(value: Callable[[Floats], Floats], at: Floats, columns: slice) -> Floats:

@@ -16,6 +16,7 @@ from vm_embedded.network.manifest import EDGES, LAYOUTS, Manifest
 from vm_embedded.network.model_file import read_model
 
 if TYPE_CHECKING:
+    from .attach_canary import CanaryPicture
     from .checkpoint import Checkpoint
     from .look_checkpoint import LookCheckpoint
     from .reference import Overrides
@@ -114,46 +115,68 @@ def _run(options: argparse.Namespace) -> int:
     import torch
 
     from .attach_canary import CanaryPicture
-    from .change_model import change_canary, change_looks, lost_canary_message
-    from .export import export, fastest_layout
-    from .reference import write_reference
 
     # These networks are small: one thread is as fast as several, and much faster while other programs use the cores.
     # The last digits of its sums are also the same on every machine.
     torch.set_num_threads(1)
-    output = options.output or options.model.with_suffix(".yaml" if options.to_yaml else ".onnx")
-    portable = output.with_suffix(".plain" + output.suffix)
+    output = _checked_output(options)
+    canary = CanaryPicture.read(*options.canary) if options.canary else None
+    if _is_model_file(options.model):
+        _change_model(options, output, canary)
+    else:
+        _export_checkpoint(options, output, canary)
+    return EXIT_OK
+
+
+def _checked_output(options: argparse.Namespace) -> Path:
+    """The file to write. Raises InputError if it, or its portable copy, can't be written, or for a wrong suffix."""
+    output: Path = options.output or options.model.with_suffix(".yaml" if options.to_yaml else ".onnx")
     one_file = options.to_yaml or options.layout or _is_model_file(options.model)
-    for path in (output,) if one_file else (output, portable):
+    for path in (output,) if one_file else (output, _portable(output)):
         check_writable(path, (options.model, options.look, *(options.canary or ())))
     suffixes = (".yaml", ".yml") if options.to_yaml else (".onnx",)
     if output.suffix not in suffixes:
         raise InputError(f"--output must end in {suffixes[0]}, not {output}")
-    canary = CanaryPicture.read(*options.canary) if options.canary else None
-    if _is_model_file(options.model) and canary is not None:
+    return output
+
+
+def _portable(output: Path) -> Path:
+    """The file for other ONNX runtimes, beside the one to write."""
+    return output.with_suffix(".plain" + output.suffix)
+
+
+def _change_model(options: argparse.Namespace, output: Path, canary: CanaryPicture | None) -> None:
+    """Write a copy of a model file with another canary, or with other close looks."""
+    from .change_model import change_canary, change_looks, lost_canary_message
+
+    if canary is not None:
         change_canary(options.model, output, canary)
         _print_written(output, f"networks of {options.model} with a new canary", [], None)
-        return EXIT_OK
-    if _is_model_file(options.model):
-        looks = _read_looks(options, read_model(options.model).manifest)
-        changed = change_looks(options.model, output, looks)
-        _print_written(output, f"mesh network of {options.model}", looks, changed.difference if looks else None)
-        if changed.lost_canary:
-            print(f"vm-export: {lost_canary_message(output, options.model)}", file=sys.stderr)
-        return EXIT_OK
+        return
+    looks = _read_looks(options, read_model(options.model).manifest)
+    changed = change_looks(options.model, output, looks)
+    _print_written(output, f"mesh network of {options.model}", looks, changed.difference if looks else None)
+    if changed.lost_canary:
+        print(f"vm-export: {lost_canary_message(output, options.model)}", file=sys.stderr)
+
+
+def _export_checkpoint(options: argparse.Namespace, output: Path, canary: CanaryPicture | None) -> None:
+    """Write a checkpoint, or a network of the reference implementation, as model files or in the reference's format."""
+    from .export import export, fastest_layout
+    from .reference import write_reference
+
     checkpoint = _load(options.model, _overrides(options))
     print(f"{options.model}: {_description(checkpoint)}")
     if options.to_yaml:
         write_reference(checkpoint, output)
         print(f"{output}: written in the format of the reference implementation")
-        return EXIT_OK
+        return
     looks = _read_looks(options, checkpoint.manifest)
     layout = options.layout or fastest_layout(checkpoint)
-    files = {portable: "plain"} if options.layout is None and layout != "plain" else {}
+    files = {_portable(output): "plain"} if options.layout is None and layout != "plain" else {}
     files[output] = layout
     for path, layout in files.items():
         _print_written(path, f"layout {layout}", looks, export(checkpoint, path, layout, looks, canary))
-    return EXIT_OK
 
 
 def _read_looks(options: argparse.Namespace, manifest: Manifest) -> list[LookCheckpoint]:

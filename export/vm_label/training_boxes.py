@@ -14,7 +14,7 @@ from pathlib import Path
 
 from vm_embedded.cameras.image_files import lens_file_of
 from vm_embedded.errors import InputError
-from vm_embedded.output.box_files import CLASSES
+from vm_embedded.output.box_files import CLASSES, yolo_line
 
 from .box_folder import BoxFolder
 from .crops import Crop
@@ -108,7 +108,7 @@ def _write_image(folder: BoxFolder, target: Path, image: str, crops: list[Crop])
     if lens is not None:
         shutil.copyfile(lens, copy.with_name(lens.name))
     numbers = {name: number for number, name in enumerate(folder.classes)}
-    lines = [f"{numbers[crop.class_name]} {' '.join(f'{each:.6f}' for each in crop.shares)}\n" for crop in crops]
+    lines = [yolo_line(numbers[crop.class_name], crop.shares) for crop in crops]
     copy.with_suffix(".txt").write_text("".join(lines), encoding="utf-8")
     classes = copy.with_name(CLASSES)
     if not classes.exists():

@@ -19,7 +19,7 @@ from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError, VisualMeshError, unknown
 from vm_embedded.files import check_writable, write_file
 from vm_workstation.contact_sheet import check_sheet_path, check_sheet_size, choose_indices, write_sheet
-from vm_workstation.option_types import at_least
+from vm_workstation.option_types import add_set, at_least
 from vm_workstation.stopping import stoppable
 
 from .dataset.assets import asset_files, read_assets
@@ -81,13 +81,7 @@ def parser() -> argparse.ArgumentParser:
         help=f"scene.toml; missing entries keep their defaults; {', '.join(_EXAMPLES[:-1])} and {_EXAMPLES[-1]} come "
         "with the package",
     )
-    made.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="SECTION.ENTRY=VALUE",
-        help=f"override one entry of the configuration, for example {_EXAMPLE}; repeatable",
-    )
+    add_set(made, _EXAMPLE)
     made.add_argument(
         "--workers", type=at_least(0), metavar="W", help="worker processes, one core each; default: all cores"
     )
@@ -205,10 +199,39 @@ def _scene_file(given: Path | None) -> Path | None:
 
 
 def _render(options: argparse.Namespace) -> int:
+    """Render the pictures that are missing."""
     workers = len(os.sched_getaffinity(0)) if options.workers is None else options.workers
     if workers < 1 or options.count < 1:
         name, value = ("--workers", workers) if workers < 1 else ("--count", options.count)
         raise InputError(f"{name} must be at least 1, not {value}")
+    job = _begin(options)
+    own = shard_of(range(options.count), *options.shard)
+    left = [index for index in own if not is_done(options.out, index)]
+    if len(left) < len(own):
+        print(f"vm-synth: {len(own) - len(left)} of {len(own)} pictures already exist", file=sys.stderr)
+    bar, memory = ProgressBar(len(left), "vm-synth"), 0
+
+    def report(finished: FinishedPicture) -> None:
+        nonlocal memory
+        memory = max(memory, finished.memory)
+        bar.advance()
+
+    try:
+        render_all(job, left, workers, report)
+    finally:
+        bar.clear()
+        if bar.done:
+            print(
+                f"vm-synth: {bar.done} pictures in {bar.elapsed:.0f} s, "
+                f"{3600.0 * bar.done / bar.elapsed:.0f} per hour; at most {memory / 2**20:.0f} MiB per worker",
+                file=sys.stderr,
+            )
+    print(f"{options.out}: {len(own)} pictures")
+    return EXIT_OK
+
+
+def _begin(options: argparse.Namespace) -> Job:
+    """Check all inputs, and write the plan of the set, or compare it with the one that is there. Raises InputError."""
     configuration = read_sections(
         SceneConfiguration, _scene_file(options.config), parse_overrides(options.set, _EXAMPLE)
     )
@@ -229,30 +252,7 @@ def _render(options: argparse.Namespace) -> int:
     Plan(options.seed, options.count, configuration, lights, files).write(options.out)
     if not configuration.object.is_ball:
         write_training(options.out, configuration)
-
-    own = shard_of(range(options.count), *options.shard)
-    left = [index for index in own if not is_done(options.out, index)]
-    if len(left) < len(own):
-        print(f"vm-synth: {len(own) - len(left)} of {len(own)} pictures already exist", file=sys.stderr)
-    bar, memory = ProgressBar(len(left), "vm-synth"), 0
-
-    def report(finished: FinishedPicture) -> None:
-        nonlocal memory
-        memory = max(memory, finished.memory)
-        bar.advance()
-
-    try:
-        render_all(Job(options.out, tuple(maps), options.seed, configuration, rooms), left, workers, report)
-    finally:
-        bar.clear()
-        if bar.done:
-            print(
-                f"vm-synth: {bar.done} pictures in {bar.elapsed:.0f} s, "
-                f"{3600.0 * bar.done / bar.elapsed:.0f} per hour; at most {memory / 2**20:.0f} MiB per worker",
-                file=sys.stderr,
-            )
-    print(f"{options.out}: {len(own)} pictures")
-    return EXIT_OK
+    return Job(options.out, tuple(maps), options.seed, configuration, rooms)
 
 
 def _maps(options: argparse.Namespace, configuration: SceneConfiguration) -> list[Path]:

@@ -1,4 +1,4 @@
-"""Types of options that several programs share."""
+"""Options and types of options that several programs share."""
 
 from __future__ import annotations
 
@@ -15,3 +15,14 @@ def at_least(least: int) -> Callable[[str], int]:
         return int(text)
 
     return parse
+
+
+def add_set(made: argparse._ActionsContainer, example: str) -> None:
+    """Add --set, which overrides entries of a configuration. example: shown in the help, such as mesh.radius=0.07."""
+    made.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="SECTION.ENTRY=VALUE",
+        help=f"override an entry of the configuration, for example {example}; repeat it for each entry",
+    )

@@ -9,28 +9,20 @@ from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.shape import Shape
 
+_CORNERS = 256
+
 
 def sphere_outline(
-    lens: Lens,
-    orientation: Orientation,
-    center: Floats,
-    radius: float,
-    size: Size,
-    corners: int = 256,
-    unseen: bool = False,
+    lens: Lens, orientation: Orientation, center: Floats, radius: float, size: Size, unseen: bool = False
 ) -> Floats:
-    """Project the rays that touch a sphere: the outline as a polygon, pixels (corners, 2).
+    """Project the rays that touch a sphere: the outline as a polygon, pixels (256, 2).
 
     center (3,) and radius [m] of the sphere; the world's origin is on the plane below the camera. size: width and
     height of the picture [px]. Corners outside of the lens's field of view are NaN; with `unseen` they are projected
     too.
     """
     toward = (center - np.array([0.0, 0.0, orientation.height])) @ orientation.rotation
-    rays = touching_rays(toward[None], np.array([radius]), corners)[0]
-    pixels = lens.project(rays, size)
-    if not unseen:
-        pixels[~lens.sees(rays)] = np.nan
-    return pixels
+    return _project(touching_rays(toward[None], np.array([radius]), _CORNERS)[0], lens, size, unseen)
 
 
 def touching_rays(toward: Floats, radii: Floats, corners: int) -> Floats:
@@ -46,21 +38,19 @@ def touching_rays(toward: Floats, radii: Floats, corners: int) -> Floats:
 
 
 def shape_outline(
-    lens: Lens,
-    orientation: Orientation,
-    shape: Shape,
-    center: Floats,
-    size: Size,
-    corners: int = 256,
-    unseen: bool = False,
+    lens: Lens, orientation: Orientation, shape: Shape, center: Floats, size: Size, unseen: bool = False
 ) -> Floats:
-    """The outline of an object on the plane as a polygon, pixels (corners, 2).
+    """The outline of an object on the plane as a polygon, pixels (256, 2).
 
     center (3,) [m]: of the object; the world's origin is on the plane below the camera. size, unseen: as in
     sphere_outline. Raises GeometryError for a camera inside of the object.
     """
     height = orientation.height
-    rays = shape.outline(center - np.array([0.0, 0.0, height]), height, corners) @ orientation.rotation
+    rays = shape.outline(center - np.array([0.0, 0.0, height]), height, _CORNERS) @ orientation.rotation
+    return _project(rays, lens, size, unseen)
+
+
+def _project(rays: Floats, lens: Lens, size: Size, unseen: bool) -> Floats:
     pixels = lens.project(rays, size)
     if not unseen:
         pixels[~lens.sees(rays)] = np.nan

@@ -112,4 +112,4 @@ def test_an_unknown_camera_and_a_missing_file_are_errors(convert, tmp_path, caps
     missing = run(capsys, "kalibr", tmp_path / "none.yaml", "-o", tmp_path / "lens.yaml", code=1)
     assert "none.yaml: No such file" in missing
     (tmp_path / "bytes.yaml").write_bytes(b"\xff\xfe\x00")
-    assert "not a text file" in run(capsys, "kalibr", tmp_path / "bytes.yaml", "-o", tmp_path / "l.yaml", code=1)
+    assert "it is not UTF-8 text" in run(capsys, "kalibr", tmp_path / "bytes.yaml", "-o", tmp_path / "l.yaml", code=1)

@@ -12,8 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.vm_embedded.strategies import lenses, reals, seeds
+from vm_calibrate import ball_fit
 from vm_calibrate.ball_fit import fit_balls
 from vm_calibrate.balls import SeenBall, read_balls
+from vm_calibrate.shared_fit import fit_shared
 from vm_embedded.cli import detect
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens_files import format_lens_file, read_lens_file
@@ -124,6 +126,28 @@ def test_balls_that_are_not_on_the_floor_are_left_out(seed):
     fit = fit_balls(balls, LENSES["equidistant"], SIZE)
     assert list(fit.left_out) == ["half hidden"]
     check(fit.orientation, CAMERA)
+
+
+def test_of_many_balls_a_twentieth_is_left_out_before_the_next_fit(monkeypatch):
+    balls = seen_balls(LENSES["equidistant"], CAMERA, np.random.default_rng(2), each=4)[:60]
+    hidden = sorted(range(60), key=lambda at: -balls[at].size)[:18:3]
+    for at in hidden:
+        balls[at] = SeenBall(f"hidden {at}", RADIUS, balls[at].measured * (1.0, 1.0, 0.6))
+    fits = []
+    monkeypatch.setattr(ball_fit, "fit_shared", lambda *given: fits.append(given) or fit_shared(*given))
+    fit = fit_balls(balls, LENSES["equidistant"], SIZE)
+    assert set(fit.left_out) == {f"hidden {at}" for at in hidden}
+    check(fit.orientation, CAMERA)
+    assert len(fits) <= 2 * 4, "two starts each: of 60, 57, and perhaps 55 balls, and of those that are left"
+
+
+def test_a_fit_shows_its_progress(monkeypatch, capsys):
+    monkeypatch.setattr("vm_embedded.cli.progress._LINE_INTERVAL", 0.0)
+    balls = seen_balls(LENSES["equidistant"], CAMERA, np.random.default_rng(3), each=1)
+    fit_balls(balls, LENSES["equidistant"], SIZE)
+    assert re.search(
+        r"^vm-calibrate: \d+/200, .*, most fits need far fewer steps$", capsys.readouterr().err, re.MULTILINE
+    )
 
 
 def test_balls_at_one_place_are_not_enough_and_the_warning_says_what_is():

@@ -14,7 +14,7 @@ from ..config.toml_reader import parse_toml
 from ..config.units import parse_angle
 from ..config.yaml_reader import read_yaml
 from ..errors import InputError, VisualMeshError, unknown
-from ..files import check_regular
+from ..files import read_text
 from .calibrated_lenses import BrownLens, CalibratedLens, FisheyeLens
 from .lens import Lens
 from .orientation import Orientation
@@ -61,15 +61,7 @@ class LensFile:
 def read_lens_file(path: str | Path) -> LensFile:
     """Reads a lens file: TOML if its name ends in .toml, else YAML. Raises InputError with the file and the reason."""
     path = Path(path)
-    try:
-        check_regular(path)
-        if path.stat().st_size > _LARGEST:
-            raise InputError(f"{path} is too large for a lens file; at most {_LARGEST} bytes are allowed")
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"lens file {path} is not a text file") from error
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
-        raise InputError(f"can't read lens file {path}: {getattr(error, 'strerror', None) or error}") from error
+    text = read_text(path, "lens file", _LARGEST)
     try:
         if path.suffix.lower() == ".toml":
             table = parse_toml(text)

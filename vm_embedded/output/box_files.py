@@ -84,7 +84,7 @@ class BoxWriter:
         write_file(path, encode_png(image) if frame.path is None else _content_of(frame.path))
         lens_file = format_lens_file(lens, orientation)
         write_file(self._folder / f"lens{name.removeprefix('image')}.yaml", lens_file)
-        labels = [self._yolo_line(each) for each in boxes if each.found]
+        labels = [yolo_line(self._classes.index(each.class_name), each.shares) for each in boxes if each.found]
         write_file(self._folder / f"{name}.txt", "".join(labels))
         self._append_candidates("".join(_json_line(path.name, each) for each in boxes))
         return path
@@ -97,8 +97,10 @@ class BoxWriter:
         except OSError as error:
             raise InputError(f"can't write {path}: {error.strerror or error}") from error
 
-    def _yolo_line(self, box: CandidateBox) -> str:
-        return f"{self._classes.index(box.class_name)} {' '.join(f'{each:.6f}' for each in box.shares)}\n"
+
+def yolo_line(number: int, shares: Shares) -> str:
+    """The line of a box in a label file in YOLO format. number: of its class in the table of names."""
+    return f"{number} {' '.join(f'{each:.6f}' for each in shares)}\n"
 
 
 def _content_of(image: Path) -> bytes:

@@ -70,11 +70,11 @@ def dome(radius: float, height: float, segments: int = 20) -> Solid:
     return upper.stretched(1.0, 1.0, height / radius)
 
 
-def torus(radius: float, thickness: float, segments: int = 32, sides: int = 12) -> Solid:
+def torus(radius: float, thickness: float) -> Solid:
     """A ring around z, with the radius of its center line [m] and its thickness [m]."""
-    around = np.append(np.arange(sides), 0) * (2.0 * np.pi / sides) - np.pi / 2.0
+    around = np.append(np.arange(12), 0) * (2.0 * np.pi / 12) - np.pi / 2.0
     ring = [(radius + thickness / 2.0 * float(np.cos(a)), thickness / 2.0 * float(np.sin(a))) for a in around]
-    return lathe(ring, segments)
+    return lathe(ring, 32)
 
 
 def capsule(start: Point, end: Point, radius: float, last: float | None = None, segments: int = 10) -> Solid:
@@ -101,9 +101,9 @@ def axle(center: Point, radius: float, width: float, segments: int = 14) -> Soli
     return cylinder(radius, width, segments).turned(rotation(roll=np.pi / 2.0)).shifted(center)
 
 
-def cord(points: Floats, radius: float, sides: int = 5) -> Solid:
+def cord(points: Floats, radius: float) -> Solid:
     """A cord along points (k, 3) [m] with open ends."""
-    return cords(points[None], radius, sides)
+    return cords(points[None], radius)
 
 
 def cords(points: Floats, radius: float, sides: int = 5) -> Solid:

@@ -20,6 +20,7 @@ from vm_workstation.ranges import uniform
 
 from ..scene.configuration import CLASSES, GroundRanges
 from ..scene.environment import Environment
+from ..scene.field import Field
 from ..scene.scene import Scene
 from ..scene.surface import Surface
 from .foreground import trace_foreground
@@ -84,61 +85,64 @@ def _background(
     if len(rows):
         # One more row on each side: lines are drawn from differences between neighboring pixels.
         part = slice(max(int(rows[0]) - 1, 0), int(rows[-1]) + 2)
+        lower, here = safe[part], radiance[part]
         if scene.surface is not None:
-            ground_share[part] = _add_surface(
-                scene, scene.surface, environment, safe[part], random, ground, radiance[part]
-            )
+            lit, share = _surface_light(scene, scene.surface, environment, lower, uniform(random, ground.light))
+            here += share[..., None] * (lit - here)
+            ground_share[part] = share
+        elif scene.field is not None:
+            lit, lines, carpet = _field_light(scene, scene.field, environment, lower, uniform(random, ground.light))
+            here += carpet[..., None] * (lit - here)
+            classes[part][carpet > 0.5] = CLASSES.index("field")
+            classes[part][(lines * carpet) > 0.5] = CLASSES.index("line")
         else:
-            _add_ground(scene, environment, safe[part], random, ground, radiance[part], classes[part])
+            here *= 1.0 + _photographed_grain(scene, lower, uniform(random, ground.detail))
     return radiance, classes, ground_share
 
 
-def _add_surface(
-    scene: Scene,
-    surface: Surface,
-    environment: Environment,
-    safe: Floats,
-    random: np.random.Generator,
-    ground: GroundRanges,
-    radiance: Singles,
-) -> Singles:
-    """Draw a table or floor into radiance (h, w, 3) where rays (h, w, 3) point down; returns its share (h, w)."""
-    distance, points = _plane_points(scene, safe)
+def _surface_light(
+    scene: Scene, surface: Surface, environment: Environment, rays: Floats, unevenness: float
+) -> tuple[Singles, Singles]:
+    """Light (h, w, 3) of a table or floor along rays (h, w, 3), and the share (h, w) of each pixel that it covers.
+
+    unevenness: how much the light changes over the plane, as a share.
+    """
+    distance, points = _plane_points(scene, rays)
     albedo, share = paint_surface(surface, points, distance, pixel_angle(scene.lens, scene.size))
-    light = 1.0 + uniform(random, ground.light) * ground_light(points, surface.seed)
-    lit = albedo * (environment.irradiance / np.pi).astype(np.float32) * light[..., None]
-    mirrored = environment.radiance_along(safe * (1.0, 1.0, -1.0))
+    lit = _lit(albedo, environment, points, surface.seed, unevenness)
+    mirrored = environment.radiance_along(rays * (1.0, 1.0, -1.0))
     # A glossy top scatters bright lamps; no camera shows them unbroken.
     limit = 4.0 * float(np.median(lit)) + 1e-6
     lit += surface.shine * cv2.GaussianBlur(np.minimum(mirrored, limit), (0, 0), 3.0)
-    radiance += share[..., None] * (lit - radiance)
-    return share
+    return lit, share
 
 
-def _add_ground(
-    scene: Scene,
-    environment: Environment,
-    safe: Floats,
-    random: np.random.Generator,
-    ground: GroundRanges,
-    radiance: Singles,
-    classes: npt.NDArray[np.uint8],
-) -> None:
-    """Draw the ground into radiance (h, w, 3) and classes (h, w) where rays (h, w, 3) point down."""
-    distance, points = _plane_points(scene, safe)
+def _field_light(
+    scene: Scene, field: Field, environment: Environment, rays: Floats, unevenness: float
+) -> tuple[Singles, Singles, Singles]:
+    """Light (h, w, 3) of a field along rays (h, w, 3), and the shares (h, w) that lines and carpet cover.
+
+    unevenness: how much the light changes over the plane, as a share.
+    """
+    distance, points = _plane_points(scene, rays)
+    range_ = np.where(np.isfinite(distance), distance, 1e6)
+    albedo, lines, carpet = paint_ground(field, points, range_, pixel_angle(scene.lens, scene.size))
+    return _lit(albedo, environment, points, scene.seed, unevenness), lines, carpet
+
+
+def _lit(albedo: Singles, environment: Environment, points: Floats, seed: int, unevenness: float) -> Singles:
+    """Light (h, w, 3) that points (h, w, 2) [m] of the plane with this albedo reflect, without shadows."""
+    light = 1.0 + unevenness * ground_light(points, seed)
+    lit: Singles = albedo * (environment.irradiance / np.pi).astype(np.float32) * light[..., None]
+    return lit
+
+
+def _photographed_grain(scene: Scene, rays: Floats, strength: float) -> Floats:
+    """Relative change (h, w, 1) of a photographed floor along rays (h, w, 3); maps are too coarse to show grain."""
+    distance, points = _plane_points(scene, rays)
     below = np.isfinite(distance)
-    pixel = pixel_angle(scene.lens, scene.size)
-    if scene.field is None:
-        strength = uniform(random, ground.detail)
-        grain = ground_noise(points, np.where(below, distance, 1.0) * pixel, scene.seed)
-        radiance *= 1.0 + strength * grain * below[..., None]
-        return
-    albedo, lines, carpet = paint_ground(scene.field, points, np.where(below, distance, 1e6), pixel)
-    light = 1.0 + uniform(random, ground.light) * ground_light(points, scene.seed)
-    lit = albedo * (environment.irradiance / np.pi).astype(np.float32) * light[..., None]
-    radiance += carpet[..., None] * (lit - radiance)
-    classes[carpet > 0.5] = CLASSES.index("field")
-    classes[(lines * carpet) > 0.5] = CLASSES.index("line")
+    footprint = np.where(below, distance, 1.0) * pixel_angle(scene.lens, scene.size)
+    return np.asarray(strength * ground_noise(points, footprint, scene.seed) * below[..., None])
 
 
 def _plane_points(scene: Scene, safe: Floats) -> tuple[Floats, Floats]:

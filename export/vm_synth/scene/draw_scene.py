@@ -82,14 +82,12 @@ def _draw_camera_and_spot(
         if floor is not None:
             high = min(high, max(orientation.height - radius, 0.0) / math.tan(floor))
         rise = max(orientation.height - radius, radius)  # a camera below the top of the ball sees it, too
-        largest, smallest = (
-            math.asin(radius / max(math.hypot(d, rise), 1.01 * radius)) for d in (min(low, high), high)
-        )
+        low = min(low, high)
         if ranges.ball.even and random.random() < ranges.ball.even:
-            distance = random.uniform(min(low, high), high)
-            angle = math.asin(radius / max(math.hypot(distance, rise), 1.01 * radius))
+            distance = random.uniform(low, high)
+            angle = _angular_radius(radius, distance, rise)
         else:
-            angle = random.uniform(smallest, largest)
+            angle = random.uniform(_angular_radius(radius, high, rise), _angular_radius(radius, low, rise))
             distance = math.sqrt(max((radius / math.sin(angle)) ** 2 - rise**2, 0.0))
         heading = random.uniform(-np.pi, np.pi, 256)
         spots = distance * np.stack([np.cos(heading), np.sin(heading)], axis=1)
@@ -101,6 +99,12 @@ def _draw_camera_and_spot(
         if len(good) and distance > NEAREST * (orientation.height < 4.0 * radius):
             return orientation, spots[good[0]]
     return orientation, None
+
+
+def _angular_radius(radius: float, distance: float, rise: float) -> float:
+    """Angular radius [rad] of a ball at a distance on the plane, whose center is lower than the camera by `rise`; all
+    [m]."""
+    return math.asin(radius / max(math.hypot(distance, rise), 1.01 * radius))
 
 
 def _draw_field_around(random: np.random.Generator, ranges: SceneConfiguration, spot: Floats, radius: float) -> Field:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,7 +44,7 @@ def draw_table_scene(random: np.random.Generator, ranges: SceneConfiguration, as
     targets = [_draw_body(random, ranges, assets, radius, height) for _ in spots]
     bodies = [each.moved(0.0, (*spot, 0.0)) for each, spot in zip(targets, spots, strict=True)]
     if random.random() < ranges.object.wrong_size:
-        placement.add_other([_wrong_size(random, ranges, assets, radius, height)])
+        placement.add([_wrong_size(random, ranges, assets, radius, height)])
     placement.add_all(radius)
     bodies += placement.bodies
     return Scene(
@@ -82,7 +83,7 @@ def _wrong_size(
     """An object that is clearly smaller or larger, of class environment."""
     factor = uniform(random, ranges.object.larger if random.random() < 0.5 else ranges.object.smaller)
     made = _draw_body(random, ranges, assets, factor * radius, factor * height)
-    return Body(**{**vars(made), "label": "environment", "name": f"other {made.name}"})
+    return replace(made, label="environment", name=f"other {made.name}")
 
 
 def _draw_spots(

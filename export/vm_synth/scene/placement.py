@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from vm_embedded.arrays import Floats, Mask
 from vm_embedded.geometry.lens import Size
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import RadialLens
-from vm_workstation.ranges import Range, log_uniform, uniform
+from vm_workstation.ranges import log_uniform, uniform
 
 from ..balls.draw_design import draw_design
 from ..bodies.catalog import draw_carrier, draw_clutter, draw_distractor, draw_furniture, draw_person, draw_robot
@@ -80,24 +81,26 @@ class Placement:
     def add_all(self, ball_radius: float) -> None:
         """Draw and place the configured numbers of all kinds of objects."""
         random, things, bodies = self._random, self._ranges.things, self._ranges.bodies
-        for _ in range(self._count(things.robots)):
-            self._add(draw_robot(random, bodies))
-        for _ in range(self._count(things.clutter)):
-            self._add(draw_clutter(random, bodies))
-        for _ in range(self._count(things.round_things)):
-            self._add(draw_distractor(random, bodies, ball_radius))
-        for _ in range(self._count(things.furniture)):
-            self._add(draw_furniture(random, bodies))
-        for _ in range(self._count(things.people)):
-            self._add(draw_person(random, bodies))
+        for numbers, draw in (
+            (things.robots, draw_robot),
+            (things.clutter, draw_clutter),
+            (things.round_things, partial(draw_distractor, ball_radius=ball_radius)),
+            (things.furniture, draw_furniture),
+            (things.people, draw_person),
+        ):
+            for _ in range(int(random.integers(int(numbers[0]), int(numbers[1]) + 1))):
+                self.add(draw(random, bodies))
         if random.random() < things.carrier:
             carrier = draw_carrier(random, bodies, self._orientation.height)
             if carrier is not None:
                 self.bodies.append(carrier.moved(self._orientation.yaw, (0.0, 0.0, 0.0)))
 
-    def add_other(self, bodies: list[Body]) -> None:
+    def add(self, bodies: list[Body]) -> None:
         """Place bodies at a free spot, if there is one."""
-        self._add(bodies)
+        half = _reach(bodies)
+        spot = self._free(half)
+        if spot is not None:
+            self._put(bodies, spot, half)
 
     def add_goals(self, field: Field) -> None:
         """Place two goals at the ends of their field."""
@@ -128,37 +131,35 @@ class Placement:
 
     def draw_other_ball(self, radius: float) -> tuple[PlacedBall | None, str]:
         """Draw a ball of the same size above the plane, one of the wrong size on it, or None, and its class."""
-        random, ranges = self._random, self._ranges.ball
-        kind = random.random()
+        ranges, kind = self._ranges.ball, self._random.random()
         if kind < ranges.off_plane:
-            height = log_uniform(random, ranges.off_plane_height)
-            stand = pedestal(random, height, 2.0 * radius * random.uniform(1.2, 3.0))
-            spot = self._free(_reach(stand))
-            if spot is None:
-                return None, ranges.off_plane_label
-            if random.random() < 0.8:
-                self._put(stand, spot, _reach(stand))
-            self.keep_clear(spot, _reach(stand))
-            return draw_ball_at(
-                random, self._ranges, np.array([*spot, height + radius]), radius
-            ), ranges.off_plane_label
+            return self._draw_raised_ball(radius), ranges.off_plane_label
         if kind < ranges.off_plane + ranges.wrong_size:
-            factor = uniform(random, ranges.larger if random.random() < 0.5 else ranges.smaller)
-            spot = self._free(factor * radius)
-            if spot is not None:
-                self.keep_clear(spot, factor * radius)
-                center = np.array([*spot, factor * radius])
-                return draw_ball_at(random, self._ranges, center, factor * radius), "environment"
+            return self._draw_ball_of_wrong_size(radius), "environment"
         return None, "environment"
 
-    def _count(self, span: Range) -> int:
-        return int(self._random.integers(int(span[0]), int(span[1]) + 1))
+    def _draw_raised_ball(self, radius: float) -> PlacedBall | None:
+        """A ball above the plane, mostly on a stand; None without a free spot."""
+        random = self._random
+        height = log_uniform(random, self._ranges.ball.off_plane_height)
+        stand = pedestal(random, height, 2.0 * radius * random.uniform(1.2, 3.0))
+        spot = self._free(_reach(stand))
+        if spot is None:
+            return None
+        if random.random() < 0.8:
+            self._put(stand, spot, _reach(stand))
+        self.keep_clear(spot, _reach(stand))
+        return draw_ball_at(random, self._ranges, np.array([*spot, height + radius]), radius)
 
-    def _add(self, bodies: list[Body]) -> None:
-        half = _reach(bodies)
-        spot = self._free(half)
-        if spot is not None:
-            self._put(bodies, spot, half)
+    def _draw_ball_of_wrong_size(self, radius: float) -> PlacedBall | None:
+        """A ball on the plane that is clearly larger or smaller than `radius` [m]; None without a free spot."""
+        random, ranges = self._random, self._ranges.ball
+        other = radius * uniform(random, ranges.larger if random.random() < 0.5 else ranges.smaller)
+        spot = self._free(other)
+        if spot is None:
+            return None
+        self.keep_clear(spot, other)
+        return draw_ball_at(random, self._ranges, np.array([*spot, other]), other)
 
     def _put(self, bodies: list[Body], spot: Floats, half: float) -> None:
         turn = self._random.uniform(-math.pi, math.pi)

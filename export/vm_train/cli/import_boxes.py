@@ -14,6 +14,7 @@ from vm_embedded.files import write_file
 from vm_embedded.geometry.make_shape import make_shape
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.bundled import SHIPPED
+from vm_workstation.option_types import add_set
 from vm_workstation.shortened import shortened
 
 from ..boxes.box import BoxedPicture, BoxedSet
@@ -54,13 +55,7 @@ def import_boxes_parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--config", type=Path, metavar="FILE", help="configuration, train.toml, for [classes], [mesh] and [data]"
     )
-    made.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="SECTION.ENTRY=VALUE",
-        help="override an entry of the configuration, for example mesh.radius=0.07; repeat it for each entry",
-    )
+    add_set(made, "mesh.radius=0.07")
     return made
 
 

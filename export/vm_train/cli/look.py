@@ -13,12 +13,11 @@ from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import SHIPPED, model_path
-from vm_workstation.option_types import at_least
+from vm_workstation.option_types import add_set, at_least
 
 from ..data.pictures import find_pictures
 from ..data.split import split_by_seed
 from ..learning.class_table import ClassTable
-from ..learning.configuration import TrainConfiguration
 from ..learning.folder_access import locked
 from ..look.configuration import LOOK_HEADER, LookConfiguration
 from .box_options import add_box_options
@@ -71,13 +70,7 @@ def look_parser() -> argparse.ArgumentParser:
         metavar="FILE",
         help="configuration, look.toml, or tune.toml with --boxes; missing entries keep their defaults",
     )
-    made.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="SECTION.ENTRY=VALUE",
-        help="override an entry of the configuration, for example training.epochs=5; repeat it for each entry",
-    )
+    add_set(made, "training.epochs=5")
     add_device(made)
     made.add_argument("--strict", action="store_true", help="fail if a picture is damaged; default: skip it")
     made.add_argument("--workers", type=at_least(1), metavar="N", help="processes that cut patches; default: all cores")
@@ -141,10 +134,19 @@ def run_look(options: argparse.Namespace) -> int:
     configuration = _with_classes_of(model, configuration)
     numbers = [each.number for each in find_pictures(options.data)]
     split = split_by_seed(numbers, configuration.data.validation, 0.0, configuration.data.split_seed)
-    strict, threads = options.strict, options.threads or 1
-    output, name = options.output, str(options.model)
-    with locked(output):
-        run = begin_look_run(output, options.data, split, configuration, model, name, strict, threads, glance, start)
+    with locked(options.output):
+        run = begin_look_run(
+            options.output,
+            options.data,
+            split,
+            configuration,
+            model,
+            str(options.model),
+            strict=options.strict,
+            threads=options.threads or 1,
+            glance=glance,
+            start=start,
+        )
         count = len(split.training), len(split.validation)
         print(
             f"{options.data}: {len(numbers)} pictures: {count[0]} for training, {count[1]} for validation", flush=True
@@ -174,7 +176,7 @@ def _with_classes_of(model: Path, configuration: LookConfiguration) -> LookConfi
     beside = model.with_name("train.toml")
     if configuration.classes != ClassTable.default() or not beside.exists():
         return configuration
-    return replace(configuration, classes=read_sections(TrainConfiguration, beside).classes)
+    return replace(configuration, classes=ClassTable.read(beside))
 
 
 def resume_look(options: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from vm_embedded.cli.program import Parser
 from vm_embedded.network.bundled import SHIPPED
-from vm_workstation.option_types import at_least
+from vm_workstation.option_types import add_set, at_least
 
 from .check import check_parser
 from .device_option import add_device
@@ -54,13 +54,6 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
     _add_configuration(made)
     add_start(made)
-    made.add_argument(
-        "--teacher",
-        type=Path,
-        metavar="MODEL",
-        help="checkpoint (.pt) of a larger network. The new network also learns from its probabilities. See "
-        "training.distillation",
-    )
     made.add_argument("--strict", action="store_true", help="fail if a picture is damaged; default: skip it")
     add_stream(made)
     _add_lists(made)
@@ -163,13 +156,7 @@ def _add_configuration(made: argparse.ArgumentParser) -> None:
     made.add_argument(
         "--config", type=Path, metavar="FILE", help="configuration, train.toml; missing entries keep their defaults"
     )
-    made.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="SECTION.ENTRY=VALUE",
-        help="override an entry of the configuration, for example training.epochs=5; repeat it for each entry",
-    )
+    add_set(made, "training.epochs=5")
 
 
 def _add_lists(made: argparse.ArgumentParser) -> None:

@@ -142,9 +142,7 @@ def _with_colors(picture: Picture, colors: Singles) -> Picture:
 
 def _camera_error(picture: Picture, perturbed: Picture) -> str:
     """The camera error of a perturbed picture, as text."""
-    true, other = picture.lens.orientation, perturbed.lens.orientation
-    assert true is not None
-    assert other is not None
+    true, other = picture.orientation, perturbed.orientation
     turn = cv2.Rodrigues(other.rotation @ true.rotation.T)[0]
     tilt = math.degrees(float(np.linalg.norm(turn)))
     return f"height {100.0 * (other.height / true.height - 1.0):+.1f} %, tilt {tilt:.1f} deg"

@@ -60,13 +60,12 @@ def middle(image: Image, width: int) -> Image:
 def with_points(picture: Picture, manifest: Manifest, grid: Grid, width: int) -> Image:
     """A picture, scaled to a width [px], with the network's mesh points; without points if the camera is too low."""
     canvas = scaled(picture.image, width)
-    height, full = picture.labels.shape
     try:
-        pixels = seen_points(picture.lens, (full, height), manifest, grid).pixels
+        pixels = seen_points(picture.lens, picture.size, manifest, grid).pixels
     except GeometryError:
         return canvas
     columns, rows = np.rint(pixels).astype(np.intp).T
-    x, y = _places(pixels, full, canvas)
+    x, y = _places(pixels, picture.size[0], canvas)
     labels = picture.labels[rows, columns]
     first = np.unique(np.stack([x // _SPACING, y // _SPACING, labels]), axis=1, return_index=True)[1]
     x, y, labels = x[first], y[first], labels[first]

@@ -135,7 +135,7 @@ def _begin(
     print(f"{options.data}: {len(good)} pictures: {parts}")
     unpacked = None if options.no_unpacked else options.unpacked or options.output / "unpacked"
     data = TrainingData(options.data, split, unpacked, source)
-    run = begin_run(options.output, data, configuration, options.teacher, start)
+    run = begin_run(options.output, data, configuration, start)
     if run.selected_points_per_picture < _FEW:
         print(
             f"vm-train: only {run.selected_points_per_picture:.1f} points of a picture give gradients, because each "

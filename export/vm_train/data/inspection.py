@@ -132,8 +132,7 @@ def _inspect_one(files: PictureFiles, classes: Classes, objects: Sequence[int]) 
         picture = read_picture(files, classes)
     except PictureFault as error:
         return FaultyPicture(files.number, error.kind, " ".join(str(error).split()))
-    orientation, (height, width) = picture.lens.orientation, picture.labels.shape
-    assert orientation is not None  # read_picture checks this
+    orientation, (width, height) = picture.orientation, picture.size
     pixels = [int(np.count_nonzero(picture.labels == index)) for index in range(len(classes.names))]
     distances = [_distances(picture.labels == index, picture.lens) for index in objects if pixels[index]]
     return PictureFacts(

@@ -13,7 +13,9 @@ import numpy as np
 from vm_embedded.arrays import Image
 from vm_embedded.cameras.decoding import decode_as
 from vm_embedded.errors import GeometryError, InputError
+from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.lens_files import LensFile, parse_lens_yaml
+from vm_embedded.geometry.orientation import Orientation
 
 from .classes import Classes, Labels
 from .picture_files import IMAGES, PARTS, PictureFault, PictureFiles, RawPicture
@@ -24,11 +26,28 @@ _LENSES_KEPT = 1 << 14
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture: BGR image (h, w, 3), labels (h, w), lens and orientation."""
+    """One picture: BGR image (h, w, 3), labels (h, w), and its lens file, which has an orientation."""
 
     image: Image
     labels: Labels
     lens: LensFile
+
+    @property
+    def size(self) -> Size:
+        """Width and height [px]."""
+        height, width = self.labels.shape
+        return width, height
+
+    @property
+    def orientation(self) -> Orientation:
+        """The camera's height and attitude."""
+        assert self.lens.orientation is not None  # decode_picture refuses pictures without
+        return self.lens.orientation
+
+    @property
+    def fitted_lens(self) -> Lens:
+        """The lens for an image of this size. Raises InputError if it does not fit."""
+        return self.lens.lens.for_image(self.size)
 
 
 def find_pictures(folder: Path) -> list[PictureFiles]:

@@ -29,7 +29,7 @@ from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import InputError
 from vm_embedded.field.features import FieldFeatures
-from vm_embedded.geometry.orientation import Orientation, rotation_z
+from vm_embedded.geometry.orientation import rotation_z
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.layout import Feeds, Layout
@@ -113,8 +113,7 @@ class ExactSubject:
         manifest = self.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         if radius is not None:
             manifest = replace(manifest, radius=radius, object_radius=radius)
-        height, width = picture.labels.shape
-        shown = seen_points(picture.lens, (width, height), manifest, self.grid)
+        shown = seen_points(picture.lens, picture.size, manifest, self.grid)
         layout = choose_layout(shown.graph, manifest)
         pixels = np.append(shown.pixels, np.full((1, 2), np.nan), axis=0)[layout.slots]  # NaN in gaps
         projected = Projection(layout, pixels, layout.slots < len(shown))
@@ -142,7 +141,7 @@ class RobotSubject:
 
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         assert radius is None  # a robot's network is for balls of one size
-        seen = self.detector.detect(picture.image, _orientation(picture), picture.lens.lens)
+        seen = self.detector.detect(picture.image, picture.orientation, picture.lens.lens)
         return _answer(seen.observation, seen.objects, seen.field, self.look, self.detector.settings)
 
 
@@ -188,8 +187,7 @@ def passed_on(observation: Observation, centers: Floats, glance: Look, least: fl
 
 def _view(picture: Picture, layout: Layout, manifest: Manifest, grid: Grid) -> PreparedView:
     """The view of a picture with a mesh for its own height."""
-    height, width = picture.labels.shape
-    orientation = _orientation(picture)
+    orientation = picture.orientation
     return PreparedView(
         layout=layout,
         levels=levels_of(picture, layout.rays, manifest, grid),
@@ -198,8 +196,8 @@ def _view(picture: Picture, layout: Layout, manifest: Manifest, grid: Grid) -> P
         height=orientation.height,
         rotation=orientation.level,
         heading=rotation_z(orientation.yaw),
-        lens=picture.lens.lens.for_image((width, height)),
-        size=(width, height),
+        lens=picture.fitted_lens,
+        size=picture.size,
     )
 
 
@@ -248,9 +246,3 @@ class TorchNetwork:
             return np.asarray(output.numpy(), dtype=np.float32)
 
         return layout.answers(network, colors, on_screen)
-
-
-def _orientation(picture: Picture) -> Orientation:
-    orientation = picture.lens.orientation
-    assert orientation is not None  # read_picture refuses pictures without
-    return orientation

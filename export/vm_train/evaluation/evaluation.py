@@ -125,9 +125,7 @@ class Evaluation:
             self.features.add(truth, answer.features)
         if scene is not None:
             self.radii.append(scene.radius)
-        orientation = picture.lens.orientation
-        assert orientation is not None
-        self.poses.append(CameraPose(files, orientation.height, orientation.pitch))
+        self.poses.append(CameraPose(files, picture.orientation.height, picture.orientation.pitch))
 
 
 def evaluate_pictures(subject: Subject, pictures: Sequence[PictureFiles], classes: Classes, rules: Rules) -> Evaluation:

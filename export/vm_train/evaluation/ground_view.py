@@ -24,10 +24,7 @@ class GroundView:
     @classmethod
     def of(cls, picture: Picture) -> GroundView:
         """The camera of a picture."""
-        height, width = picture.labels.shape
-        orientation = picture.lens.orientation
-        assert orientation is not None  # read_picture refuses pictures without
-        return cls(picture.lens.lens.for_image((width, height)), orientation, (width, height))
+        return cls(picture.fitted_lens, picture.orientation, picture.size)
 
     def pixels(self, places: Floats, height: float = 0.0) -> Floats:
         """Pixels (n, 2) of places (n, 2) [m] at a height [m]; NaN for those that the lens does not see."""

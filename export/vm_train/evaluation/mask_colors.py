@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.network.manifest import Manifest
 from vm_synth.dataset.files import CLASS_COLORS
 
 from ..data.classes import Classes, Color
-from ..learning.configuration import TrainConfiguration
+from ..learning.class_table import ClassTable
 
 
 def default_colors(model: Path, chosen: Path | None) -> Mapping[str, tuple[Color, ...]]:
@@ -22,7 +21,7 @@ def default_colors(model: Path, chosen: Path | None) -> Mapping[str, tuple[Color
     named = [each for each in (chosen, model) if each is not None and each.suffix in (".json", ".pt", ".onnx")]
     for folder in (each.parent for each in named):
         if (folder / "train.toml").exists():
-            return read_sections(TrainConfiguration, folder / "train.toml").classes.colors
+            return ClassTable.read(folder / "train.toml").colors
     return {name: (color,) for name, color in CLASS_COLORS.items()}
 
 

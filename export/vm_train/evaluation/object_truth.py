@@ -120,13 +120,10 @@ def true_objects(picture: Picture, scene: SceneTruth | None, manifest: Manifest)
 
 
 def _of_scene(picture: Picture, shown: SceneObject) -> TrueObject:
-    height, width = picture.labels.shape
-    orientation, size = picture.lens.orientation, (width, height)
-    assert orientation is not None
-    lens = picture.lens.lens.for_image(size)
+    lens, orientation, size = picture.fitted_lens, picture.orientation, picture.size
     whole: dict[str, Any] = {"center": shown.center, "size": size}
     window, share = coverage(shape_outline(lens, orientation, shown.shape, **whole), size)
-    mask = np.zeros((height, width), dtype=np.float32)
+    mask = np.zeros(picture.labels.shape, dtype=np.float32)
     mask[window] = share
     radius = math.sqrt(polygon_area(shape_outline(lens, orientation, shown.shape, **whole, unseen=True)) / math.pi)
     toward = shown.center - (0.0, 0.0, orientation.height)
@@ -144,9 +141,7 @@ def _of_mask(picture: Picture, shown: Mask, shape: Shape) -> list[TrueObject]:
 
 def _of_piece(picture: Picture, mask: Mask, area: float, shape: Shape) -> TrueObject:
     """An object of that shape, from its pixels in a mask (h, w). Above the horizon, its place and size are NaN."""
-    orientation = picture.lens.orientation
-    assert orientation is not None
-    bearing = _bearing(picture, mask)
+    orientation, bearing = picture.orientation, _bearing(picture, mask)
     position, angle = np.full(3, np.nan), math.nan
     if bearing[2] < 0.0:
         center = shape.center_along(bearing[None], orientation.height)[0]
@@ -157,11 +152,8 @@ def _of_piece(picture: Picture, mask: Mask, area: float, shape: Shape) -> TrueOb
 
 def _bearing(picture: Picture, mask: Mask) -> Floats:
     """Unit vector (3,) along the mean ray through the pixels of a mask (h, w); NaN if the lens sees none of them."""
-    orientation = picture.lens.orientation
-    assert orientation is not None
-    height, width = mask.shape
     pixels = np.argwhere(mask)[:, ::-1].astype(np.float64)
-    rays = picture.lens.lens.for_image((width, height)).unproject(pixels, (width, height)) @ orientation.rotation.T
+    rays = picture.fitted_lens.unproject(pixels, picture.size) @ picture.orientation.rotation.T
     rays = rays[np.isfinite(rays).all(axis=1)]
     middle = rays.mean(axis=0) if len(rays) else np.zeros(3)
     length = float(np.linalg.norm(middle))

@@ -82,9 +82,7 @@ def median_camera_figure(
     nearest = np.linalg.norm((values - np.median(values, axis=0)) / spread, axis=1).argmin()
     pose = poses[int(nearest)]
     picture = read_picture(pose.files, classes)
-    orientation = picture.lens.orientation
-    assert orientation is not None
-    camera = PosedCamera(orientation, picture.lens.lens, (picture.image.shape[1], picture.image.shape[0]))
+    camera = PosedCamera(picture.orientation, picture.lens.lens, picture.size)
     text = (
         f"Camera of {pose.files.image.name}, the nearest to the median: {pose.height:.2f} m high, "
         f"{np.degrees(pose.pitch):.0f} degrees down. Ball of radius {radius:g} m."

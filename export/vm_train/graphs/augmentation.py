@@ -129,18 +129,15 @@ def with_camera_error(
     center: shift of the optical center to the right and down [image widths]. Raises InputError if the lens does not fit
     the image.
     """
-    orientation = picture.lens.orientation
-    assert orientation is not None  # read_picture checked it
+    orientation, width = picture.orientation, picture.size[0]
     turn = cv2.Rodrigues(np.array([*tilt, 0.0]))[0]
     changed = Orientation(orientation.height * height, np.asarray(turn @ orientation.rotation, dtype=np.float64))
-    rows, columns = picture.labels.shape
-    lens = _other_lens(picture.lens.lens, (columns, rows), focal_length, (center[0] * columns, center[1] * columns))
+    lens = _other_lens(picture.fitted_lens, picture.size, focal_length, (center[0] * width, center[1] * width))
     return replace(picture, lens=LensFile(lens, changed))
 
 
-def _other_lens(lens: Lens, size: Size, factor: float, shift: tuple[float, float]) -> Lens:
-    """A lens for an image of this size, its lengths scaled by a factor and its optical center shifted [px]."""
-    fitted = lens.for_image(size)
+def _other_lens(fitted: Lens, size: Size, factor: float, shift: tuple[float, float]) -> Lens:
+    """A lens that fits an image of this size, its lengths scaled by a factor and its optical center shifted [px]."""
     # Scaling includes the distortion, so the lens's field of view stays the same.
     scaled = fitted.scaled(factor, size)
     if isinstance(fitted, RadialLens):

@@ -52,24 +52,20 @@ class LabeledGraph:
 
 def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> LabeledGraph:
     """The graph of a picture for a network with this manifest. Raises GeometryError or InputError as seen_points."""
-    height, width = picture.labels.shape
-    shown = seen_points(picture.lens, (width, height), manifest, grid)
+    shown = seen_points(picture.lens, picture.size, manifest, grid)
     points = np.full((len(shown) + 1, 3), OFF_SCREEN, dtype=np.float32)
     levels = levels_of(picture, shown.graph.rays, manifest, grid)
     points[:-1] = normalized(sample(Pyramid(picture.image, "bgr"), shown.pixels, levels), manifest.colors).T
     x, y = np.rint(shown.pixels).astype(np.intp).T
-    assert picture.lens.orientation is not None
-    distances = plane_distances(shown.graph.rays, picture.lens.orientation.height)
+    distances = plane_distances(shown.graph.rays, picture.orientation.height)
     return LabeledGraph(points, shown.graph.neighbors, picture.labels[y, x], distances, shown.pixels)
 
 
 def levels_of(picture: Picture, rays: Floats, manifest: Manifest, grid: Grid) -> Levels:
     """Which picture of the pyramid colors each of the points with rays (n, 3)."""
-    height, width = picture.labels.shape
     if grid.is_visual:
-        assert picture.lens.orientation is not None
-        lens = picture.lens.lens.for_image((width, height))
-        return levels_for(manifest, rays, picture.lens.orientation.height, lens)
+        return levels_for(manifest, rays, picture.orientation.height, picture.fitted_lens)
+    width, height = picture.size
     single = manifest.sampling == "bilinear"
     return uniform_levels(len(rays), 1.0 if single else math.sqrt(height * width / max(len(rays), 1)))
 

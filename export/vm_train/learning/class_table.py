@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from vm_embedded.config.toml_reader import parse_toml
 from vm_embedded.errors import InputError
+from vm_embedded.files import read_text
 from vm_embedded.network.manifest import KINDS, ObjectClass
 from vm_synth.dataset.files import CLASS_COLORS
 
@@ -48,6 +51,19 @@ class ClassTable:
                 raise InputError(f"{name}: kind must be one of {', '.join(KINDS)}, not {entry['kind']!r}")
             colors[name], kinds[name] = _colors(name, entry), entry["kind"]
         return cls(colors, kinds)
+
+    @classmethod
+    def read(cls, path: Path) -> ClassTable:
+        """Read [classes] of a train.toml, which may be that of an earlier release: other sections are not read.
+
+        Without [classes], the classes are the defaults. Raises InputError.
+        """
+        text = read_text(path, "configuration")
+        try:
+            table = parse_toml(text)
+            return cls.from_table(table["classes"]) if "classes" in table else cls.default()
+        except InputError as error:
+            raise InputError(f"configuration {path}: {error}") from error
 
     def to_commented_toml(self) -> str:
         """The section as TOML with a comment."""

@@ -64,22 +64,6 @@ class Recipe:
         "",
         (0.0, 1.0),
     )
-    smoothing: float = number(
-        0.0, "share of a point's target that comes from its neighbors' labels; softens outlines", "", (0.0, 1.0)
-    )
-    distillation: float = number(
-        0.5,
-        "share of the target that comes from the network of vm-train --teacher; no effect without it",
-        "",
-        (0.0, 1.0),
-    )
-    averaging: float = number(
-        0.0,
-        "decay of the weights' moving average, which is then validated and saved; 0.999: over about the last thousand "
-        "steps; 0: no average",
-        "",
-        (0.0, 0.999999),
-    )
     # "This resampling was run twice" (paper: section "Training"): three rounds.
     rounds: int = number(3, "for selection hard: networks to train one after the other", "", (2, 10))
     patience: int = number(

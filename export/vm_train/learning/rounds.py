@@ -234,7 +234,7 @@ class _Round:
             "torch": torch.__version__,
         }
         manifest = replace(run.configuration.manifest, provenance=provenance)
-        checkpoint = Checkpoint(self._trainer.result, manifest, run.configuration.grid)
+        checkpoint = Checkpoint(self._trainer.network, manifest, run.configuration.grid)
         checkpoint.save(run.round_path(progress.round))
         if is_best_ever:
             checkpoint.save(run.model_path)
@@ -252,8 +252,7 @@ def _round_trainer(run: TrainingRun, hardware: Hardware, progress: TrainingProgr
     # looks: how often an epoch uses each picture
     total = recipe.epochs * steps_an_epoch(recipe.looks * run.data.pictures_per_epoch, recipe.batch)
     shares, weights = run.shares_and_weights(progress.round)
-    teacher = None if run.teacher is None else run.teacher.network
-    trainer = Trainer(network, recipe, total, shares, weights, graders, teacher, hardware.device)
+    trainer = Trainer(network, recipe, total, shares, weights, graders, hardware.device)
     if run.state_path.exists():
         state = read_state(run.state_path)
         if state["more"]["round"] == progress.round:

@@ -1,10 +1,9 @@
 """The folder of a training: what it was begun with, and what it has produced.
 
 train.toml: the configuration. pictures.json: the split of the pictures. run.json: where the pictures are, and the
-numbers of points of each class. teacher.pt, and start.pt or start.onnx: copies of the networks of --teacher and --from.
-unpacked/: a cache of decoded pictures, during the training. state.pt: the state to resume from. log.jsonl and
-tensorboard/: the record of each step. round1.pt, ...: the best network of each round. model.pt: the best network of all
-rounds, for vm-evaluate and vm-export.
+numbers of points of each class. start.pt or start.onnx: a copy of the network of --from. unpacked/: a cache of decoded
+pictures, during the training. state.pt: the state to resume from. log.jsonl and tensorboard/: the record of each step.
+round1.pt, ...: the best network of each round. model.pt: the best network of all rounds, for vm-evaluate and vm-export.
 """
 
 from __future__ import annotations
@@ -34,15 +33,13 @@ from .configuration import TrainConfiguration
 from .folder_access import check_unused, description
 from .selection import class_weights, selection_shares
 from .start import Start
-from .teacher import Teacher
 from .training_data import TrainingData
 
-_FORMAT = 4
-_TEACHER = "teacher.pt"
+_FORMAT = 5
 _STARTS = {".pt": "start.pt", ".onnx": "start.onnx"}
 """Copies of the network to begin with, by the suffix of its file."""
 
-FILES = ("train.toml", "pictures.json", _TEACHER, *_STARTS.values(), "state.pt", "model.pt", "round1.pt", "log.jsonl")
+FILES = ("train.toml", "pictures.json", *_STARTS.values(), "state.pt", "model.pt", "round1.pt", "log.jsonl")
 """Files that a new training would overwrite, besides run.json."""
 
 
@@ -58,7 +55,6 @@ class TrainingRun:
     data: TrainingData
     configuration: TrainConfiguration
     counts: npt.NDArray[np.int64]
-    teacher: Teacher | None = None
     start: Start | None = None
 
     @property
@@ -125,7 +121,6 @@ class TrainingRun:
             "configuration_sha256": self.configuration_sha256,
             "selection": recipe.selection,
             "loss": recipe.loss,
-            "teacher_sha256": "none" if self.teacher is None else self.teacher.sha256,
             "start_sha256": "none" if self.start is None else self.start.sha256,
             "epochs": str(recipe.epochs),
             "seed": str(recipe.seed),
@@ -136,17 +131,15 @@ def begin_run(
     folder: Path,
     data: TrainingData,
     configuration: TrainConfiguration,
-    teacher: Path | None = None,
     start: Start | None = None,
 ) -> TrainingRun:
     """Count the points of each class, and write the files of a new training.
 
-    teacher: checkpoint of the teacher. start: the network to begin with, which fits the configuration. Raises
-    InputError, also if the folder holds a training.
+    start: the network to begin with, which fits the configuration. Raises InputError, also if the folder holds a
+    training.
     """
     check_unused(folder, FILES)
     data = replace(data, folder=data.folder.resolve())
-    loaded = None if teacher is None else _load_teacher(teacher, configuration)
     make_folder(folder)
     counts = data.count_points(configuration)
     if not counts.any():
@@ -154,10 +147,8 @@ def begin_run(
             "no training picture has a labeled point: check that the lens files fit the pictures, and [mesh] the "
             "object (a camera below the top of a sphere or cylinder sees no point of its mesh)"
         )
-    run = TrainingRun(folder, data, configuration, counts, loaded, start)
+    run = TrainingRun(folder, data, configuration, counts, start)
     write_split(folder / "pictures.json", data.split)
-    if teacher is not None:
-        write_file(folder / _TEACHER, teacher.read_bytes())
     if start is not None:
         write_file(folder / _start_name(start), start.path.read_bytes())
     write_file(folder / "train.toml", to_commented_toml(configuration))
@@ -170,18 +161,15 @@ def read_run(folder: Path) -> TrainingRun:
     with description(folder, _FORMAT) as content:
         counts = np.array(list(content["points"].values()), dtype=np.int64)
         pictures, unpacked, stream = Path(content["data"]), content["unpacked"], content["source"]
-        configuration_sha256, teacher_sha256 = content["configuration_sha256"], content["teacher_sha256"]
+        configuration_sha256 = content["configuration_sha256"]
         started = content["start"]
         start_name, start_sha256 = (None, None) if started is None else (str(started["file"]), started["sha256"])
         source = None if stream is None else StreamSource(**(stream | {"shards": tuple(stream["shards"])}))
     configuration = read_sections(TrainConfiguration, folder / "train.toml")
-    teacher = None if teacher_sha256 is None else _load_teacher(folder / _TEACHER, configuration)
     start = None if start_name is None else Start.load(folder / start_name)
     split = read_split(folder / "pictures.json")
     data = TrainingData(pictures, split, None if unpacked is None else folder / unpacked, source)
-    run = TrainingRun(folder, data, configuration, counts, teacher, start)
-    if teacher is not None and teacher.sha256 != teacher_sha256:
-        raise InputError(f"{folder / _TEACHER} was changed since the training began: begin another one")
+    run = TrainingRun(folder, data, configuration, counts, start)
     if start is not None and start.sha256 != start_sha256:
         raise InputError(f"{start.path} was changed since the training began: begin another one")
     if run.configuration_sha256 != configuration_sha256:
@@ -202,7 +190,6 @@ def _description(run: TrainingRun) -> dict[str, Any]:
         "unpacked": None if data.unpacked is None else _relative(data.unpacked, run.folder),
         "configuration_sha256": run.configuration_sha256,
         "source": None if data.source is None else asdict(data.source),
-        "teacher_sha256": None if run.teacher is None else run.teacher.sha256,
         "start": None if run.start is None else {"file": _start_name(run.start), "sha256": run.start.sha256},
         "points": dict(zip(names, run.counts.tolist(), strict=True)),
     }
@@ -210,10 +197,6 @@ def _description(run: TrainingRun) -> dict[str, Any]:
 
 def _start_name(start: Start) -> str:
     return _STARTS.get(start.path.suffix.lower(), "start.pt")
-
-
-def _load_teacher(path: Path, configuration: TrainConfiguration) -> Teacher:
-    return Teacher.load(path, configuration.manifest, configuration.grid)
 
 
 def _relative(unpacked: Path, folder: Path) -> str:

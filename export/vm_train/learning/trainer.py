@@ -1,9 +1,9 @@
 """Trains a network step by step, and saves and loads the state between two steps.
 
-A step depends only on the seed, its number and the state before it: the weights, their average, and the state of the
-optimizer. With one computing thread on a CPU, a training that resumes from its last state therefore ends with the
-weights of one that nobody interrupted. With several processes (torch.distributed), each takes its part of every batch,
-and the gradient is that of the mean loss over the selected points of all parts.
+A step depends only on the seed, its number and the state before it: the weights and the state of the optimizer. With
+one computing thread on a CPU, a training that resumes from its last state therefore ends with the weights of one that
+nobody interrupted. With several processes (torch.distributed), each takes its part of every batch, and the gradient is
+that of the mean loss over the selected points of all parts.
 """
 
 from __future__ import annotations
@@ -13,12 +13,11 @@ import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import torch
 from torch import distributed, nn
-from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from vm_embedded.arrays import Floats, Singles
 from vm_embedded.errors import InputError, one_line
@@ -27,7 +26,7 @@ from vm_export.torch_files import save_values
 
 from ..graphs.labeled_graph import LabeledGraph, join_graphs
 from ..graphs.schedule import Item
-from .loss import point_losses, soft_targets
+from .loss import point_losses
 from .optimizer import ScheduledOptimizer
 from .recipe import Recipe
 from .selection import class_totals, hardness_weights, point_errors, select_points
@@ -66,8 +65,8 @@ class Trainer:
     """A network that is trained for `total` steps.
 
     shares (C,): chance that a point of each class is selected. weights (C,): weight of a selected point in the loss.
-    graders: networks of earlier rounds; a point is more likely to be selected if they were wrong about it. teacher:
-    network whose probabilities are learned beside the labels. device: "cpu" or "cuda", as torch names it.
+    graders: networks of earlier rounds; a point is more likely to be selected if they were wrong about it. device:
+    "cpu" or "cuda", as torch names it.
     """
 
     def __init__(
@@ -78,7 +77,6 @@ class Trainer:
         shares: Floats,
         weights: Floats,
         graders: Sequence[Network] = (),
-        teacher: nn.Module | None = None,
         device: str = "cpu",
     ) -> None:
         self.network = network.to(device).train()
@@ -86,14 +84,7 @@ class Trainer:
         self._shares, self._device = shares, device
         self._weights = torch.from_numpy(weights.astype(np.float32)).to(device)
         self._graders = [each.to(device).eval() for each in graders]
-        self._teacher = None if teacher is None else teacher.to(device).eval()
         self._optimizer = ScheduledOptimizer(self.network, recipe, total)
-        self._average = _averaged(self.network, recipe.averaging) if recipe.averaging else None
-
-    @property
-    def result(self) -> Network:
-        """The network to validate and keep: with averaged weights if the recipe asks for them."""
-        return self.network if self._average is None else cast(Network, self._average.module)
 
     def set_rate(self, rate: float) -> None:
         """Set the learning rate of the next step. Any schedule but a constant one replaces it after that step."""
@@ -116,8 +107,6 @@ class Trainer:
         if self.recipe.clip:
             nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.clip)
         self._optimizer.step()
-        if self._average is not None:
-            self._average.update_parameters(self.network)
         self.done += 1
         return StepResult(self.done, mean, int(sum_over_processes(torch.tensor(part.points))), rate)
 
@@ -135,27 +124,9 @@ class Trainer:
         labels = torch.from_numpy(np.where(chosen, graph.labels, -1).astype(np.int64)).to(self._device)
         with torch.autocast(torch.device(self._device).type, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
             logits = self.network.logits(points, neighbors)
-        # The last row is the off-screen point.
-        losses = point_losses(logits[:-1], self._targets(graph, points, neighbors, labels), self.recipe)
+        losses = point_losses(logits[:-1], labels, self.recipe)  # without the off-screen point, the last one
         weights = torch.where(labels >= 0, self._weights[labels], 0.0)
         return _BatchLoss(losses @ weights, float(weights.sum()), int(chosen.sum()))
-
-    @torch.no_grad()
-    def _targets(
-        self, graph: LabeledGraph, points: torch.Tensor, neighbors: torch.Tensor, selected: torch.Tensor
-    ) -> torch.Tensor:
-        """Targets of the points.
-
-        selected: labels (n,), -1 for points that are not selected. They are the targets, unless the recipe has
-        smoothing or a teacher; then the targets are probabilities (n, C) of all points.
-        """
-        recipe = self.recipe
-        if self._teacher is None and not recipe.smoothing:
-            return selected
-        labels = torch.from_numpy(graph.labels.astype(np.int64)).to(self._device)
-        taught = None if self._teacher is None else self._teacher(points, neighbors)[:-1]
-        classes = self.network.shape.classes
-        return soft_targets(labels, classes, neighbors, recipe.smoothing, taught, recipe.distillation)
 
     @torch.no_grad()
     def _chance_factors(self, points: torch.Tensor, neighbors: torch.Tensor, graph: LabeledGraph) -> Floats:
@@ -171,10 +142,10 @@ class Trainer:
 
     @torch.no_grad()
     def probabilities(self, graph: LabeledGraph) -> Singles:
-        """Probabilities (n, C) that `result` gives the points of a graph."""
+        """Probabilities (n, C) that the network gives the points of a graph."""
         # torch.tensor copies the neighbors: those of a mesh are read-only, and torch.from_numpy warns about that.
         points, neighbors = torch.from_numpy(graph.points), torch.tensor(graph.neighbors)
-        answers: Singles = self.result(points.to(self._device), neighbors.to(self._device))[:-1].cpu().numpy()
+        answers: Singles = self.network(points.to(self._device), neighbors.to(self._device))[:-1].cpu().numpy()
         return answers
 
     def save(self, path: Path, more: Mapping[str, Any]) -> None:
@@ -182,7 +153,6 @@ class Trainer:
         state = {
             "done": self.done,
             "network": self.network.state_dict(),
-            "average": None if self._average is None else self._average.state_dict(),
             "optimizer": self._optimizer.state_dict(),
             "more": dict(more),
         }
@@ -193,8 +163,6 @@ class Trainer:
         try:
             self.network.load_state_dict(state["network"])
             self._optimizer.load_state_dict(state["optimizer"])
-            if self._average is not None:
-                self._average.load_state_dict(state["average"])
             self.done = int(state["done"])
         except (RuntimeError, KeyError, ValueError, TypeError) as error:
             raise InputError(f"the state belongs to another training: {one_line(error)}") from error
@@ -230,12 +198,6 @@ def _draws(items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> Floats:
             for item, each in zip(items, graphs, strict=True)
         ]
     )
-
-
-def _averaged(network: Network, decay: float) -> AveragedModel:
-    """A copy of a network whose weights are the exponential moving average of those it is given."""
-    fading = get_ema_multi_avg_fn(decay)  # type: ignore[no-untyped-call]
-    return AveragedModel(network, multi_avg_fn=fading)
 
 
 def _sum_gradients(network: nn.Module) -> None:

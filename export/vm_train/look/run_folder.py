@@ -18,19 +18,16 @@ from typing import Any
 from vm_embedded import __version__
 from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
-from vm_embedded.detection.settings import Settings
-from vm_embedded.errors import InputError, unknown
-from vm_embedded.field.uprights import KINDS
+from vm_embedded.errors import InputError
 from vm_embedded.files import write_file
-from vm_embedded.network.look_contract import MOST_NETWORKS
 from vm_embedded.output.result_files import make_folder
 from vm_export.look_checkpoint import LookCheckpoint
 
 from ..data.split import Split, read_split, write_split
-from ..evaluation.answers import ExactSubject, load_subject
-from ..evaluation.field_truth import CLASSES
+from ..evaluation.answers import ExactSubject
 from ..learning.folder_access import check_unused, description
 from .configuration import LookConfiguration
+from .judged import check_glance, judged_class, load_mesh, upright_radius_of
 
 KIND = "look"
 _FORMAT = 4
@@ -116,63 +113,7 @@ class LookRun:
     @property
     def upright_radius(self) -> float:
         """Radius of the circles around bases [m]; 0 for a class of kind object."""
-        return _upright_radius(self.configuration, self.object_class)
-
-
-def load_mesh(path: Path) -> ExactSubject:
-    """A mesh network that can propose places. Raises InputError or ModelError."""
-    subject = load_subject(path, Settings())
-    assert isinstance(subject, ExactSubject)
-    if not subject.grid.is_visual:
-        raise InputError(f"{path}: a close look needs a network on the Visual Mesh, not on a {subject.grid.kind} grid")
-    return subject
-
-
-def _upright_radius(configuration: LookConfiguration, object_class: str) -> float:
-    is_upright = configuration.classes.kinds[object_class] == "upright"
-    return configuration.patches.upright_radius if is_upright else 0.0
-
-
-def _check_glance(glance: LookCheckpoint, object_class: str, upright_radius: float) -> None:
-    """Raise InputError if a look network can't go before one for this class, and circles of this radius [m]."""
-    contract = glance.contract
-    if contract.object_class != object_class:
-        raise InputError(
-            f"the glance of --glance or --start judges class {contract.object_class!r}; a glance for class "
-            f"{object_class!r} is needed"
-        )
-    if len(contract.chain) == MOST_NETWORKS:
-        raise InputError(
-            f"the look of --glance has {MOST_NETWORKS} networks, and the new one would be another: give one with at "
-            f"most {MOST_NETWORKS - 1}"
-        )
-    if contract.upright_radius != upright_radius:
-        raise InputError(
-            f"the glance of --glance or --start has an upright_radius of {contract.upright_radius:g} m, "
-            f"patches.upright_radius is {upright_radius:g} m: give both the same one"
-        )
-
-
-def judged_class(configuration: LookConfiguration, subject: ExactSubject, model: str) -> str:
-    """The class that the look network judges. Raises InputError if model or masks do not have it."""
-    kinds = {each.name: each.kind for each in subject.manifest.classes}
-    objects = [name for name, kind in kinds.items() if kind == "object"]
-    uprights = [name for name, kind in kinds.items() if kind == "upright" and name in KINDS]
-    if not objects + uprights:
-        raise InputError(f"{model} has no class of the kind object, and neither goal nor robot of the kind upright")
-    name = configuration.patches.object_class or (objects + uprights)[0]
-    if name not in objects + uprights:
-        raise InputError(f"[patches] object_class: {unknown(f'object of {model}', name, objects + uprights)}")
-    in_masks = [each for each, kind in configuration.classes.kinds.items() if kind == kinds[name]]
-    if name not in in_masks:
-        raise InputError(
-            f"{model} has class {name!r}, but those of the kind {kinds[name]} in [classes] are "
-            f"{', '.join(in_masks) or 'none'}: give the class and its colors in masks there"
-        )
-    missing = [each for each in CLASSES if each not in configuration.classes.kinds]
-    if name in uprights and missing:
-        raise InputError(f"the truth about a {name} needs the classes {', '.join(missing)}: add them to [classes]")
-    return name
+        return upright_radius_of(self.configuration, self.object_class)
 
 
 def begin_look_run(
@@ -182,6 +123,7 @@ def begin_look_run(
     configuration: LookConfiguration,
     model: Path,
     name: str,
+    *,
     strict: bool = False,
     threads: int = 1,
     glance: LookCheckpoint | None = None,
@@ -197,23 +139,23 @@ def begin_look_run(
     subject = load_mesh(model)
     object_class = judged_class(configuration, subject, name)
     if glance is not None:
-        _check_glance(glance, object_class, _upright_radius(configuration, object_class))
+        check_glance(glance, object_class, upright_radius_of(configuration, object_class))
     make_folder(folder / "patches")
     mesh = folder / f"mesh{model.suffix.lower()}"
     write_file(mesh, model.read_bytes())
     run = LookRun(
-        folder,
-        data.resolve(),
-        split,
-        configuration,
-        name,
-        mesh,
-        subject.sha256,
-        _saved(glance, folder / _GLANCE),
-        _saved(start, folder / _START),
-        object_class,
-        strict,
-        threads,
+        folder=folder,
+        data=data.resolve(),
+        split=split,
+        configuration=configuration,
+        model=name,
+        mesh=mesh,
+        mesh_sha256=subject.sha256,
+        glance_sha256=_saved(glance, folder / _GLANCE),
+        start_sha256=_saved(start, folder / _START),
+        object_class=object_class,
+        strict=strict,
+        threads=threads,
     )
     write_split(folder / "pictures.json", split)
     write_file(folder / "look.toml", to_commented_toml(configuration))
@@ -225,18 +167,18 @@ def read_look_run(folder: Path) -> LookRun:
     """Read a training that was begun. Raises InputError, also if its files were changed since, and ModelError."""
     with description(folder, _FORMAT) as content:
         run = LookRun(
-            folder,
-            Path(content["data"]),
-            read_split(folder / "pictures.json"),
-            read_sections(LookConfiguration, folder / "look.toml"),
-            str(content["model"]),
-            folder / str(content["mesh"]),
-            str(content["mesh_sha256"]),
-            None if content["glance_sha256"] is None else str(content["glance_sha256"]),
-            None if content["start_sha256"] is None else str(content["start_sha256"]),
-            str(content["object_class"]),
-            bool(content["strict"]),
-            int(content["threads"]),
+            folder=folder,
+            data=Path(content["data"]),
+            split=read_split(folder / "pictures.json"),
+            configuration=read_sections(LookConfiguration, folder / "look.toml"),
+            model=str(content["model"]),
+            mesh=folder / str(content["mesh"]),
+            mesh_sha256=str(content["mesh_sha256"]),
+            glance_sha256=None if content["glance_sha256"] is None else str(content["glance_sha256"]),
+            start_sha256=None if content["start_sha256"] is None else str(content["start_sha256"]),
+            object_class=str(content["object_class"]),
+            strict=bool(content["strict"]),
+            threads=int(content["threads"]),
         )
         configuration_sha256 = content["configuration_sha256"]
     if run.configuration_sha256 != configuration_sha256:

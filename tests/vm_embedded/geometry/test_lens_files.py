@@ -283,14 +283,14 @@ def test_a_folder_is_no_lens_file(tmp_path):
 def test_a_binary_file_is_refused(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(bytes(range(256)) * 4)
-    with pytest.raises(InputError, match=f"{name} is not a text file"):
+    with pytest.raises(InputError, match=f"{name}: it is not UTF-8 text"):
         read_lens_file(path)
 
 
 def test_a_picture_is_no_lens_file(tmp_path):
     path = tmp_path / "picture.yaml"
     path.write_bytes(cv2.imencode(".png", np.zeros((8, 8, 3), dtype=np.uint8))[1].tobytes())
-    with pytest.raises(InputError, match=r"picture\.yaml is not a text file"):
+    with pytest.raises(InputError, match=r"picture\.yaml: it is not UTF-8 text"):
         read_lens_file(path)
 
 

@@ -26,6 +26,16 @@ def test_classes_without_colors_are_asked_for():
         classes_with_colors(MANIFEST, COLORS, [("environment", (255, 0, 0))])
 
 
+def test_the_classes_of_a_training_by_an_earlier_release_are_read(tmp_path):
+    own = '[classes]\npuck = { kind = "object", colors = [[9, 9, 9]] }\nice = { kind = "area", colors = [[1, 1, 1]] }\n'
+    (tmp_path / "train.toml").write_text(own + "[training]\nan_entry_that_is_gone = 0\n")
+    colors = {"puck": ((9, 9, 9),), "ice": ((1, 1, 1),)}
+    assert default_colors(tmp_path / "model.pt", None) == colors
+    (tmp_path / "train.toml").write_text(own.replace("object", "thing"))
+    with pytest.raises(InputError, match=r"train\.toml: puck: kind must be one of"):
+        default_colors(tmp_path / "model.pt", None)
+
+
 def test_a_background_class_without_a_color_gets_those_of_the_classes_that_the_network_lacks():
     classes = (ObjectClass("ball", "object"), ObjectClass("other", "background"))
     known = classes_with_colors(replace(MANIFEST, classes=classes), COLORS, [("ball", (255, 255, 0))]).colors

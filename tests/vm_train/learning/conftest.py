@@ -1,4 +1,4 @@
-"""Fixtures of trainings with a start or a teacher: pictures, and a short configuration."""
+"""Fixtures of trainings: pictures, and a short configuration."""
 
 import pytest
 

@@ -23,8 +23,6 @@ RECIPES = {
     "sgd": Recipe(epochs=3, batch=2, optimizer="sgd", schedule="constant", loss="focal"),
     "muon": Recipe(epochs=3, batch=4, optimizer="muon", rate=0.02),
     "mixed": Recipe(epochs=3, batch=4, precision="mixed", clip=0.0),
-    "averaged": Recipe(epochs=3, batch=4, averaging=0.9),
-    "smoothed": Recipe(epochs=3, batch=4, smoothing=0.3),
 }
 
 
@@ -51,9 +49,9 @@ def batches_of(recipe):
     return list(schedule((recipe.seed, 1), recipe.epochs, recipe.batch, COUNT, 0))
 
 
-def training(recipe=None, graders=(), teacher=None):
+def training(recipe=None, graders=()):
     recipe = recipe or Recipe(epochs=3, batch=2, seed=5)
-    return Trainer(network(), recipe, len(batches_of(recipe)), SHARES, WEIGHTS, graders, teacher)
+    return Trainer(network(), recipe, len(batches_of(recipe)), SHARES, WEIGHTS, graders)
 
 
 def run(made, until=None, rank=0, size=1):
@@ -66,8 +64,7 @@ def run(made, until=None, rank=0, size=1):
 
 
 def weights(made):
-    """Those that answer, which may be a mean of those that learn."""
-    return {name: value.clone() for name, value in made.result.state_dict().items()}
+    return {name: value.clone() for name, value in made.network.state_dict().items()}
 
 
 def same(first, second):
@@ -125,35 +122,6 @@ def test_graders_change_which_points_are_selected_but_hardly_how_many():
     first, second = training(recipe), training(recipe, graders=[network(8), network(9)])
     run(first), run(second)
     assert not same(weights(first), weights(second))
-
-
-def test_averaged_weights_are_a_mean_of_those_after_each_step():
-    made, expected = training(Recipe(epochs=3, batch=2, averaging=0.75)), None
-    for batch in batches_of(made.recipe):
-        made.step(batch.items, [graph(each.position) for each in batch.items])
-        now = {name: value.clone() for name, value in made.network.state_dict().items()}
-        expected = now if expected is None else {name: 0.75 * expected[name] + 0.25 * now[name] for name in now}
-    assert all(torch.allclose(value, expected[name], atol=1e-6) for name, value in weights(made).items())
-    probed = graph(9)
-    alone = made.result(torch.from_numpy(probed.points), torch.from_numpy(probed.neighbors))[:-1]
-    assert np.array_equal(made.probabilities(probed), alone.detach().numpy())
-
-
-def test_a_pupil_comes_to_answer_as_its_teacher_whatever_the_labels_say():
-    class Teacher(torch.nn.Module):
-        """Takes reddish points for class 1."""
-
-        def forward(self, points, neighbors):
-            red = (points[:, 0] > points[:, 1]).float()
-            return torch.stack([0.9 - 0.8 * red, 0.1 + 0.8 * red], dim=1)
-
-    made = training(Recipe(epochs=150, batch=3, rate=0.02, distillation=1.0), teacher=Teacher())
-    run(made)
-    probed = graph(0)
-    reddish = probed.points[:-1, 0] > probed.points[:-1, 1]
-    answers = made.probabilities(probed)[:, 1]
-    assert ((answers > 0.5) == reddish).mean() > 0.9
-    assert 0.05 < answers[~reddish].mean() < 0.3 < 0.7 < answers[reddish].mean() < 0.95
 
 
 def test_a_batch_without_points_changes_no_weights():

@@ -31,7 +31,7 @@ def begin(drawn, tiny, tmp_path):
         split = split_by_seed([each.number for each in find_pictures(data)], 0.25, 0.0, 0)
         configuration = read_sections(LookConfiguration, tiny, changes)
         model = model_path("ball-small")
-        return begin_look_run(tmp_path / name, data, split, configuration, model, "ball-small", strict)
+        return begin_look_run(tmp_path / name, data, split, configuration, model, "ball-small", strict=strict)
 
     return begin_one
 

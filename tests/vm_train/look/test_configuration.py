@@ -11,7 +11,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
 from vm_train.evaluation.answers import load_subject
 from vm_train.look.configuration import LOOK_HEADER, LookConfiguration, LookRecipe
-from vm_train.look.run_folder import judged_class
+from vm_train.look.judged import judged_class
 
 
 def read(*entries):
