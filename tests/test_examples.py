@@ -10,12 +10,10 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.messages import read_message
-from tests.vm_embedded.live.running import DEMO, running
+from tests.vm_embedded.live.running import DEMO, counts, running
 from vm_embedded import Orientation
 from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cameras.synthetic import Motion, SyntheticCamera
-from vm_embedded.live.control import ask
 
 CHECKOUT = Path(__file__).parents[1]
 EXAMPLES = CHECKOUT / "docs" / "examples"
@@ -83,12 +81,12 @@ def test_poses_over_udp(tmp_path):
             try:
                 found.wait_for_state("ok")
                 found.wait(lambda: sum(len(each["detections"]) for each in found.frames) > 5)
-                counts = read_message(ask(tmp_path / "control", "status"))["counts"]
+                counted = counts(tmp_path)
             finally:
                 sending.kill()
         found.stop()
-    assert counts["poses"] > 10
-    assert counts["poses_bad"] == 0
+    assert counted["poses"] > 10
+    assert counted["poses_bad"] == 0
     off = [
         np.linalg.norm(ball["position"] - Motion().ball(each["t"]))
         for each in found.frames

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.drawn_scenes import IMAGES
+from tests.folders import contents
 from tests.programs import run_program
 from tests.vm_calibrate.test_kalibr import CAMCHAIN
 from tests.vm_embedded.cameras.ros.rolling_ball import Scene
@@ -78,10 +79,6 @@ def folder(tmp_path_factory):
     (made / "report").mkdir()
     (made / "report" / "field.csv").write_text("0000\n")
     return made
-
-
-def contents(folder):
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.mark.long

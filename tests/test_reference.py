@@ -1,26 +1,21 @@
 """The reference's golden answers, through the commands that a user types."""
 
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
 from tests.messages import read_message
+from tests.programs import run_program
 
-COMMANDS = Path(sys.executable).parent
 SAME_POINTS = (0, 1, 3, 7, 8, 9, 11, 12, 13, 14)
 RECEPTIVE_STEPS = 13
 """Convolutions of the reference's network: how far a differing point can reach."""
 
 
 def run(*command):
-    done = subprocess.run([str(COMMANDS / command[0]), *map(str, command[1:])], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return run_program(*command).stdout
 
 
 @pytest.fixture(scope="module")

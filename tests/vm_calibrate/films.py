@@ -1,12 +1,13 @@
 """Pictures of boards, drawn by following each pixel's ray through a lens to the board."""
 
 import math
-from functools import cache
+from functools import cache, cached_property, partial
 
 import cv2
 import numpy as np
 import pytest
 
+from tests.programs import run_main
 from tests.vm_embedded.strategies import rotation
 from vm_calibrate.boards import board_from
 from vm_calibrate.cli import main
@@ -15,6 +16,8 @@ from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 
 SIZE = (640, 480)
+
+run = partial(run_main, main)
 
 LENSES = {
     "pinhole": BrownLens(
@@ -71,11 +74,15 @@ class Film:
     def __init__(self, lens):
         self.lens = lens
         self.random = np.random.default_rng(0)
+
+    @cached_property
+    def rays(self):
+        """A ray (3,) for each quarter of a pixel, 0 where the lens sees nothing; takes up to six seconds."""
         x, y = ((np.arange(2 * n) - 0.5) / 2.0 for n in SIZE)
         pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        rays = lens.unproject(pixels, SIZE)
-        rays[~(np.isfinite(rays).all(axis=1) & lens.sees(rays))] = 0.0
-        self.rays = rays.astype(np.float32)
+        rays = self.lens.unproject(pixels, SIZE)
+        rays[~(np.isfinite(rays).all(axis=1) & self.lens.sees(rays))] = 0.0
+        return rays.astype(np.float32)
 
     def picture(self, turn, place, texture, blur=0.6, noise=2.0):
         """A gray picture of a board whose frame has rotation `turn` (3, 3) and origin `place` (3,) for the camera.
@@ -136,7 +143,7 @@ class Film:
 
 @cache
 def film(kind):
-    """The film of a kind of lens: its rays take a second or more."""
+    """The film of a kind of lens, one for all tests of a process."""
     return Film(LENSES[kind])
 
 
@@ -146,11 +153,3 @@ def write(folder, pictures):
     for index, picture in enumerate(pictures):
         cv2.imwrite(str(folder / f"{index:03d}.png"), picture)
     return folder
-
-
-def run(capsys, *arguments, code=0):
-    """What a command prints: standard output, or standard error if it fails."""
-    assert main([str(each) for each in arguments]) == code
-    done = capsys.readouterr()
-    assert "Traceback" not in done.err
-    return done.err if code else done.out

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.programs import BIN, run_program
+from tests.programs import run_program
 from tests.vm_export.checkpoints import checkpoint, manifest
 from tests.vm_export.test_reference import reference_file
 from vm_embedded.network.manifest import EDGES, ObjectClass
@@ -177,6 +177,6 @@ def test_a_portable_file_that_can_not_be_written_leaves_no_half_of_the_work(tmp_
     ],
 )
 def test_a_file_must_have_the_suffix_of_its_content(tmp_path, arguments, message):
-    done = subprocess.run([BIN / "vm-export", *arguments], capture_output=True, text=True, cwd=tmp_path, check=False)
-    assert (done.returncode, done.stderr) == (1, f"vm-export: {message}\n")
+    done = run_program("vm-export", *arguments, code=1, cwd=tmp_path)
+    assert done.stderr == f"vm-export: {message}\n"
     assert not list(tmp_path.iterdir())

@@ -9,6 +9,8 @@ from contextlib import contextmanager
 import cv2
 import numpy as np
 
+from tests.preloaded import run_preloaded
+
 COMMAND = [sys.executable, "-m", "vm_label"]
 SIZE = 160, 120
 
@@ -35,7 +37,7 @@ def make_folder(folder, count, near=True, classes=("ball",)):
 
 
 def run(*arguments, code=0, **more):
-    done = subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=60, **more)
+    done = run_preloaded(["-m", "vm_label", *arguments], **more)
     assert done.returncode == code, (done.returncode, done.stderr)
     assert "Traceback" not in done.stderr
     return done

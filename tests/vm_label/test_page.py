@@ -1,10 +1,10 @@
 """The labeling page in a real browser, without a screen."""
 
 import random
-import time
 
 import pytest
 
+from tests.waiting import wait
 from vm_label.answers import read_answers
 from vm_label.box_folder import read_box_folder
 from vm_label.crops import most_doubtful_first
@@ -12,13 +12,6 @@ from vm_label.crops import most_doubtful_first
 from .made import make_folder, run, serving
 
 KEYS = {"yes": "y", "no": "n", "skip": "s"}
-
-
-def wait(what, seconds=60.0):
-    deadline = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
 
 
 class Page:

@@ -4,25 +4,21 @@ import json
 import re
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from tests.programs import run_main
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_mesh.cli import main
 
 DEMO = Path(__file__).parents[1] / "fixtures/demo"
 LENS, IMAGE = DEMO / "lens0000000.yaml", DEMO / "image0000000.jpg"
 SMALL = ("--max-distance", "3", "--intersections", "3")
-
-
-def run(capsys, *arguments, code=0):
-    assert main([str(each) for each in arguments]) == code
-    done = capsys.readouterr()
-    assert "Traceback" not in done.err
-    return done.err if code else done.out
+run = partial(run_main, main)
 
 
 def test_help_and_unknown_commands_as_a_process():

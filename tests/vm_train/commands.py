@@ -6,6 +6,9 @@ import subprocess
 import sys
 import time
 
+from tests.preloaded import LEARNING, run_preloaded
+from tests.programs import heed_interrupts
+
 COMMAND = [sys.executable, "-m", "vm_train"]
 SMALL = """
 [mesh]
@@ -33,13 +36,7 @@ def run(*arguments, code=0):
 
 def run_module(module, *arguments, code=0):
     """Run python -m MODULE and check its exit status."""
-    done = subprocess.run(
-        [sys.executable, "-m", module, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=240,
-        env=environment(),
-    )
+    done = run_preloaded(["-m", module, *arguments], LEARNING, env=environment())
     assert done.returncode == code, done.stderr
     assert "Traceback" not in done.stderr
     return done
@@ -54,7 +51,7 @@ def run_and_stop(how, folder, file, steps, *arguments):
         text=True,
         env=environment(),
         start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        preexec_fn=heed_interrupts,
     )
     wait_for_steps(folder / file, steps, process)
     process.send_signal(how)

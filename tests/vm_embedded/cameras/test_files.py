@@ -1,6 +1,5 @@
 """Video files that are played as a camera would deliver them."""
 
-import subprocess
 import time
 
 import cv2
@@ -8,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.messages import read_message
+from tests.preloaded import run_preloaded
 from tests.vm_embedded.live.running import COMMAND, DEMO, LENS, arguments, running
 from vm_embedded.cameras import image_files
 from vm_embedded.cameras.camera import CameraSettings
@@ -55,7 +55,7 @@ def video(tmp_path):
 
 def test_attack_2_a_video_of_large_frames_is_refused(video, tmp_path):
     options = (video, "--camera-max-megapixels", "0.1", "--fov", "70deg", "--height", "0.6")
-    done = subprocess.run([COMMAND, *options], capture_output=True, text=True, timeout=60, check=False)
+    done = run_preloaded([COMMAND, *options])
     assert done.returncode == 1
     assert done.stdout == ""
     assert f"{video} has 640 x 512 px" in done.stderr
@@ -79,7 +79,7 @@ def test_files_may_be_played_as_a_camera_gives_them_and_end(tmp_path):
     lens = ("--lens", DEMO / "lens0000000.yaml", "--height", "0.6")
     options = ("--camera", DEMO, "--live", "--camera-fps", "20", *lens)
     started = time.monotonic()
-    done = subprocess.run(arguments(tmp_path, *options), capture_output=True, text=True, timeout=60, check=False)
+    done = run_preloaded(arguments(tmp_path, *options))
     assert done.returncode == 0, done.stderr
     assert time.monotonic() - started > 12 / 20
     frames = [read_message(line) for line in done.stdout.splitlines()]

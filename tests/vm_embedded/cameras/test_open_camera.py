@@ -1,11 +1,11 @@
 """Which names are live cameras, and which can never work."""
 
 import os
-import subprocess
 from contextlib import contextmanager
 
 import pytest
 
+from tests.preloaded import run_preloaded
 from tests.vm_embedded.live.running import COMMAND
 from vm_embedded.cameras import opencv
 from vm_embedded.cameras.camera import CameraSettings
@@ -53,7 +53,7 @@ LONG = 300 * "x"
     ],
 )
 def test_a_name_that_is_too_long_is_one_line(options, status, says):
-    done = subprocess.run([COMMAND, *options], capture_output=True, text=True, timeout=60, check=False)
+    done = run_preloaded([COMMAND, *options])
     assert done.returncode == status
     assert says in done.stderr
     assert done.stderr.count("\n") == 1

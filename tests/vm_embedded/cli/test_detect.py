@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.drawn_scenes import IMAGES, MODEL
+from tests.programs import heed_interrupts
 from vm_embedded.cli.detect import parser
 from vm_embedded.detection.settings import Settings
 
@@ -94,9 +95,6 @@ def test_an_interrupt_ends_it_with_130(folder):
         shutil.copy(IMAGES[0], folder / f"image{number}.jpg")
         shutil.copy(folder / "lens0000000.yaml", folder / f"lens{number}.yaml")
     command = [str(COMMAND), "--camera", str(folder), "--model", str(MODEL)]
-
-    def heed_interrupts():  # a shell's background jobs ignore them, and so would their children
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with subprocess.Popen(command, preexec_fn=heed_interrupts, **pipes) as process:

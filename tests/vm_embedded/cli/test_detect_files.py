@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from tests.drawn_scenes import FOLDER, IMAGES, MODEL, TRUTH
+from tests.folders import contents
 from tests.programs import heed_permissions, limit_files
 from vm_embedded.output.video_file import VideoFile
 
@@ -20,10 +21,6 @@ from .commands import COMMAND, detect, lines, one_complaint, run
 
 DEMO = Path(__file__).parents[2] / "fixtures" / "demo" / "image0000002.jpg"
 STAGES = ["mesh", "project", "sample", "infer", "cluster", "field", "total"]
-
-
-def contents(folder):
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def film(path, count, rate=10.0):

@@ -3,10 +3,10 @@
 import json
 import os
 import socket
-import subprocess
 
 import pytest
 
+from tests.preloaded import run_preloaded
 from tests.programs import BIN
 from tests.vm_embedded.live.running import arguments, running
 from vm_embedded.cli.finding import BAD, GOOD, WARNING
@@ -20,7 +20,7 @@ CAMERA = ("--camera", "http://127.0.0.1:9/", "--fov", "70deg", "--height", 0.8)
 
 
 def run(*command):
-    return subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=120, check=False)
+    return run_preloaded([*map(str, command)])
 
 
 def doctor(tmp_path, *options):

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import vm_embedded
+from tests.preloaded import run_preloaded
 from vm_embedded.cli.program import program
 from vm_embedded.config.toml_reader import parse_toml
 
@@ -19,13 +20,12 @@ PROGRAMS = sorted(parse_toml((TOP / "pyproject.toml").read_text())["project"]["s
 
 
 def run(program, *arguments, **more):
-    command = [str(BIN / program), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **more)
+    return run_preloaded([BIN / program, *arguments], **more)
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_a_program_prints_its_version(program):
-    done = run(program, "--version")
+    done = subprocess.run([BIN / program, "--version"], capture_output=True, text=True, timeout=120, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, f"{program} {vm_embedded.__version__}\n", "")
 
 

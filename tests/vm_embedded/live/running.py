@@ -10,7 +10,8 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-from tests.messages import checked
+from tests.messages import checked, read_message
+from vm_embedded.live.control import ask
 
 COMMAND = Path(sys.executable).parent / "vm-detect"
 DEMO = Path(__file__).parents[2] / "fixtures" / "demo"
@@ -80,6 +81,11 @@ class Running:
 def arguments(tmp_path, *options):
     """A command line whose sockets are in a folder of the test."""
     return [str(COMMAND), "--status-socket", str(tmp_path / "control"), "--max-distance", "6", *map(str, options)]
+
+
+def counts(tmp_path):
+    """What a detector counts that runs with these arguments."""
+    return read_message(ask(tmp_path / "control", "status"))["counts"]
 
 
 @contextmanager

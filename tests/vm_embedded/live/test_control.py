@@ -10,6 +10,7 @@ import subprocess
 import pytest
 
 from tests.messages import read_message
+from tests.preloaded import run_preloaded
 from tests.vm_embedded.live.running import COMMAND, arguments, running
 from vm_embedded.errors import InputError
 from vm_embedded.live.control import ControlServer, ask, control_path
@@ -63,7 +64,7 @@ def test_asking_what_is_no_detector_ends(tmp_path):
         other.bind(str(path))
         other.listen()
         command = [COMMAND, "--status", "--status-socket", path]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+        done = run_preloaded(command)
     assert done.returncode == 1
     assert "no detector replies" in done.stderr
 

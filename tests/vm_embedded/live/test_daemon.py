@@ -4,22 +4,16 @@ import os
 import signal
 import socket
 import stat
-import subprocess
 import time
 
 import numpy as np
 import pytest
 
 from tests.messages import read_message
-from tests.vm_embedded.live.running import DEMO, arguments, running
+from tests.preloaded import run_preloaded
+from tests.vm_embedded.live.running import DEMO, arguments, counts, running
 from vm_embedded.cameras.synthetic import Motion
-from vm_embedded.live.control import ask
 from vm_embedded.network.bundled import model_path
-
-
-def counts(tmp_path):
-    """What the running detector counts."""
-    return read_message(ask(tmp_path / "control", "status"))["counts"]
 
 
 def test_a_drawn_camera_is_watched_and_its_ball_is_where_it_is(tmp_path):
@@ -88,7 +82,7 @@ def test_a_camera_that_is_not_there_yet_is_waited_for(tmp_path):
         found.wait_for_state("camera_lost")
         found.wait(lambda: any(each.get("reason", "").startswith("there is no camera") for each in found.messages))
         found.wait(lambda: counts(tmp_path)["reconnects"] > 2)
-        asked = subprocess.run(arguments(tmp_path, "--status"), capture_output=True, text=True, timeout=60, check=False)
+        asked = run_preloaded(arguments(tmp_path, "--status"))
         assert asked.returncode == 1
         assert read_message(asked.stdout)["state"] == "camera_lost"
         assert found.stop()[0] == 0

@@ -4,11 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.messages import read_message
-from tests.vm_embedded.live.running import running
+from tests.vm_embedded.live.running import counts, running
 from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cameras.synthetic import SyntheticCamera
-from vm_embedded.live.control import ask
 
 LENS = '[lens]\nprojection = "rectilinear"\nfocal_length = 224\nfov = 1.75\n[orientation]\nheight = 0.8\npitch = 0.4\n'
 
@@ -32,10 +30,10 @@ def test_a_detector_five_times_slower_than_its_camera_works_on_the_newest_frame(
     slow = ("--object-radius", 0.008, "--output-file", tmp_path / "lines", "--camera-loop", "--live")
     with running(tmp_path, "--config", tmp_path / "vm.toml", "--camera", video, *slow) as found:
         found.wait(lambda: len(found.frames) > 40)
-        counts = read_message(ask(tmp_path / "control", "status"))["counts"]
+        counted = counts(tmp_path)
         found.stop()
-    assert counts["grabbed"] > 5 * counts["frames"]
-    assert counts["skipped"] > 4 * counts["frames"]
+    assert counted["grabbed"] > 5 * counted["frames"]
+    assert counted["skipped"] > 4 * counted["frames"]
     frames = found.frames[10:]
     assert (np.diff([each["t"] for each in frames]) > 0).all()
     # When its turn came, a frame had waited for less than two others to come: the detector never falls behind.

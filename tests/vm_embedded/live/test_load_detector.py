@@ -9,6 +9,8 @@ import subprocess
 
 import pytest
 
+from tests.preloaded import run_preloaded
+from tests.programs import run_program
 from tests.vm_embedded.live.running import COMMAND, DEMO, arguments, running
 from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cameras.fault import FaultScript
@@ -53,7 +55,7 @@ def test_an_option_that_can_never_work_is_wrong_usage(tmp_path):
 
 
 def check_refusal(folder, options, status, says):
-    done = subprocess.run(arguments(folder, *options), capture_output=True, text=True, timeout=60, check=False)
+    done = run_preloaded(arguments(folder, *options))
     assert done.returncode == status, (options, done.stderr)
     assert says in done.stderr
     assert "Traceback" not in done.stderr
@@ -81,34 +83,32 @@ def test_the_printed_configuration_can_be_put_into_any_folder(tmp_path):
     (tmp_path / "lens.yaml").write_text(f"{lens}Hoc: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.7], [0, 0, 0, 1]]\n")
     (tmp_path / "vm.toml").write_text('model = "own.onnx"\nlens = "lens.yaml"\n')
     command = [COMMAND, "--config", "vm.toml", "--print-config"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True, cwd=tmp_path)
+    done = run_program(*command, cwd=tmp_path)
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "vm.toml").write_text(done.stdout)
     found, expected = (read_configuration(folder / "vm.toml") for folder in (tmp_path / "elsewhere", tmp_path))
     assert (found.model, found.lens.lens) == (expected.model, expected.lens.lens)
     assert found.fixed_orientation().height == 0.7
-    alone = subprocess.run([COMMAND, "--print-config"], capture_output=True, text=True, timeout=60, check=True).stdout
+    alone = run_program(COMMAND, "--print-config").stdout
     (tmp_path / "vm.toml").write_text(alone)
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True, cwd=tmp_path)
+    done = run_program(*command, cwd=tmp_path)
     assert done.stdout == alone
 
 
 def test_the_printed_configuration_is_one_and_says_what_the_defaults_are(tmp_path):
     path = tmp_path / "vm.toml"
-    printed = subprocess.run([COMMAND, "--print-config"], capture_output=True, text=True, timeout=60, check=True).stdout
+    printed = run_program(COMMAND, "--print-config").stdout
     path.write_text(printed)
     again = [COMMAND, "--config", path, "--print-config"]
-    assert subprocess.run(again, capture_output=True, text=True, timeout=60, check=True).stdout.count(
-        "\n"
-    ) == printed.count("\n")
+    assert run_program(*again).stdout.count("\n") == printed.count("\n")
     checked = [COMMAND, "--config", path, "--check-config", "--camera", "synthetic"]
-    assert "self-test passed" in subprocess.run(checked, capture_output=True, text=True, timeout=60, check=True).stdout
+    assert "self-test passed" in run_program(*checked).stdout
     for camera, fault in (
         ("synthetik", "no such image"),
         ("rstp://a/b", "unknown protocol 'rstp'"),
         (tmp_path, "no images"),
     ):
-        done = subprocess.run([*checked[:-1], str(camera)], capture_output=True, text=True, timeout=60, check=False)
+        done = run_preloaded([*checked[:-1], str(camera)])
         assert (done.returncode, fault in done.stderr) == (1, True), done.stderr
 
 
@@ -123,7 +123,7 @@ def test_an_object_that_is_too_large_for_the_camera_s_height_is_refused(tmp_path
 @pytest.mark.parametrize("format", ["rgb", "bgra", "rgba"])
 def test_a_pixel_format_that_no_camera_delivers_is_refused(tmp_path, format):
     command = arguments(tmp_path, "--live", "--check-config", "--camera", DEMO, "--format", format)
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = run_preloaded(command)
     assert done.returncode == 1
     assert f"--format {format} is only for frames passed in from Python; frames of files and cameras are bgr, gray" in (
         done.stderr
@@ -133,7 +133,7 @@ def test_a_pixel_format_that_no_camera_delivers_is_refused(tmp_path, format):
 @pytest.mark.long
 def test_an_address_that_the_network_may_get_later_asks_for_a_restart(tmp_path):
     command = arguments(tmp_path, "--camera", "synthetic", "--status-page", "192.0.2.1:8080")
-    done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+    done = run_preloaded(command)
     assert done.returncode == 75
     assert done.stderr.count("waiting for the network") == 1
     assert "can't start" in done.stderr
@@ -159,7 +159,7 @@ def test_a_running_detector_is_asked_although_its_vm_toml_has_got_an_error(tmp_p
     with running(tmp_path, "--camera", "synthetic") as found:
         found.wait_for_state("ok")
         command = [COMMAND, "--config", tmp_path / "vm.toml", "--status"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        done = run_preloaded(command)
     assert done.returncode == 0
     assert json.loads(done.stdout)["state"] == "ok"
     assert "did you mean 'fps'" in done.stderr

@@ -11,9 +11,8 @@ import pytest
 
 from tests.messages import read_message
 from tests.vm_embedded.cameras.test_mjpeg import LENS
-from tests.vm_embedded.live.running import running
+from tests.vm_embedded.live.running import counts, running
 from tests.vm_embedded.poses.test_stream import MOTION, free_port, pose_line
-from vm_embedded.live.control import ask
 from vm_embedded.live.log import EventLog
 
 DESCRIPTORS = 200
@@ -49,14 +48,14 @@ def test_attack_6_hundreds_of_silent_connections_do_no_harm(name, tmp_path):
         found.wait(lambda: found.states)
         sender = connected(addresses["poses"], stack)
         sender.sendall(pose_line(MOTION, time.monotonic()))
-        found.wait(lambda: read_message(ask(tmp_path / "control", "status"))["counts"]["poses"] == 1)
+        found.wait(lambda: counts(tmp_path)["poses"] == 1)
         for _ in range(2 * DESCRIPTORS):
             connected(addresses[name], stack)
         # The sender from before is still connected, a new one is let in, and the status answers.
         late = connected(addresses["poses"], stack)
         for connection in (sender, late):
             connection.sendall(pose_line(MOTION, time.monotonic()))
-        found.wait(lambda: read_message(ask(tmp_path / "control", "status"))["counts"]["poses"] == 3)
+        found.wait(lambda: counts(tmp_path)["poses"] == 3)
         page = connected(addresses["page"], stack)
         page.sendall(b"GET /state HTTP/1.0\r\n\r\n")
         page.settimeout(20.0)

@@ -2,7 +2,6 @@
 
 import re
 import socket
-import time
 from pathlib import Path
 from urllib.request import Request, urlopen
 
@@ -11,6 +10,7 @@ import pytest
 from tests.soak.faults import QUICK
 from tests.vm_embedded.live.running import running
 from tests.vm_embedded.live.test_faults import script
+from tests.waiting import wait
 
 DAEMON = Path(__file__).parents[3] / "docs" / "daemon.md"
 
@@ -23,13 +23,6 @@ const pixels = context.getImageData(0, 0, 64, 48).data;
 return picture.naturalWidth + ":" + pixels.reduce((sum, each) => (sum * 31 + each) % 1000003, 7);
 """
 """A number that tells the shown picture from others, after its width."""
-
-
-def wait(what, seconds=60.0):
-    deadline = time.monotonic() + seconds
-    while not what():
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
 
 
 def free_address():

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from tests.messages import read_message
-from tests.vm_embedded.live.running import running
+from tests.vm_embedded.live.running import counts, running
 from vm_embedded.errors import InputError
 from vm_embedded.live.control import ask
 from vm_embedded.output.channels import OutputSettings
@@ -34,11 +34,7 @@ def test_many_read_the_socket_and_one_that_sleeps_holds_nobody_up(tmp_path):
             assert {one["frame"] for one in each if "frame" in one} & {
                 one["frame"] for one in lines[0] if "frame" in one
             }
-        found.wait(
-            lambda: (
-                read_message(ask(tmp_path / "control", "status"))["counts"]["dropped"] > 0 or heard[0].readline() == ""
-            )
-        )
+        found.wait(lambda: counts(tmp_path)["dropped"] > 0 or heard[0].readline() == "")
         for each in (*heard, *readers, sleeper):
             each.close()
         found.stop()

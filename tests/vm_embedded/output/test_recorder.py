@@ -2,13 +2,14 @@
 
 import shutil
 import signal
-import subprocess
 import time
 
 import pytest
 
 from tests.drawn_scenes import MODEL
 from tests.messages import read_message
+from tests.preloaded import run_preloaded
+from tests.programs import run_program
 from tests.vm_embedded.live.running import COMMAND, arguments, running
 from vm_embedded.output.recordings import delete_oldest_recordings, locked
 
@@ -19,7 +20,7 @@ def test_a_recording_is_detected_in_again_bit_by_bit(tmp_path):
     options = ("--camera", "synthetic", "--recorder-folder", kept, "--recorder-seconds", 0.5)
     with running(tmp_path, *options) as found:
         found.wait(lambda: len(found.frames) > 20)
-        done = subprocess.run(arguments(tmp_path, "--record"), capture_output=True, text=True, timeout=60, check=True)
+        done = run_program(*arguments(tmp_path, "--record"))
         assert "frames to" in done.stdout
         found.wait(lambda: [each for each in found.events if each["event"] == "recorded"])
         found.stop()
@@ -27,7 +28,7 @@ def test_a_recording_is_detected_in_again_bit_by_bit(tmp_path):
     recorded = [read_message(line) for line in (folder / "recording.jsonl").read_text().splitlines()]
     assert len(recorded) > 3
     assert '\nmodel = "ball"\n' in (folder / "vm.toml").read_text()  # on another machine, it is elsewhere
-    done = subprocess.run([COMMAND, "--camera", folder], capture_output=True, text=True, timeout=60, check=True)
+    done = run_program(COMMAND, "--camera", folder)
     again = [read_message(line) for line in done.stdout.splitlines()]
     assert [each["detections"] for each in again] == [each["detections"] for each in recorded]
     assert any(each["detections"] for each in again)
@@ -69,13 +70,13 @@ def count_promised(done):
 
 
 def ask_to_record(tmp_path):
-    return subprocess.run(arguments(tmp_path, "--record"), capture_output=True, text=True, timeout=60, check=False)
+    return run_preloaded(arguments(tmp_path, "--record"))
 
 
 def count_found(folder):
     """The number of frames of a recording that vm-detect reads, each with detections like those in its messages."""
     recorded = [read_message(line) for line in (folder / "recording.jsonl").read_text().splitlines()]
-    done = subprocess.run([COMMAND, "--camera", folder], capture_output=True, text=True, timeout=120, check=True)
+    done = run_program(COMMAND, "--camera", folder)
     found = [read_message(line)["detections"] for line in done.stdout.splitlines()]
     assert found[: len(recorded)] == [each["detections"] for each in recorded]
     return len(recorded)

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from tests.messages import read_message
-from tests.vm_embedded.live.running import arguments, running
+from tests.preloaded import run_preloaded
+from tests.vm_embedded.live.running import arguments, counts, running
 from tests.vm_embedded.poses.test_parsing import quaternion
 from vm_embedded.cameras.synthetic import Motion
-from vm_embedded.live.control import ask
 from vm_embedded.poses import stream
 from vm_embedded.poses.settings import PoseSettings
 
@@ -101,9 +101,9 @@ def test_poses_that_stop_are_stale_and_nothing_is_reported(tmp_path):
             sender.on = False
             sender.join()
         found.wait_for_state("pose_stale")
-        before = len(found.frames)
+        before = counts(tmp_path)["frames"]  # which messages on their way can't change
         time.sleep(0.5)
-        assert len(found.frames) == before
+        assert counts(tmp_path)["frames"] == before
         found.stop()
 
 
@@ -147,17 +147,13 @@ def test_ten_thousand_bad_poses_change_nothing(tmp_path):
     with running(tmp_path, "--camera", "synthetic", "--pose-source", f"udp:127.0.0.1:{port}") as found:
         found.wait_for_state("pose_stale")
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
-
-            def bad():
-                return read_message(ask(tmp_path / "control", "status"))["counts"]["poses_bad"]
-
             sent = 0
             while sent < 10000:
                 for _ in range(50):
                     sending.sendto(spoilt(), ("127.0.0.1", port))
                     sent += 1
                 time.sleep(0.01)
-            found.wait(lambda: bad() > 5000)
+            found.wait(lambda: counts(tmp_path)["poses_bad"] > 5000)
             sender = Sender(lambda line: sending.sendto(line, ("127.0.0.1", port)), Motion())
             sender.start()
             found.wait_for_state("ok")
@@ -170,7 +166,7 @@ def test_what_the_line_of_a_pose_lacks_is_said_in_the_state(tmp_path):
     port = free_port()
     with running(tmp_path, "--camera", "synthetic", "--pose-source", f"udp:127.0.0.1:{port}") as found:
         found.wait_for_state("pose_stale")
-        asked = subprocess.run(arguments(tmp_path, "--status"), capture_output=True, text=True, timeout=60, check=False)
+        asked = run_preloaded(arguments(tmp_path, "--status"))
         assert read_message(asked.stdout)["reason"] == "no pose received yet"
         found.stop()
 
@@ -197,10 +193,10 @@ def test_attack_12_a_pose_in_the_future_is_refused_and_blocks_no_good_one(tmp_pa
         found.wait_for_state("ok")
         for ahead in (0.1, 0.5, 0.9):
             sending.sendto(pose_line(MOTION, time.monotonic() + ahead), ("127.0.0.1", port))
-        found.wait(lambda: json.loads(ask(tmp_path / "control", "status"))["counts"]["poses_bad"] >= 3)
-        before, accepted = len(found.frames), json.loads(ask(tmp_path / "control", "status"))["counts"]["poses"]
+        found.wait(lambda: counts(tmp_path)["poses_bad"] >= 3)
+        before, accepted = len(found.frames), counts(tmp_path)["poses"]
         found.wait(lambda: len(found.frames) > before + 5)
-        assert json.loads(ask(tmp_path / "control", "status"))["counts"]["poses"] > accepted
+        assert counts(tmp_path)["poses"] > accepted
 
         def says_why():
             sending.sendto(pose_line(MOTION, time.monotonic() + 0.5), ("127.0.0.1", port))
@@ -244,7 +240,7 @@ def test_a_client_that_floods_the_pose_socket_stops_nothing(flood, tmp_path):
             found.wait(lambda: len(found.frames) > 10)
             before = len(found.frames)
             found.wait(lambda: len(found.frames) > before + 10)
-            assert read_message(ask(tmp_path / "control", "status"))["counts"]["frames"] > before
+            assert counts(tmp_path)["frames"] > before
             assert found.stop()[0] == 0
             sender.on = False
             sender.join()
@@ -265,11 +261,8 @@ def test_a_datagram_of_many_lines_is_cut_off(tmp_path):
             sending.sendto(30000 * b"x\n", ("127.0.0.1", port))
             sending.sendto(pose_line(Motion(), time.monotonic()), ("127.0.0.1", port))
 
-        def counted():
-            return read_message(ask(tmp_path / "control", "status"))["counts"]
-
-        found.wait(lambda: counted()["poses"] == 1)
-        assert counted()["poses_bad"] == 64 + 64 + 1
+        found.wait(lambda: counts(tmp_path)["poses"] == 1)
+        assert counts(tmp_path)["poses_bad"] == 64 + 64 + 1
         found.stop()
 
 

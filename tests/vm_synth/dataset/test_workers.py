@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import vm_synth
+from tests.folders import contents
 from vm_embedded.errors import InputError
 from vm_synth.dataset.files import PARTS, file_of, indices_in
 from vm_synth.render.mitsuba import load_mitsuba
@@ -61,10 +62,6 @@ def started(command):
         start_new_session=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-
-
-def contents(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from vm_synth.scene.configuration import TargetRanges, ThingRanges
 from .drawn import DEFAULT, FLOOR, scenes
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def crowded():
     """Scenes with much around, on fields and on photographed floors."""
     configuration = replace(

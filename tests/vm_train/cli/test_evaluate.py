@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import cv2
 import pytest
 
-from tests.programs import BIN, run_program
+from tests.programs import BIN, heed_interrupts, run_program
 from tests.vm_export.looks import look_checkpoint
 from vm_export.change_model import change_looks
 from vm_export.checkpoint import Checkpoint
@@ -276,9 +276,6 @@ def test_an_interrupt_ends_it_with_130_and_writes_nothing(data, tmp_path):
         for number in range(1, 4000):
             (folder / f"{part}{number:04d}.{suffix}").hardlink_to(folder / f"{part}0000.{suffix}")
     command = [str(BIN / "vm-evaluate"), str(MODEL), str(folder), "-o", str(tmp_path / "out"), "--workers", "2"]
-
-    def heed_interrupts():  # a shell's background jobs ignore them, and so would their children
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     with subprocess.Popen(
         command, preexec_fn=heed_interrupts, start_new_session=True, stderr=subprocess.PIPE, text=True

@@ -12,21 +12,16 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-import torch
 
 from tests.vm_train.commands import COMMAND, environment, run, run_and_stop, wait_for_steps
+from tests.vm_train.weights import same, weights_of
 from vm_export.checkpoint import Checkpoint
 from vm_train.learning.folder_access import locked
 from vm_train.learning.log import read_log
 
 
-def weights(path):
-    return Checkpoint.load(path).network.state_dict()
-
-
-def same(first, second):
-    one, other = weights(first), weights(second)
-    return one.keys() == other.keys() and all(torch.equal(one[name], other[name]) for name in one)
+def same_network(first, second):
+    return same(weights_of(first), weights_of(second))
 
 
 def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, data):
@@ -102,8 +97,8 @@ def test_its_network_is_exported_with_its_provenance(whole, tmp_path):
 @pytest.mark.long
 def test_the_same_command_gives_the_same_weights(whole, data, configuration, tmp_path):
     run(data, "-o", tmp_path / "run", "--config", configuration, "--workers", 0, "--threads", 1, "--no-unpacked")
-    assert same(tmp_path / "run" / "model.pt", whole[0] / "model.pt")
-    assert same(tmp_path / "run" / "round2.pt", whole[0] / "round2.pt")
+    assert same_network(tmp_path / "run" / "model.pt", whole[0] / "model.pt")
+    assert same_network(tmp_path / "run" / "round2.pt", whole[0] / "round2.pt")
 
 
 @pytest.mark.parametrize(
@@ -120,7 +115,7 @@ def test_what_is_stopped_at_any_moment_ends_with_the_same_weights(how, steps, wh
     run_and_stop(how, folder, "log.jsonl", steps, data, "--config", configuration, "--workers", 1, "--threads", 1)
     run("resume", folder, "--workers", 1, "--threads", 1)
     for name in ("model.pt", "round1.pt", "round2.pt"):
-        assert same(folder / name, whole[0] / name)
+        assert same_network(folder / name, whole[0] / name)
     assert (folder / "log.jsonl").read_text() == (whole[0] / "log.jsonl").read_text()
 
 
@@ -212,7 +207,7 @@ def test_a_training_goes_on_where_its_folders_were_moved_to(whole, data, tmp_pat
     (folder / "state.pt").unlink()
     moved = Path(shutil.copytree(data, tmp_path / "moved"))
     run("resume", folder, "--data", moved, "--workers", 1, "--threads", 1)
-    assert same(folder / "model.pt", whole[0] / "model.pt")
+    assert same_network(folder / "model.pt", whole[0] / "model.pt")
     assert not (folder / "unpacked").exists()
 
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from tests.folders import contents
 from vm_embedded import read_lens_file
 from vm_embedded.errors import InputError
 from vm_train.data.pictures import find_pictures
@@ -53,10 +54,6 @@ def test_numbers_go_on_over_all_files(tmp_path):
     assert imported(files, tmp_path / "out").count == 4
     numbers = [int(each.number) for each in find_pictures(tmp_path / "out")]
     assert numbers == [0, 1, 2, 3]
-
-
-def contents(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
 class Stop(Exception):

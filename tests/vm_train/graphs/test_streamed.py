@@ -10,10 +10,10 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
 
 import pytest
-import torch
 
 from tests.vm_train.commands import SMALL
 from tests.vm_train.drawn import CLASSES, draw_set
+from tests.vm_train.weights import same
 from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError
 from vm_export.checkpoint import Checkpoint
@@ -72,10 +72,6 @@ def trained(training, stops=None):
         training = read_run(training.folder)
     assert train(training, here, lambda: False).finished
     return Checkpoint.load(training.model_path).network.state_dict()
-
-
-def same(first, second):
-    return all(torch.equal(first[name], second[name]) for name in first)
 
 
 def rewritten(path, change):

@@ -10,6 +10,7 @@ import torch
 from tests.vm_export.checkpoints import manifest
 from tests.vm_train.commands import run
 from tests.vm_train.drawn import CLASSES
+from tests.vm_train.weights import weights_of
 from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import SHIPPED, model_path
@@ -33,10 +34,6 @@ def first(data, configuration, tmp_path_factory):
     return folder / "model.pt"
 
 
-def weights(path):
-    return Checkpoint.load(path).network.state_dict()
-
-
 @pytest.mark.long
 def test_with_a_tiny_rate_the_network_stays_the_same_from_a_checkpoint_and_from_its_model_file(first, data, tmp_path):
     export(Checkpoint.load(first), tmp_path / "model.onnx", "runs")
@@ -45,7 +42,7 @@ def test_with_a_tiny_rate_the_network_stays_the_same_from_a_checkpoint_and_from_
     for start in (first, tmp_path / "model.onnx"):
         folder = tmp_path / start.suffix.removeprefix(".")
         run(data, "-o", folder, "--from", start, "--config", tables, *ONE_EPOCH, *STILL)
-        made, before = weights(folder / "model.pt"), weights(first)
+        made, before = weights_of(folder / "model.pt"), weights_of(first)
         assert made.keys() == before.keys()
         differences = [float((made[name] - before[name]).abs().max()) for name in before if "layers.2" not in name]
         assert max(differences) < 1e-5
@@ -69,7 +66,7 @@ def test_a_stopped_training_goes_on_from_the_copy_to_the_same_bytes(first, data,
     start.unlink()
     run("resume", stopped, "--workers", 0, "--threads", 1)
     assert (stopped / "model.pt").read_bytes() == (tmp_path / "whole" / "model.pt").read_bytes()
-    made, before = weights(stopped / "model.pt"), weights(first)
+    made, before = weights_of(stopped / "model.pt"), weights_of(first)
     assert any(not torch.equal(made[name], before[name]) for name in made)
 
     changed = Checkpoint.load(stopped / "start.pt")

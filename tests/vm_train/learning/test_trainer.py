@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from tests.vm_train.weights import same
 from vm_embedded.errors import InputError
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape
@@ -65,10 +66,6 @@ def run(made, until=None, rank=0, size=1):
 
 def weights(made):
     return {name: value.clone() for name, value in made.network.state_dict().items()}
-
-
-def same(first, second):
-    return all(torch.equal(first[name], second[name]) for name in first)
 
 
 def test_graphs_together_answer_as_they_do_alone():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from tests.vm_train.weights import same
 from vm_embedded.errors import InputError
 from vm_export.look_network import LookNetwork, LookShape
 from vm_train.learning.trainer import read_state
@@ -40,10 +41,6 @@ def trainer(patches=None, recipe=RECIPE, total=40):
 
 def weights(made):
     return {name: value.clone() for name, value in made.network.state_dict().items()}
-
-
-def same(first, second):
-    return all(torch.equal(first[name], second[name]) for name in first)
 
 
 def test_it_learns_presence_and_place():
