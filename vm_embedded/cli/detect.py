@@ -225,7 +225,8 @@ def _check_configuration(given: Configuration) -> int:
         if finding.state == BAD:
             raise InputError(f"{finding.about}: {finding.seen}")
     model, proved = asyncio.run(prove_model(given))
-    print(f"{given.model}: {len(model.manifest.classes)} classes, {proved}; the configuration is good")
+    missing = "" if given.camera.source else ", but names no camera: set [camera] source, or give --camera"
+    print(f"{given.model}: {len(model.manifest.classes)} classes, {proved}; the configuration is good{missing}")
     return EXIT_OK
 
 
