@@ -162,9 +162,11 @@ class _DefaultPose:
             file = read_lens_file(beside)
             lens, orientation = file.lens, file.orientation or orientation
         if lens is None:
-            place = lens_place(frame.path)
+            place, options = lens_place(frame.path), "no lens: give --lens or --fov"
+            if frame.path is None:
+                raise InputError(options)
             beside_it = "lensNAME.yaml beside imageNAME" if place is None else f"{place.name} beside it"
-            raise InputError(f"no lens: give --lens or --fov, or put {beside_it}")
+            raise InputError(f"{options}, or put {beside_it}")
         if orientation is None:
             raise InputError("no orientation: give --height (and --pitch, --roll), or Hoc in the lens file")
         return lens, orientation
