@@ -66,7 +66,12 @@ def read_balls(path: Path, radius: float | None, label: str | None, size: Size |
     of names, or by its number without one; None takes all boxes. size [px]: of the pictures, for a JSON file. Raises
     InputError with the file and the entry.
     """
-    if radius is not None and not 0.0 < radius < 10.0:
+    if radius is not None and radius > 1.0:
+        raise InputError(
+            f"--radius must be a length in meters, at most 1, not {radius:g}; {radius:g} cm are {radius / 100:g}, "
+            f"{radius:g} mm are {radius / 1000:g}"
+        )
+    if radius is not None and not radius > 0.0:
         raise InputError(f"--radius must be a length above 0 m, as in 0.11, not {radius:g}")
     if path.is_dir():
         if radius is None:

@@ -22,7 +22,7 @@ def first_pose(places: Floats, rays: Floats) -> tuple[Floats, Floats]:
     equations = np.vstack([np.hstack(row) for row in rows])
     if not np.isfinite(equations).all():
         raise InputError("a corner lies where the lens sees nothing")
-    homography = np.linalg.svd(equations)[2][-1].reshape(3, 3)
+    homography = np.linalg.svd(equations, full_matrices=False)[2][-1].reshape(3, 3)
     if ((flat @ homography.T) * rays).sum() < 0.0:
         homography = -homography
     length = (np.linalg.norm(homography[:, 0]) + np.linalg.norm(homography[:, 1])) / 2.0

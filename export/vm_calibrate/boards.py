@@ -126,9 +126,9 @@ def board_from(
         raise InputError(unknown("--charuco dictionary", dictionary, DICTIONARIES))
     if marker is None:
         raise InputError("a ChArUco board needs --marker, the length of a marker's side [m]")
-    _check_length("--marker", marker)
     if marker >= square:
         raise InputError(f"--marker {marker:g} must be below --square {square:g}: markers lie inside of squares")
+    _check_length("--marker", marker)
     board = CharucoBoard(columns, rows, square, marker, name, legacy)
     needed, held = columns * rows // 2, len(board.markers.bytesList)
     if needed > held:
@@ -159,5 +159,9 @@ def _refined(gray: Image, pixels: Floats, reach: float) -> Floats:
 
 
 def _check_length(name: str, value: float) -> None:
-    if not 0.0 < value < 100.0:
+    if value > 1.0:
+        raise InputError(
+            f"{name} must be a length in meters, at most 1, not {value:g}; {value:g} mm are {value / 1000:g}"
+        )
+    if not value > 0.0:
         raise InputError(f"{name} must be a length above 0 m, as in 0.03, not {value:g}")

@@ -94,10 +94,13 @@ def _board(options: argparse.Namespace, square: float | None) -> Board:
 
 def _fit(kind: str, sightings: list[Sighting], size: Size) -> LensFit:
     """The fitted lens of a kind; for `auto` the better one of pinhole and fisheye. Raises InputError."""
+    count = len(sightings)
     if kind != "auto":
+        _tell(f"fitting a lens of kind {kind} to {count} frames")
         return fit_lens(kind, sightings, size)
     fits, problems = [], []
     for each in ("pinhole", "fisheye"):
+        _tell(f"fitting a lens of kind {each} to {count} frames")
         try:
             fits.append(fit_lens(each, sightings, size))
         except InputError as error:
@@ -141,6 +144,11 @@ def _write(path: Path, lens: Lens, orientation: Orientation | None, lines: list[
     write_file(path, head + format_lens_file(lens, orientation))
     print("\n".join(lines))
     print(f"{path}: written")
+
+
+def _tell(progress: str) -> None:
+    """Say what takes the next seconds, or a minute on a slow machine."""
+    print(f"vm-calibrate: {progress}", file=sys.stderr)
 
 
 def _warn(warnings: list[str]) -> None:

@@ -60,6 +60,7 @@ def test_the_command_line_knows_the_kinds_of_lenses():
         (("9x2",), "--board must be COLUMNSxROWS of at least 3 each"),
         (("9x6", "--square", "0"), "--square must be a length above 0 m"),
         (("9x6", "--square", "nan"), "--square must be a length above 0 m"),
+        (("9x6", "--square", "30"), "--square must be a length in meters, at most 1, not 30; 30 mm are 0.03"),
         (("9x6", "--marker", "0.02"), "--marker and --legacy belong to a ChArUco board"),
         (("9x6", "--charuco", "4X4_50"), "a ChArUco board needs --square and --marker"),
         (("9x6", "--square", "1", "--charuco", "4X4_50"), "a ChArUco board needs --marker"),

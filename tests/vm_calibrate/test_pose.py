@@ -252,6 +252,19 @@ def test_a_wrong_file_of_balls_is_one_line(content, problem, tmp_path, capsys):
     assert not (tmp_path / "lens.yaml").exists()
 
 
+@pytest.mark.parametrize(
+    ("radius", "problem"),
+    [
+        (0.0, "must be a length above 0 m"),
+        (math.nan, "must be a length above 0 m"),
+        (11.0, "must be a length in meters, at most 1, not 11; 11 cm are 0.11, 11 mm are 0.011"),
+    ],
+)
+def test_a_wrong_radius_is_explained(radius, problem, tmp_path):
+    with pytest.raises(InputError, match=problem):
+        read_balls(tmp_path, radius, None, (640, 480))
+
+
 def test_the_label_chooses_the_balls_of_a_json_file(tmp_path):
     ball = {"cx": 1, "cy": 2, "r_px": 3, "radius": 0.1}
     path = tmp_path / "balls.json"

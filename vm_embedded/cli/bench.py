@@ -124,7 +124,7 @@ def _run(options: argparse.Namespace) -> int:
         write_file(options.json, text + "\n")
     if options.tune is not None:
         write_entries(options.tune, "detector", found["tuned"])
-        chosen = ", ".join(f"{name} = {value}" for name, value in found["tuned"].items())
+        chosen = ", ".join(f"{name} = {json.dumps(value)}" for name, value in found["tuned"].items())
         print(f"{options.tune}: {chosen}", file=sys.stderr if _prints_json(options) else sys.stdout)
     return EXIT_OK
 

@@ -27,4 +27,7 @@ def check_configuration(configuration: Configuration, with_ros: bool) -> str:
         if finding.state == BAD:
             raise InputError(f"{finding.about}: {finding.seen}")
     model, proved = asyncio.run(prove_model(configuration))
-    return f"{configuration.model}: {len(model.manifest.classes)} classes, {proved}; the configuration is good"
+    good = f"{configuration.model}: {len(model.manifest.classes)} classes, {proved}; the configuration is good"
+    if configuration.camera.source:
+        return good
+    return f"{good}, but names no camera: set [camera] source, or give --camera"

@@ -32,9 +32,12 @@ class DefaultPose:
             file = read_lens_file(beside)
             lens, orientation = file.lens, file.orientation or orientation
         if lens is None:
+            options = "no lens: give --lens or --fov"
+            if frame.path is None:
+                raise InputError(options)
             place = lens_place(frame.path)
             beside_it = "lensNAME.yaml beside imageNAME" if place is None else f"{place.name} beside it"
-            raise InputError(f"no lens: give --lens or --fov, or put {beside_it}")
+            raise InputError(f"{options}, or put {beside_it}")
         if orientation is None:
             raise InputError("no orientation: give --height (and --pitch, --roll), or Hoc in the lens file")
         return lens, orientation

@@ -105,9 +105,9 @@ def format_lens_file(lens: Lens, orientation: Orientation | None) -> str:
             lines.append(f"size: {_listed(lens.size)}")
     elif isinstance(lens, CalibratedLens):
         (fx, fy), (cx, cy) = lens.focal_lengths, lens.optical_center
-        fisheye = isinstance(lens, FisheyeLens)
+        brown = "plumb_bob" if len(lens.coefficients) <= 5 else "rational_polynomial"
         lines = [
-            f"distortion_model: {'equidistant' if fisheye else 'rational_polynomial'}",
+            f"distortion_model: {'equidistant' if isinstance(lens, FisheyeLens) else brown}",
             f"camera_matrix: {_listed((fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0))}",
             f"distortion_coefficients: {_listed(lens.coefficients)}",
         ]

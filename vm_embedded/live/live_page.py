@@ -102,7 +102,7 @@ class LivePage:
 
 
 def _text(text: str) -> Response:
-    return Response("text/plain; charset=utf-8", text.encode())
+    return Response("text/plain; charset=utf-8", f"{text}\n".encode())
 
 
 def _describe_pose(orientation: Orientation, source: str) -> Message:

@@ -70,8 +70,6 @@ class BoxWriter:
             raise InputError(f"--save-boxes {folder}: the folder is not empty; give a new one, to keep its labels")
         self._folder, self._classes = folder, classes
         self._names = FrameNames("image")  # so that the lens file belongs to the image
-        write_file(folder / CLASSES, "".join(f"{name}\n" for name in classes))
-        write_file(folder / CANDIDATES, b"")
 
     def write(self, frame: Frame, image: Image, lens: Lens, orientation: Orientation, detections: Detections) -> Path:
         """Write the files of a frame, and return the path of its image.
@@ -80,6 +78,8 @@ class BoxWriter:
         candidates. Raises InputError.
         """
         name, boxes = self._names.of(frame), candidate_boxes(detections, (image.shape[1], image.shape[0]))
+        if not (self._folder / CLASSES).exists():  # not earlier: if no frame can be processed, the folder stays empty
+            write_file(self._folder / CLASSES, "".join(f"{name}\n" for name in self._classes))
         path = self._folder / f"{name}{'.png' if frame.path is None else frame.path.suffix}"
         write_file(path, encode_png(image) if frame.path is None else _content_of(frame.path))
         lens_file = format_lens_file(lens, orientation)

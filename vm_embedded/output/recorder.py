@@ -136,7 +136,7 @@ class Recorder:
         except RuntimeError as error:  # the system gives no thread
             part.rmdir()
             raise InputError(f"can't write a recording: {error}") from error
-        return f"recording {len(moments)} frames to {folder}"
+        return f"recording {len(moments)} frame{'s' if len(moments) > 1 else ''} to {folder}"
 
     def _write(self, folder: Path, part: Path, moments: Sequence[Moment], files: Mapping[str, bytes]) -> None:
         """Write a recording into the folder `part`, which gets the name `folder` at the end.

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Image
-from vm_workstation.contact_sheet import FAINT_INK, GAP, INK, LINE, PAPER, scaled_pixels, write_text
+from vm_workstation.contact_sheet import FAINT_INK, GAP, INK, LINE, PAPER, Color, scaled_pixels, write_text
 
 from .box import Box, BoxedPicture
 from .checked_boxes import is_cut
@@ -23,7 +23,8 @@ _CELL, _COLUMNS = 112, 16
 _AROUND = 2.0
 """Width and height of a crop, as a multiple of the box's longer side."""
 
-_OUTLINE = (0, 220, 255)  # BGR
+_OUTLINE, _UNLABELED = (0, 220, 255), (60, 60, 255)
+"""Colors of boxes, and of places without a box that look like an object (BGR)."""
 
 Place = tuple[BoxedPicture, Box]
 
@@ -42,12 +43,14 @@ def unusual_first(pictures: Sequence[BoxedPicture], name: str) -> list[Place]:
     return [places[index] for index in np.argsort(-oddness, kind="stable")]
 
 
-def box_sheet(places: Sequence[Place], folder: Path) -> Image:
+def box_sheet(places: Sequence[Place], folder: Path, unlabeled: Sequence[Place] = ()) -> Image:
     """A sheet (h, w, 3) BGR with a crop around each box, its outline, its picture below the folder, and its size.
 
-    places: at least one. Raises InputError if an image can't be read.
+    places: at least one. unlabeled: places without a box that look like an object; they follow, in red. Raises
+    InputError if an image can't be read.
     """
-    cells = [cell for _, cell in sorted(_cells(places, folder), key=lambda each: each[0])]
+    found = _cells([*places, *unlabeled], folder, [_OUTLINE] * len(places) + [_UNLABELED] * len(unlabeled))
+    cells = [cell for _, cell in sorted(found, key=lambda each: each[0])]
     empty = np.full_like(cells[0], PAPER[0])
     columns = min(_COLUMNS, len(cells))
     cells += [empty] * (-len(cells) % columns)
@@ -55,7 +58,7 @@ def box_sheet(places: Sequence[Place], folder: Path) -> Image:
     return np.vstack(rows)
 
 
-def _cells(places: Sequence[Place], folder: Path) -> Iterator[tuple[int, Image]]:
+def _cells(places: Sequence[Place], folder: Path, colors: Sequence[Color]) -> Iterator[tuple[int, Image]]:
     """The position and the cell of each box; each image is read once."""
     order = sorted(range(len(places)), key=lambda index: places[index][0].image)
     path, image = None, np.empty((0, 0, 3), dtype=np.uint8)
@@ -64,7 +67,7 @@ def _cells(places: Sequence[Place], folder: Path) -> Iterator[tuple[int, Image]]
         if picture.image != path:
             path, image = picture.image, read_upright(picture.image)
         lines = (str(picture.image.relative_to(folder).with_suffix("")), f"{box.width:.0f} x {box.height:.0f} px")
-        yield index, _cell(_crop(image, box), lines)
+        yield index, _cell(_crop(image, box, colors[index]), lines)
 
 
 def _cell(crop: Image, lines: tuple[str, str]) -> Image:
@@ -77,7 +80,7 @@ def _cell(crop: Image, lines: tuple[str, str]) -> Image:
     return cell
 
 
-def _crop(image: Image, box: Box) -> Image:
+def _crop(image: Image, box: Box, color: Color) -> Image:
     """A square around a box, scaled to the size of a cell, with the box's outline; gray outside of the image."""
     side = max(round(_AROUND * max(box.width, box.height)), 8)
     x, y = np.round(box.center + 0.5 - side / 2.0).tolist()
@@ -86,7 +89,7 @@ def _crop(image: Image, box: Box) -> Image:
     crop = cv2.resize(cutout, (_CELL, _CELL), interpolation=cv2.INTER_AREA if side > _CELL else cv2.INTER_LINEAR)
     edges = np.array([[box.left, box.top], [box.right, box.bottom]])
     (left, top), (right, bottom) = np.round(scaled_pixels(edges, (x, y), _CELL / side)).astype(int).tolist()
-    cv2.rectangle(crop, (left, top), (right, bottom), _OUTLINE, 1)
+    cv2.rectangle(crop, (left, top), (right, bottom), color, 1)
     return np.asarray(crop, dtype=np.uint8)
 
 

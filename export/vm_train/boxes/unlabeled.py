@@ -1,4 +1,4 @@
-"""Objects that a detector sees clearly where no box is: probably nobody drew one."""
+"""Objects that a detector sees clearly where no box is: nobody drew one, or another thing looks like the object."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Sighting:
     probability: float
 
 
-def unlabeled(pictures: Sequence[BoxedPicture], sightings: Iterable[Sighting]) -> list[Sighting]:
+def without_box(pictures: Sequence[BoxedPicture], sightings: Iterable[Sighting]) -> list[Sighting]:
     """The sightings that overlap no box of their class, the most probable first.
 
     Of sightings that overlap each other, only the most probable one is left. Sightings in images that are not among the
@@ -40,7 +40,7 @@ def describe(sighting: Sighting, folder: Path) -> str:
     box = sighting.box
     x, y = box.center
     return (
-        f"{sighting.image.relative_to(folder)}: probably an unlabeled {box.name} at x {x:.0f}, y {y:.0f}, "
+        f"{sighting.image.relative_to(folder)}: without a box, but looks like a {box.name}: x {x:.0f}, y {y:.0f}, "
         f"{box.width:.0f} x {box.height:.0f} px (probability {sighting.probability:.3f})"
     )
 

@@ -27,7 +27,7 @@ from ..boxes.box import BoxedSet
 from ..boxes.read import files_in, read_boxes
 from ..boxes.sheet import box_sheet, unusual_first
 from ..boxes.summary import classes_of, name_faults, summary_lines
-from ..boxes.unlabeled import describe, unlabeled
+from ..boxes.unlabeled import Sighting, describe, without_box
 from .box_options import add_box_options, parse_names
 
 EXIT_FAULTS = 1
@@ -93,21 +93,22 @@ def run_check_boxes(options: argparse.Namespace) -> int:
         check_sheet_path(options.sheet)
     objects, round_names = _objects(network)
     found = read_boxes(options.data, options.format, parse_names(options.names), round_names)
-    faults = [*found.faults, *name_faults(found, objects)]
-    if not options.no_look:
-        faults += _unlabeled(found, network, bool(round_names), options.data)
+    unlabeled = [] if options.no_look else _unlabeled(found, network, bool(round_names))
+    faults = [*found.faults, *name_faults(found, objects), *(describe(each, options.data) for each in unlabeled)]
     print("\n".join(summary_lines(found)))
     if options.json is not None:
         write_file(options.json, json.dumps(_as_json(found, faults), indent=1) + "\n")
     for line in shortened(faults, _NAMED, "; vm-train check --boxes --json FILE lists all"):
         print(f"vm-train: {line}", file=sys.stderr)
+    if unlabeled:
+        print(_advice(len(unlabeled), options.sheet), file=sys.stderr)
     if options.sheet is not None:
-        _write_sheet(options, found, objects)
+        _write_sheet(options, found, objects, unlabeled)
     return EXIT_FAULTS if faults else EXIT_OK
 
 
-def _unlabeled(found: BoxedSet, network: Path, is_round: bool, folder: Path) -> list[str]:
-    """A line for each object that the network's close look sees clearly where no box is. Raises ModelError."""
+def _unlabeled(found: BoxedSet, network: Path, is_round: bool) -> list[Sighting]:
+    """The objects that the network's close look sees clearly where no box is. Raises ModelError."""
     from ..tuning.sightings import clear_sightings
 
     if network.suffix.lower() != ".onnx":
@@ -120,7 +121,14 @@ def _unlabeled(found: BoxedSet, network: Path, is_round: bool, folder: Path) -> 
         sightings = list(clear_sightings(look, found.pictures, is_round, bar.advance))
     finally:
         bar.clear()
-    return [describe(each, folder) for each in unlabeled(found.pictures, sightings)]
+    return without_box(found.pictures, sightings)
+
+
+def _advice(count: int, sheet: Path | None) -> str:
+    """What to do about places without a box that look like an object."""
+    where = "look at them with --sheet FILE" if sheet is None else f"{sheet} shows them in red"
+    places = "1 place looks" if count == 1 else f"{count} places look"
+    return f"vm-train: {places} like an object without a box; {where}; only real objects need one, lamps do not"
 
 
 def _objects(network: Path) -> tuple[list[str], list[str]]:
@@ -132,13 +140,19 @@ def _objects(network: Path) -> tuple[list[str], list[str]]:
     return objects, objects if manifest.shape == "sphere" else []
 
 
-def _write_sheet(options: argparse.Namespace, found: BoxedSet, objects: Sequence[str]) -> None:
+def _write_sheet(
+    options: argparse.Namespace, found: BoxedSet, objects: Sequence[str], unlabeled: Sequence[Sighting]
+) -> None:
     places = [place for name in objects for place in unusual_first(found.pictures, name)]
-    chosen = places[: options.count or _ON_SHEET]
+    most = options.count or _ON_SHEET
+    chosen = places[:most]
     if not chosen:
         raise InputError(f"can't draw {options.sheet}: there is no box of class {' or '.join(objects)}")
-    write_sheet(options.sheet, box_sheet(chosen, options.data))
-    print(f"{options.sheet}: {len(chosen)} of {len(places)} boxes of {', '.join(objects)}")
+    pictures = {each.image: each for each in found.pictures}
+    red = [(pictures[each.image], each.box) for each in unlabeled[:most]]
+    write_sheet(options.sheet, box_sheet(chosen, options.data, red))
+    also = f"; {len(red)} of {len(unlabeled)} places without a box, in red" if red else ""
+    print(f"{options.sheet}: {len(chosen)} of {len(places)} boxes of {', '.join(objects)}{also}")
 
 
 def _as_json(found: BoxedSet, faults: Sequence[str]) -> dict[str, Any]:

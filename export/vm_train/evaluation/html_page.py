@@ -13,7 +13,8 @@ p.note { background: #fff6dd; border-left: 4px solid #e0b030; padding: 0.5em 0.8
 .cards { display: flex; flex-wrap: wrap; gap: 0.7em; margin: 1em 0 }
 .card { border: 1px solid #ddd; border-radius: 6px; padding: 0.5em 0.9em; min-width: 7.5em }
 .card b { display: block; font-size: 1.45em } .card span { color: #666; font-size: 0.87em }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 0.92em }
+table { display: block; max-width: 100%; overflow-x: auto; border-collapse: collapse }
+table { font-variant-numeric: tabular-nums; font-size: 0.92em }
 th, td { padding: 0.2em 0.75em; text-align: right; border-bottom: 1px solid #e8e8e8 }
 td { white-space: nowrap } .facts td { white-space: normal; overflow-wrap: anywhere }
 th:first-child, td:first-child, .facts td { text-align: left } th { color: #555; font-weight: 600 }

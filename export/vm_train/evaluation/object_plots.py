@@ -103,7 +103,9 @@ def distance_errors(objects: Objects) -> Figure:
         signed.fill_between(middles, low, high, color=color, alpha=0.18, linewidth=0, label="10 to 90 %")
         signed.vlines(middles, low, high, color=color, alpha=0.4, linewidth=1.0)  # a single bin has no filled band
         relative.plot(middles, 100.0 * median, color=color, marker=".", linewidth=1.3, label=f"{name}: median")
-        relative.plot(middles, 100.0 * p90, color=color, linestyle="--", linewidth=1.2, label=f"{name}: 90 %")
+        relative.plot(
+            middles, 100.0 * p90, color=color, marker=".", linestyle="--", linewidth=1.2, label=f"{name}: 90 %"
+        )
     for axes, label in ((signed, "found minus true distance [m]"), (relative, "absolute error [% of the distance]")):
         distance_axis(axes, next(iter(objects.values())).distance_edges)
         axes.set_ylabel(label)

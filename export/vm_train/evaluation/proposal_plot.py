@@ -34,7 +34,9 @@ def proposal_recalls(proposals: Mapping[str, ProposalScores], objects: Mapping[s
         overlap = objects[name].overlaps[0]
         rankings = [objects[name].ranking(overlap, number) for number in range(len(middles))]
         found = [each.at().recall if each.truths >= FEWEST else math.nan for each in rankings]
-        over_distance.plot(middles, found, color="#555555", linestyle=":", label=f"{name}: found, IoU {overlap:g}")
+        over_distance.plot(
+            middles, found, color="#555555", marker=".", linestyle=":", label=f"{name}: found, IoU {overlap:g}"
+        )
         distance_axis(over_distance, edges)
         for axes, measure in zip(others, _LABELS, strict=True):
             bins = scores.recalls_by(measure)

@@ -89,5 +89,6 @@ def _check(run: LookRun, part: PatchSet, name: str) -> None:
         found = "none" if not part.objects else "all"
         raise InputError(
             f"{found} of the {len(part)} patches for {name} show the object {run.object_class}: the close look needs "
-            f"both; check {run.data} with vm-train check, and that {run.model} proposes objects in it"
+            f"both; give more pictures if they are few, or check {run.data} with vm-train check, and that {run.model} "
+            "proposes objects in it"
         )

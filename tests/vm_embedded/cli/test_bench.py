@@ -53,6 +53,7 @@ def test_tuned_settings_are_written_and_read_by_vm_detect(tmp_path):
     path = tmp_path / "vm.toml"
     path.write_text('# ours\nmodel = "ball.onnx"\n\n[detector]\nthreads = 7 # too many\nmax_proposals = 9\n')
     out = run("--model", MODEL, "--frames", 300, "--up-to", 1, "--size", "320x240", "--tune", path).stdout
+    assert f"{path}: threads = 1, spinning = false, pitch_step = " in out
     assert "pitch_step" in out
     settings = read_configuration(path).detector
     assert (settings.threads, settings.max_proposals) == (1, 9)

@@ -60,6 +60,18 @@ def test_settings_out_of_range_are_named():
     one_complaint(detect(IMAGES[0], "--format", "RGB", code=2), "--format", "did you mean 'rgb'?", "bayer_rggb")
 
 
+@pytest.mark.parametrize(
+    ("camera", "end"),
+    [
+        ((), "is good, but names no camera: set [camera] source, or give --camera"),
+        (("--camera", "synthetic"), "the configuration is good"),
+    ],
+)
+def test_a_good_configuration_without_a_camera_says_so(camera, end, tmp_path):
+    (tmp_path / "vm.toml").write_text("")
+    assert run("--config", tmp_path / "vm.toml", *camera, "--check-config").stdout.endswith(end + "\n")
+
+
 def test_every_setting_is_an_option():
     options = {option for action in parser()._actions for option in action.option_strings}
     assert {"--" + each.name.replace("_", "-") for each in fields(Settings)} <= options

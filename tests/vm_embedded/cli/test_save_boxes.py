@@ -101,6 +101,15 @@ def test_images_with_one_name_stay_apart(tmp_path, lens):
     assert len(list((tmp_path / "boxes").glob("lens*.yaml"))) == 3
 
 
+def test_a_call_without_a_lens_can_be_repeated_with_one(tmp_path):
+    shutil.copy(IMAGES[0], tmp_path / "photo.jpg")
+    command = (tmp_path / "photo.jpg", "--save-boxes", tmp_path / "boxes")
+    one_complaint(detect(*command, code=1), "no lens: give --lens or --fov")
+    assert not any((tmp_path / "boxes").iterdir())
+    detect(*command, "--fov", "70deg", "--height", 0.8)
+    assert (tmp_path / "boxes" / "classes.txt").read_text() == "ball\n"
+
+
 def test_labels_are_never_overwritten(tmp_path):
     (tmp_path / "boxes").mkdir()
     (tmp_path / "boxes" / "image0000000.txt").write_text("0 0.5 0.5 0.1 0.1\n")

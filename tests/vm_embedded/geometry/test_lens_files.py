@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
-from vm_embedded.geometry.lens_files import lens_from_calibration, lens_from_table, read_lens_file
+from vm_embedded.geometry.lens_files import format_lens_file, lens_from_calibration, lens_from_table, read_lens_file
 from vm_embedded.geometry.radial_lenses import PROJECTIONS, Equidistant, Equisolid, Rectilinear
 
 from ..strategies import attempt
@@ -144,6 +144,20 @@ def test_a_camera_info_is_read(write, model, coefficients, kind):
     fov = math.radians(160.0) if kind is BrownLens else 2.0 * math.pi
     assert file.lens == kind(**MATRIX, coefficients=coefficients, fov=fov)
     assert file.orientation is None
+
+
+@pytest.mark.parametrize(
+    ("model", "lens"),
+    [
+        ("plumb_bob", BrownLens(**MATRIX, coefficients=PLUMB_BOB, fov=2.0)),
+        ("rational_polynomial", BrownLens(**MATRIX, coefficients=RATIONAL, fov=2.0)),
+        ("equidistant", FisheyeLens(**MATRIX, coefficients=FISHEYE, fov=2.0)),
+    ],
+)
+def test_a_written_lens_has_the_name_of_ros_for_its_model(write, model, lens):
+    text = format_lens_file(lens, None)
+    assert f"distortion_model: {model}\n" in text
+    assert read_lens_file(write(text)).lens.coefficients == lens.coefficients
 
 
 def test_a_camera_info_message_is_read(write):

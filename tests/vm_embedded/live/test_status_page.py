@@ -100,9 +100,11 @@ def test_the_addresses_of_the_documentation_answer(tmp_path):
             request = Request(f"http://{where}{address}", method=method, headers={"X-Token": token})
             with urlopen(request, timeout=60.0) as answer:
                 assert answer.status == 200
-                content = answer.read(100)
+                content = answer.read(300)
             if address in ("/state", "/map"):
                 assert content.startswith(b'{"'), address
+            if method == "POST":
+                assert content.endswith(b"\n"), address  # so that a shell's prompt begins a line
         found.stop()
 
 

@@ -44,3 +44,14 @@ def test_the_sheet_is_full_rows_of_cells(tmp_path):
     places = unusual_first(found.pictures, "ball")
     one, all_of_them = box_sheet(places[:1], tmp_path), box_sheet(places, tmp_path)
     assert all_of_them.shape == (2 * one.shape[0], 16 * one.shape[1], 3)
+
+
+def test_places_without_a_box_follow_in_red(tmp_path):
+    write_yolo(tmp_path, {"a": [("ball", 40.0, 40.0, 60.0, 60.0)]})
+    cv2.imwrite(str(tmp_path / "a.jpg"), np.zeros((120, 160, 3), dtype=np.uint8))
+    (picture,) = read_boxes(tmp_path).pictures
+    place = (picture, picture.boxes[0])
+    sheet = box_sheet([place], tmp_path, [place])
+    first, second = np.hsplit(sheet, 2)
+    np.testing.assert_array_equal(first, box_sheet([place], tmp_path))
+    np.testing.assert_array_equal(second[28, 28], (60, 60, 255))

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from vm_train.boxes.box import Box, BoxedPicture
-from vm_train.boxes.unlabeled import Sighting, describe, unlabeled
+from vm_train.boxes.unlabeled import Sighting, describe, without_box
 
 FOLDER = Path("/frames")
 
@@ -27,9 +27,9 @@ def test_sightings_without_a_box_of_their_class_are_told_once():
         seen("c.jpg", 0.9),
         seen("elsewhere.jpg", 0.9),
     ]
-    found = unlabeled(pictures, sightings)
+    found = without_box(pictures, sightings)
     assert found == [sightings[3], sightings[1], sightings[4]]
-    assert unlabeled(pictures, reversed(sightings)) == found
+    assert without_box(pictures, reversed(sightings)) == found
     assert describe(found[0], FOLDER) == (
-        "sub/b.jpg: probably an unlabeled ball at x 32, y 40, 20 x 20 px (probability 0.970)"
+        "sub/b.jpg: without a box, but looks like a ball: x 32, y 40, 20 x 20 px (probability 0.970)"
     )

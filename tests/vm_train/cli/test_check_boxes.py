@@ -114,10 +114,18 @@ def test_a_clear_ball_without_a_box_is_told(tmp_path):
         (line for line in map(json.loads, (saved / "candidates.jsonl").read_text().splitlines()) if line["found"]),
         key=lambda line: line["confidence"],
     )
-    start = f"vm-train: {clearest['image']}: probably an unlabeled ball at "
+    start = f"vm-train: {clearest['image']}: without a box, but looks like a ball: "
     assert run("check", saved, "--boxes").stderr == ""
     (saved / clearest["image"]).with_suffix(".txt").write_text("")
-    told = [line for line in run("check", saved, "--boxes", code=1).stderr.splitlines() if line.startswith(start)]
-    assert len(told) == 1
-    assert re.search(r"\(probability 0\.9\d+\)$", told[0])
+    sheet = tmp_path / "sheet.jpg"
+    done = run("check", saved, "--boxes", "--sheet", sheet, code=1)
+    *_, told, advice = done.stderr.splitlines()
+    assert told.startswith(start)
+    assert done.stderr.count(start) == 1
+    assert re.search(r"\(probability 0\.9\d+\)$", told)
+    assert advice == (
+        f"vm-train: 1 place looks like an object without a box; {sheet} shows them in red; only real objects need one, "
+        "lamps do not"
+    )
+    assert done.stdout.endswith("; 1 of 1 places without a box, in red\n")
     assert run("check", saved, "--boxes", "--no-look").stderr == ""

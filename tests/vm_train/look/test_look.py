@@ -257,6 +257,7 @@ def test_pictures_without_the_object_end_in_one_line(drawn, tiny, tmp_path):
     arguments = ["--from", "ball-small", "--config", tiny, "--workers", 1]
     done = run("look", folder, "-o", tmp_path / "run", *arguments, code=1)
     assert re.search(r"none of the \d+ patches for training show the object ball", done.stderr)
+    assert "give more pictures if they are few" in done.stderr
 
 
 def test_masks_of_other_colors_end_with_advice(look, tmp_path):
