@@ -77,12 +77,13 @@ class Answerer:
             self._counters.outcomes.failed += 1
             self._health.add_trouble(time.monotonic(), one_line(error))
             return None
-        if self._refuse_late(shot):
+        took = time.perf_counter() - started
+        if self._refuse_late(shot, took):
             return None
         self._report_height(orientation, detections)
         now = time.monotonic()
         self._health.add_answer(now, now - shot.arrived)
-        self._counters.add_answer(detections, time.perf_counter() - started, now - shot.captured)
+        self._counters.add_answer(detections, took, now - shot.captured)
         return Answer(shot, lens, orientation, detections, now)
 
     def prepare(self, answer: Answer) -> None:
@@ -90,13 +91,16 @@ class Answerer:
         height, width = answer.shot.image.shape[:2]
         self.detector.prepare_nearby(answer.orientation, answer.lens, (width, height))
 
-    def _refuse_late(self, shot: Shot) -> bool:
-        """Count and report a shot that is too old. Return whether it is."""
+    def _refuse_late(self, shot: Shot, took: float = 0.0) -> bool:
+        """Count and report a shot that is too old. Return whether it is. took: time of its detection so far [s]."""
         age, limit = time.monotonic() - shot.captured, self.configuration.camera.max_age_ms
         if age <= 1e-3 * limit:
             return False
         self._counters.outcomes.late += 1
-        self._health.add_trouble(time.monotonic(), f"frame is {1e3 * age:.0f} ms old, allowed are {limit:g} ms")
+        reason = f"frame is {1e3 * age:.0f} ms old, allowed are {limit:g} ms"
+        if took > 0.5 * age:
+            reason += f"; its detection took {1e3 * took:.0f} ms: use a faster network or a lower max_distance"
+        self._health.add_trouble(time.monotonic(), reason)
         return True
 
     def _report_height(self, orientation: Orientation, detections: Detections) -> None:

@@ -89,6 +89,12 @@ def test_a_camera_that_is_not_there_yet_is_waited_for(tmp_path):
     assert found.frames == []
 
 
+def test_frames_that_are_late_because_of_their_detection_say_what_to_change(tmp_path):
+    with running(tmp_path, "--camera", "synthetic", "--model", "soccer", "--camera-max-age-ms", 5) as found:
+        found.wait(lambda: any("its detection took" in each.get("reason", "") for each in found.messages))
+        found.stop()
+
+
 def test_hangup_reads_the_configuration_again_and_keeps_the_old_one_if_it_is_bad(tmp_path):
     path = tmp_path / "vm.toml"
     path.write_text('[camera]\nsource = "synthetic"\n[detector]\nthreshold = 0.5\n')
