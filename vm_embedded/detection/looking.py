@@ -21,7 +21,7 @@ from .judging import repeated
 from .observation import Observation
 from .patches import Tangents, apparent_radii, cut_patches, patch_nodes
 from .prepared_view import PreparedView
-from .proposals import propose_places
+from .proposals import best_apart, propose_places
 from .settings import Settings
 from .stopwatch import Stopwatch
 
@@ -60,7 +60,7 @@ _EARLIER = 0.3
 _SUREST = 1.0 - 1e-6
 """Limit of a probability: one that is rounded to 1 would outvote all others in a mean, and pass a threshold of 1."""
 
-_NEAR = 0.3
+NEAR = 0.3
 """Places within this share of an object's radius around its center were meant to be its center."""
 
 _LARGEST_SIZE = 3.0
@@ -98,6 +98,9 @@ class Places(Protocol):
     def radii(self, rows: Chosen) -> Floats:
         """Radii (k,) that the objects expected there would have in the picture [px]."""
 
+    def near(self, rows: Chosen) -> Mask:
+        """Which of the places (k,) are so near each other (k, k) that they show one object; each is near itself."""
+
     def move(self, rows: Chosen, right: Floats, down: Floats) -> Mask:
         """Move places by shifts (k,) in expected radii. Returns which of them (k,) may hold an object there."""
 
@@ -126,6 +129,11 @@ class PlanePlaces:
     def radii(self, rows: Chosen) -> Floats:
         """See Places."""
         return apparent_radii(self._observation.view, self._planes(rows))
+
+    def near(self, rows: Chosen) -> Mask:
+        """See Places."""
+        centers = self.centers[rows]
+        return _near(self._observation.view, centers, centers)
 
     def move(self, rows: Chosen, right: Floats, down: Floats) -> Mask:
         """See Places. A place that moves to the horizon or above it can't hold an object."""
@@ -199,8 +207,10 @@ def look_at(places: Places, look: Look) -> Singles:
     """Look at n places, as often as the contracts of look and glance say, and move them to where an object was seen.
 
     In its last pass, if there are several, a doubtful place gets a second opinion. If that is the third or a later one,
-    its probability is a mean with the one before, unless that is the answer of the first of several networks. Returns
-    the last answers (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError if a network does not run.
+    its probability is a mean with the one before, unless that is the answer of the first of several networks. A wide
+    look judges only the most probable of the places that show the same object; the others keep their answers, but are
+    not more probable. Returns the last answers (n, 4) to each place, as `CloseLook.run` gives them. Raises ModelError
+    if a network does not run.
     """
     # Each pass has its network: first those of the glance, then those of the look.
     chain = chain_of(look)
@@ -213,6 +223,9 @@ def look_at(places: Places, look: Look) -> Singles:
             worth = worth[answers[worth, 0] > rules.worth]
         if not len(worth):
             break
+        asked = worth
+        first = _most_probable_near(places, asked, answers[asked, 0]) if network.contract.is_wide else asked
+        worth = np.unique(first)
         found = network.run(places.cut(worth, network.contract))
         last = _is_last(places, worth, networks[number + 1 :])
         low, high = rules.doubtful
@@ -225,9 +238,17 @@ def look_at(places: Places, look: Look) -> Singles:
             both = np.stack([answers[worth[last], 0], found[last, 0]])
             found[last, 0] = _mean_odds(both, [_EARLIER, 1.0 - _EARLIER])
         answers[worth] = found
+        answers[asked, 0] = np.minimum(answers[asked, 0], answers[first, 0])
         possible = places.move(worth, found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
         worth = worth[possible & ~last]
     return answers
+
+
+def _most_probable_near(places: Places, rows: Chosen, probabilities: Singles) -> Chosen:
+    """The most probable place (k,) that shows the same object as each place with the numbers `rows` (k,)."""
+    near = places.near(rows)
+    chosen = best_apart(probabilities, near, len(rows))
+    return np.asarray(rows[chosen][near[chosen].argmax(axis=0)])
 
 
 def _is_last(places: Places, rows: Chosen, following: Sequence[Look]) -> Mask:
@@ -295,6 +316,12 @@ def mean_center(view: PreparedView, centers: Floats, probabilities: Singles, num
     Several proposals move to the same object, each with an error of its own. number: of the place.
     """
     rays = centers / np.linalg.norm(centers, axis=1, keepdims=True)
-    near = view.shape.covers(rays, centers[[number]], view.height, _NEAR)[0]
-    near[number] = True  # far away, rounding may leave out the place itself
+    near = _near(view, centers[[number]], centers)[0]
     return np.asarray(view.shape.center_along(((near * probabilities) @ rays)[None], view.height)[0])
+
+
+def _near(view: PreparedView, objects: Floats, centers: Floats) -> Mask:
+    """Which places (c, 3) [m] were meant to be the center of each object (n, 3) [m]; (n, c)."""
+    rays = centers / np.linalg.norm(centers, axis=1, keepdims=True)
+    itself = (objects[:, None] == centers).all(axis=2)  # far away, rounding may leave it out
+    return np.asarray(view.shape.covers(rays, objects, view.height, NEAR) | itself)

@@ -34,14 +34,14 @@ def propose_places(observation: Observation, probabilities: Singles, above: floa
     rays, p = view.layout.rays[likely], probabilities[likely]
     centers = view.shape.center_along(rays, view.height)
     near, core = view.shape.covers(rays, centers, view.height, _WHOLE_AND_CORE)
-    chosen = _apart(core.astype(np.float32) @ p, near, most)
+    chosen = best_apart(core.astype(np.float32) @ p, near, most)
     # Once only: a second move would lead away to larger things near by, and fewer balls would be found.
     middle = (near[chosen] * p) @ rays
     return view.shape.center_along(middle / np.linalg.norm(middle, axis=1, keepdims=True), view.height)
 
 
-def _apart(score: Singles, near: Mask, most: int) -> list[int]:
-    """At most `most` places by descending score (m,); none is near (m, m) a better one."""
+def best_apart(score: Singles, near: Mask, most: int) -> list[int]:
+    """Numbers of at most `most` places by descending score (m,), each above 0; none is near (m, m) a better one."""
     left, chosen = score.copy(), []
     for _ in range(min(most, len(score))):
         best = int(left.argmax())

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Image, Mask
+from vm_embedded.detection.looking import NEAR
 from vm_embedded.detection.patches import cut_patches
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.geometry.lens import Size
@@ -97,6 +98,13 @@ class WindowPlaces:
     def radii(self, rows: npt.NDArray[np.intp]) -> Floats:
         """See looking.Places."""
         return self.windows.radii[rows]
+
+    def near(self, rows: npt.NDArray[np.intp]) -> Mask:
+        """See looking.Places. Windows of objects of another size show another object."""
+        windows = self.windows.part(rows)
+        shift = windows.centers - windows.centers[:, None]
+        radii = windows.radii[:, None]
+        return (np.hypot(shift[..., 0], shift[..., 1]) < NEAR * radii) & np.isclose(radii, windows.radii)
 
     def move(self, rows: npt.NDArray[np.intp], right: Floats, down: Floats) -> Mask:
         """See looking.Places. An object may be anywhere."""

@@ -193,6 +193,23 @@ def test_a_wide_look_sees_only_what_the_close_look_takes_seriously(scene):
     assert look.seen == []
 
 
+@pytest.mark.parametrize("wide", [0.05, 0.99])
+def test_a_wide_look_judges_each_object_once(scene, wide):
+    """Of several places on the same ball, none stays more probable than the one that it judges."""
+    look = chain(0.5, 0.9, wide)
+    ball, _ = small_and_large(scene)
+    other = center_at(scene.view, (200.0, 225.0))
+    radius = scene.view.shape.radius
+    beside = ball + radius * np.array([[0.0, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, -0.1, 0.0]])
+    _, answers = looked_at(scene, look, np.stack([*beside, other]))
+    assert look.seen == [2]
+    assert look.glance.seen == [4]
+    (alone,) = looked_at(scene, chain(0.5, 0.9, wide), other[None])[1][:, 0]
+    assert answers[3, 0] == pytest.approx(alone)
+    assert answers[:3, 0].max() == pytest.approx(alone)
+    assert (answers[:3, 0] >= min(alone, 0.9) - 1e-6).all()
+
+
 @pytest.mark.parametrize(("wide", "opinions"), [(0.1, 0), (0.5, 1), (0.9, 0)])
 def test_where_a_wide_look_is_sure_it_sees_no_mirror_image(scene, wide, opinions):
     look = chain(0.5, 0.5, wide)

@@ -143,6 +143,16 @@ def test_windows_tell_how_large_their_objects_are():
     assert places.radii(np.array([1, 0])).tolist() == [30.0, 10.0]
 
 
+def test_windows_are_near_if_place_and_size_agree():
+    places = WindowPlaces(
+        disks(), windows((44.0, 60.0, 10.0), (46.0, 60.0, 10.0), (44.0, 64.0, 10.0), (44.0, 60.0, 12.0))
+    )
+    near = np.eye(4, dtype=bool)
+    near[0, 1] = near[1, 0] = True
+    assert places.near(np.arange(4)).tolist() == near.tolist()
+    assert places.near(np.array([1, 3])).tolist() == np.eye(2, dtype=bool).tolist()
+
+
 def test_a_look_leaves_the_windows_that_it_was_given_as_they_are():
     given_windows = windows((44.0, 60.0, 10.0))
     places = WindowPlaces(disks((40.3, 60.0, 10.0)), given_windows)
