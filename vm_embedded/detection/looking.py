@@ -223,9 +223,10 @@ def look_at(places: Places, look: Look) -> Singles:
             worth = worth[answers[worth, 0] > rules.worth]
         if not len(worth):
             break
+        # Several proposals move to the same object, and a wide patch takes long: one for each object is enough.
         asked = worth
-        first = _most_probable_near(places, asked, answers[asked, 0]) if network.contract.is_wide else asked
-        worth = np.unique(first)
+        best = _most_probable_near(places, asked, answers[asked, 0]) if network.contract.is_wide else asked
+        worth = np.unique(best)
         found = network.run(places.cut(worth, network.contract))
         last = _is_last(places, worth, networks[number + 1 :])
         low, high = rules.doubtful
@@ -238,7 +239,7 @@ def look_at(places: Places, look: Look) -> Singles:
             both = np.stack([answers[worth[last], 0], found[last, 0]])
             found[last, 0] = _mean_odds(both, [_EARLIER, 1.0 - _EARLIER])
         answers[worth] = found
-        answers[asked, 0] = np.minimum(answers[asked, 0], answers[first, 0])
+        answers[asked, 0] = np.minimum(answers[asked, 0], answers[best, 0])
         possible = places.move(worth, found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
         worth = worth[possible & ~last]
     return answers

@@ -72,7 +72,8 @@ def dome(radius: float, height: float, segments: int = 20) -> Solid:
 
 def torus(radius: float, thickness: float) -> Solid:
     """A ring around z, with the radius of its center line [m] and its thickness [m]."""
-    around = np.append(np.arange(12), 0) * (2.0 * np.pi / 12) - np.pi / 2.0
+    sides = 12
+    around = np.append(np.arange(sides), 0) * (2.0 * np.pi / sides) - np.pi / 2.0
     ring = [(radius + thickness / 2.0 * float(np.cos(a)), thickness / 2.0 * float(np.sin(a))) for a in around]
     return lathe(ring, 32)
 
