@@ -91,9 +91,10 @@ def _entry(name: str) -> str:
     if issubclass(value, BaseException):
         head = f"class {name}({value.__bases__[0].__name__})"
         return f"### {name}\n\n{_code(head)}\n\n{_markdown(value.__doc__)}"
-    base = next((each.__name__ for each in value.__mro__[1:] if each.__name__ in _NAMES), None)
-    head = f"class {name}({base or ''})".replace("()", "")
+    base = next((each for each in value.__mro__[1:] if each.__name__ in _NAMES), None)
+    head = f"class {name}({base.__name__ if base else ''})".replace("()", "")
     fields = dataclasses.is_dataclass(value)
+    has_own = base is None or not fields or len(_fields(value)) > len(_fields(base))
     if not fields:
         head += _signature(value)
     meanings: dict[str, str] = {}
@@ -108,8 +109,9 @@ def _entry(name: str) -> str:
     if name in OTHERS:
         parts.append(f"It is in `{value.__module__}`.")
     if base:
-        parts.append(f"[{base}](#{base.lower()}) has more methods.")
-    if fields:
+        more = "more methods" if has_own else "its arguments and more methods"
+        parts.append(f"[{base.__name__}](#{base.__name__.lower()}) has {more}.")
+    if fields and has_own:
         parts += [_field_table(value, meanings)]
     parts += [_member(name, value, member) for member in _members(value)]
     return "\n\n".join(parts)

@@ -69,14 +69,20 @@ def command_line() -> str:
         "and `--completion` the script that completes options in bash."
     )
     parts = [f"# Command line\n\n{made}\n"]
+    shown: dict[tuple[str, str], str] = {}  # the first program with a group of options, by its title and its table
     for parser in parsers().values():
         parts.append(f"## {parser.prog}\n\n{parser.description}\n")
         for group in parser._action_groups:
-            rows = [_row(action) for action in group._group_actions if not isinstance(action, _ABOUT)]
-            if rows:
-                note = f" ({group.description})" if group.description else ""
-                title = (group.title or "").capitalize()
-                parts.append(f"**{title}**{note}\n\n| option | meaning |\n| --- | --- |\n" + "\n".join(rows) + "\n")
+            rows = "\n".join(_row(action) for action in group._group_actions if not isinstance(action, _ABOUT))
+            if not rows:
+                continue
+            title = f"**{(group.title or '').capitalize()}**"
+            note = f" ({group.description})" if group.description else ""
+            first = shown.setdefault((title, rows), parser.prog)
+            if first == parser.prog or rows.count("\n") < 2:
+                parts.append(f"{title}{note}\n\n| option | meaning |\n| --- | --- |\n{rows}\n")
+            else:
+                parts.append(f"{title}{note}: as for [{first}](#{first.replace(' ', '-')}).\n")
         if parser.epilog:
             parts.append(f"{parser.epilog}\n")
     parts.append("## Scripts on the robot\n\n[On a robot](../deploy/README.md) describes when to use them.\n")

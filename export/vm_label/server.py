@@ -1,4 +1,4 @@
-"""The web server of the labeling page. It needs no network, and by default only this machine can reach it.
+"""The web server of the labeling page. It needs no internet, and by default only this machine can reach it.
 
 GET / is the page, /state the session as JSON, /alive a short sign of life, /crop/ID and /picture/ID are JPEGs of a crop
 and of its entire image. POST /answer takes {"session": ID, "crop": ID, "answer": "yes", "no", "skip" or null}; its

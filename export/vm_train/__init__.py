@@ -1,0 +1,1 @@
+"""Training and evaluation of networks: the programs vm-train and vm-evaluate."""

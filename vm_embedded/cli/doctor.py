@@ -27,7 +27,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--camera", metavar="SOURCE", help="as for vm-detect")
     parser.add_argument("--json", action="store_true", help="print each finding as a line of JSON")
     add_model(parser)
-    add_pose(parser, "as for vm-detect")
+    add_pose(parser, "those to check")
     add_settings(parser)
     add_live(parser)
     return parser

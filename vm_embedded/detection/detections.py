@@ -49,7 +49,7 @@ class Detections:
     objects: the accepted objects. rejected: the rejected candidates, each with its reason; empty unless `explain` was
     set. observation: the points. threshold: a point belongs to a class if its probability is above this. timing_ms:
     time of each stage [ms]. field: goal posts, robots, lines and border of the field; None for a network without these
-    classes.
+    classes, and with `field_features` off.
     """
 
     objects: tuple[Detection, ...]
@@ -74,7 +74,7 @@ class Detections:
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON, with the fields of a line of vm-detect: points, detections, field, timing_ms [ms].
 
-        `field` is missing for a network without classes of the field.
+        `field` is missing where it is None.
         """
         data: dict[str, Any] = {
             "points": len(self.pixels),

@@ -1,7 +1,7 @@
 """The close look: a small network decides about each proposal of the mesh network.
 
 It sees a patch of the picture in which the proposed object would fill the same disk at every distance. It says how
-probable the object is, where its center is, and how large it is. Then it looks again, where it saw the center. A
+probable the object is, where its center is, and how large it is. Then it may look again, where it saw the center. A
 still smaller network, the glance, may go before it and leave out what is clearly nothing. A third one, the wide look,
 may go after both: it sees more of the surroundings of what may be an object.
 """

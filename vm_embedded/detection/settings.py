@@ -49,12 +49,18 @@ class Settings:
         0.3, "close look: lowest probability of an object; below it, the proposal is rejected"
     )
     max_proposals: int = number(40, "close look: largest number of proposals", "", (1, 1000))
-    min_inside: float = share(0.85, "lowest mean probability inside the outline; below it, the object is rejected")
-    max_around: float = share(
-        0.25, "highest mean probability just outside the outline; above it, the object is rejected"
+    min_inside: float = share(
+        0.85, "without close look: lowest mean probability inside the outline; below it, the object is rejected"
     )
-    max_widths: float = number(2.0, "reject clusters wider than this", "object widths", (1.0, 100.0))
-    min_visible: float = share(0.25, "reject objects with a smaller share of their points on screen")
+    max_around: float = share(
+        0.25, "without close look: highest mean probability just outside the outline; above it, the object is rejected"
+    )
+    max_widths: float = number(
+        2.0, "without close look: reject clusters wider than this", "object widths", (1.0, 100.0)
+    )
+    min_visible: float = share(
+        0.25, "without close look: reject objects with a smaller share of their points on screen"
+    )
     field_features: bool = switch(
         True, "find goal posts, robots, lines and the border, if the network has the classes goal, robot, line or field"
     )

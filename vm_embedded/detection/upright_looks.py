@@ -3,8 +3,8 @@
 The look at objects serves here, too. The object is a circle on the plane, around the base of the upright. So a patch
 shows the base in its middle, the ground around it, and the lower part of the upright.
 
-A point of an upright is seen against the plane behind the base. So only the nearest points of the class in each
-direction propose a place.
+A point of an upright is seen against the plane behind the base. So in each direction, only the nearest points of the
+class propose a place: the nearest of all, and those of the more probable ones.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Output of detections: messages, channels, result files, overlays and recordings."""
+"""Output of detections: messages, channels, files of results and boxes, recordings, and messages of ROS."""
