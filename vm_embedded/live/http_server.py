@@ -100,9 +100,15 @@ class HttpServer:
             writer.close()
 
     async def _respond(self, head: list[str], writer: asyncio.StreamWriter) -> None:
+        writer.transport.set_write_buffer_limits(0)  # so that drain waits for all of it
+
         async def write(content: bytes) -> None:
             writer.write(content)
-            await asyncio.wait_for(writer.drain(), _TIMEOUT)
+            try:
+                await asyncio.wait_for(writer.drain(), _TIMEOUT)
+            except asyncio.TimeoutError:
+                writer.transport.abort()  # close would wait for the browser forever, with an open descriptor
+                raise
 
         method, path, *_ = [*head[0].split(" "), "", ""]
         path, _, text = path.partition("?")

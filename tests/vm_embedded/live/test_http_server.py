@@ -2,13 +2,15 @@
 
 import asyncio
 import json
+import select
 import socket
+import time
 
 import pytest
 
 from tests.vm_embedded.live.running import running
 from vm_embedded.errors import InputError
-from vm_embedded.live.http_server import HttpServer
+from vm_embedded.live.http_server import HttpServer, Response
 from vm_embedded.sockets import datagram_socket, is_open_to_network
 
 
@@ -55,6 +57,33 @@ def test_a_server_ends_a_stream_that_is_about_to_send(tmp_path, steps):
         writer.close()
 
     asyncio.run(close_while_it_streams())
+
+
+@pytest.mark.parametrize("address", ["/page", "/stream"])
+def test_a_browser_that_reads_nothing_is_disconnected(tmp_path, monkeypatch, address):
+    monkeypatch.setattr("vm_embedded.live.http_server._TIMEOUT", 0.2)
+    content = bytes(1_000_000)
+
+    async def serve():
+        async def stream(write):
+            while True:
+                await write(content)
+
+        pages, streams = {"/page": lambda _: Response("text/plain", content)}, {"/stream": stream}
+        server = HttpServer(f"unix:{tmp_path / 'page'}", "--status-page", pages, streams)
+        await server.open()
+        with socket.socket(socket.AF_UNIX) as browser:
+            browser.connect(str(tmp_path / "page"))
+            browser.sendall(f"GET {address} HTTP/1.1\r\n\r\n".encode())
+            ended = select.poll()
+            ended.register(browser, select.POLLHUP)
+            deadline = time.monotonic() + 5.0
+            while not ended.poll(0):
+                assert time.monotonic() < deadline
+                await asyncio.sleep(0.02)
+        await server.close()
+
+    asyncio.run(serve())
 
 
 def test_orientations_beside_the_camera_s_are_prepared_between_frames(tmp_path):
