@@ -8,7 +8,7 @@ import ipaddress
 import os
 import socket
 import stat
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import Field
 from pathlib import Path
 from typing import Any
@@ -230,17 +230,42 @@ def cant_listen(where: str, error: OSError | UnicodeError) -> InputError:
     return kind(f"can't listen at {where}: {reason}")
 
 
+def bound_sockets(where: str, kind: socket.SocketKind) -> list[socket.socket]:
+    """Sockets for a server at ADDRESS:PORT, one for each address of a name. Raises InputError as `cant_listen`.
+
+    They leave out addresses that this machine lacks, if it has another one: the name localhost also has an address of
+    IPv6 where that is switched off. asyncio ignores such addresses, too, but not before Python 3.13.
+    """
+    host, port = parse_address(where, "address", "127.0.0.1:8080")
+    lacking: OSError | None = None
+    with ExitStack() as opened:
+        bound: list[socket.socket] = []
+        try:
+            for family, _, protocol, _, address in socket.getaddrinfo(host, port, type=kind):
+                try:
+                    tried = opened.enter_context(socket.socket(family, kind | socket.SOCK_CLOEXEC, protocol))
+                    if kind == socket.SOCK_STREAM:  # connections that have just ended do not count
+                        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                    if family == socket.AF_INET6:
+                        tried.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+                    tried.bind(address)
+                    bound.append(tried)
+                except OSError as error:
+                    if error.errno not in (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT):
+                        raise
+                    lacking = error
+            if lacking is not None and not bound:
+                raise lacking
+        except (OSError, UnicodeError) as error:
+            raise cant_listen(where, error) from error
+        opened.pop_all()
+    return bound
+
+
 def check_port(where: str, kind: socket.SocketKind) -> None:
     """Raise InputError as `cant_listen` if no server can listen at ADDRESS:PORT: bind sockets to it for a moment."""
-    host, port = parse_address(where, "address", "127.0.0.1:8080")
-    try:
-        for family, _, protocol, _, address in socket.getaddrinfo(host, port, type=kind):
-            with socket.socket(family, kind, protocol) as tried:
-                if kind == socket.SOCK_STREAM:  # as servers do: connections that have just ended do not count
-                    tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                tried.bind(address)
-    except (OSError, UnicodeError) as error:
-        raise cant_listen(where, error) from error
+    for each in bound_sockets(where, kind):
+        each.close()
 
 
 def datagram_socket(

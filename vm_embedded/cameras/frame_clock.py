@@ -43,11 +43,13 @@ class FrameClock:
     With stamps of the server, the fastest delivery so far gives the difference of the two clocks. Without them, the
     rate tells: if a frame comes late, it and those that follow in a burst may have waited. Each of them is as old as it
     can be: it was taken one period after the one before.
+
+    begun: when the connection was opened, for a reader that lets frames wait until it knows the stream [s].
     """
 
-    def __init__(self) -> None:
+    def __init__(self, begun: float = math.nan) -> None:
         self._intervals: deque[float] = deque(maxlen=_REMEMBERED)
-        self._arrived = self._taken = math.nan  # of the last frame
+        self._arrived = self._taken = begun  # of the last frame
         self._calm = _CALM  # intervals in a row that were not of a burst
         self._stamp = -math.inf
         self._offset = math.inf  # of our clock to the server's, for the fastest delivery

@@ -69,6 +69,9 @@ class OpenCvCamera:
         else:
             limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, int(settings.open_ms)]
             limits += [cv2.CAP_PROP_READ_TIMEOUT_MSEC, int(settings.lost_ms)]
+            # By default, FFmpeg decodes on all cores, and each further thread holds back another frame.
+            limits += [cv2.CAP_PROP_N_THREADS, 1]
+            self._clock = FrameClock(time.monotonic())  # FFmpeg lets frames wait until it knows the stream
             with _ffmpeg_options():
                 self._capture = cv2.VideoCapture(source, cv2.CAP_FFMPEG, limits)
         if not self._capture.isOpened():

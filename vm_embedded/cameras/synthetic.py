@@ -138,7 +138,8 @@ class SyntheticCamera:
         center = self.motion.ball(captured) - (0.0, 0.0, orientation.height)  # from the camera, z up
         square = float(center @ center)
         toward = (orientation.rotation.T @ center).astype(np.float32)
-        near = np.flatnonzero(self._rays.reshape(-1, 3) @ toward > math.sqrt(max(square - 4.0 * RADIUS**2, 0.0)))
+        ahead = np.einsum("ij,j->i", self._rays.reshape(-1, 3), toward)  # with @, OpenBLAS occupies all cores
+        near = np.flatnonzero(ahead > math.sqrt(max(square - 4.0 * RADIUS**2, 0.0)))
         rays = self._rays.reshape(-1, 3)[near].astype(np.float64) @ orientation.rotation.T
 
         on_ground = rays * (orientation.height / np.maximum(-rays[:, 2:], 0.01)) - center

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import hmac
+import socket
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from ipaddress import ip_address
 from urllib.parse import parse_qsl
 
 from ..errors import VisualMeshError
-from ..sockets import BACKLOG, Connections, UnixListener, cant_listen, parse_address
+from ..sockets import BACKLOG, Connections, UnixListener, bound_sockets, cant_listen
 
 _TIMEOUT = 5.0
 """How long a browser may take to send its request, and to receive each part of the response [s]."""
@@ -63,7 +64,7 @@ class HttpServer:
         self._streams, self._actions = streams or {}, actions or {}
         self._token = token
         self._file: UnixListener | None = None
-        self._server: asyncio.Server | None = None
+        self._servers: list[asyncio.Server] = []
         self._tasks: set[asyncio.Task[None]] = set()
         self._connections = Connections()
         self._streaming = 0  # number of streams
@@ -72,14 +73,14 @@ class HttpServer:
         """Listen. Raises InputError, and NetworkError for what may work later."""
         if self._where.startswith("unix:"):
             self._file = UnixListener(self._where.removeprefix("unix:"), self._option)
-            self._server = await asyncio.start_unix_server(
-                self._serve, sock=self._file.socket, limit=8192, backlog=BACKLOG
+            self._servers.append(
+                await asyncio.start_unix_server(self._serve, sock=self._file.socket, limit=8192, backlog=BACKLOG)
             )
             return
-        host, port = parse_address(self._where, self._option, "127.0.0.1:8080")
         try:
-            self._server = await asyncio.start_server(self._serve, host, port, limit=8192)
-        except (OSError, UnicodeError) as error:
+            for each in bound_sockets(self._where, socket.SOCK_STREAM):
+                self._servers.append(await asyncio.start_server(self._serve, sock=each, limit=8192))
+        except OSError as error:  # another process has begun to listen since
             raise cant_listen(self._where, error) from error
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -100,9 +101,15 @@ class HttpServer:
             writer.close()
 
     async def _respond(self, head: list[str], writer: asyncio.StreamWriter) -> None:
+        writer.transport.set_write_buffer_limits(0)  # so that drain waits for all of it
+
         async def write(content: bytes) -> None:
             writer.write(content)
-            await asyncio.wait_for(writer.drain(), _TIMEOUT)
+            try:
+                await asyncio.wait_for(writer.drain(), _TIMEOUT)
+            except asyncio.TimeoutError:
+                writer.transport.abort()  # close would wait for the browser forever, with an open descriptor
+                raise
 
         method, path, *_ = [*head[0].split(" "), "", ""]
         path, _, text = path.partition("?")
@@ -130,8 +137,8 @@ class HttpServer:
 
     async def close(self) -> None:
         """Stop listening and end all streams."""
-        if self._server is not None:
-            self._server.close()
+        for each in self._servers:
+            each.close()
         # More than once: until Python 3.11, wait_for may swallow a cancellation.
         while self._tasks:
             for task in self._tasks:

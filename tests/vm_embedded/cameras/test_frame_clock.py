@@ -55,6 +55,17 @@ def test_a_second_after_a_stall_all_frames_are_as_new_as_before(rate, stalls, se
     np.testing.assert_array_equal(said[after], arrived[after])
 
 
+@pytest.mark.parametrize("opening", [0.02, 0.3, 0.8, 3.0])
+@pytest.mark.parametrize("rate", [10.0, 30.0, 60.0])
+def test_frames_that_waited_while_a_stream_was_opened_are_old(rate, opening):
+    taken = np.arange(0.0, 6.0, 1.0 / rate)
+    arrived = np.maximum(taken + LATENCY, opening + 5e-3 * np.arange(len(taken)))
+    clock = FrameClock(0.0)
+    said = np.array([clock.taken(each) for each in arrived.tolist()])
+    assert (said - taken).max() < LATENCY + 0.05
+    np.testing.assert_array_equal(said[taken > 5.0], arrived[taken > 5.0])
+
+
 def test_frames_that_are_ready_after_a_stall_are_old_also_for_a_slow_reader():
     """Frames come every 66 ms; after a second without one, the reader takes 60 ms for each of those that waited."""
     taken, at, clock = np.arange(0.0, 6.0, 1 / 15), 0.0, FrameClock()

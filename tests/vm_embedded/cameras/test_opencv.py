@@ -1,6 +1,9 @@
 """What is asked of a device, and what is believed of its frames, with a capture that stands in for one."""
 
+import socket
+import threading
 import time
+from contextlib import ExitStack, contextmanager
 
 import cv2
 import numpy as np
@@ -135,6 +138,45 @@ def test_an_address_is_read_through_ffmpeg(tmp_path):
     camera.close()
     with pytest.raises(CameraError, match="can't open"):
         OpenCvCamera(CameraSettings(source=f"file://{tmp_path / 'none.avi'}"))
+
+
+@contextmanager
+def stream(path, pause=0.0):
+    """The address of a stream of six frames, whose last one never arrives. pause: before it begins [s]."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"FMP4"), 25.0, SIZE)
+    for at in range(6):
+        writer.write(SyntheticCamera(CameraSettings()).draw(at / 25.0))
+    writer.release()
+    content = path.read_bytes()
+    last = content.rindex(b"00dc", 0, content.rindex(b"idx1"))
+    with socket.create_server(("127.0.0.1", 0)) as server, ExitStack() as connections:
+
+        def serve():
+            connection = connections.enter_context(server.accept()[0])
+            connection.recv(4096)
+            time.sleep(pause)
+            connection.sendall(b"HTTP/1.0 200 OK\r\nContent-Type: video/x-msvideo\r\n\r\n" + content[:last])
+
+        threading.Thread(target=serve, daemon=True).start()
+        yield f"http://127.0.0.1:{server.getsockname()[1]}/field.avi"
+
+
+def test_a_frame_of_a_stream_does_not_wait_for_the_next_one(tmp_path):
+    """FFmpeg's threads would hold back as many frames as there are further cores, whose times would then be wrong."""
+    with stream(tmp_path / "field.avi") as address:
+        camera = OpenCvCamera(CameraSettings(source=address, lost_ms=10_000))
+        begun = time.monotonic()
+        assert all(camera.read().image.shape == (SIZE[1], SIZE[0], 3) for _ in range(5))
+        assert time.monotonic() - begun < 5.0  # FFmpeg gives what it holds back after `lost_ms`
+        camera.close()
+
+
+def test_a_frame_may_have_waited_while_its_stream_was_opened(tmp_path):
+    with stream(tmp_path / "field.avi", pause=0.5) as address:
+        begun = time.monotonic()
+        camera = OpenCvCamera(CameraSettings(source=address))
+        assert camera.read().captured < begun + 0.25
+        camera.close()
 
 
 def test_attack_2_a_stream_of_large_frames_is_not_decoded(tmp_path):

@@ -2,13 +2,15 @@
 
 import asyncio
 import json
+import select
 import socket
+import time
 
 import pytest
 
 from tests.vm_embedded.live.running import running
-from vm_embedded.errors import InputError
-from vm_embedded.live.http_server import HttpServer
+from vm_embedded.errors import InputError, NetworkError
+from vm_embedded.live.http_server import HttpServer, Response
 from vm_embedded.sockets import datagram_socket, is_open_to_network
 
 
@@ -26,6 +28,34 @@ def test_a_busy_port_and_an_unknown_host_are_named_once():
             asyncio.run(HttpServer(f"{host}:1", "--status-page", {}).open())
         with pytest.raises(InputError, match="can't be the name of a host"):
             datagram_socket(host, 1, "can't send to")
+
+
+def test_a_name_may_have_an_address_that_the_machine_lacks(monkeypatch):
+    """As localhost in /etc/hosts where IPv6 is switched off. Python 3.13 has another error without a number."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    here, elsewhere = (
+        socket.getaddrinfo(each, port, type=socket.SOCK_STREAM)[0] for each in ("127.0.0.1", "192.0.2.1")
+    )
+
+    async def begun(*found):
+        monkeypatch.setattr(socket, "getaddrinfo", lambda *_, **__: found)
+        server = HttpServer(f"localhost:{port}", "--status-page", {})
+        await server.open()
+        connection = socket.socket()
+        connection.connect(here[4])
+        reader, writer = await asyncio.open_connection(sock=connection)
+        writer.write(b"GET / HTTP/1.1\r\n\r\n")
+        answer = await reader.read()
+        writer.close()
+        await server.close()
+        return answer
+
+    for found in ((here, elsewhere), (elsewhere, here)):
+        assert asyncio.run(begun(*found)).startswith(b"HTTP/1.1 404")
+    with pytest.raises(NetworkError, match=f"can't listen at localhost:{port}: Cannot assign requested address"):
+        asyncio.run(begun(elsewhere))
 
 
 @pytest.mark.parametrize("steps", range(6))
@@ -55,6 +85,33 @@ def test_a_server_ends_a_stream_that_is_about_to_send(tmp_path, steps):
         writer.close()
 
     asyncio.run(close_while_it_streams())
+
+
+@pytest.mark.parametrize("address", ["/page", "/stream"])
+def test_a_browser_that_reads_nothing_is_disconnected(tmp_path, monkeypatch, address):
+    monkeypatch.setattr("vm_embedded.live.http_server._TIMEOUT", 0.2)
+    content = bytes(1_000_000)
+
+    async def serve():
+        async def stream(write):
+            while True:
+                await write(content)
+
+        pages, streams = {"/page": lambda _: Response("text/plain", content)}, {"/stream": stream}
+        server = HttpServer(f"unix:{tmp_path / 'page'}", "--status-page", pages, streams)
+        await server.open()
+        with socket.socket(socket.AF_UNIX) as browser:
+            browser.connect(str(tmp_path / "page"))
+            browser.sendall(f"GET {address} HTTP/1.1\r\n\r\n".encode())
+            ended = select.poll()
+            ended.register(browser, select.POLLHUP)
+            deadline = time.monotonic() + 5.0
+            while not ended.poll(0):
+                assert time.monotonic() < deadline
+                await asyncio.sleep(0.02)
+        await server.close()
+
+    asyncio.run(serve())
 
 
 def test_orientations_beside_the_camera_s_are_prepared_between_frames(tmp_path):
