@@ -192,6 +192,10 @@ def _report(run: TrainingRun, outcome: TrainingOutcome) -> None:
         radius = " --radius-of scene" if run.configuration.mesh.radius_of == "scene" else ""
         pictures = f"--list {run.folder / 'pictures.json'} --part test"
         print(f"next: vm-evaluate {model} {data.folder} {pictures}{radius} -o report")
+    if run.configuration.mesh.grid == "hexagonal":  # it can't be exported
+        return
+    if "object" in run.configuration.classes.kinds.values():
+        print(f"next: vm-train look {data.folder} --from {model} -o {run.folder}-look")
     print(f"next: vm-export {model}")
 
 

@@ -6,10 +6,11 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Sequence
+from difflib import get_close_matches
 
 import numpy as np
 
-from vm_embedded.errors import InputError, unknown
+from vm_embedded.errors import InputError
 
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.whole import whole_object
@@ -41,11 +42,11 @@ def check_boxes(boxes: BoxedSet, name: str, folder: str) -> None:
     if not boxes.pictures:
         raise InputError(f"no picture of {folder} can be used: vm-train check {folder} --boxes tells why")
     if not counts[name]:
-        found = ", ".join(f"{each} ({count})" for each, count in counts.most_common()) or "none"
-        nearest = unknown("box class", name, sorted(counts)) if counts else "there are no boxes"
+        found = ", ".join(f"{each} ({count})" for each, count in counts.most_common()) or "no boxes"
+        near = list(counts) if len(counts) == 1 else get_close_matches(name.lower(), counts, n=1, cutoff=0.5)
         raise InputError(
-            f"{folder} has no box of class {name}, which the close look judges; it has {found}. Map a class to it, for "
-            f"example --names {next(iter(counts), '0')}={name} ({nearest})"
+            f"{folder} has no box of class {name}, which the close look judges; it has {found}. Rename the class of "
+            f"these objects: --names {near[0] if near else 'NAME'}={name}"
         )
 
 
