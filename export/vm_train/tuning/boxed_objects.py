@@ -6,13 +6,13 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Sequence
-from difflib import get_close_matches
 
 import numpy as np
 
 from vm_embedded.errors import InputError
 
 from ..boxes.box import BoxedPicture, BoxedSet
+from ..boxes.summary import rename_advice
 from ..boxes.whole import whole_object
 from ..data.split import Split
 from .windows import Windows
@@ -42,11 +42,8 @@ def check_boxes(boxes: BoxedSet, name: str, folder: str) -> None:
     if not boxes.pictures:
         raise InputError(f"no picture of {folder} can be used: vm-train check {folder} --boxes tells why")
     if not counts[name]:
-        found = ", ".join(f"{each} ({count})" for each, count in counts.most_common()) or "no boxes"
-        near = list(counts) if len(counts) == 1 else get_close_matches(name.lower(), counts, n=1, cutoff=0.5)
         raise InputError(
-            f"{folder} has no box of class {name}, which the close look judges; it has {found}. Rename the class of "
-            f"these objects: --names {near[0] if near else 'NAME'}={name}"
+            f"{folder} has no box of class {name}, which the close look judges; {rename_advice(counts, name)}"
         )
 
 
