@@ -108,8 +108,8 @@ def _describe(run: TuningRun, boxes: Path) -> None:
     )
     if not count[1]:
         print(
-            "vm-train: no recording is small enough to be kept for validation; only rendered patches decide when the "
-            "training ends",
+            "vm-train: no recording is small enough to be kept for validation, so nothing measures the result: record "
+            "several times, and put the frames of each recording into a folder of its own",
             file=sys.stderr,
         )
     if count[0] < _FEW:

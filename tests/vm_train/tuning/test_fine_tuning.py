@@ -95,6 +95,8 @@ def test_frames_without_validation_measure_nothing_and_those_with_lenses_can_be_
         f"report: {tmp_path / 'run' / 'report.html'}",
         f"next: vm-detect --model {model} {seen} --save-overlay found",
     ]
+    assert "put the frames of each recording into a folder of its own" in done.stderr
+    assert "0 other frames" not in (tmp_path / "run" / "report.html").read_text()
 
 
 def test_a_wide_look_is_left_out(tune, tmp_path):
