@@ -124,7 +124,10 @@ def _answers(folder: BoxFolder) -> dict[str, str]:
 def _serve(options: argparse.Namespace, folder: BoxFolder) -> None:
     """Serve the page until Ctrl-C. Raises InputError."""
     if not folder.crops:
-        raise InputError(f"no boxes to judge in {folder.path}")
+        raise InputError(
+            f"no boxes to judge in {folder.path}: vm-detect --save-boxes makes some; boxes of another tool must be in "
+            "YOLO format (NAME.txt)"
+        )
     with AnswerFile(folder.path) as file:
         session = Session(folder, _answers(folder), file)
         with LabelServer(session, options.host, options.port) as server:
@@ -147,5 +150,6 @@ def _report(target: Path, written: Written) -> str:
         (written.faulty, "with boxes that can't be read"),
     ]
     lines = [f"{target}: {written.images} images, {written.background} of them background; boxes: {boxes}"]
-    lines += [f"left out: {count} images {reason}" for count, reason in left if count]
+    lines += [f"left out: {count} image{'s' * (count != 1)} {reason}" for count, reason in left if count]
+    lines.append(f"next: vm-train look --from ball --boxes {target} -o tuned")
     return "\n".join(lines)

@@ -43,9 +43,10 @@ def test_only_fully_judged_images_become_training_data(tmp_path):
     done = run(folder, "--write", tmp_path / "out")
     assert done.stdout.splitlines() == [
         f"{tmp_path / 'out'}: 3 images, 1 of them background; boxes: 2 ball",
-        "left out: 1 images with unanswered crops",
-        "left out: 1 images with skipped crops",
-        "left out: 1 images without any crop (--empty writes them)",
+        "left out: 1 image with unanswered crops",
+        "left out: 1 image with skipped crops",
+        "left out: 1 image without any crop (--empty writes them)",
+        f"next: vm-train look --from ball --boxes {tmp_path / 'out'} -o tuned",
     ]
     out = tmp_path / "out"
     assert sorted(path.name for path in out.iterdir()) == sorted(
@@ -84,7 +85,7 @@ def test_images_with_unreadable_boxes_are_left_out(tmp_path):
     (folder / "image0001.txt").write_text("0 0.5 0.5 0.1 0.1\nbroken\n")
     judge(folder, ["yes", "yes"])
     done = run(folder, "--write", tmp_path / "out")
-    assert "left out: 1 images with boxes that can't be read" in done.stdout
+    assert "left out: 1 image with boxes that can't be read" in done.stdout
     assert "image0001.txt line 2: 'broken' has 1 values" in done.stderr
 
 
@@ -124,7 +125,7 @@ def test_a_folder_without_boxes_is_named(tmp_path):
     make_folder(tmp_path, 1, near=False)
     (tmp_path / "candidates.jsonl").unlink()
     (tmp_path / "image0000.txt").write_text("")
-    assert "no boxes to judge" in run(tmp_path, code=1).stderr
+    assert "vm-detect --save-boxes makes some" in run(tmp_path, code=1).stderr
 
 
 def test_a_stopped_server_says_how_far_it_came(tmp_path):

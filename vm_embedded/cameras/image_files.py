@@ -119,7 +119,7 @@ def _open(name: str, path: Path, raw: bool, max_megapixels: float) -> Source:
     if path.is_dir():
         found = [each for each in path.iterdir() if each.suffix.lower() in IMAGE_SUFFIXES]
         if not found:
-            raise InputError(f"no images in directory {name} (looked for {', '.join(IMAGE_SUFFIXES)})")
+            raise InputError(f"no images in directory {name} (looked for {', '.join(IMAGE_SUFFIXES)}){_deeper(path)}")
         return _images(_without_companions(found), read, _recorded_times(path / MESSAGES))
     if path.is_file() and path.suffix.lower() in IMAGE_SUFFIXES:
         return _images([path], read)
@@ -132,6 +132,15 @@ def _open(name: str, path: Path, raw: bool, max_megapixels: float) -> Source:
             raise InputError(f"no images match {name}")
         return _images(_without_companions(found), read)
     raise InputError(f"no such image, directory, video or camera: {name}")
+
+
+def _deeper(folder: Path) -> str:
+    """The end of a message about a folder without images: a folder in it that has some, if there is one."""
+    for inner in sorted(each for each in folder.iterdir() if each.is_dir()):
+        with suppress(OSError):
+            if any(each.suffix.lower() in IMAGE_SUFFIXES for each in inner.iterdir()):
+                return f"; give the folders in it one by one, such as {inner}"
+    return ""
 
 
 def _without_companions(paths: Sequence[Path]) -> list[Path]:

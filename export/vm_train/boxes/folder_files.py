@@ -39,7 +39,9 @@ class FolderFiles:
 
 
 def find_files(folder: Path) -> FolderFiles:
-    """All files below a folder. Raises InputError if there is no such folder, or no image in it."""
+    """All files below a folder. Raises InputError if it is no folder, or has no image in it."""
+    if folder.is_file():
+        raise InputError(f"{folder} is a file: give the folder with the images and their annotations")
     if not folder.is_dir():
         raise InputError(f"there is no folder {folder}")
     found: list[Path] = []

@@ -26,6 +26,9 @@ from .yolo import is_yolo, read_yolo
 FORMATS = {"yolo": (is_yolo, read_yolo), "voc": (is_voc, read_voc), "coco": (is_coco, read_coco)}
 """For each format: whether a folder has it, and its reader."""
 
+_ANNOTATIONS = ("annotations", "Annotations")
+"""Folders that Pascal VOC and COCO have beside that of the images."""
+
 
 def read_boxes(
     folder: Path,
@@ -65,9 +68,12 @@ def _format(files: FolderFiles, format: str | None) -> str:
         raise InputError(unknown("format", format, FORMATS))
     found = [name for name, (is_there, _) in FORMATS.items() if is_there(files)]
     if not found:
+        above = files.folder.parent
+        beside = next((each for each in _ANNOTATIONS if (above / each).is_dir()), None)
+        hint = f"; for those in {beside} beside it, give {above}" if beside else ""
         raise InputError(
             f"no annotations in {files.folder}: expected YOLO (NAME.txt), Pascal VOC (NAME.xml) or COCO (.json with "
-            "images, annotations and categories)"
+            f"images, annotations and categories){hint}"
         )
     if format is None and len(found) > 1:
         raise InputError(

@@ -77,6 +77,13 @@ def name_faults(found: BoxedSet, objects: Sequence[str]) -> list[str]:
     return lines
 
 
+def rename_advice(counts: Counter[str], name: str) -> str:
+    """How to give boxes the name of a network's class that none has. counts: the number of boxes of each class."""
+    found = ", ".join(f"{each} ({count})" for each, count in counts.most_common()) or "no boxes"
+    near = list(counts) if len(counts) == 1 else get_close_matches(name.lower(), counts, n=1, cutoff=0.5)
+    return f"it has {found}. Rename the class of these objects: --names {near[0] if near else 'NAME'}={name}"
+
+
 def _of_class(picture: BoxedPicture, name: str) -> list[Box]:
     return [box for box in picture.boxes if box.name == name]
 

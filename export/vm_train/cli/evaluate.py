@@ -22,7 +22,7 @@ from .evaluate_options import calibrate_parser, points_parser
 from .evaluate_options import parser as parser
 from .evaluate_options import parsers as parsers
 from .evaluate_points import run_points
-from .evaluating import evaluate_with_progress
+from .evaluating import evaluate_with_progress, other_radii
 
 if TYPE_CHECKING:
     from vm_embedded.network.look_contract import LookContract
@@ -158,14 +158,8 @@ def _notes(options: argparse.Namespace, settings: Settings, subject: Subject, re
     notes = []
     if not subject.grid.is_visual:
         notes.append(f"A network of a {subject.grid.kind} grid has scores of points only; objects need a Visual Mesh.")
-    radius = settings.object_radius or subject.manifest.object_radius
-    if options.radius_of == "all" and any(abs(each - radius) > 0.02 * radius for each in result.radii):
-        low, high = min(result.radii), max(result.radii)
-        found = f"radii from {low:.3f} to {high:.3f} m" if high > low else f"a radius of {low:.3f} m"
-        notes.append(
-            f"The balls in these pictures have {found}, but the detector expects {radius:g} m. --radius-of scene uses "
-            "the radius of each picture's ball."
-        )
+    if options.radius_of == "all":
+        notes += other_radii(result, settings.object_radius or subject.manifest.object_radius)
     if options.radius_of == "scene":
         notes.append("--radius-of scene: the detector was given the radius of each picture's ball.")
     return notes

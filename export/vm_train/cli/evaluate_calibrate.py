@@ -13,7 +13,7 @@ from vm_embedded.files import check_writable
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
 
-from .evaluating import evaluate_with_progress
+from .evaluating import evaluate_with_progress, other_radii
 
 if TYPE_CHECKING:
     from vm_embedded.arrays import Floats, Mask
@@ -60,6 +60,9 @@ def run_calibrate(options: argparse.Namespace) -> int:
     rules = Rules(options.radius_of, options.min_radius, options.strict)
     job = Job(path, _CANDIDATES, False, classes, rules)
     result = evaluate_with_progress(job, job.subject(), pictures, options.workers)
+    if options.radius_of == "all":
+        for note in other_radii(result, model.manifest.object_radius):
+            print(f"vm-evaluate: {note}", file=sys.stderr)
     calibrated = [_calibrated(look, *_answers(result, look.contract.object_class), len(result.poses)) for look in looks]
     changed = change_looks(path, options.output, calibrated)
     print(f"{options.output}: written; other objects may now pass --min-confidence")
@@ -97,4 +100,6 @@ def _calibrated(look: LookCheckpoint, confidence: Floats, right: Mask, pictures:
         f"{name}: {source}; expected calibration error {before:.3f} before, {after:.3f} after "
         f"(scale {fitted.scale:.2f}, offset {fitted.offset:+.2f} of the logit)"
     )
+    if after >= before:
+        print(f"vm-evaluate: class {name}: the error is not smaller than before: give more pictures", file=sys.stderr)
     return look.recalibrated(fitted.scale, fitted.offset, source)

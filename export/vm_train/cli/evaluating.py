@@ -36,3 +36,15 @@ def evaluate_with_progress(
     if not result.poses:
         raise InputError("no picture could be evaluated")
     return result
+
+
+def other_radii(result: Evaluation, radius: float) -> list[str]:
+    """A remark if the objects in the pictures have other radii than the detector expects [m]."""
+    if not any(abs(each - radius) > 0.02 * radius for each in result.radii):
+        return []
+    low, high = min(result.radii), max(result.radii)
+    found = f"radii from {low:.3f} to {high:.3f} m" if high > low else f"a radius of {low:.3f} m"
+    return [
+        f"The objects in these pictures have {found}, but the detector expects {radius:g} m. --radius-of scene uses "
+        "the radius of each picture's object."
+    ]

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 _NAMED = 20
 """Faults to name."""
 
+_FEW = 25
+"""Frames for training; with fewer, the share of found boxes varied by half between seeds (docs/own-frames.md)."""
+
 
 def tune_config_parser() -> argparse.ArgumentParser:
     """The parser of vm-train tune-config, which has no options."""
@@ -99,16 +102,30 @@ def _describe(run: TuningRun, boxes: Path) -> None:
     recordings = len({each.recording for each in run.pictures})
     count = len(run.split.training), len(run.split.validation)
     print(
-        f"{boxes}: {len(run.pictures)} frames of {recordings} recordings: {count[0]} for training, {count[1]} "
-        "for validation",
+        f"{boxes}: {len(run.pictures)} frames of {recordings} recording{'s' * (recordings != 1)}: {count[0]} for "
+        f"training, {count[1]} for validation",
         flush=True,
     )
     if not count[1]:
         print(
-            "vm-train: no recording is small enough to be kept for validation; only rendered patches decide when the "
-            "training ends",
+            "vm-train: no recording is small enough to be kept for validation, so nothing measures the result: record "
+            "several times, and put the frames of each recording into a folder of its own",
             file=sys.stderr,
         )
+    if count[0] < _FEW:
+        print(
+            f"vm-train: with fewer than {_FEW} frames for training, the result depends much on chance; about 50 of "
+            "several recordings are enough",
+            file=sys.stderr,
+        )
+
+
+def _frames_to_try(run: TuningRun) -> str:
+    """What to give vm-detect: a folder of frames with lens files, if possible for validation, or what to fill in."""
+    for each in run.part((*run.split.validation, *run.split.training)):
+        if each.lens is not None:
+            return str(each.image.parent)
+    return "FRAMES --lens LENS.yaml --height METERS --pitch ANGLE"
 
 
 def _fine_tune(run: TuningRun, options: argparse.Namespace) -> int:
@@ -128,5 +145,5 @@ def _fine_tune(run: TuningRun, options: argparse.Namespace) -> int:
     if not finished:
         raise KeyboardInterrupt
     print(f"report: {run.folder / 'report.html'}")
-    print(f"next: vm-detect --model {run.model_path}")
+    print(f"next: vm-detect --model {run.model_path} {_frames_to_try(run)} --save-overlay found")
     return EXIT_OK

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from vm_embedded.cli.program import EXIT_OK, Parser
-from vm_embedded.errors import InputError, unknown
+from vm_embedded.errors import InputError
 from vm_embedded.files import write_file
 from vm_embedded.geometry.make_shape import make_shape
 from vm_embedded.geometry.sphere import Sphere
@@ -19,6 +19,7 @@ from vm_workstation.shortened import shortened
 
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.read import read_boxes
+from ..boxes.summary import rename_advice
 from ..formats.box_import import import_boxes
 from ..formats.box_masks import MaskRule
 from ..learning.configuration import TrainConfiguration
@@ -72,6 +73,12 @@ def run_import_boxes(options: argparse.Namespace) -> int:
     write_radius = configuration.mesh.radius_of == "scene"
     result = import_boxes(found.pictures, options.boxes, options.out, rule, write_radius)
     _complain(result.misfits, "no label comes from any of them")
+    if len(result.misfits) > result.labeled:
+        print(
+            "vm-train: most boxes do not fit: check --object-radius (a radius, not a diameter; it is "
+            f"{rule.shape.radius:g}), and lens and pose in the lens files",
+            file=sys.stderr,
+        )
     used = [(each, name) for each, name in zip(found.pictures, result.numbers, strict=True) if name is not None]
     split = split_by_recording([each for each, _ in used], configuration.data.validation, configuration.data.split_seed)
     if split.validation:
@@ -111,11 +118,7 @@ def _check(found: BoxedSet, rule: MaskRule, folder: Path) -> None:
     counts = Counter(box.name for picture in found.pictures for box in picture.boxes)
     objects = " or ".join(rule.colors)
     if counts and not counts.keys() & rule.colors.keys():
-        name, old = next(iter(rule.colors)), next(iter(counts))
-        raise InputError(
-            f"{folder} has no box of class {objects}: {unknown('class', name, sorted(counts))}; map a class to it, for "
-            f"example --names {old}={name}"
-        )
+        raise InputError(f"{folder} has no box of class {objects}; {rename_advice(counts, next(iter(rule.colors)))}")
     if not any(_has_object(each, rule) for each in found.pictures if each.lens is not None):
         raise InputError(
             f"no frame of {folder} has a box of {objects} and a lens file beside it (NAME.yaml or lensNAME.yaml); "

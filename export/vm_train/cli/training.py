@@ -17,6 +17,7 @@ from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.network.bundled import model_path
+from vm_embedded.network.model_file import read_model
 
 from ..data.inspection import inspect_pictures
 from ..data.picture_files import PictureFiles
@@ -192,6 +193,14 @@ def _report(run: TrainingRun, outcome: TrainingOutcome) -> None:
         radius = " --radius-of scene" if run.configuration.mesh.radius_of == "scene" else ""
         pictures = f"--list {run.folder / 'pictures.json'} --part test"
         print(f"next: vm-evaluate {model} {data.folder} {pictures}{radius} -o report")
+    if run.configuration.mesh.grid == "hexagonal":  # it can't be exported
+        return
+    start = run.folder / "start.onnx"
+    if start.exists() and read_model(start).manifest.looks:
+        print(f"next: vm-export {model} --look {start}")
+        return
+    if "object" in run.configuration.classes.kinds.values():
+        print(f"next: vm-train look {data.folder} --from {model} -o {run.folder}-look")
     print(f"next: vm-export {model}")
 
 

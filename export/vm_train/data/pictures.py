@@ -77,8 +77,8 @@ def find_pictures(folder: Path) -> list[PictureFiles]:
         shard = find_shards(folder)[0].name
         raise InputError(f"{folder} has both pictures and shards, for example {shard}: move one kind to another folder")
     if not parts["image"]:
-        hint = "; the image* files in it have another suffix" if other else ""
-        raise InputError(f"no pictures in {folder}: images must be named imageX.jpg or imageX.png{hint}")
+        hint = "the image* files in it have another suffix" if other else "for images with boxes, vm-train has --boxes"
+        raise InputError(f"no pictures in {folder}: images must be named imageX.jpg or imageX.png; {hint}")
     return [
         PictureFiles(
             number,

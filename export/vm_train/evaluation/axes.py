@@ -57,10 +57,14 @@ def unit_square(axes: Axes, x: str, y: str) -> None:
     add_legend(axes)
 
 
-def distance_axis(axes: Axes, edges: Floats) -> None:
-    """A horizontal axis that covers all distance bins with edges (D + 1,) [m]."""
+def distance_axis(axes: Axes, edges: Floats, counts: Sequence[int]) -> None:
+    """A horizontal axis of distance bins with edges (D + 1,) [m], up to the last bin that is not empty.
+
+    counts (D,): what is in each bin.
+    """
     label_axes(axes, "distance [m]", "")
-    axes.set_xlim(float(edges[0]), float(edges[-1]))
+    used = np.flatnonzero(counts)
+    axes.set_xlim(float(edges[0]), float(edges[used[-1] + 1 if len(used) else -1]))
 
 
 def add_legend(axes: Axes) -> None:

@@ -143,7 +143,8 @@ def evaluate_pictures(subject: Subject, pictures: Sequence[PictureFiles], classe
         except (InputError, GeometryError) as error:
             if isinstance(error, PictureFault) and error.kind == "color":
                 # Many masks may have this color. To skip them all would change what the scores measure.
-                raise InputError(f"{files.mask}: {error}; assign it to a class with --color CLASS=R,G,B") from error
+                reason = str(error).removeprefix(f"{files.mask.name}: ")
+                raise InputError(f"{files.mask}: {reason}; assign it to a class with --color CLASS=R,G,B") from error
             if rules.strict:
                 raise InputError(f"{files.image}: {error}") from error
             result.faults[str(files.image)] = str(error)

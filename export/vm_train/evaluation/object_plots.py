@@ -79,7 +79,7 @@ def objects_over_distance(objects: Objects) -> Figure:
         numbers = [scores.ranking(scores.overlaps[0], number).truths for number in range(len(middles))]
         panels[3].stairs(numbers, scores.distance_edges, color=color, label=name)
     for axes, title in zip(panels, (*drawn, "true objects"), strict=True):
-        distance_axis(axes, next(iter(objects.values())).distance_edges)
+        distance_axis(axes, next(iter(objects.values())).distance_edges, _true_objects(objects))
         axes.set_title(title, fontsize=10)
     for axes in panels[:3]:
         axes.set_ylim(-0.02, 1.02)
@@ -87,6 +87,12 @@ def objects_over_distance(objects: Objects) -> Figure:
         axes.set_xlabel("")
     shared_legend(figure, panels, 4)
     return figure
+
+
+def _true_objects(objects: Objects) -> list[int]:
+    """The number of true objects of all classes in each distance bin."""
+    bins = range(len(next(iter(objects.values())).distance_edges) - 1)
+    return [sum(each.ranking(each.overlaps[0], number).truths for each in objects.values()) for number in bins]
 
 
 def distance_errors(objects: Objects) -> Figure:
@@ -107,7 +113,7 @@ def distance_errors(objects: Objects) -> Figure:
             middles, 100.0 * p90, color=color, marker=".", linestyle="--", linewidth=1.2, label=f"{name}: 90 %"
         )
     for axes, label in ((signed, "found minus true distance [m]"), (relative, "absolute error [% of the distance]")):
-        distance_axis(axes, next(iter(objects.values())).distance_edges)
+        distance_axis(axes, next(iter(objects.values())).distance_edges, _true_objects(objects))
         axes.set_ylabel(label)
         add_legend(axes)
     signed.axhline(0.0, color="black", linewidth=0.7)

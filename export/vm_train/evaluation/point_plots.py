@@ -56,8 +56,9 @@ def points_over_distance(scores: PointScores, threshold: float) -> Figure:
         for axes, score in zip(panels, _SCORES, strict=True):
             values = [math.nan if each[score] is None else each[score] for each in rankings]
             axes.plot(middles, values, color=color, linewidth=1.2, marker=".", markersize=4, label=name)
+    counts = [int(scores.confusion(number).sum()) for number in range(len(middles))]
     for axes, score in zip(panels, _SCORES, strict=True):
-        distance_axis(axes, scores.distance_edges)
+        distance_axis(axes, scores.distance_edges, counts)
         axes.set_title(_title(score), fontsize=10)
         axes.set_ylim(min(-0.02, axes.get_ylim()[0]), 1.02)  # some scores are 0 by chance, and below 0 if worse
     for axes in panels[: len(panels) // 2]:

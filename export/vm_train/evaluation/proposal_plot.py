@@ -37,7 +37,7 @@ def proposal_recalls(proposals: Mapping[str, ProposalScores], objects: Mapping[s
         over_distance.plot(
             middles, found, color="#555555", marker=".", linestyle=":", label=f"{name}: found, IoU {overlap:g}"
         )
-        distance_axis(over_distance, edges)
+        distance_axis(over_distance, edges, [each.truths for each in scores.recalls_by("distance").values()])
         for axes, measure in zip(others, _LABELS, strict=True):
             bins = scores.recalls_by(measure)
             places = range(len(bins))

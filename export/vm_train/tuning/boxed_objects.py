@@ -9,9 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vm_embedded.errors import InputError, unknown
+from vm_embedded.errors import InputError
 
 from ..boxes.box import BoxedPicture, BoxedSet
+from ..boxes.summary import rename_advice
 from ..boxes.whole import whole_object
 from ..data.split import Split
 from .windows import Windows
@@ -41,11 +42,8 @@ def check_boxes(boxes: BoxedSet, name: str, folder: str) -> None:
     if not boxes.pictures:
         raise InputError(f"no picture of {folder} can be used: vm-train check {folder} --boxes tells why")
     if not counts[name]:
-        found = ", ".join(f"{each} ({count})" for each, count in counts.most_common()) or "none"
-        nearest = unknown("box class", name, sorted(counts)) if counts else "there are no boxes"
         raise InputError(
-            f"{folder} has no box of class {name}, which the close look judges; it has {found}. Map a class to it, for "
-            f"example --names {next(iter(counts), '0')}={name} ({nearest})"
+            f"{folder} has no box of class {name}, which the close look judges; {rename_advice(counts, name)}"
         )
 
 

@@ -97,6 +97,9 @@ def _finish(run: TuningRun, stop_requested: Callable[[], bool]) -> bool:
     both = {"before": before.as_dict(), "after": after.as_dict()}
     write_file(run.folder / "result.json", json.dumps(both, indent=1) + "\n")
     write_report(run, before, after)
-    print(f"{run.model_path}: in {len(frames)} frames for validation, it finds {after.found_of()}")
-    print(f"before the fine-tuning: {before.found_of()}")
+    if frames:
+        print(f"{run.model_path}: in {len(frames)} frames for validation, it finds {after.found_of()}")
+        print(f"before the fine-tuning: {before.found_of()}")
+    else:
+        print(f"{run.model_path}: not measured, because no frames are for validation")
     return True

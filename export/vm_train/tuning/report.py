@@ -43,14 +43,14 @@ def write_report(run: TuningRun, before: WindowScores, after: WindowScores) -> N
 def _page(run: TuningRun, frames: list[BoxedPicture], before: WindowScores, after: WindowScores) -> str:
     name = run.object_class
     recordings = len({each.recording for each in frames})
-    about = (
-        f"The close look of {run.model} learned from {len(run.split.training)} frames of {run.boxes.folder.name}. "
-        f"These scores are of {len(frames)} other frames, from {recordings} other recordings."
-    )
+    about = f"The close look of {run.model} learned from {len(run.split.training)} frames of {run.boxes.folder.name}."
+    if frames:
+        about += f" These scores are of {len(frames)} other frames, from {recordings} other recordings."
     parts = [f"<h1>{escape(run.boxes.folder.name)}: {escape(name)}</h1>", f"<p>{escape(about)}</p>"]
     if not frames:
         parts.append(
-            '<p class="note">No recording is small enough to be kept for validation, so nothing was measured.</p>'
+            '<p class="note">No recording is small enough to be kept for validation, so nothing was measured. Record '
+            "several times, and put the frames of each recording into a folder of its own.</p>"
         )
         return html_page(f"vm-train look: {run.boxes.folder.name}", parts)
     heading, rows = _table(before, after)

@@ -158,10 +158,10 @@ class _Stage:
         record = {"epoch": self._progress.validated, "own": own, "rendered": mixture.loss, "share": mixture.share}
         log.write(self._trainer.done, record)
         self._bar.clear()
-        yours = "no frames of yours for validation" if math.isnan(own) else f"loss {own:.3f} for your frames"
+        yours = "" if math.isnan(own) else f"{own:.3f} for your frames, "
         print(
-            f"{self._stage}, epoch {self._progress.validated} of {self._recipe.epochs}: {yours}, "
-            f"{mixture.loss:.3f} for rendered ones, with {mixture.share:.0%} of the new weights",
+            f"{self._stage}, epoch {self._progress.validated} of {self._recipe.epochs}: loss {yours}"
+            f"{mixture.loss:.3f} for rendered patches, with {mixture.share:.0%} of the new weights",
             flush=True,
         )
 

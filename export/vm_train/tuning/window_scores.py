@@ -81,7 +81,8 @@ class WindowScores:
 
     def found_of(self) -> str:
         """The counts as text."""
-        return f"{self.reported} of {len(self.boxes.probabilities)} boxes and {self.false} false objects"
+        false = f"{self.false} false object{'s' * (self.false != 1)}"
+        return f"{self.reported} of {len(self.boxes.probabilities)} boxes and {false}"
 
     def as_dict(self) -> dict[str, float | int | None]:
         """Plain values for JSON; None for what has no value."""

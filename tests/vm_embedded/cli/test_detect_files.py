@@ -454,6 +454,8 @@ def test_an_output_without_permission_is_named(option, tmp_path):
 
 def test_a_directory_without_images_is_named(tmp_path):
     one_complaint(detect(tmp_path, code=1), "no images in directory", str(tmp_path))
+    shutil.copytree(IMAGES[0].parent, tmp_path / "day1")
+    one_complaint(detect(tmp_path, code=1), f"give the folders in it one by one, such as {tmp_path / 'day1'}")
 
 
 @pytest.mark.parametrize("content", [b"", b"no video at all", os.urandom(20000)])

@@ -1,6 +1,7 @@
 """The same boxes in three formats, their layouts, names, recordings and lenses."""
 
 import json
+import re
 import tempfile
 from collections import Counter
 from pathlib import Path
@@ -122,6 +123,9 @@ def test_a_confidence_is_no_fault(tmp_path):
 def test_folders_without_use_are_refused(tmp_path):
     with pytest.raises(InputError, match="there is no folder"):
         read_boxes(tmp_path / "none")
+    (tmp_path / "boxes.json").write_text("{}")
+    with pytest.raises(InputError, match="is a file: give the folder with the images"):
+        read_boxes(tmp_path / "boxes.json")
     with pytest.raises(InputError, match="no images in"):
         read_boxes(tmp_path)
     write_image(tmp_path / "a.jpg")
@@ -129,6 +133,12 @@ def test_folders_without_use_are_refused(tmp_path):
     (tmp_path / "settings.json").write_text("{}")
     with pytest.raises(InputError, match=r"no annotations in .*YOLO.*VOC.*COCO"):
         read_boxes(tmp_path)
+    (tmp_path / "images").mkdir()
+    (tmp_path / "annotations").mkdir()
+    write_image(tmp_path / "images" / "b.jpg")
+    with pytest.raises(InputError, match=rf"; for those in annotations beside it, give {re.escape(str(tmp_path))}$"):
+        read_boxes(tmp_path / "images")
+    (tmp_path / "images" / "b.jpg").unlink()
     with pytest.raises(InputError, match="unknown format 'yol'; did you mean 'yolo'"):
         read_boxes(tmp_path, "yol")
     write_yolo(tmp_path, {"a": [BALL]})

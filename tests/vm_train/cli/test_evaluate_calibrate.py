@@ -15,7 +15,7 @@ from vm_embedded.network.model_file import read_model
 from vm_export.change_model import change_looks
 from vm_export.look_weights import look_of
 from vm_train.cli.evaluate import main
-from vm_train.scores.calibration import logits_from
+from vm_train.scores.calibration import Calibration, logits_from
 
 from ...drawn_scenes import MODEL
 from ..drawn import draw_set
@@ -50,6 +50,14 @@ def test_the_confidence_fits_the_pictures_afterward_and_all_else_stays(data, tmp
     assert calibrate(tmp_path / "once.onnx", data, "-o", tmp_path / "twice.onnx") == 0
     again = float(FITTED.search(capsys.readouterr().out)[4])
     assert again == pytest.approx(1.0, abs=0.1)
+
+
+def test_objects_of_another_size_and_a_calibration_that_does_not_help_are_told(data, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(Calibration, "fit", lambda logits, right: Calibration(1.0, 0.0))
+    assert main(["calibrate", "ball-small", str(data), "-o", str(tmp_path / "own.onnx")]) == 0
+    said = capsys.readouterr().err
+    assert "have a radius of 0.070 m, but the detector expects 0.095 m. --radius-of scene" in said
+    assert "class ball: the error is not smaller than before: give more pictures" in said
 
 
 def test_a_canary_that_is_not_found_any_more_is_a_warning(data, tmp_path, capsys):

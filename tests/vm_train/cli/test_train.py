@@ -67,7 +67,7 @@ def test_without_torch_it_says_what_to_install(arguments, tmp_path):
 
 @pytest.mark.long
 def test_a_folder_without_pictures_or_a_training_ends_in_one_line(tmp_path):
-    assert "no pictures in" in run(tmp_path, "-o", tmp_path / "run", code=1).stderr
+    assert "for images with boxes, vm-train has --boxes" in run(tmp_path, "-o", tmp_path / "run", code=1).stderr
     assert "holds no training" in run("resume", tmp_path, code=1).stderr
 
 

@@ -28,6 +28,7 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, data):
     folder, done = whole
     assert re.search(r"30 pictures: \d+ for training, \d+ for validation, \d+ for test", done.stdout)
     assert re.search(r"model\.pt: average precision 0\.\d+ on the validation, \d+ pictures/s", done.stdout)
+    assert f"\nnext: vm-train look {data} --from {folder / 'model.pt'} -o {folder}-look\nnext: vm-export" in done.stdout
     assert {path.name for path in folder.iterdir()} == {
         "train.toml",
         "pictures.json",

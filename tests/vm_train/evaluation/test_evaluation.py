@@ -202,7 +202,7 @@ def test_colors_of_no_class_end_it(tmp_path):
     mask = cv2.imread(str(folder / "mask0001.png"), cv2.IMREAD_UNCHANGED)
     mask[:5, :5] = (255, 0, 0, 255)
     cv2.imwrite(str(folder / "mask0001.png"), mask)
-    with pytest.raises(InputError, match=r"mask0001.*\[0, 0, 255\]"):
+    with pytest.raises(InputError, match=r"/mask0001\.png: 25 pixels .*\[0, 0, 255\]"):
         evaluate_pictures(KNOWING, find_pictures(folder), CLASSES, Rules())
     known = classes_with_colors(MANIFEST, USUAL, [("environment", (0, 0, 255))])
     assert len(evaluate_pictures(KNOWING, find_pictures(folder), known, Rules()).poses) == 2

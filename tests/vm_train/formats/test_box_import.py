@@ -94,6 +94,12 @@ def test_masks_from_true_boxes_agree_with_the_true_masks(frames, configuration, 
     assert not list(out.glob("scene*.json"))
 
 
+def test_a_diameter_instead_of_a_radius_is_suspected(frames, configuration, tmp_path, capsys):
+    wrong = ("--object-radius", 2 * RADIUS)
+    import_frames(frames[0], tmp_path / "out", "--names", "0=ball", "--config", configuration, *wrong)
+    assert "check --object-radius (a radius, not a diameter; it is 0.14)" in capsys.readouterr().err
+
+
 lenses = st.sampled_from(
     [
         Rectilinear(focal_length=200.0, fov=2.2),
@@ -231,7 +237,7 @@ def test_a_number_has_no_sign_of_a_comment():
 
 def test_what_is_missing_is_named(frames, configuration, tmp_path):
     folder, out = frames[0], tmp_path / "out"
-    with pytest.raises(InputError, match=r"no box of class ball: .* for example --names 0=ball"):
+    with pytest.raises(InputError, match=r"no box of class ball; it has 0 .* --names 0=ball"):
         import_frames(folder, out, "--config", configuration)
     bare = tmp_path / "bare"
     shutil.copytree(folder, bare, ignore=shutil.ignore_patterns("*.yaml"))
@@ -261,6 +267,7 @@ def test_a_network_of_the_package_is_fine_tuned_as_a_user_types_it(frames, tmp_p
     few = ("--set", "training.epochs=1", "--workers", 0, "--threads", 1, "--no-unpacked")
     trained = run(mixed, "-o", folder, "--from", "ball", "--validation", out / "validation.txt", *few)
     assert "80 pictures: 76 for training, 4 for validation" in trained.stdout
+    assert trained.stdout.endswith(f"\nnext: vm-export {folder / 'model.pt'} --look {folder / 'start.onnx'}\n")
     made = Checkpoint.load(folder / "model.pt").manifest
     assert (made.any_radius, made.sampling, made.colors) == (True, "footprint", "relative")
     assert json.loads((folder / "run.json").read_text())["start"]["file"] == "start.onnx"

@@ -63,6 +63,10 @@ def test_a_class_without_boxes_tells_which_there_are():
     boxes = BoxedSet((BoxedPicture(Path("x.jpg"), SIZE, (Box("0", 1, 2, 3, 4),), "a"),), (), ("0",))
     with pytest.raises(InputError, match=r"DIR has no box of class ball.*it has 0 \(1\).*--names 0=ball"):
         check_boxes(boxes, "ball", "DIR")
+    for names, old in ((("2", "0"), "NAME"), (("robot", "Ball"), "Ball")):
+        some = tuple(Box(name, 1, 2, 3, 4) for name in names)
+        with pytest.raises(InputError, match=f"--names {old}=ball"):
+            check_boxes(BoxedSet((BoxedPicture(Path("x.jpg"), SIZE, some, "a"),), (), names), "ball", "DIR")
     with pytest.raises(InputError, match="no picture of DIR can be used"):
         check_boxes(BoxedSet((), (), ()), "ball", "DIR")
     check_boxes(boxes, "0", "DIR")

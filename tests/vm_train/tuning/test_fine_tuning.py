@@ -16,6 +16,8 @@ from vm_export.look_weights import look_of
 from vm_train.cli.train import main
 from vm_train.learning.log import read_log
 
+from ..drawn import draw_set
+
 
 @pytest.fixture(scope="module")
 def tune(frames, tiny):
@@ -43,12 +45,17 @@ def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
         assert re.fullmatch(rf"{stage}: \d+ patches of your frames, \d+ of them show the object", lines[start])
         for epoch in (1, 2):
             assert re.fullmatch(
-                rf"{stage}, epoch {epoch} of 2: loss [\d.]+ for your frames, [\d.]+ for rendered ones, "
+                rf"{stage}, epoch {epoch} of 2: loss [\d.]+ for your frames, [\d.]+ for rendered patches, "
                 r"with \d+0% of the new weights",
                 lines[start + epoch],
             )
     assert re.search(r"model.onnx: in 4 frames for validation, it finds \d+ of \d+ boxes and \d+ false", lines[7])
-    assert lines[9:] == [f"report: {folder / 'report.html'}", f"next: vm-detect --model {folder / 'model.onnx'}"]
+    assert lines[9:] == [
+        f"report: {folder / 'report.html'}",
+        f"next: vm-detect --model {folder / 'model.onnx'} FRAMES --lens LENS.yaml --height METERS --pitch ANGLE "
+        "--save-overlay found",
+    ]
+    assert "with fewer than 25 frames for training" in done.stderr
     assert {path.name for path in folder.iterdir()} == {
         *("tune.toml", "run.json", "before.onnx", "rendered.npz", "patches", "glance.pt", "look.pt"),
         *("log-glance", "log-look", "model.onnx", "report.html", "result.json"),
@@ -72,6 +79,24 @@ def test_the_new_model_differs_only_in_its_close_look(whole):
     assert provenance["fine_tuned_from_sha256"] == before.sha256
     assert provenance["data"] == before.manifest.look.provenance["data"]
     assert CloseLook.of(after).glance is not None  # loads, and passes its self-tests
+
+
+def test_frames_without_validation_measure_nothing_and_those_with_lenses_can_be_tried(tune, frames, tmp_path):
+    seen = shutil.copytree(frames, tmp_path / "seen")
+    lens = draw_set(tmp_path / "drawn", 1) / "lens0000.yaml"
+    for image in seen.glob("*.jpg"):
+        shutil.copy(lens, image.with_suffix(".yaml"))
+    done = tune(tmp_path / "run", "--boxes", seen, "--set", "data.validation=0")
+    lines = done.stdout.splitlines()
+    assert re.match(r"glance, epoch 1 of 2: loss [\d.]+ for rendered patches, with ", lines[2])
+    model = tmp_path / "run" / "model.onnx"
+    assert lines[7:] == [
+        f"{model}: not measured, because no frames are for validation",
+        f"report: {tmp_path / 'run' / 'report.html'}",
+        f"next: vm-detect --model {model} {seen} --save-overlay found",
+    ]
+    assert "put the frames of each recording into a folder of its own" in done.stderr
+    assert "0 other frames" not in (tmp_path / "run" / "report.html").read_text()
 
 
 def test_a_wide_look_is_left_out(tune, tmp_path):
