@@ -14,6 +14,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot
 
 RESULTS = Path(__file__).with_name("results.json")
+OTHER_MACHINE = Path(__file__).with_name("results_xeon.json")
 PEER_TIMES = Path(__file__).with_name("peer_times.json")
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "performance.md"
@@ -105,6 +106,26 @@ def shipped(found: dict[str, Any]) -> str:
             [name, str(row["points"]), str(row["found"]), *stages, ms(row["total"]["p50"]), ms(row["total"]["p99"])]
         )
     return table(["network", "points", "found", *names, "whole call", "p99"], rows)
+
+
+def both_machines(first: dict[str, Any], second: dict[str, Any]) -> str:
+    """The same calls on two machines."""
+    one, other = _medians(first), _medians(second)
+    rows = [[name, ms(one[name]), ms(other[name]), f"{other[name] / one[name]:.1f}"] for name in one]
+    return table(["network", "EPYC", "Xeon", "Xeon / EPYC"], rows)
+
+
+def _medians(found: dict[str, Any]) -> dict[str, float]:
+    """Median times [ms] of some calls on a machine."""
+    made = {}
+    for kind, title in (("session", "session"), ("whole", "whole call")):
+        made |= {f"{name}, {title}": found["whole_calls"][name][kind]["p50"] for name in ("5x4", "13x16")}
+    made |= {
+        f"`{name}`": found["shipped"][f"{name}, to 14 m"]["total"]["p50"] for name in ("ball", "ball-small", "soccer")
+    }
+    return made | {
+        name: found["peers"]["calls"][name]["p50"] for name in ("SSDLite MobileNet v3, 320", "YOLO nano, 640")
+    }
 
 
 def speed(found: dict[str, Any]) -> str:
@@ -262,7 +283,8 @@ def plot_growth(found: dict[str, Any], path: Path) -> None:
 
 def main() -> None:
     found = json.loads(RESULTS.read_text())
-    fill(PAGE, {name: made(found) for name, made in TABLES.items()})
+    other = json.loads(OTHER_MACHINE.read_text())
+    fill(PAGE, {name: made(found) for name, made in TABLES.items()} | {"both machines": both_machines(found, other)})
     fill(README, {"speed": speed(found)})
     plot_peers(found, DOCS / "performance-peers.png")
     plot_roofline(json.loads(PEER_TIMES.read_text()), DOCS / "performance-roofline.png")
