@@ -161,7 +161,7 @@ def _run(options: argparse.Namespace) -> int:
     except InputError as error:
         if options.print_config or options.check_config or not _is_for_live(options):
             raise
-        return report_failed_start(EventLog("vm-detect"), error)
+        return report_failed_start(EventLog(), error)
     if options.print_config:
         print(to_commented_toml(replace(given, model=_movable(given.model)), HEADER), end="")
         return EXIT_OK
@@ -231,7 +231,7 @@ def _check_file_options(options: argparse.Namespace) -> None:
 
 def _detect_live(options: argparse.Namespace) -> int:
     """Run the daemon on a live camera until it is stopped."""
-    log = EventLog("vm-detect")
+    log = EventLog()
     try:
         _check_live_options(options)
     except InputError as error:

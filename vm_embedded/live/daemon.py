@@ -39,11 +39,11 @@ from .frame_remarks import FrameRemarks
 from .frame_watchdog import FrameWatchdog
 from .free_memory import give_back_memory
 from .health import Health
-from .live_page import LivePage
 from .load_detector import find_opener, load_checked_detector
 from .log import EventLog
 from .prometheus import resident_bytes
 from .reloading import read_again
+from .status_page import StatusPage
 from .systemd import SystemdNotifier
 
 EXIT_OK, EXIT_FAILED, EXIT_RESTART, EXIT_CONFIGURATION = 0, 1, 75, 78
@@ -103,9 +103,12 @@ class Daemon:
         self._log = log
         self._bridge = bridge
         camera, status = configuration.camera, configuration.status
-        self.recorder = Recorder(configuration.recorder, lambda event, level, folder: log(event, level, folder=folder))
+        self.recorder = Recorder(
+            configuration.recorder,
+            recording_files(configuration, detector.session.model),
+            lambda event, level, folder: log(event, level, folder=folder),
+        )
         self.last: Message | None = None
-        self.counters = Counters()
         self.health = Health(1e-3 * camera.lost_ms, (1e-3 * status.budget_ms) or math.inf)
         self._sent = 0.0  # when the last message was sent
         self._stops = 0  # how often a signal has asked to stop
@@ -115,16 +118,15 @@ class Daemon:
         self._reloading: asyncio.Task[None] | None = None
         self.grabber = Grabber(opener, camera, self._wake)
         self.poses = PoseStream(configuration.pose, self._report_bad_pose)
+        self.outputs = Channels(configuration.output)
+        self.counters = Counters(self.grabber, self.poses, self.outputs)
         self._watchdog = FrameWatchdog(self._end_hanging)
         self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health, self._watchdog)
         self._remarks = FrameRemarks()
-        self._recording_files = recording_files(configuration, detector.session.model)
-        self.outputs = Channels(configuration.output)
         self.state = DaemonState(self.health, self.grabber, self.outputs, log, self._notifier)
-        self.page = LivePage(self.answerer, self._status, self.record, self.metrics, self._use_threshold)
-        commands = {"status": lambda: json.dumps(self._status(), allow_nan=False)}
-        commands |= {"record": self.record, "metrics": self.metrics}
-        control = ControlServer(control_path(status.socket), commands)
+        self.page = StatusPage(self.answerer, self._status, self.record, self.metrics, self._use_threshold)
+        commands = {"status": lambda: json.dumps(self._status(), allow_nan=False), "record": self.record}
+        control = ControlServer(control_path(status.socket), commands | {"metrics": self.metrics})
         self._parts: list[Part] = [self.outputs, self.poses, control, *self.page.servers()]
 
     @classmethod
@@ -265,7 +267,7 @@ class Daemon:
         for event, reason in self._remarks.about(answer):
             self._log(event, "warning", reason=reason)
         self.page.show(answer)
-        self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._recording_files)
+        self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last))
 
     def _report_bad_pose(self, reason: str) -> None:
         self.health.add_trouble(time.monotonic(), reason)
@@ -283,9 +285,8 @@ class Daemon:
 
     def _status(self) -> Message:
         """State, counts, and the last frame's message."""
-        self._collect_counts()
         return state_message(self.state.name, self.state.reason) | {
-            "counts": self.counters.counts(self.grabber.counts),
+            "counts": self.counters.counts(),
             "memory_mib": round(resident_bytes() / 2**20, 1),
             "model_sha256": self.answerer.detector.session.model.sha256,
             "last": self.last,
@@ -293,26 +294,21 @@ class Daemon:
 
     def _use_threshold(self, name: str, value: float) -> None:
         """Let recordings have a threshold that the status page has changed."""
-        self.recorder.clear()  # a recording has one vm.toml
-        self._recording_files = recording_files(self.configuration, self.answerer.detector.session.model)
+        self._begin_recording_anew()
         self._log("threshold changed", "warning", **{name: value})
 
     def metrics(self) -> str:
         """All metrics in Prometheus's text format."""
-        self._collect_counts()
-        cache = self.answerer.detector.cache
-        return self.counters.metrics(self.state.name, self.grabber.counts, cache, self.health.answered)
+        return self.counters.metrics(self.state.name, self.answerer.detector.cache, self.health.answered)
 
-    def _collect_counts(self) -> None:
-        """Copy the counts of poses and outputs into the counters."""
-        outcomes = self.counters.outcomes
-        outcomes.poses, outcomes.poses_bad = self.poses.received, self.poses.bad
-        outcomes.dropped = self.outputs.dropped
+    def _begin_recording_anew(self) -> None:
+        """Let recordings have the current configuration and network."""
+        self.recorder.begin_anew(recording_files(self.configuration, self.answerer.detector.session.model))
 
     def record(self) -> str:
         """Start to write a recording of the last seconds; return where it goes, or REFUSED and the reason."""
         try:
-            result = self.recorder.record(self._recording_files)
+            result = self.recorder.record()
         except InputError as error:
             self._log("not recorded", "warning", reason=str(error))
             return f"{REFUSED}{error}"
@@ -338,10 +334,9 @@ class Daemon:
             reason = str(error) if isinstance(error, VisualMeshError) else one_line(error)
             self._log("reload refused", "error", reason=reason)
             return
-        self.recorder.clear()
         self.answerer.reload(new.configuration, new.detector)
+        self._begin_recording_anew()
         self._remarks = FrameRemarks()
-        self._recording_files = new.recording_files
         give_back_memory()
         self._log("reloaded", model=new.configuration.model, proved=new.proved, needs_restart=new.needs_restart)
 

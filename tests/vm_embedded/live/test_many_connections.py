@@ -83,7 +83,7 @@ def test_attack_6_the_log_has_at_most_fifty_lines_of_a_kind_in_ten_seconds(monke
     now = [1000.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     stream = io.StringIO()
-    log = EventLog("vm-detect", stream)
+    log = EventLog(stream)
     for _ in range(1000):
         log("internal error", "error")
     log("state", state="ok")
