@@ -10,7 +10,8 @@ from ..detection.cache import MeshCache
 from ..detection.detections import Detections
 from ..output.channels import Channels
 from ..poses.stream import PoseStream
-from .prometheus import Histogram, resident_bytes, to_prometheus_text
+from .memory import resident_bytes
+from .prometheus import Histogram, to_prometheus_text
 
 
 @dataclass

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import resource
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
 from ..output.messages import STATES
 
-BUCKETS = (0.0005, 0.001, 0.002, 0.003, 0.005, 0.008, 0.012, 0.02, 0.033, 0.05, 0.1, 0.25, 1.0, math.inf)
+_BUCKETS = (0.0005, 0.001, 0.002, 0.003, 0.005, 0.008, 0.012, 0.02, 0.033, 0.05, 0.1, 0.25, 1.0, math.inf)
 """Upper bounds of the histogram buckets [s]."""
 
 
@@ -18,18 +16,18 @@ class Histogram:
     """Counts of durations in each bucket, and their sum [s]."""
 
     def __init__(self) -> None:
-        self.counts = [0] * len(BUCKETS)
+        self.counts = [0] * len(_BUCKETS)
         self.sum = 0.0
 
     def add(self, seconds: float) -> None:
         """Add a duration [s]."""
-        self.counts[bisect_left(BUCKETS, seconds)] += 1
+        self.counts[bisect_left(_BUCKETS, seconds)] += 1
         self.sum += seconds
 
     def lines(self, name: str, label: str) -> Iterator[str]:
         """Lines of the text format."""
         total = 0
-        for end, count in zip(BUCKETS, self.counts, strict=True):
+        for end, count in zip(_BUCKETS, self.counts, strict=True):
             total += count
             upper = "+Inf" if math.isinf(end) else f"{end:g}"
             yield f'{name}_bucket{{{label},le="{upper}"}} {total}'
@@ -55,11 +53,3 @@ def to_prometheus_text(
     for stage, histogram in stages.items():
         lines += histogram.lines("vm_stage_seconds", f'stage="{stage}"')
     return "\n".join(lines) + "\n"
-
-
-def resident_bytes() -> int:
-    """Memory of this process [bytes]."""
-    try:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
-    except (OSError, IndexError, ValueError):
-        return 0
