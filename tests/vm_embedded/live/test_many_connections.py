@@ -10,8 +10,7 @@ from contextlib import ExitStack
 import pytest
 
 from tests.messages import read_message
-from tests.vm_embedded.cameras.test_mjpeg import LENS
-from tests.vm_embedded.live.running import counts, running
+from tests.vm_embedded.live.running import LENS, counts, running
 from tests.vm_embedded.poses.test_stream import MOTION, free_port, pose_line
 from vm_embedded.live.log import EventLog
 
