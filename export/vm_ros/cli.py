@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     cv2.setNumThreads(1)
     if options.check_config:
         return _check(options)
-    log = EventLog("vm-ros")
+    log = EventLog()
     return run_daemon(log, lambda: _prepare(options, given[cut + 1 :], log))
 
 

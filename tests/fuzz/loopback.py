@@ -48,7 +48,7 @@ def opened_daemon() -> tuple[Daemon, int]:
 
 async def _opened(configuration: Configuration, detector: Detector) -> Daemon:
     opener = camera_opener(configuration.camera)
-    daemon = Daemon(lambda: configuration, configuration, opener, detector, "", EventLog("vm-detect", io.StringIO()))
+    daemon = Daemon(lambda: configuration, configuration, opener, detector, "", EventLog(io.StringIO()))
     for part in daemon._parts:
         await part.open()
     file = read_lens_file(_FRAME.with_name("lens0000000.yaml"))

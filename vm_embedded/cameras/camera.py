@@ -18,6 +18,9 @@ from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from .image_header import MAX_MEGAPIXELS
 
+EARLY = 0.005
+"""How far in the future a frame's time may be [s]: the two clocks are read one after the other."""
+
 
 class CameraError(VisualMeshError):
     """A camera that can't be opened or has disappeared. Opening it again may help."""

@@ -20,15 +20,11 @@ import numpy as np
 
 from ..arrays import Image
 from ..errors import VisualMeshError, one_line
-from .camera import BrokenFrameError, Camera, CameraSettings, Shot
+from .camera import EARLY, BrokenFrameError, Camera, CameraSettings, Shot
 from .open_camera import Opener
 
 MOST_HANGING = 8
 """Largest number of hanging threads; beyond it, only a new process helps."""
-
-_EARLY = 0.005
-"""How far in the future a frame's time may be [s]: the two clocks are read one after the other."""
-
 
 _M_ARENA_MAX, _ARENAS = -8, 2
 """Parameter of glibc's mallopt, and the arenas from which threads get memory: one for the first, one for all others."""
@@ -160,7 +156,7 @@ class Grabber:
         with self._lock:
             if reader is not self._reader:
                 return
-            if shot.captured > arrived + _EARLY:
+            if shot.captured > arrived + EARLY:
                 self.trouble = f"frame time is {shot.captured - arrived:.3f} s in the future"
                 self.counts.ahead += 1
                 return

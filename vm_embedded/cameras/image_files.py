@@ -38,8 +38,9 @@ def check_read_format(format: str) -> None:
 
     OpenCV reads colors as BGR and keeps the single channel of a gray or Bayer image.
     """
-    if format in ("rgb", "bgra", "rgba"):
-        allowed = ", ".join(name for name in FORMATS if name not in ("rgb", "bgra", "rgba"))
+    never = ("rgb", "bgra", "rgba")
+    if format in never:
+        allowed = ", ".join(name for name in FORMATS if name not in never)
         raise InputError(
             f"--format {format} is only for frames passed in from Python; frames of files and cameras are {allowed}"
         )
@@ -268,6 +269,5 @@ def _of_video(image: Image, name: str, max_megapixels: float) -> Image:
 
 def _next_image(capture: cv2.VideoCapture) -> Image | None:
     """The next image, or None at the end."""
-
     good, image = capture.read()
     return np.asarray(image, dtype=np.uint8) if good else None

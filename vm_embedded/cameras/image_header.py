@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from contextlib import suppress
 
 from ..errors import InputError
 from ..geometry.lens import Size
@@ -44,10 +45,8 @@ def image_size(content: bytes) -> Size:
     reader = next((each for start, each in _READERS.items() if content.startswith(start)), None)
     size = None
     if reader is not None:
-        try:
+        with suppress(struct.error, IndexError, ValueError):  # it ends within the header
             size = reader(content)
-        except (struct.error, IndexError, ValueError):  # it ends within the header
-            size = None
     if size is None:
         raise InputError("can't be decoded as an image")
     return size

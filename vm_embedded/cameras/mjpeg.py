@@ -52,7 +52,7 @@ class MjpegCamera:
             self._response = self._request(url.path or "/", url.query, url.username, url.password)
         except (OSError, http.client.HTTPException) as error:
             self.close()
-            raise CameraError(f"no response from {without_password(settings.source)}: {one_line(error)}") from error
+            raise CameraError(f"no response from {self._name}: {one_line(error)}") from error
         except CameraError:
             self.close()
             raise

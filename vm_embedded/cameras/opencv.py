@@ -16,17 +16,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import exists
-from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, without_password
+from .camera import EARLY, BrokenFrameError, CameraError, CameraSettings, Shot, without_password
 from .decoding import decode_frame
 from .frame_clock import FrameClock
 from .video_size import check_frame, check_video
 
 _OLDEST = 1.0
 """Largest age of a device's own timestamp that is trusted [s]."""
-
-_EARLY = 0.005
-"""How far in the future a timestamp may be [s]: the two clocks are read one after the other."""
-
 
 _FFMPEG_OPTIONS = "OPENCV_FFMPEG_CAPTURE_OPTIONS"
 
@@ -130,7 +126,7 @@ class OpenCvCamera:
         """When the frame was taken, in monotonic time [s]: V4L2's timestamp if it is plausible, else what the
         arrivals tell, less the configured latency."""
         stamp = 1e-3 * self._capture.get(cv2.CAP_PROP_POS_MSEC) if self._device is not None else -np.inf
-        trusted = arrived - _OLDEST < stamp < arrived + _EARLY and stamp > self._last
+        trusted = arrived - _OLDEST < stamp < arrived + EARLY and stamp > self._last
         self._last = max(self._last, stamp) if trusted else self._last
         taken = self._clock.taken(arrived)
         return float(min(stamp, arrived)) if trusted else taken - 1e-3 * self.settings.latency_ms

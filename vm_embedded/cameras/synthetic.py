@@ -86,7 +86,7 @@ class SyntheticCamera:
         self.settings = settings
         self.motion = parse_motion(settings.source)
         self.size: Size = (settings.width or SIZE[0], settings.height or SIZE[1])
-        self.lens = synthetic_lens(self.size)
+        self.lens = _synthetic_lens(self.size)
         self._period = 1.0 / (settings.fps or RATE)
         self._due = time.monotonic()
         self._random = np.random.default_rng(0)
@@ -156,9 +156,8 @@ class SyntheticCamera:
         image[near[hit]] = np.where(patch[:, None], _PATCH, _BALL) * light
 
 
-def synthetic_lens(size: Size) -> Lens:
+def _synthetic_lens(size: Size) -> Lens:
     """The lens of a synthetic camera with images of a size (width, height) [px]."""
-
     focal_length = _FOCAL_LENGTH * size[0]
     diagonal = math.hypot(*size)
     return Rectilinear(focal_length=focal_length, fov=2.0 * math.atan(diagonal / focal_length), size=size)

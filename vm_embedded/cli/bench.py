@@ -16,7 +16,7 @@ import cv2
 from ..config.toml_editor import check_editable, write_entries
 from ..detection.detector import Detector
 from ..detection.settings import Settings
-from ..errors import InputError, VisualMeshError
+from ..errors import InputError
 from ..files import check_not_input, check_writable, is_file, write_file
 from ..live.configuration import Configuration
 from ..network.bundled import model_path
@@ -25,7 +25,7 @@ from .bench_table import bench_table
 from .machine import describe_machine, rss_mib, sgemm_rate
 from .measuring import Run, measure, measure_cold
 from .options import ANGLES, add_model, add_pose, add_settings, read_options
-from .program import EXIT_FAILED, EXIT_OK, Parser, program, system_error
+from .program import EXIT_OK, Parser, complain, program, run_or_complain
 from .progress import ProgressBar
 from .tuning import TUNED, fastest_settings
 from .workload import Workload, make_workload
@@ -78,16 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-bench and return its exit status."""
     options = parser().parse_args(arguments)
     cv2.setNumThreads(1)  # as vm-detect does
-    try:
-        return _run(options)
-    except VisualMeshError as error:
-        print(f"vm-bench: {' '.join(str(error).split())}", file=sys.stderr)
-        return EXIT_FAILED
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        print(f"vm-bench: {system_error(error)}", file=sys.stderr)
-        return EXIT_FAILED
+    return run_or_complain("vm-bench", lambda: _run(options))
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -113,9 +104,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.tune is not None:
         bar = ProgressBar(options.frames)
         threads = max(each.threads for each in settings)
-        found["tuned"] = fastest_settings(
-            model, given.detector, threads, work.image, work.lens, work.orientations, bar.show
-        )
+        found["tuned"] = fastest_settings(model, given.detector, threads, work, bar.show)
         bar.clear()
     text = json.dumps(found, indent=1, allow_nan=False)
     if _prints_json(options):
@@ -164,10 +153,10 @@ def _complain_about_defaults(given: Configuration, work: Workload) -> None:
     has_lens, has_pose = given.lens_for(work.size) is not None, given.fixed_orientation() is not None
     assumed = [name for name, is_given in (("lens", has_lens), ("pose", has_pose)) if not is_given]
     if assumed:
-        print(
-            f"vm-bench: no {' and no '.join(assumed)} given, so common ones were used; the robot's own decide how many "
-            "points a frame has",
-            file=sys.stderr,
+        complain(
+            "vm-bench",
+            f"no {' and no '.join(assumed)} given, so common ones were used; the robot's own decide how many points a "
+            "frame has",
         )
 
 

@@ -16,7 +16,7 @@ from ..cameras.open_camera import is_live
 from ..cameras.ros.bags import is_bag
 from ..config.toml_reader import parse_toml
 from ..config.toml_writer import to_commented_toml
-from ..errors import InputError, VisualMeshError
+from ..errors import InputError
 from ..files import read_text
 from ..live.configuration import HEADER
 from ..live.control import REFUSED, ask, control_path
@@ -24,9 +24,9 @@ from ..live.daemon import Daemon
 from ..live.log import EventLog
 from ..network.bundled import SHIPPED, shipped_name
 from .check_configuration import check_configuration
-from .detect_files import complain, detect_in_files
+from .detect_files import detect_in_files
 from .options import ANGLES, LIVE, add_live, add_model, add_pose, add_settings, add_track, read_options
-from .program import EXIT_FAILED, EXIT_OK, Parser, program, system_error
+from .program import EXIT_FAILED, EXIT_OK, Parser, complain, program, run_or_complain
 from .run_daemon import report_failed_start, run_daemon
 
 _FILES_ONLY = (
@@ -140,16 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.camera = options.files[0] if options.files else None
     silence_opencv()
     cv2.setNumThreads(1)  # a frame has a few thousand points: too little work for more
-    try:
-        return _run(options)
-    except VisualMeshError as error:
-        complain(str(error))
-        return EXIT_FAILED
-    except BrokenPipeError:
-        raise
-    except OSError as error:  # for example a full disk behind standard output
-        complain(system_error(error))
-        return EXIT_FAILED
+    return run_or_complain("vm-detect", lambda: _run(options))
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -161,7 +152,7 @@ def _run(options: argparse.Namespace) -> int:
     except InputError as error:
         if options.print_config or options.check_config or not _is_for_live(options):
             raise
-        return report_failed_start(EventLog("vm-detect"), error)
+        return report_failed_start(EventLog(), error)
     if options.print_config:
         print(to_commented_toml(replace(given, model=_movable(given.model)), HEADER), end="")
         return EXIT_OK
@@ -193,7 +184,7 @@ def _status_socket(options: argparse.Namespace) -> str:
     try:
         return read_options(options).status.socket
     except InputError as error:  # the detector runs with what it has read before
-        complain(str(error))
+        complain("vm-detect", str(error))
         return options.status_socket or _socket_in(options.config)
 
 
@@ -231,7 +222,7 @@ def _check_file_options(options: argparse.Namespace) -> None:
 
 def _detect_live(options: argparse.Namespace) -> int:
     """Run the daemon on a live camera until it is stopped."""
-    log = EventLog("vm-detect")
+    log = EventLog()
     try:
         _check_live_options(options)
     except InputError as error:

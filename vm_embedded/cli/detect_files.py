@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -33,6 +32,7 @@ from ..output.ros.mcap_file import McapFile
 from ..output.video_file import VideoFile
 from .closing_remarks import ClosingRemarks
 from .default_pose import DefaultPose
+from .program import complain
 from .progress import ProgressBar
 
 _IMAGES_RATE = 10.0
@@ -66,11 +66,12 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
         if options.save_video is not None:
             video = stack.enter_context(VideoFile(options.save_video, source.rate or _IMAGES_RATE, source.files))
         if options.save_boxes is not None:
-            boxes = BoxWriter(options.save_boxes, _object_classes(detector))
+            classes = tuple(each.name for each in detector.manifest.classes if each.kind == "object")
+            boxes = BoxWriter(options.save_boxes, classes)
         work = _Pass(detector, pose, tracker, options, emit_points, boxes, mcap, video, ClosingRemarks(detector))
         _process_all(source, work)
     for remark in filter(None, (work.replaced, *work.remarks.lines())):
-        complain(remark)
+        complain("vm-detect", remark)
     return work.processed
 
 
@@ -101,7 +102,7 @@ def _process_all(source: Source, work: _Pass) -> None:
             bar.clear()
             reason = str(error).removeprefix(f"{frame.source}: ")
             if reason not in reasons:
-                complain(str(error))
+                complain("vm-detect", str(error))
             reasons[reason] += 1
             if work.mcap is not None:
                 work.mcap.write_state(frame, "degraded", str(error))
@@ -112,7 +113,7 @@ def _process_all(source: Source, work: _Pass) -> None:
     bar.clear()
     for reason, count in reasons.items():
         if count > 1:
-            complain(f"{count} frames could not be processed: {reason}")
+            complain("vm-detect", f"{count} frames could not be processed: {reason}")
 
 
 def _open(names: Sequence[str], given: Configuration) -> Source:
@@ -147,10 +148,6 @@ class _TimedTracker:
         if frame.stamp is None and not self.rate:
             raise InputError("--track needs the time of each frame: give --camera-fps, the frame rate of the images")
         return frame.index / self.rate if frame.stamp is None else frame.stamp
-
-
-def _object_classes(detector: Detector) -> tuple[str, ...]:
-    return tuple(each.name for each in detector.manifest.classes if each.kind == "object")
 
 
 @dataclass(eq=False)
@@ -210,8 +207,3 @@ class _Pass:
         if self.video is not None:
             self.video.write(detections.draw())
         return json.dumps(file_message(frame, detections, self.emit_points, options.explain), allow_nan=False)
-
-
-def complain(message: str) -> None:
-    """Print an error of vm-detect as one line on standard error."""
-    print(f"vm-detect: {' '.join(message.split())}", file=sys.stderr)

@@ -12,7 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..live.prometheus import resident_bytes
+from ..live.memory import resident_bytes
 from ..network.onnx_model import RUNTIME_VERSION
 
 _SGEMM = """

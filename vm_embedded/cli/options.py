@@ -87,22 +87,22 @@ def add_pose(parser: argparse.ArgumentParser, description: str) -> None:
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
     """Add an option for each field of Settings."""
-    add_section(parser.add_argument_group("settings"), Settings, "")
+    _add_section(parser.add_argument_group("settings"), Settings, "")
 
 
 def add_live(parser: argparse.ArgumentParser) -> None:
     """Add an option for each entry of the sections for live cameras."""
     for name, section in LIVE.items():
         group = parser.add_argument_group(f"[{name}], for {'vm-ros and bags' if name == 'ros' else 'live cameras'}")
-        add_section(group, section, f"{name}_", ("source",) if name == "camera" else ())
+        _add_section(group, section, f"{name}_", ("source",) if name == "camera" else ())
 
 
 def add_track(parser: argparse.ArgumentParser) -> None:
     """Add an option for each entry of [track]; --track switches it on."""
-    add_section(parser.add_argument_group("[track]"), TrackSection, "track_")
+    _add_section(parser.add_argument_group("[track]"), TrackSection, "track_")
 
 
-def add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, skip: Sequence[str] = ()) -> None:
+def _add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, skip: Sequence[str] = ()) -> None:
     """Add an option for each entry of a section, except those in `skip`. prefix: first part of the option names."""
     for each in fields(section):
         if each.name in skip:

@@ -14,6 +14,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NoReturn, ParamSpec
 
+from ..errors import VisualMeshError
+
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
 _COMPLETING = "_VM_COMPLETE"
@@ -165,6 +167,24 @@ def program(main: Callable[P, int]) -> Callable[P, int]:
             return EXIT_FAILED
 
     return run
+
+
+def run_or_complain(prog: str, run: Callable[[], int]) -> int:
+    """Run a program and return its exit status; if it fails, say why in one line. prog: name of the program."""
+    try:
+        return run()
+    except VisualMeshError as error:
+        complain(prog, str(error))
+    except BrokenPipeError:
+        raise
+    except OSError as error:  # for example a full disk behind standard output
+        complain(prog, system_error(error))
+    return EXIT_FAILED
+
+
+def complain(prog: str, message: str) -> None:
+    """Print an error as one line on standard error. prog: name of the program."""
+    print(f"{prog}: {' '.join(message.split())}", file=sys.stderr)
 
 
 def system_error(error: OSError) -> str:

@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Image
 from ..detection.detector import Detector
 from ..detection.settings import Settings
-from ..geometry.lens import Lens
-from ..geometry.orientation import Orientation
 from ..network.model_file import ModelFile
 from .measuring import Run, measure
+from .workload import Workload
 
 TUNED = ("threads", "spinning", "pitch_step", "roll_step")
 """The settings that are tuned."""
@@ -30,10 +28,8 @@ def fastest_settings(
     model: ModelFile,
     settings: Settings,
     threads: int,
-    image: Image,
-    lens: Lens,
-    orientations: Sequence[Orientation],
-    progress: Callable[[int], None] = lambda frames: None,
+    work: Workload,
+    progress: Callable[[int], None],
 ) -> dict[str, Any]:
     """The fastest values of TUNED on a walk, the other settings as given.
 
@@ -43,7 +39,9 @@ def fastest_settings(
     """
 
     def runs(candidates: Sequence[Settings]) -> list[Run]:
-        return measure([Detector(model, each) for each in candidates], image, lens, orientations, progress)
+        return measure(
+            [Detector(model, each) for each in candidates], work.image, work.lens, work.orientations, progress
+        )
 
     def medians(candidates: Sequence[Settings]) -> list[float]:
         return [float(np.median(run.total)) for run in runs(candidates)]

@@ -23,8 +23,7 @@ def write_entries(path: Path, section: str, entries: Mapping[str, Any]) -> None:
 
     Raises InputError if the file can't be read or written, or if the section can't be edited line by line.
     """
-    edited = _edited_file(path, section, entries)
-    write_file(path, edited)
+    write_file(path, _edited_file(path, section, entries))
 
 
 def _edited_file(path: Path, section: str, entries: Mapping[str, Any]) -> str:

@@ -5,25 +5,24 @@ from __future__ import annotations
 import time
 from dataclasses import asdict, dataclass
 
-from ..cameras.grabber import CameraCounts
+from ..cameras.grabber import Grabber
 from ..detection.cache import MeshCache
 from ..detection.detections import Detections
-from ..output.messages import STATES
-from .prometheus import Histogram, resident_bytes, to_prometheus_text
+from ..output.channels import Channels
+from ..poses.stream import PoseStream
+from .memory import resident_bytes
+from .prometheus import Histogram, to_prometheus_text
 
 
 @dataclass
 class Outcomes:
-    """Counts of what happened to frames after the camera, to poses and to messages; _HELP has the meanings."""
+    """Counts of what happened to frames after the camera; _HELP has the meanings."""
 
     frames: int = 0
     detections: int = 0
     late: int = 0
     stale: int = 0
     failed: int = 0
-    poses: int = 0
-    poses_bad: int = 0
-    dropped: int = 0
 
 
 _HELP = {
@@ -48,10 +47,11 @@ _HELP = {
 
 
 class Counters:
-    """All counters and stage times since the process started."""
+    """All counters and stage times since the process started, also those that grabber, poses and outputs count."""
 
-    def __init__(self) -> None:
+    def __init__(self, grabber: Grabber, poses: PoseStream, outputs: Channels) -> None:
         self.outcomes = Outcomes()
+        self._grabber, self._poses, self._outputs = grabber, poses, outputs
         self._stages: dict[str, Histogram] = {}
         self._started = time.monotonic()
 
@@ -63,19 +63,19 @@ class Counters:
         for name, seconds in {**stages, "answer": duration, "age": age}.items():
             self._stages.setdefault(name, Histogram()).add(seconds)
 
-    def counts(self, camera: CameraCounts) -> dict[str, int]:
-        """All counts by name, with those of the camera."""
-        return {**asdict(self.outcomes), **asdict(camera)}
+    def counts(self) -> dict[str, int]:
+        """All counts by name."""
+        poses = {"poses": self._poses.received, "poses_bad": self._poses.bad}
+        return {**asdict(self.outcomes), **poses, "dropped": self._outputs.dropped, **asdict(self._grabber.counts)}
 
-    def metrics(self, state: str, camera: CameraCounts, cache: MeshCache, answered: float) -> str:
+    def metrics(self, state: str, cache: MeshCache, answered: float) -> str:
         """All metrics in Prometheus's text format. answered: monotonic time of the last answered frame [s]."""
         now = time.monotonic()
         cached = {"cache_hits": cache.hits, "cache_misses": cache.misses, "cache_prepared": cache.prepared}
-        counts = {**self.counts(camera), **cached}
         gauges = {
             "frame_age_seconds": ("time since the last frame was answered", now - max(answered, self._started)),
             "resident_bytes": ("memory of the process", resident_bytes()),
             "uptime_seconds": ("time since the process started", now - self._started),
         }
-        counters = {name: (_HELP[name], float(value)) for name, value in counts.items()}
-        return to_prometheus_text(counters, gauges, state, STATES, self._stages)
+        counters = {name: (_HELP[name], float(value)) for name, value in {**self.counts(), **cached}.items()}
+        return to_prometheus_text(counters, gauges, state, self._stages)

@@ -37,13 +37,12 @@ from .counters import Counters
 from .daemon_state import DaemonState
 from .frame_remarks import FrameRemarks
 from .frame_watchdog import FrameWatchdog
-from .free_memory import give_back_memory
 from .health import Health
-from .live_page import LivePage
 from .load_detector import find_opener, load_checked_detector
 from .log import EventLog
-from .prometheus import resident_bytes
+from .memory import give_back_memory, resident_bytes
 from .reloading import read_again
+from .status_page import StatusPage
 from .systemd import SystemdNotifier
 
 EXIT_OK, EXIT_FAILED, EXIT_RESTART, EXIT_CONFIGURATION = 0, 1, 75, 78
@@ -103,29 +102,31 @@ class Daemon:
         self._log = log
         self._bridge = bridge
         camera, status = configuration.camera, configuration.status
-        self.recorder = Recorder(configuration.recorder, lambda event, level, folder: log(event, level, folder=folder))
-        self.last: Message | None = None
-        self.counters = Counters()
-        self.health = Health(1e-3 * camera.lost_ms, (1e-3 * status.budget_ms) or math.inf)
+        self._recorder = Recorder(
+            configuration.recorder,
+            recording_files(configuration, detector.session.model),
+            lambda event, level, folder: log(event, level, folder=folder),
+        )
+        self._last: Message | None = None
+        self._health = Health(1e-3 * camera.lost_ms, (1e-3 * status.budget_ms) or math.inf)
         self._sent = 0.0  # when the last message was sent
         self._stops = 0  # how often a signal has asked to stop
         self._notifier = SystemdNotifier()
         self._stuck = ""  # why only a new process helps; empty if none is needed
         self._wakeup = asyncio.Event()
         self._reloading: asyncio.Task[None] | None = None
-        self.grabber = Grabber(opener, camera, self._wake)
-        self.poses = PoseStream(configuration.pose, self._report_bad_pose)
+        self._grabber = Grabber(opener, camera, self._wake)
+        self._poses = PoseStream(configuration.pose, self._report_bad_pose)
+        self._outputs = Channels(configuration.output)
+        self._counters = Counters(self._grabber, self._poses, self._outputs)
         self._watchdog = FrameWatchdog(self._end_hanging)
-        self.answerer = Answerer(configuration, detector, self.poses, self.counters, self.health, self._watchdog)
+        self.answerer = Answerer(configuration, detector, self._poses, self._counters, self._health, self._watchdog)
         self._remarks = FrameRemarks()
-        self._recording_files = recording_files(configuration, detector.session.model)
-        self.outputs = Channels(configuration.output)
-        self.state = DaemonState(self.health, self.grabber, self.outputs, log, self._notifier)
-        self.page = LivePage(self.answerer, self._status, self.record, self.metrics, self._use_threshold)
-        commands = {"status": lambda: json.dumps(self._status(), allow_nan=False)}
-        commands |= {"record": self.record, "metrics": self.metrics}
-        control = ControlServer(control_path(status.socket), commands)
-        self._parts: list[Part] = [self.outputs, self.poses, control, *self.page.servers()]
+        self._state = DaemonState(self._health, self._grabber, self._outputs, log, self._notifier)
+        self.page = StatusPage(self.answerer, self._status, self._record, self._metrics, self._use_threshold)
+        commands = {"status": lambda: json.dumps(self._status(), allow_nan=False), "record": self._record}
+        control = ControlServer(control_path(status.socket), commands | {"metrics": self._metrics})
+        self._parts: list[Part] = [self._outputs, self._poses, control, *self.page.servers()]
 
     @classmethod
     async def prepare(
@@ -138,7 +139,7 @@ class Daemon:
         return cls(configure, configuration, opener, detector, proved, log, bridge)
 
     @property
-    def configuration(self) -> Configuration:
+    def _configuration(self) -> Configuration:
         """The current configuration."""
         return self.answerer.configuration
 
@@ -158,12 +159,12 @@ class Daemon:
             self._start()
             while not (self._stops or self._stuck or self._camera_ended()):
                 await self._step()
-            self.health.stopping = True
+            self._health.stopping = True
             self._update_state()
             self._notifier.send(STOPPING=1)
             await self._close()
         status, reason = self._exit_status()
-        self._log("stopped", frames=self.counters.outcomes.frames, reason=reason)
+        self._log("stopped", frames=self._counters.outcomes.frames, reason=reason)
         return status
 
     def _handle_signals(self) -> None:
@@ -171,7 +172,7 @@ class Daemon:
             (signal.SIGTERM, self._stop),
             (signal.SIGINT, self._stop),
             (signal.SIGHUP, self._start_reload),
-            (signal.SIGUSR1, self.record),
+            (signal.SIGUSR1, self._record),
         ):
             self._loop.add_signal_handler(number, handle)
 
@@ -179,20 +180,20 @@ class Daemon:
         for part in self._parts:
             await self._open(part)
         if self._bridge is not None:
-            await self._bridge.open(self.poses)
+            await self._bridge.open(self._poses)
 
     def _start(self) -> None:
         """Begin to take frames, once all parts are open, and say so."""
-        camera, status = self.configuration.camera, self.configuration.status
+        camera, status = self._configuration.camera, self._configuration.status
         for entry, address in (("page", status.page), ("metrics", status.metrics)):
             if address and is_open_to_network(address):
                 self._log("open to the network", "warning", entry=f"[status] {entry}", address=address)
-        self.recorder.finish_left()
-        self.grabber.start()
+        self._recorder.finish_left()
+        self._grabber.start()
         self._watchdog.start()
         self._update_state()
         self._notifier.send(READY=1)
-        self._log("ready", model=self.configuration.model, proved=self._proved, camera=without_password(camera.source))
+        self._log("ready", model=self._configuration.model, proved=self._proved, camera=without_password(camera.source))
         if status.page:
             self._log("status page", address=status.page, token=self.page.token)
         self._clock_offset = _clock_offset()
@@ -222,11 +223,11 @@ class Daemon:
             return EXIT_RESTART, self._stuck
         if self._stops:
             return EXIT_OK, "signal"
-        return EXIT_OK if self.counters.outcomes.frames else EXIT_FAILED, "the camera has ended"
+        return EXIT_OK if self._counters.outcomes.frames else EXIT_FAILED, "the camera has ended"
 
     def _camera_ended(self) -> bool:
         """Whether the camera has ended and its last shot was taken."""
-        return self.grabber.ended and not self.grabber.has_shot
+        return self._grabber.ended and not self._grabber.has_shot
 
     async def _step(self) -> None:
         """Wait for a shot or for one tick, and do all that is due."""
@@ -236,17 +237,17 @@ class Daemon:
         self._notifier.feed_watchdog()
         self._log_clock_jump()
         self._update_state()
-        shot = self.grabber.take()
+        shot = self._grabber.take()
         if shot is not None:
             answer = await self.answerer.answer(shot)
             if answer is not None:
                 self._report(answer)
-                if not self.grabber.has_shot:
+                if not self._grabber.has_shot:
                     self.answerer.prepare(answer)
         if time.monotonic() - self._sent > _HEARTBEAT:
-            self._send(state_message(self.state.name, self.state.reason))
+            self._send(state_message(self._state.name, self._state.reason))
         # A signal during this step goes first: it ends the daemon with EXIT_OK.
-        self._stuck = "" if self._stops else self.grabber.stuck
+        self._stuck = "" if self._stops else self._grabber.stuck
 
     def _log_clock_jump(self) -> None:
         jump = _clock_offset() - self._clock_offset
@@ -259,60 +260,54 @@ class Daemon:
         self._update_state()
         shot, detections = answer.shot, answer.detections
         # The camera may be lost while its last frame is processed; a frame that says so would contradict itself.
-        state = "degraded" if self.state.name == "camera_lost" else self.state.name
-        self.last = live_message(self.counters.outcomes.frames, state, shot, detections, answer.time)
-        self._send(self.last, answer)
+        state = "degraded" if self._state.name == "camera_lost" else self._state.name
+        self._last = live_message(self._counters.outcomes.frames, state, shot, detections, answer.time)
+        self._send(self._last, answer)
         for event, reason in self._remarks.about(answer):
             self._log(event, "warning", reason=reason)
         self.page.show(answer)
-        self.recorder.keep(Moment(shot, answer.lens, answer.orientation, self.last), self._recording_files)
+        self._recorder.keep(Moment(shot, answer.lens, answer.orientation, self._last))
 
     def _report_bad_pose(self, reason: str) -> None:
-        self.health.add_trouble(time.monotonic(), reason)
+        self._health.add_trouble(time.monotonic(), reason)
 
     def _update_state(self) -> None:
         """Determine the state; if it has changed, send it."""
-        if self.state.update():
-            self._send(state_message(self.state.name, self.state.reason))
+        if self._state.update():
+            self._send(state_message(self._state.name, self._state.reason))
 
     def _send(self, message: Message, answer: Answer | None = None) -> None:
         self._sent = time.monotonic()
-        self.outputs.send(message)
+        self._outputs.send(message)
         if self._bridge is not None:
             self._bridge.publish(message, answer)
 
     def _status(self) -> Message:
         """State, counts, and the last frame's message."""
-        self._collect_counts()
-        return state_message(self.state.name, self.state.reason) | {
-            "counts": self.counters.counts(self.grabber.counts),
+        return state_message(self._state.name, self._state.reason) | {
+            "counts": self._counters.counts(),
             "memory_mib": round(resident_bytes() / 2**20, 1),
             "model_sha256": self.answerer.detector.session.model.sha256,
-            "last": self.last,
+            "last": self._last,
         }
 
     def _use_threshold(self, name: str, value: float) -> None:
         """Let recordings have a threshold that the status page has changed."""
-        self.recorder.clear()  # a recording has one vm.toml
-        self._recording_files = recording_files(self.configuration, self.answerer.detector.session.model)
+        self._begin_recording_anew()
         self._log("threshold changed", "warning", **{name: value})
 
-    def metrics(self) -> str:
+    def _metrics(self) -> str:
         """All metrics in Prometheus's text format."""
-        self._collect_counts()
-        cache = self.answerer.detector.cache
-        return self.counters.metrics(self.state.name, self.grabber.counts, cache, self.health.answered)
+        return self._counters.metrics(self._state.name, self.answerer.detector.cache, self._health.answered)
 
-    def _collect_counts(self) -> None:
-        """Copy the counts of poses and outputs into the counters."""
-        outcomes = self.counters.outcomes
-        outcomes.poses, outcomes.poses_bad = self.poses.received, self.poses.bad
-        outcomes.dropped = self.outputs.dropped
+    def _begin_recording_anew(self) -> None:
+        """Let recordings have the current configuration and network."""
+        self._recorder.begin_anew(recording_files(self._configuration, self.answerer.detector.session.model))
 
-    def record(self) -> str:
+    def _record(self) -> str:
         """Start to write a recording of the last seconds; return where it goes, or REFUSED and the reason."""
         try:
-            result = self.recorder.record(self._recording_files)
+            result = self._recorder.record()
         except InputError as error:
             self._log("not recorded", "warning", reason=str(error))
             return f"{REFUSED}{error}"
@@ -333,15 +328,14 @@ class Daemon:
     async def _reload(self) -> None:
         """Read the configuration and the model again. If anything is wrong, nothing changes."""
         try:
-            new = await read_again(self._configure, self.configuration, self._bridge)
+            new = await read_again(self._configure, self._configuration, self._bridge)
         except Exception as error:  # noqa: BLE001 (nobody else would hear of it)
             reason = str(error) if isinstance(error, VisualMeshError) else one_line(error)
             self._log("reload refused", "error", reason=reason)
             return
-        self.recorder.clear()
         self.answerer.reload(new.configuration, new.detector)
+        self._begin_recording_anew()
         self._remarks = FrameRemarks()
-        self._recording_files = new.recording_files
         give_back_memory()
         self._log("reloaded", model=new.configuration.model, proved=new.proved, needs_restart=new.needs_restart)
 
@@ -354,8 +348,8 @@ class Daemon:
     def _end_hanging(self) -> None:
         """End the process, whose event loop hangs in a frame. Called in another thread."""
         reason = f"a frame takes more than {FrameWatchdog.limit:g} s"
-        self._log("stopped", "error", frames=self.counters.outcomes.frames, reason=reason)
-        self.outputs.send(state_message("stopping", reason))
+        self._log("stopped", "error", frames=self._counters.outcomes.frames, reason=reason)
+        self._outputs.send(state_message("stopping", reason))
         self._notifier.send(STATUS=f"stopping: {reason}")
         time.sleep(_LAST_WORDS_S)
         os._exit(EXIT_RESTART)
@@ -368,8 +362,8 @@ class Daemon:
             await self._bridge.close()
         for part in self._parts:
             await part.close()
-        await self.recorder.close(_RECORDING_S)
-        self.grabber.stop(0.3)
+        await self._recorder.close(_RECORDING_S)
+        self._grabber.stop(0.3)
         self._notifier.close()
 
 

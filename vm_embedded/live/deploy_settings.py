@@ -14,7 +14,7 @@ _ED25519 = b"\x00\x00\x00\x0bssh-ed25519\x00\x00\x00\x20"
 """First bytes of such a public key (RFC 8709); its 32 bytes follow."""
 
 
-def check_signer(entry: Field[Any], value: Any) -> str:
+def _checked_signer(entry: Field[Any], value: Any) -> str:
     """An Ed25519 public key in ssh-keygen's format, without its comment, or an empty string. Raises InputError."""
     words = value.split()[:2] if isinstance(value, str) else [value]
     if not words:
@@ -39,7 +39,7 @@ class DeploySettings:
         30.0, "time within which a new release must be ready and ok; otherwise vm-deploy rolls it back", "s", (5, 600)
     )
     signer: str = entry(
-        check_signer,
+        _checked_signer,
         "",
         "Ed25519 public key, from ssh-keygen's .pub file; vm-deploy accepts only bundles and models signed with its "
         "private key; empty: it accepts unsigned ones",

@@ -43,7 +43,6 @@ class Health:
         """Note that a frame was answered, `latency` after its arrival [s]."""
         self.answered = now
         self._latencies.append(latency)
-        self.pose_trouble = ""
 
     def state(self, now: float, camera_lost: bool, camera_trouble: str) -> tuple[str, str]:
         """The state, one of messages.STATES, and the reason."""

@@ -24,8 +24,7 @@ class EventLog:
     on; the detector keeps running.
     """
 
-    def __init__(self, program: str, stream: TextIO | None = None) -> None:
-        self.program = program
+    def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = stream or _copy_of_standard_error()
         self._text = self._stream.isatty()
         self._recent: dict[str, _Recent] = {}

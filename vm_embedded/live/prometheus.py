@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import resource
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
-BUCKETS = (0.0005, 0.001, 0.002, 0.003, 0.005, 0.008, 0.012, 0.02, 0.033, 0.05, 0.1, 0.25, 1.0, math.inf)
+from ..output.messages import STATES
+
+_BUCKETS = (0.0005, 0.001, 0.002, 0.003, 0.005, 0.008, 0.012, 0.02, 0.033, 0.05, 0.1, 0.25, 1.0, math.inf)
 """Upper bounds of the histogram buckets [s]."""
 
 
@@ -16,31 +16,29 @@ class Histogram:
     """Counts of durations in each bucket, and their sum [s]."""
 
     def __init__(self) -> None:
-        self.counts = [0] * len(BUCKETS)
+        self.counts = [0] * len(_BUCKETS)
         self.sum = 0.0
 
     def add(self, seconds: float) -> None:
         """Add a duration [s]."""
-        self.counts[bisect_left(BUCKETS, seconds)] += 1
+        self.counts[bisect_left(_BUCKETS, seconds)] += 1
         self.sum += seconds
 
-    def lines(self, name: str, labels: str) -> Iterator[str]:
+    def lines(self, name: str, label: str) -> Iterator[str]:
         """Lines of the text format."""
         total = 0
-        comma = "," if labels else ""
-        for end, count in zip(BUCKETS, self.counts, strict=True):
+        for end, count in zip(_BUCKETS, self.counts, strict=True):
             total += count
             upper = "+Inf" if math.isinf(end) else f"{end:g}"
-            yield f'{name}_bucket{{{labels}{comma}le="{upper}"}} {total}'
-        yield f"{name}_sum{{{labels}}} {self.sum:.9g}"
-        yield f"{name}_count{{{labels}}} {total}"
+            yield f'{name}_bucket{{{label},le="{upper}"}} {total}'
+        yield f"{name}_sum{{{label}}} {self.sum:.9g}"
+        yield f"{name}_count{{{label}}} {total}"
 
 
 def to_prometheus_text(
     counters: Mapping[str, tuple[str, float]],
     gauges: Mapping[str, tuple[str, float]],
     state: str,
-    states: tuple[str, ...],
     stages: Mapping[str, Histogram],
 ) -> str:
     """Format all metrics. counters, gauges: help and value by name. stages: the histogram of each stage."""
@@ -50,16 +48,8 @@ def to_prometheus_text(
             full = f"vm_{name}{'_total' if kind == 'counter' else ''}"
             lines += [f"# HELP {full} {help}", f"# TYPE {full} {kind}", f"{full} {value:.12g}"]
     lines += ["# HELP vm_state whether the detector is in a state", "# TYPE vm_state gauge"]
-    lines += [f'vm_state{{state="{each}"}} {int(each == state)}' for each in states]
+    lines += [f'vm_state{{state="{each}"}} {int(each == state)}' for each in STATES]
     lines += ["# HELP vm_stage_seconds how long each stage of a frame takes", "# TYPE vm_stage_seconds histogram"]
     for stage, histogram in stages.items():
         lines += histogram.lines("vm_stage_seconds", f'stage="{stage}"')
     return "\n".join(lines) + "\n"
-
-
-def resident_bytes() -> int:
-    """Memory of this process [bytes]."""
-    try:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
-    except (OSError, IndexError, ValueError):
-        return 0

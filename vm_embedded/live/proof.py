@@ -47,7 +47,7 @@ def prove(model: ModelFile) -> str:
     difference = _difference(found, expected)
     if difference:
         raise ModelError(f"{model.path}: it does not find its canary: {difference}")
-    return f"self-test passed, canary found ({in_words(expected)})"
+    return f"self-test passed, canary found ({_in_words(expected)})"
 
 
 def find_canary(detector: Detector, picture: bytes, camera: LensFile) -> Canary:
@@ -66,7 +66,7 @@ def find_canary(detector: Detector, picture: bytes, camera: LensFile) -> Canary:
     return Canary(picture, format_lens_file(camera.lens, camera.orientation), objects, points)
 
 
-def in_words(canary: Canary) -> str:
+def _in_words(canary: Canary) -> str:
     """What a canary shows: the number of objects of each class, and of points of the other classes."""
     names = [each.class_name for each in canary.objects]
     objects = [f"{names.count(name)} {name}" for name in dict.fromkeys(names)]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from ..detection.detector import Detector
 from ..errors import InputError
 from .bridge import Bridge
-from .configuration import Configuration, recording_files
+from .configuration import Configuration
 from .load_detector import check_lens_and_pose, check_trigger_class, find_opener, prove_model
 
 _NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder", "ros")
@@ -19,15 +19,13 @@ _NEEDS_RESTART = ("camera", "pose", "output", "status", "recorder", "ros")
 class Reloaded:
     """The parts of a daemon that a reload replaces.
 
-    proved: in words, what shows that the network works. recording_files: the files of a recording besides its frames.
-    needs_restart: names of the changed sections and entries that only a restart applies; the configuration has their
-    old values.
+    proved: in words, what shows that the network works. needs_restart: names of the changed sections and entries that
+    only a restart applies; the configuration has their old values.
     """
 
     configuration: Configuration
     detector: Detector
     proved: str
-    recording_files: dict[str, bytes]
     needs_restart: list[str]
 
 
@@ -56,5 +54,4 @@ async def read_again(
             raise
         raise InputError(f"{error} (only a restart changes {', '.join(needs_restart)})") from error
     check_trigger_class(wanted, model)
-    detector = Detector(model, configuration.detector)
-    return Reloaded(configuration, detector, proved, recording_files(configuration, model), needs_restart)
+    return Reloaded(configuration, Detector(model, configuration.detector), proved, needs_restart)

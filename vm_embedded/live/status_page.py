@@ -1,124 +1,125 @@
-"""The status page: state, counters, the camera's images with the detections drawn into them, and an overhead map.
-
-Its preview shows what another threshold would change in the latest frame.
-"""
+"""The status page of a running detector: what it shows, what it may change, and the servers of page and metrics."""
 
 from __future__ import annotations
 
-import asyncio
-import base64
 import json
-from collections.abc import Callable
-from contextlib import suppress
+import math
+import secrets
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
-import cv2
-
-from ..detection.detections import Detections
+from ..cameras.camera import without_password
+from ..errors import InputError
+from ..geometry.orientation import Orientation
 from ..output.messages import Message
-from .http_server import Query, Response, Write
-from .overhead_map import overhead_map
+from .answering import Answer, Answerer
+from .control import REFUSED
+from .frame_views import FrameViews
+from .http_server import HttpServer, Page, Query, Response
+from .temperatures import read_temperatures
+from .threshold import threshold_name, with_settings, with_threshold
 
 _PAGE = Path(__file__).with_name("status_page.html")
-_BOUNDARY = b"--picture"
-_QUALITY = 80
-
-_REPEAT = 2.0
-"""Time after which the last image is sent again, if there is no new one [s]."""
 
 
 class StatusPage:
-    """Pages and the video stream.
+    """The page and its two changes: a recording, and another threshold. Changes need `token`, which the log prints.
 
-    state: returns the content of /state. preview: returns what a frame shows with the threshold of a query; it raises
-    VisualMeshError.
-
-    It draws images and computes maps only while a browser asks for them: in another thread, and once for all browsers.
+    answerer: has detector and configuration. status, record, metrics: texts of the daemon. use_threshold: is called
+    with name and value of a threshold that was changed.
     """
 
     def __init__(
-        self, fps: float, state: Callable[[], Message], preview: Callable[[Detections, Query], Detections]
+        self,
+        answerer: Answerer,
+        status: Callable[[], Message],
+        record: Callable[[], str],
+        metrics: Callable[[], str],
+        use_threshold: Callable[[str, float], None],
     ) -> None:
-        self._state, self._preview = state, preview
-        self._period = 1.0 / fps
-        self._latest: Detections | None = None
-        self._shown: tuple[Detections, bytes] | None = None
-        self._mapped: tuple[Detections, bytes] | None = None
-        self._changed = asyncio.Event()
-        self._drawing = asyncio.Lock()
-        self._mapping = asyncio.Lock()
-        self._page = _PAGE.read_bytes()
+        self.token = secrets.token_urlsafe(9)
+        self._answerer, self._status, self._record, self._metrics = answerer, status, record, metrics
+        self._use_threshold = use_threshold
+        self._html = _PAGE.read_bytes()
+        self._views = FrameViews(answerer.configuration.status.picture_fps)
+        self._pose: Message | None = None  # of the last frame
 
-    def show(self, detections: Detections) -> None:
-        """Set the detections to show, with their frame."""
-        self._latest = detections
-        self._changed.set()
+    def servers(self) -> Iterator[HttpServer]:
+        """The servers that the configuration asks for."""
+        status, views = self._answerer.configuration.status, self._views
+        metrics: dict[str, Page] = {"/metrics": self._metrics_page}
+        if status.page:
+            pages: dict[str, Page] = {"/": self._page, "/state": self._state, "/preview": self._preview}
+            pages |= metrics | {"/map": views.map}
+            actions: dict[str, Page] = {"/record": self._start_recording, "/threshold": self._change_threshold}
+            yield HttpServer(status.page, "--status-page", pages, {"/stream": views.stream}, actions, self.token)
+        if status.metrics:
+            yield HttpServer(status.metrics, "--status-metrics", metrics)
 
-    def page(self, _: Query) -> Response:
-        """The page itself."""
-        return Response("text/html; charset=utf-8", self._page)
+    def show(self, answer: Answer) -> None:
+        """Show an answer."""
+        self._views.show(answer.detections)
+        self._pose = _describe_pose(answer.orientation, self._answerer.configuration.pose.source)
 
-    def state(self, _: Query) -> Response:
-        """State and counters as JSON."""
-        return Response("application/json", json.dumps(self._state(), allow_nan=False).encode())
+    def _page(self, _: Query) -> Response:
+        return Response("text/html; charset=utf-8", self._html)
 
-    async def map(self, _: Query) -> Response:
-        """The overhead map as JSON, see overhead_map.py; null before the first frame."""
-        async with self._mapping:
-            if self._latest is not None and (self._mapped is None or self._mapped[0] is not self._latest):
-                detections = self._latest
-                self._mapped = detections, await asyncio.to_thread(_map_json, detections)
-        return Response("application/json", b"null" if self._mapped is None else self._mapped[1])
+    def _state(self, _: Query) -> Response:
+        """The status of the daemon, and what runs, as JSON."""
+        detector, configuration = self._answerer.detector, self._answerer.configuration
+        name = threshold_name(detector)
+        content = self._status() | {
+            "model": Path(configuration.model).name,
+            "camera": without_password(configuration.camera.source),
+            "pose": self._pose,
+            "temperatures": read_temperatures(),
+            "threshold": {"name": name, "value": getattr(detector.settings, name)},
+            "records": bool(configuration.recorder.folder),
+        }
+        return Response("application/json", json.dumps(content, allow_nan=False).encode())
 
-    async def preview(self, query: Query) -> Response:
-        """The latest frame with another threshold, as JSON: accepted, rejected (numbers), and the picture (base64).
-
-        null before the first frame. Raises VisualMeshError for a wrong query.
-        """
-        if self._latest is None:
+    async def _preview(self, query: Query) -> Response:
+        """The latest frame with the threshold of a query; null before the first one. Raises VisualMeshError."""
+        detector, detections = self._answerer.detector, self._views.latest
+        if detections is None:
             return Response("application/json", b"null")
         # Here, and not in a thread: the detector belongs to the thread of the loop.
-        detections = self._preview(self._latest, query)
-        async with self._drawing:
-            picture = await asyncio.to_thread(_jpeg, detections)
-        content = {
-            "accepted": len(detections),
-            "rejected": len(detections.rejected),
-            "picture": base64.b64encode(picture).decode(),
-        }
-        return Response("application/json", json.dumps(content).encode())
+        found = with_settings(detector, detections, with_threshold(detector, query.get("value", "")))
+        return await self._views.preview(found)
 
-    async def stream(self, write: Write) -> None:
-        """Send Motion JPEG until the browser disconnects."""
-        await write(
-            b"HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=picture\r\n"
-            b"Cache-Control: no-store\r\nConnection: close\r\n\r\n"
+    def _metrics_page(self, _: Query) -> Response:
+        return Response("text/plain; version=0.0.4", self._metrics().encode())
+
+    def _start_recording(self, _: Query) -> Response:
+        reply = self._record()
+        if reply.startswith(REFUSED):
+            raise InputError(reply.removeprefix(REFUSED))
+        return _text(reply)
+
+    def _change_threshold(self, query: Query) -> Response:
+        """Use another threshold until the configuration is read again. Raises InputError."""
+        detector = self._answerer.detector
+        settings, name = with_threshold(detector, query.get("value", "")), threshold_name(detector)
+        detector.settings = settings
+        self._answerer.configuration = replace(self._answerer.configuration, detector=settings)
+        value = getattr(settings, name)
+        self._use_threshold(name, value)
+        return _text(
+            f"{name} = {value:g} until a restart or reload; to keep it, write it to [detector] in vm.toml. Recordings "
+            "begin with this frame."
         )
-        while True:
-            sent = self._latest
-            picture = await self._picture()
-            if picture is not None:
-                head = b"\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(picture)
-                await write(_BOUNDARY + head + picture + b"\r\n")
-            await asyncio.sleep(self._period)
-            if self._latest is sent:
-                self._changed.clear()
-                # After that time, send the same image: only a write notices a closed connection.
-                with suppress(asyncio.TimeoutError):
-                    await asyncio.wait_for(self._changed.wait(), _REPEAT)
-
-    async def _picture(self) -> bytes | None:
-        """The latest image as a JPEG."""
-        async with self._drawing:
-            if self._latest is not None and (self._shown is None or self._shown[0] is not self._latest):
-                detections = self._latest
-                self._shown = detections, await asyncio.to_thread(_jpeg, detections)
-        return None if self._shown is None else self._shown[1]
 
 
-def _jpeg(detections: Detections) -> bytes:
-    return cv2.imencode(".jpg", detections.draw(), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+def _text(text: str) -> Response:
+    return Response("text/plain; charset=utf-8", f"{text}\n".encode())
 
 
-def _map_json(detections: Detections) -> bytes:
-    return json.dumps(overhead_map(detections), allow_nan=False, separators=(",", ":")).encode()
+def _describe_pose(orientation: Orientation, source: str) -> Message:
+    """A pose: height [m], pitch and roll [degrees], and where it comes from."""
+    return {
+        "height": round(orientation.height, 3),
+        "pitch": round(math.degrees(orientation.pitch), 1),
+        "roll": round(math.degrees(orientation.roll), 1),
+        "source": source,
+    }

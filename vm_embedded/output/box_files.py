@@ -77,7 +77,7 @@ class BoxWriter:
         image: uint8 (height, width[, channels]), written as PNG if the frame has no file. detections: with the rejected
         candidates. Raises InputError.
         """
-        name, boxes = self._names.of(frame), candidate_boxes(detections, (image.shape[1], image.shape[0]))
+        name, boxes = self._names.of(frame), _candidate_boxes(detections, (image.shape[1], image.shape[0]))
         if not (self._folder / CLASSES).exists():  # not earlier: if no frame can be processed, the folder stays empty
             write_file(self._folder / CLASSES, "".join(f"{name}\n" for name in self._classes))
         path = self._folder / f"{name}{'.png' if frame.path is None else frame.path.suffix}"
@@ -111,7 +111,7 @@ def _content_of(image: Path) -> bytes:
         raise InputError(f"can't read {image}: {error.strerror or error}") from error
 
 
-def candidate_boxes(detections: Detections, size: tuple[int, int]) -> list[CandidateBox]:
+def _candidate_boxes(detections: Detections, size: tuple[int, int]) -> list[CandidateBox]:
     """The boxes of detections, and after them those of near misses, each most confident first.
 
     size: width and height of the image [px]. A near miss at the place of a better box of its class is left out.

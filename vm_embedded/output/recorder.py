@@ -69,11 +69,15 @@ class Moment:
 class Recorder:
     """Keeps the moments of the last seconds and writes them in a separate thread.
 
-    report: gets an event, its level and its detail; that thread calls it.
+    files: those of a recording besides its frames, by name: vm.toml and a model. report: gets an event, its level and
+    its detail; that thread calls it.
     """
 
-    def __init__(self, settings: RecorderSettings, report: Callable[[str, str, str], None]) -> None:
+    def __init__(
+        self, settings: RecorderSettings, files: Mapping[str, bytes], report: Callable[[str, str, str], None]
+    ) -> None:
         self.settings = settings
+        self._files = files
         self._report = report
         self._moments: deque[Moment] = deque()
         self._nbytes = 0
@@ -82,11 +86,8 @@ class Recorder:
         self._writer: threading.Thread | None = None
         self._last_trigger = -float("inf")  # when a class last triggered a recording [s]
 
-    def keep(self, moment: Moment, files: Mapping[str, bytes]) -> None:
-        """Keep a moment and drop those that are too old. Record if the trigger class was detected.
-
-        files: those of a recording besides its frames, by name: vm.toml and a model.
-        """
+    def keep(self, moment: Moment) -> None:
+        """Keep a moment and drop those that are too old. Record if the trigger class was detected."""
         if not self.settings.folder:
             return
         self._moments.append(moment)
@@ -95,7 +96,7 @@ class Recorder:
         if self._moments and self._is_triggered(moment):
             self._last_trigger = time.monotonic()
             try:
-                self.record(files)
+                self.record()
             except InputError as error:
                 self._report("not recorded", "warning", str(error))
 
@@ -111,11 +112,8 @@ class Recorder:
         is_shown = bool(name) and any(each["class"] == name for each in moment.message["detections"])
         return is_shown and time.monotonic() - self._last_trigger >= self.settings.pause
 
-    def record(self, files: Mapping[str, bytes]) -> str:
-        """Start to write the kept moments, and return a line that says so. Raises InputError if it can't start.
-
-        files: as for `keep`.
-        """
+    def record(self) -> str:
+        """Start to write the kept moments, and return a line that says so. Raises InputError if it can't start."""
         if not self.settings.folder:
             raise InputError("recording is off: set [recorder] folder")
         if self._writer is not None and self._writer.is_alive():
@@ -129,7 +127,7 @@ class Recorder:
         except OSError as error:
             raise InputError(f"can't create {part}: {error.strerror or error}") from error
         moments = list(self._moments)
-        arguments = (folder, part, moments, files)
+        arguments = (folder, part, moments, self._files)
         self._writer = threading.Thread(target=self._write, args=arguments, name="recorder", daemon=True)
         try:
             self._writer.start()
@@ -200,8 +198,9 @@ class Recorder:
         except OSError as error:
             self._report("recording failed", "error", f"{self.settings.folder}: {error.strerror or error}")
 
-    def clear(self) -> None:
-        """Drop all moments; call it when settings change, since a recording has one vm.toml."""
+    def begin_anew(self, files: Mapping[str, bytes]) -> None:
+        """Drop all moments, and use other files from now on: a recording has one vm.toml."""
+        self._files = files
         self._moments.clear()
         self._nbytes = 0
 

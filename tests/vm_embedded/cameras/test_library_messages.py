@@ -18,7 +18,7 @@ print("done")
 LOGGED = """
 from vm_embedded.cameras.library_messages import library_messages
 from vm_embedded.live.log import EventLog
-log = EventLog("vm-detect")
+log = EventLog()
 with library_messages():
     log("logged")
     print("decoded", flush=True)

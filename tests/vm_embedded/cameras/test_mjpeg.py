@@ -6,7 +6,7 @@ import socket
 import threading
 import time
 import tracemalloc
-from contextlib import suppress
+from contextlib import closing, contextmanager, suppress
 
 import cv2
 import numpy as np
@@ -23,32 +23,33 @@ from vm_embedded.errors import InputError
 from vm_embedded.output.recorder import MESSAGES
 
 
+@contextmanager
+def camera_of(server, **settings):
+    """A camera that reads from a server; both end with the block."""
+    try:
+        with closing(MjpegCamera(CameraSettings(source=server.address, **settings))) as camera:
+            yield camera
+    finally:
+        server.kill()
+
+
 @pytest.mark.parametrize("length", [True, False], ids=["with lengths", "without"])
 def test_motion_jpeg_is_read_picture_by_picture(pictures, length):
-    server = Server(pictures, length=length, rate=100.0)
-    try:
-        camera = MjpegCamera(CameraSettings(source=server.address))
+    with camera_of(Server(pictures, length=length, rate=100.0)) as camera:
         for at in range(20):
             shot = camera.read()
             assert shot.encoded == pictures[at]
             assert shot.image.shape == (SIZE[1], SIZE[0], 3)
-        camera.close()
-    finally:
-        server.kill()
 
 
 def test_a_picture_that_is_cut_short_is_not_taken_and_the_next_one_is(pictures):
     count = iter(range(1000))
     server = Server(pictures, spoil=lambda part: part[: len(part) // 2] if next(count) % 2 else part, rate=100.0)
-    try:
-        camera = MjpegCamera(CameraSettings(source=server.address))
+    with camera_of(server) as camera:
         for _ in range(5):
             assert camera.read().image.shape == (SIZE[1], SIZE[0], 3)
             with pytest.raises(BrokenFrameError, match="cut short"):
                 camera.read()
-        camera.close()
-    finally:
-        server.kill()
 
 
 def test_attacks_2_and_4_a_huge_or_half_picture_is_not_taken_and_the_next_one_is(pictures, capfd):
@@ -61,32 +62,22 @@ def test_attacks_2_and_4_a_huge_or_half_picture_is_not_taken_and_the_next_one_is
             *[pictures[0]] * 1000,
         )
     )
-    server = Server(pictures, spoil=lambda _: next(spoiled), rate=100.0)
-    try:
-        camera = MjpegCamera(CameraSettings(source=server.address))
+    with camera_of(Server(pictures, spoil=lambda _: next(spoiled), rate=100.0)) as camera:
         for says in ("32767 x 32767 px, 1074 Mpx; at most 50 Mpx", "cut short or damaged"):
             with pytest.raises(BrokenFrameError, match=says):
                 camera.read()
             assert camera.read().image.shape == (SIZE[1], SIZE[0], 3)
-        camera.close()
-    finally:
-        server.kill()
     assert capfd.readouterr() == ("", "")
 
 
 def test_a_server_that_falls_silent_is_given_up_in_time(pictures):
     stop = threading.Event()
-    server = Server(pictures, spoil=lambda part: stop.wait(20.0) or part)
-    try:
-        camera = MjpegCamera(CameraSettings(source=server.address, lost_ms=200))
+    with camera_of(Server(pictures, spoil=lambda part: stop.wait(20.0) or part), lost_ms=200) as camera:
         started = time.monotonic()
         with pytest.raises(CameraError, match="timed out"):
             camera.read()
         assert time.monotonic() - started < 5.0
-        camera.close()
-    finally:
         stop.set()
-        server.kill()
 
 
 def test_what_is_no_motion_jpeg_is_said(pictures):
@@ -186,9 +177,8 @@ STAMPS = pytest.mark.parametrize("stamps", [None, 5000.0], ids=["without stamps"
 @STAMPS
 def test_attack_5_after_a_stall_of_the_network_a_frame_is_as_old_as_it_is(pictures, stamps):
     server = LiveServer(pictures, stamps)
-    camera = MjpegCamera(CameraSettings(source=server.address, lost_ms=10000))
     shots, old = [], 0
-    try:
+    with camera_of(server, lost_ms=10000) as camera:
         for at in range(150):
             if at in (40, 100):
                 server.stalled.set()
@@ -201,9 +191,6 @@ def test_attack_5_after_a_stall_of_the_network_a_frame_is_as_old_as_it_is(pictur
         assert said.max() < 0.25  # a frame that waited is up to 1 s old
         assert old > 5
         assert len(shots) > 50
-    finally:
-        camera.close()
-        server.kill()
 
 
 @pytest.mark.long

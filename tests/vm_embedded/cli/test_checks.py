@@ -20,7 +20,6 @@ from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.live.configuration import Configuration, FixedPose, StatusSettings
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
-from vm_embedded.output.recorder import RecorderSettings
 from vm_embedded.poses.settings import PoseSettings
 
 HEALTHY = Configuration(
@@ -227,11 +226,6 @@ def test_where_poses_come_from_is_shown(root):
     assert (seen.state, seen.seen) == (BAD, "pitch and roll need a height: give --height")
 
 
-def test_a_status_socket_without_a_folder_is_seen(root):
-    nowhere = replace(HEALTHY, status=StatusSettings(socket="/nowhere/at/all"))
-    assert found(nowhere, root)["status socket"].state == BAD
-
-
 def test_a_folder_that_systemd_will_create_is_no_fault(root, monkeypatch):
     monkeypatch.setenv("RUNTIME_DIRECTORY", "/nowhere/at/all")
     status = found(HEALTHY, root)["status socket"]
@@ -242,12 +236,3 @@ def test_every_fault_has_a_command_that_mends_it(root):
     broken = Configuration(camera=CameraSettings(source="9"), status=StatusSettings(socket="/nowhere/at/all"))
     for each in run_checks(broken, root):
         assert each.state == GOOD or each.mend, each
-
-
-def test_a_folder_that_takes_no_recording_is_seen(root, tmp_path):
-    file = tmp_path / "file"
-    file.touch()
-    for folder, state in ((file / "recordings", BAD), (tmp_path / "new" / "recordings", GOOD)):
-        recorder = RecorderSettings(folder=str(folder))
-        assert found(replace(HEALTHY, recorder=recorder), root)["recorder"].state == state
-    assert not (tmp_path / "new").exists()

@@ -4,7 +4,6 @@ import json
 import sys
 from pathlib import Path
 
-from tests.drawn_scenes import FOLDER
 from tests.preloaded import run_preloaded
 
 COMMAND = Path(sys.executable).parent / "vm-doctor"
@@ -18,11 +17,3 @@ def test_the_command_prints_findings_and_fails_if_one_is_in_the_way(tmp_path):
     assert {"processor", "threads", "model", "camera", "clock"} <= {each["about"] for each in findings}
     done = run_preloaded([*command, "--camera", "/dev/none"])
     assert done.returncode == 1
-
-
-def test_a_folder_whose_pictures_have_lens_files_needs_no_other_lens_and_pose(tmp_path):
-    command = [COMMAND, "--json", "--status-socket", tmp_path / "socket", "--camera", FOLDER]
-    done = run_preloaded(command)
-    assert done.returncode == 0, done.stdout
-    states = {each["about"]: each["state"] for each in map(json.loads, done.stdout.splitlines())}
-    assert (states["lens"], states["pose"]) == ("ok", "ok")

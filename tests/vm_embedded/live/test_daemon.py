@@ -36,16 +36,6 @@ def test_a_drawn_camera_is_watched_and_its_ball_is_where_it_is(tmp_path):
     assert numbers == list(range(1, len(numbers) + 1))
 
 
-def test_state_messages_have_no_detections_and_frames_have_a_state(tmp_path):
-    with running(tmp_path, "--camera", "synthetic") as found:
-        found.wait_for_state("ok")
-        found.wait(lambda: len(found.frames) > 3)
-        found.stop()
-    for each in found.messages:
-        assert ("detections" in each) == (each["type"] == "frame")
-        assert each["state"] in ("starting", "ok", "degraded", "stopping")
-
-
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_it_and_its_sockets_are_gone(tmp_path, number):
     with running(tmp_path, "--camera", "synthetic", "--output-unix", tmp_path / "lines") as found:

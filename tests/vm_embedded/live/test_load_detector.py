@@ -173,5 +173,5 @@ def test_the_start_reads_the_script_of_a_camera_once(tmp_path, monkeypatch):
     configuration = Configuration(
         camera=CameraSettings(source=f"fault:{path}"), status=StatusSettings(socket=str(tmp_path / "control"))
     )
-    asyncio.run(Daemon.prepare(lambda: configuration, EventLog("vm-detect", io.StringIO())))
+    asyncio.run(Daemon.prepare(lambda: configuration, EventLog(io.StringIO())))
     assert seen == [path]

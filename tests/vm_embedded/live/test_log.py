@@ -19,8 +19,8 @@ class Terminal(io.StringIO):
 def test_text_leaves_out_empty_fields_and_json_keeps_them():
     fields = {"state": "ok", "was": "starting", "reason": "", "code": None, "frames": 0}
     terminal, file = Terminal(), io.StringIO()
-    EventLog("vm-detect", terminal)("state", **fields)
-    EventLog("vm-detect", file)("state", **fields)
+    EventLog(terminal)("state", **fields)
+    EventLog(file)("state", **fields)
     assert terminal.getvalue().endswith(" state: state ok, was starting, frames 0\n")
     assert fields.items() <= json.loads(file.getvalue()).items()
 
@@ -38,7 +38,7 @@ def test_events_of_several_threads_are_whole_lines(hasty, tmp_path):
     """Without a buffer, as with PYTHONUNBUFFERED: a line and its end could be two writes."""
     written = tmp_path / "log"
     with written.open("wb", buffering=0) as file, io.TextIOWrapper(file, write_through=True) as stream:
-        log = EventLog("vm-detect", stream)
+        log = EventLog(stream)
 
         def tell(thread):
             for number in range(400):
@@ -58,7 +58,7 @@ def test_events_of_several_threads_are_whole_lines(hasty, tmp_path):
 def test_a_pipe_that_nobody_reads_does_not_stop_the_program():
     reading, writing = os.pipe()
     with os.fdopen(reading) as reader, os.fdopen(writing, "w") as stream:
-        log = EventLog("vm-detect", stream)
+        log = EventLog(stream)
         for number in range(3000):
             log(f"event {number}", text="x" * 100)
         log("lost")

@@ -10,8 +10,7 @@ from contextlib import ExitStack
 import pytest
 
 from tests.messages import read_message
-from tests.vm_embedded.cameras.test_mjpeg import LENS
-from tests.vm_embedded.live.running import counts, running
+from tests.vm_embedded.live.running import LENS, counts, running
 from tests.vm_embedded.poses.test_stream import MOTION, free_port, pose_line
 from vm_embedded.live.log import EventLog
 
@@ -83,7 +82,7 @@ def test_attack_6_the_log_has_at_most_fifty_lines_of_a_kind_in_ten_seconds(monke
     now = [1000.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     stream = io.StringIO()
-    log = EventLog("vm-detect", stream)
+    log = EventLog(stream)
     for _ in range(1000):
         log("internal error", "error")
     log("state", state="ok")

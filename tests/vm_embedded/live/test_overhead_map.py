@@ -11,9 +11,9 @@ import pytest
 
 from tests.vm_embedded.output.features import demo_frame, scene
 from vm_embedded import Detector, Equidistant, Orientation, Rectilinear
-from vm_embedded.live import status_page
+from vm_embedded.live import frame_views
+from vm_embedded.live.frame_views import FrameViews
 from vm_embedded.live.overhead_map import REACH, field_of_view, overhead_map
-from vm_embedded.live.status_page import StatusPage
 
 
 def inside(polygons, places):
@@ -75,17 +75,17 @@ def test_the_map_has_what_the_messages_have():
 
 def test_maps_are_computed_when_asked_for_and_once_for_all(monkeypatch):
     computed = []
-    monkeypatch.setattr(status_page, "overhead_map", lambda each: computed.append(each) or {"n": len(computed)})
-    page = StatusPage(10.0, dict, lambda detections, query: detections)
+    monkeypatch.setattr(frame_views, "overhead_map", lambda each: computed.append(each) or {"n": len(computed)})
+    views = FrameViews(10.0)
 
     async def ask():
-        assert (await page.map({})).content == b"null"
+        assert (await views.map({})).content == b"null"
         detections = demo_frame(0)[1]
-        page.show(detections)
+        views.show(detections)
         assert computed == []
-        answers = await asyncio.gather(page.map({}), page.map({}))
+        answers = await asyncio.gather(views.map({}), views.map({}))
         assert {each.content for each in answers} == {b'{"n":1}'}
-        page.show(replace(detections))
-        assert (await page.map({})).content == b'{"n":2}'
+        views.show(replace(detections))
+        assert (await views.map({})).content == b'{"n":2}'
 
     asyncio.run(ask())

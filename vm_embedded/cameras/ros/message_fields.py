@@ -43,7 +43,7 @@ FIELDS = {
 """Type and name of each field. Messages stand below those that they contain. A type is primitive or the short name of a
 message, with [] for a sequence and [n] for n values."""
 
-FOXGLOVE_FIELDS = {
+_FOXGLOVE_FIELDS = {
     "foxglove_msgs/msg/Color": "float64 r, float64 g, float64 b, float64 a",
     "foxglove_msgs/msg/Point2": "float64 x, float64 y",
     "foxglove_msgs/msg/CircleAnnotation": "Time timestamp, Point2 position, float64 diameter, float64 thickness, "
@@ -57,10 +57,10 @@ FOXGLOVE_FIELDS = {
 }
 """The same for the messages that Foxglove draws over images. They are only in files."""
 
-MESSAGES = {full.rpartition("/")[2]: full for full in FIELDS | FOXGLOVE_FIELDS}
+MESSAGES = {full.rpartition("/")[2]: full for full in FIELDS | _FOXGLOVE_FIELDS}
 """The full name of each message by its short name, which is unique."""
 
 
 def fields_of(full: str) -> list[tuple[str, str]]:
     """Type and name of each field of a message."""
-    return [(kind, name) for kind, name in (each.split(" ") for each in (FIELDS | FOXGLOVE_FIELDS)[full].split(", "))]
+    return [(kind, name) for kind, name in (each.split(" ") for each in (FIELDS | _FOXGLOVE_FIELDS)[full].split(", "))]

@@ -15,7 +15,7 @@ from ...detection.detection import Detection
 from ...detection.detections import Detections
 from ...geometry.orientation import OPTICAL_TO_CAMERA, Orientation
 
-LEVELS = {"ok": "OK", "starting": "WARN", "degraded": "WARN", "stopping": "WARN"}
+_LEVELS = {"ok": "OK", "starting": "WARN", "degraded": "WARN", "stopping": "WARN"}
 """Levels of a DiagnosticStatus for states; the others, without detections, are errors."""
 
 
@@ -70,7 +70,7 @@ def _detection_3d(types: Any, header: Any, detection: Detection, offset: Floats,
     return types.Detection3D(
         header=header,
         results=[_hypothesis(types, detection, position)],
-        bbox=types.BoundingBox3D(center=pose_at(types, position), size=types.Vector3(x=side, y=side, z=side)),
+        bbox=types.BoundingBox3D(center=_pose_at(types, position), size=types.Vector3(x=side, y=side, z=side)),
         id=_track_id(detection),
     )
 
@@ -83,11 +83,11 @@ def _track_id(detection: Detection) -> str:
 def _hypothesis(types: Any, detection: Detection, position: Floats) -> Any:
     return types.ObjectHypothesisWithPose(
         hypothesis=types.ObjectHypothesis(class_id=detection.class_name, score=float(detection.confidence)),
-        pose=types.PoseWithCovariance(pose=pose_at(types, position), covariance=types.doubles([0.0] * 36)),
+        pose=types.PoseWithCovariance(pose=_pose_at(types, position), covariance=types.doubles([0.0] * 36)),
     )
 
 
-def pose_at(types: Any, position: Floats) -> Any:
+def _pose_at(types: Any, position: Floats) -> Any:
     """A geometry_msgs/Pose at a position (3,), not rotated."""
     x, y, z = (float(each) for each in position)
     return types.Pose(position=types.Point(x=x, y=y, z=z), orientation=types.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
@@ -100,7 +100,7 @@ def diagnostic_array(
 
     name: of the status, such as "vm_ros: detector". hardware: the camera.
     """
-    level = getattr(types.DiagnosticStatus, LEVELS.get(state, "ERROR"))
+    level = getattr(types.DiagnosticStatus, _LEVELS.get(state, "ERROR"))
     pairs = {"state": state, "reason": reason, **values}
     status = types.DiagnosticStatus(
         level=level,
