@@ -1,7 +1,6 @@
 """The README's way from a recording to a network that has learned from it, command by command."""
 
 import math
-import re
 import shlex
 
 import cv2
@@ -46,5 +45,5 @@ def test_the_readme_leads_from_a_recording_to_a_tuned_network(tmp_path):
         less = [word for each in LESS for word in ("--set", each)] if words[0] == "vm-train" else []
         shown = run(words + less, tmp_path)
     assert len(list((tmp_path / "judged").glob("*.png"))) == 12
-    assert re.search(r"it finds \d+ of \d+ boxes", shown)
+    assert "not measured, because no frames are for validation" in shown  # a single recording
     assert read_model(tmp_path / "tuned" / "model.onnx").manifest.look is not None

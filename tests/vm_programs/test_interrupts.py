@@ -17,6 +17,14 @@ NUMPY = "import os, signal, sys\nos.kill(os.getpid(), signal.SIGINT)\nsys.exit(3
 """A module in the place of numpy, which all programs import: it interrupts its own process."""
 
 
+@pytest.fixture(autouse=True)
+def interrupts_arrive():
+    """Tests that a shell runs in the background have interrupts ignored, and so would the programs that they start."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def interrupted(program, folder, **more):
     """What a program says and ends with if it is interrupted during its imports."""
     (folder / "numpy.py").write_text(NUMPY)
