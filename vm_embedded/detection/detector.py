@@ -35,6 +35,10 @@ class Detector:
     """
 
     def __init__(self, model: ModelFile, settings: Settings | None = None) -> None:
+        if not isinstance(model, ModelFile):
+            raise InputError(f"model must be a ModelFile, not {model!r}; Detector.from_file takes names and paths")
+        if not isinstance(settings, Settings | None):
+            raise InputError(f"settings must be Settings(...), not {settings!r}")
         self.settings = settings or Settings()
         self.manifest = model.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         self.session = Session(model, self.settings.threads, self.settings.spinning)

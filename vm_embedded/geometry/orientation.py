@@ -110,7 +110,9 @@ class Orientation:
 
     @classmethod
     def from_roll_pitch(cls, height: float, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Orientation:
-        """From angles [rad], R = Rz(yaw) Ry(pitch) Rx(roll). pitch > 0 looks down, roll > 0 tilts to the right.
+        """From angles [rad], R = Rz(yaw) Ry(pitch) Rx(roll).
+
+        roll > 0 tilts to the right, pitch > 0 looks down, yaw > 0 turns to the left.
 
         Raises GeometryError for a roll or pitch beyond a full turn, which is probably in degrees, and for angles that
         are not finite.
