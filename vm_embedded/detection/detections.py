@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import cv2
 import numpy as np
@@ -65,7 +65,13 @@ class Detections:
     def __iter__(self) -> Iterator[Detection]:
         return iter(self.objects)
 
-    def __getitem__(self, index: int) -> Detection:
+    @overload
+    def __getitem__(self, index: int) -> Detection: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Detection, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Detection | tuple[Detection, ...]:
         return self.objects[index]
 
     def __repr__(self) -> str:

@@ -30,10 +30,15 @@ class Detector:
         for ball in detector.detect(image, orientation, lens):
             print(ball.class_name, ball.distance, ball.position)
 
-    Use it from one thread only; its calls share a cache. Raises ModelError if the network does not run.
+    Use it from one thread only; its calls share a cache. Several detectors may run in threads at the same time. A
+    detector can't be pickled: load one in each process. Raises ModelError if the network does not run.
     """
 
     def __init__(self, model: ModelFile, settings: Settings | None = None) -> None:
+        if not isinstance(model, ModelFile):
+            raise InputError(f"model must be a ModelFile, not {model!r}; Detector.from_file takes names and paths")
+        if not isinstance(settings, Settings | None):
+            raise InputError(f"settings must be Settings(...), not {settings!r}")
         self.settings = settings or Settings()
         self.manifest = model.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         self.session = Session(model, self.settings.threads, self.settings.spinning)
@@ -55,8 +60,9 @@ class Detector:
     ) -> Detections:
         """Find objects in an image. A camera that sees no part of the plane gives no points and no detections.
 
-        image: uint8 (height, width[, channels]) in the pixel format of the settings. orientation: of the camera at the
-        time of the image. explain: also return the rejected candidates.
+        image: uint8 (height, width[, channels]) in the pixel format of the settings. It is not copied, and drawing or
+        saving the result reads it again. orientation: of the camera at the time of the image. explain: also return the
+        rejected candidates.
 
         Raises InputError for an image or lens that doesn't fit, and if image or orientation is None. GeometryError: the
         camera is too low for the object. cv2.imread returns None if it can't read a file. A lens file without a pose
@@ -75,7 +81,10 @@ class Detector:
         return self.cache.prepare_nearby(orientation, lens.for_image(size), size)
 
     def observe(self, image: AnyImage | None, orientation: Orientation | None, lens: Lens) -> Observation:
-        """Classify the mesh points in an image: the first step of `detect`, with the same arguments and errors."""
+        """Classify the mesh points in an image: the first step of `detect`, with the same arguments and errors.
+
+        The image is not copied, and `locate` reads it again.
+        """
         frame = checked_image(image, self.settings.format)
         if orientation is None:
             raise InputError("there is no orientation: perhaps the lens file has no pose (Hoc); give an Orientation")

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from ..arrays import Floats
 from ..errors import InputError
@@ -54,19 +55,20 @@ class Tracker:
         """The current tracks, also of objects that the last frame did not show, each at its last detection."""
         return self._tracks
 
-    def update(self, detections: Detections, time: float, moved: Move | None = None) -> Detections:
+    def update(self, detections: Detections, time: float, moved: npt.ArrayLike | None = None) -> Detections:
         """The same detections, each object with its track.
 
         time: of the frame [s], on any clock; if it jumps by more than `forget`, all tracks start anew. moved: how the
         robot has moved since the last call, by its odometry: x and y [m], and the turn [rad] (counterclockwise), in the
         plane's frame of the last call.
 
-        Raises InputError if a number is not finite.
+        Raises InputError if a number is not finite, or if `moved` is not three numbers.
         """
-        if not all(map(math.isfinite, (time, *(moved or ())))):
-            raise InputError(f"time and moved must be finite numbers, not {time} and {moved}")
+        if not math.isfinite(time):
+            raise InputError(f"time must be finite [s], not {time}")
+        move = None if moved is None else _checked_move(moved)
         watch = Stopwatch()
-        tracks = [each if moved is None else _seen_from(each, moved) for each in self._tracks]
+        tracks = [each if move is None else _seen_from(each, move) for each in self._tracks]
         found, rest = follow(tracks, detections.objects, time, self.settings, self._used + 1)
         self._tracks = (*found, *rest)
         self._used = max([self._used, *(each.id for each in found)])
@@ -153,6 +155,18 @@ def _continued(track: Track, detection: Detection, time: float, state: Floats, c
         covariance=covariance,
         count=track.count + 1,
     )
+
+
+def _checked_move(moved: npt.ArrayLike) -> Move:
+    """The three numbers of a move. Raises InputError."""
+    try:
+        numbers = np.asarray(moved, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.array([math.nan])
+    if numbers.shape != (3,) or not np.isfinite(numbers).all():
+        raise InputError(f"moved must be finite x, y [m] and turn [rad], not {moved!r}")
+    x, y, turn = numbers.tolist()
+    return x, y, turn
 
 
 def _seen_from(track: Track, moved: Move) -> Track:

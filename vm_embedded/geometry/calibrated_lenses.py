@@ -33,9 +33,9 @@ class CalibratedLens(Lens):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not np.isfinite([*self.focal_lengths, *self.optical_center, *self.coefficients]).all():
-            raise InputError("camera matrix and distortion coefficients must be finite numbers")
-        if min(self.focal_lengths) <= 0:
+        self._store("optical_center", 2)
+        self._store("coefficients")
+        if min(self._store("focal_lengths", 2)) <= 0:
             raise InputError(f"focal lengths must be above 0 px, not {self.focal_lengths}")
 
     @property

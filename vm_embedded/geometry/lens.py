@@ -30,10 +30,13 @@ Size = tuple[int, int]
 class Lens(ABC):
     """Maps rays to pixels and back.
 
+    Rays are unit vectors in the camera's frame: x along the optical axis, y to the left, z up. Pixels are (x, y), x to
+    the right and y down; the center of the upper left pixel is (0, 0).
+
     fov [rad]: full angle that the lens covers. size [px]: width and height of the image for which the lens was
     calibrated, or None if its numbers hold unchanged for every image.
 
-    Raises InputError for an angle outside of (0, 2 pi] and for an image smaller than 2 x 2 px.
+    Raises InputError for an angle outside of (0, 2 pi], and for a size that is not two whole numbers of at least 2.
     """
 
     fov: float
@@ -42,8 +45,29 @@ class Lens(ABC):
     def __post_init__(self) -> None:
         if not (math.isfinite(self.fov) and 0.0 < self.fov <= 2.0 * math.pi):
             raise InputError(f"lens fov must be an angle above 0 and up to 2 pi rad, not {self.fov}")
-        if self.size is not None and min(self.size) < 2:
-            raise InputError(f"lens image size must be at least 2 x 2 px, not {self.size[0]} x {self.size[1]}")
+        if self.size is None:
+            return
+        width, height = self._store("size", 2)
+        if min(width, height) < 2 or not (width.is_integer() and height.is_integer()):
+            raise InputError(f"lens image size must be whole numbers of at least 2 x 2 px, not {width:g} x {height:g}")
+        object.__setattr__(self, "size", (int(width), int(height)))
+
+    def _store(self, name: str, count: int | None = None) -> tuple[float, ...]:
+        """Store the finite numbers of a field as a tuple, also those of an array, which would have no hash.
+
+        count: how many there must be, or None for any number. Raises InputError.
+        """
+        given = getattr(self, name)
+        try:
+            numbers = np.asarray(given, dtype=np.float64).ravel()
+        except (TypeError, ValueError):
+            numbers = np.array([math.nan])
+        if not np.isfinite(numbers).all() or (count is not None and len(numbers) != count):
+            wanted = "finite" if count is None else f"{count} finite"
+            raise InputError(f"lens {name} must be {wanted} numbers, not {given}")
+        stored = tuple(numbers.tolist())
+        object.__setattr__(self, name, stored)
+        return stored
 
     @abstractmethod
     def project(self, rays: Floats, size: Size) -> Floats:

@@ -11,7 +11,6 @@ plane, so a network handles turns of the camera better (section "Discussion and 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -31,11 +30,14 @@ def rotation_z(angle: float) -> Floats:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def rotation_from_quaternion(quaternion: Sequence[float]) -> Floats:
+def rotation_from_quaternion(quaternion: npt.ArrayLike) -> Floats:
     """Rotation (3, 3) of a quaternion (w, x, y, z). Raises GeometryError if its length differs from 1 by over 1e-3."""
-    q = np.asarray(quaternion, dtype=np.float64)
+    try:
+        q = np.asarray(quaternion, dtype=np.float64)
+    except (TypeError, ValueError):
+        q = np.array([math.nan])
     if q.shape != (4,) or not np.isfinite(q).all() or abs(float(q @ q) - 1.0) > 2e-3:
-        raise GeometryError(f"quaternion must be (w, x, y, z) of length 1, not {list(quaternion)}")
+        raise GeometryError(f"quaternion must be (w, x, y, z) of length 1, not {quaternion!r}")
     w, x, y, z = q / np.linalg.norm(q)
     return np.array(
         [
@@ -108,7 +110,9 @@ class Orientation:
 
     @classmethod
     def from_roll_pitch(cls, height: float, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0) -> Orientation:
-        """From angles [rad], R = Rz(yaw) Ry(pitch) Rx(roll). pitch > 0 looks down, roll > 0 tilts to the right.
+        """From angles [rad], R = Rz(yaw) Ry(pitch) Rx(roll).
+
+        roll > 0 tilts to the right, pitch > 0 looks down, yaw > 0 turns to the left.
 
         Raises GeometryError for a roll or pitch beyond a full turn, which is probably in degrees, and for angles that
         are not finite.
@@ -126,7 +130,7 @@ class Orientation:
         return cls(height, rotation_z(yaw) @ tilt)
 
     @classmethod
-    def from_quaternion(cls, height: float, quaternion: Sequence[float], optical: bool = False) -> Orientation:
+    def from_quaternion(cls, height: float, quaternion: npt.ArrayLike, optical: bool = False) -> Orientation:
         """From a quaternion (w, x, y, z) of the rotation from camera to plane.
 
         optical: the quaternion rotates from the optical frame of OpenCV and ROS instead of the camera frame.

@@ -44,9 +44,8 @@ class RadialLens(Lens):
         super().__post_init__()
         if not (math.isfinite(self.focal_length) and self.focal_length > 0):
             raise InputError(f"lens focal length must be above 0 px, not {self.focal_length}")
-        if not np.isfinite([*self.center, *self.distortion]).all():
-            raise InputError(f"lens center {self.center} and distortion {self.distortion} must be finite numbers")
-        if max(map(abs, self.distortion)) > _STRONGEST:
+        self._store("center", 2)
+        if max(map(abs, self._store("distortion", 2))) > _STRONGEST:
             raise InputError(f"lens distortion must be from -{_STRONGEST:g} to {_STRONGEST:g}, not {self.distortion}")
 
     @property

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import os
-from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +41,16 @@ _SELF_TEST_TOLERANCE = 1e-4
 """A hundred times the rounding of single precision, in which processors differ, and far below a change of an answer."""
 
 
+class _InferenceSession(onnxruntime.InferenceSession):  # type: ignore[misc]
+    """A session that does not try again after an error.
+
+    ONNX Runtime would first print to standard output, among the messages. Its own switch, `enable_fallback`, does not
+    exist before 1.18. Nor can standard output be redirected meanwhile: all threads of the program share it.
+    """
+
+    _enable_fallback = property(lambda self: False, lambda self, value: None)
+
+
 def usable_threads(threads: int) -> int:
     """A number of threads, but at most the cores that this process may use."""
     return min(threads, len(os.sched_getaffinity(0)))
@@ -73,13 +81,7 @@ class OnnxModel:
         options.add_session_config_entry("session.load_model_format", "ONNX")
         options.add_session_config_entry("session.intra_op.allow_spinning", "1" if spinning else "0")
         try:
-            # After an error it would print to standard output, among the messages, and try the same again. Versions
-            # before 1.18 do so whatever they are told.
-            with redirect_stdout(io.StringIO()):
-                self._session = onnxruntime.InferenceSession(
-                    content, options, providers=["CPUExecutionProvider"], enable_fallback=0
-                )
-            self._session.disable_fallback()
+            self._session = _InferenceSession(content, options, providers=["CPUExecutionProvider"])
             found = {
                 node.name: (node.type, [size for size in node.shape if isinstance(size, int)])
                 for node in (*self._session.get_inputs(), *self._session.get_outputs())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -38,6 +39,7 @@ class Session:
     def __init__(self, model: ModelFile, threads: int = 1, spinning: bool = False) -> None:
         self.model = model
         self.threads = usable_threads(threads)
+        self._process = os.getpid()
         is_split = self.threads > 1 and model.manifest.layout != "lattice"
         self._others = ThreadPoolExecutor(self.threads - 1, "network") if is_split else None
         interface = _interface(model.manifest)
@@ -62,8 +64,14 @@ class Session:
     def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
         """Probabilities (m, C) of a layout's slots, from their colors (3, m) and which slots (m,) are on screen.
 
-        Raises ModelError, also if the system has no thread left, and for answers that are not finite.
+        Raises ModelError, also if the system has no thread left, for answers that are not finite, and for several
+        threads in a process that was forked after the model was loaded.
         """
+        if self.threads > 1 and os.getpid() != self._process:  # it would wait forever: a fork has no other threads
+            raise ModelError(
+                f"{self.model.path}: its {self.threads} threads belong to another process; "
+                "load the detector in each process, or use one thread"
+            )
         try:
             answers = layout.answers(self.onnx.run, colors, on_screen)
         except RuntimeError as error:

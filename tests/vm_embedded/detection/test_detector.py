@@ -306,3 +306,10 @@ def test_the_model_s_facts_are_readable():
     model = read_model(MODEL)
     assert len(model.sha256) == 64
     assert [each.name for each in model.manifest.classes] == ["ball", "line", "field", "environment"]
+
+
+def test_the_name_of_a_network_in_place_of_its_file_is_refused():
+    with pytest.raises(InputError, match=r"model must be a ModelFile, not 'ball'; Detector\.from_file takes names"):
+        Detector("ball")
+    with pytest.raises(InputError, match=r"settings must be Settings\(...\), not {'threads': 1}"):
+        Detector.from_file("ball", {"threads": 1})

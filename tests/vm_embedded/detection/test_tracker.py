@@ -259,6 +259,20 @@ def test_numbers_that_are_not_finite_are_refused(time, moved):
         Tracker().update(detections_of([]), time, moved)
 
 
+@pytest.mark.parametrize("moved", [(0.0, 0.0), (0.0, 0.0, 0.0, 0.0), 0.1, "left"])
+def test_a_move_that_is_not_three_numbers_is_refused(moved):
+    with pytest.raises(InputError, match=r"moved must be finite x, y \[m\] and turn \[rad\], not "):
+        Tracker().update(detections_of([]), 0.0, moved)
+
+
+@pytest.mark.parametrize("kind", [tuple, list, np.array])
+def test_a_move_is_any_three_numbers(kind):
+    tracker = Tracker()
+    tracker.update(detections_of([detection_at((2.0, 0.0))]), 0.0)
+    tracker.update(detections_of([]), 0.1, kind([0.5, 0.0, 0.0]))
+    np.testing.assert_allclose(tracker.tracks[0].position[:2], (1.5, 0.0))
+
+
 def test_detections_keep_all_but_their_tracks_and_times():
     before = detections_of([detection_at((2.0, 0.1)), detection_at((3.0, 0.1))])
     after = Tracker().update(before, 0.0)

@@ -6,7 +6,7 @@ from hypothesis import assume, example, given
 
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.calibrated_lenses import BrownLens
-from vm_embedded.geometry.radial_lenses import PROJECTIONS, Rectilinear
+from vm_embedded.geometry.radial_lenses import PROJECTIONS, Equidistant, Rectilinear
 
 from ..strategies import SIZE, lenses, rays_at, rays_within, seeds
 
@@ -120,3 +120,42 @@ def test_equal_lenses_are_one_key_of_a_table(lens):
     assert twin == lens.scaled(1.0, SIZE)
     assert hash(twin) == hash(lens.scaled(1.0, SIZE))
     assert twin != lens.scaled(1.5, SIZE)
+
+
+def test_lenses_take_what_opencv_calibrates():
+    matrix = np.array([[420.0, 0.0, 318.0], [0.0, 415.0, 250.0], [0.0, 0.0, 1.0]])
+    coefficients = np.array([[-0.2, 0.05, 0.001, -0.0005, 0.0]])  # of the shape that calibrateCamera returns
+    given = BrownLens(
+        fov=2.0,
+        size=np.array([640, 512]),
+        focal_lengths=matrix[[0, 1], [0, 1]],
+        optical_center=matrix[:2, 2],
+        coefficients=coefficients,
+    )
+    expected = BrownLens(
+        fov=2.0,
+        size=(640, 512),
+        focal_lengths=(420.0, 415.0),
+        optical_center=(318.0, 250.0),
+        coefficients=(-0.2, 0.05, 0.001, -0.0005, 0.0),
+    )
+    assert given == expected
+    assert hash(given) == hash(expected)  # the detector's cache needs it
+    radial = Equidistant(fov=2.0, focal_length=300.0, center=np.array([1.0, 2.0]), distortion=[1e-7, 0.0])
+    assert hash(radial) == hash(Equidistant(fov=2.0, focal_length=300.0, center=(1.0, 2.0), distortion=(1e-7, 0.0)))
+
+
+@pytest.mark.parametrize(
+    ("entries", "message"),
+    [
+        ({"center": 5.0}, "lens center must be 2 finite numbers, not 5.0"),
+        ({"center": (1.0, 2.0, 3.0)}, "lens center must be 2 finite numbers"),
+        ({"distortion": (0.0,)}, "lens distortion must be 2 finite numbers"),
+        ({"size": (640,)}, "lens size must be 2 finite numbers"),
+        ({"size": 640}, "lens size must be 2 finite numbers, not 640"),
+        ({"size": (640.5, 480)}, "lens image size must be whole numbers of at least 2 x 2 px, not 640.5 x 480"),
+    ],
+)
+def test_entries_of_another_shape_are_refused(entries, message):
+    with pytest.raises(InputError, match=message):
+        Equidistant(fov=2.0, focal_length=300.0, **entries)

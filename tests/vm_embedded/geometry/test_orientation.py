@@ -140,6 +140,12 @@ def test_a_level_ros_camera_has_the_quaternion_that_ros_gives_it():
     np.testing.assert_allclose(found.rotation, np.eye(3), atol=1e-15)
 
 
+@pytest.mark.parametrize("quaternion", [(1.0, 0.0, 0.0), (2.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0), None, "wxyz"])
+def test_what_is_not_a_quaternion_is_refused(quaternion):
+    with pytest.raises(GeometryError, match=r"quaternion must be \(w, x, y, z\) of length 1, not "):
+        Orientation.from_quaternion(1.0, quaternion)
+
+
 @given(orientations(), seeds)
 def test_rotations_of_few_digits_are_accepted(orientation, seed):
     """Files of the reference hold six digits; half of what is allowed passes in any case."""

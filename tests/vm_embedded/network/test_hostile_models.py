@@ -4,6 +4,8 @@ import base64
 import math
 import random
 import struct
+import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import onnx
@@ -159,6 +161,23 @@ def test_attack_10_a_damaged_model_prints_nothing_to_standard_output(capfd):
             refused += 1
     assert refused == 200  # also the readable ones: they have other inputs than {}
     assert capfd.readouterr() == ("", "")
+
+
+def test_threads_that_load_models_leave_standard_output_alone():
+    content, before, during = model_path("ball").read_bytes(), sys.stdout, set()
+
+    def load():
+        for _ in range(3):
+            with pytest.raises(ModelError, match="its manifest asks for"):
+                OnnxModel("ball", content, {}, "probabilities", threads=1, spinning=False)
+
+    with ThreadPoolExecutor(3) as threads:
+        loads = [threads.submit(load) for _ in range(3)]
+        while not all(each.done() for each in loads):
+            during.add(sys.stdout)
+    for each in loads:
+        each.result()
+    assert {*during, sys.stdout} == {before}
 
 
 def weights_of(model, key):

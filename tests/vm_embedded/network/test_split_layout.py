@@ -1,5 +1,7 @@
 """Sectors of a mesh give the answers of the whole mesh, whatever the network, the mesh and the view."""
 
+import os
+import signal
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
@@ -149,6 +151,25 @@ def test_without_a_thread_the_call_ends_in_one_line(monkeypatch):
     colors = np.full((3, len(parts)), 0.5, dtype=np.float32)
     with pytest.raises(ModelError, match="can't run it in 1 threads: can't start new thread"):
         session.run(parts, colors, parts.slots < len(WHOLE["ring6"]))
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_forked_process_without_the_threads_is_told_to_load_its_own_detector(monkeypatch):
+    monkeypatch.setattr("os.sched_getaffinity", lambda process: {0, 1})
+    file, image = read_lens_file(DEMO / "lens0000002.yaml"), cv2.imread(str(DEMO / "image0000002.jpg"))
+    detector = Detector.from_file("soccer", Settings(threads=2))
+    detector.detect(image, file.orientation, file.lens)
+    child = os.fork()
+    if not child:
+        signal.alarm(20)  # ends the child if it waits for threads that it does not have
+        status = 1
+        try:
+            detector.detect(image, file.orientation, file.lens)
+        except ModelError:
+            status = 0
+        finally:
+            os._exit(status)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 
 
 def test_a_detector_finds_the_same_with_two_threads(monkeypatch):
