@@ -1,7 +1,9 @@
-"""How well points could be classified at most: `python -m benchmarks.point_limits FOLDER`.
+"""How well single points tell their class: `python -m benchmarks.point_limits FOLDER`.
 
 A point's true class is that of one pixel, but a network sees the mean color around the point. Here, the masks of the
-classes take the place of the picture: each point gets the exact share of every class in what a network sees of it.
+classes take the place of the picture: each point gets the exact share of every class in what a network sees of it. A
+network could do better only with what it sees of the neighbors.
+
 Prints the F1 of these shares up to 10 m, and how well the class of the pixel below agrees with that of the point.
 """
 

@@ -94,7 +94,7 @@ def _entry(name: str) -> str:
     base = next((each for each in value.__mro__[1:] if each.__name__ in _NAMES), None)
     head = f"class {name}({base.__name__ if base else ''})".replace("()", "")
     fields = dataclasses.is_dataclass(value)
-    has_own = base is None or not fields or len(_fields(value)) > len(_fields(base))
+    same_fields = fields and base is not None and len(_fields(value)) == len(_fields(base))
     if not fields:
         head += _signature(value)
     meanings: dict[str, str] = {}
@@ -109,9 +109,9 @@ def _entry(name: str) -> str:
     if name in OTHERS:
         parts.append(f"It is in `{value.__module__}`.")
     if base:
-        more = "more methods" if has_own else "its arguments and more methods"
+        more = "its arguments and more methods" if same_fields else "more methods"
         parts.append(f"[{base.__name__}](#{base.__name__.lower()}) has {more}.")
-    if fields and has_own:
+    if fields and not same_fields:
         parts += [_field_table(value, meanings)]
     parts += [_member(name, value, member) for member in _members(value)]
     return "\n\n".join(parts)

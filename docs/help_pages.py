@@ -79,6 +79,7 @@ def command_line() -> str:
             title = f"**{(group.title or '').capitalize()}**"
             note = f" ({group.description})" if group.description else ""
             first = shown.setdefault((title, rows), parser.prog)
+            # A table of one or two options is as short as the reference to it.
             if first == parser.prog or rows.count("\n") < 2:
                 parts.append(f"{title}{note}\n\n| option | meaning |\n| --- | --- |\n{rows}\n")
             else:

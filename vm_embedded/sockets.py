@@ -8,7 +8,7 @@ import ipaddress
 import os
 import socket
 import stat
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from dataclasses import Field
 from pathlib import Path
 from typing import Any
@@ -237,29 +237,38 @@ def bound_sockets(where: str, kind: socket.SocketKind) -> list[socket.socket]:
     IPv6 where that is switched off. asyncio ignores such addresses, too, but not before Python 3.13.
     """
     host, port = parse_address(where, "address", "127.0.0.1:8080")
+    bound: list[socket.socket] = []
     lacking: OSError | None = None
-    with ExitStack() as opened:
-        bound: list[socket.socket] = []
-        try:
-            for family, _, protocol, _, address in socket.getaddrinfo(host, port, type=kind):
-                try:
-                    tried = opened.enter_context(socket.socket(family, kind | socket.SOCK_CLOEXEC, protocol))
-                    if kind == socket.SOCK_STREAM:  # connections that have just ended do not count
-                        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                    if family == socket.AF_INET6:
-                        tried.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
-                    tried.bind(address)
-                    bound.append(tried)
-                except OSError as error:
-                    if error.errno not in (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT):
-                        raise
-                    lacking = error
-            if lacking is not None and not bound:
-                raise lacking
-        except (OSError, UnicodeError) as error:
-            raise cant_listen(where, error) from error
-        opened.pop_all()
+    try:
+        for family, _, protocol, _, address in socket.getaddrinfo(host, port, type=kind):
+            try:
+                bound.append(_bound_socket(family, kind, protocol, address))
+            except OSError as error:
+                if error.errno not in (errno.EADDRNOTAVAIL, errno.EAFNOSUPPORT):
+                    raise
+                lacking = error
+        if lacking is not None and not bound:
+            raise lacking
+    except (OSError, UnicodeError) as error:
+        for each in bound:
+            each.close()
+        raise cant_listen(where, error) from error
     return bound
+
+
+def _bound_socket(family: int, kind: socket.SocketKind, protocol: int, address: Any) -> socket.socket:
+    """A socket that is bound to an address of getaddrinfo. Raises OSError."""
+    opened = socket.socket(family, kind | socket.SOCK_CLOEXEC, protocol)
+    try:
+        if kind == socket.SOCK_STREAM:  # connections that have just ended do not count
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if family == socket.AF_INET6:
+            opened.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+        opened.bind(address)
+    except OSError:
+        opened.close()
+        raise
+    return opened
 
 
 def check_port(where: str, kind: socket.SocketKind) -> None:

@@ -151,5 +151,6 @@ def _report(target: Path, written: Written) -> str:
     ]
     lines = [f"{target}: {written.images} images, {written.background} of them background; boxes: {boxes}"]
     lines += [f"left out: {count} image{'s' * (count != 1)} {reason}" for count, reason in left if count]
-    lines.append(f"next: vm-train look --from ball --boxes {target} -o tuned")
+    start = "ball" if set(written.boxes) <= {"ball"} else "MODEL"
+    lines.append(f"next: vm-train look --from {start} --boxes {target} -o tuned")
     return "\n".join(lines)

@@ -80,6 +80,12 @@ def test_images_keep_their_folders_and_only_chosen_classes_count(tmp_path):
     assert found.classes == ("ball",)
 
 
+def test_the_next_training_does_not_begin_with_the_ball_if_the_boxes_show_something_else(tmp_path):
+    folder = make_folder(tmp_path / "boxes", 1, near=False, classes=("cup",))
+    judge(folder, ["yes"])
+    assert "next: vm-train look --from MODEL" in run(folder, "--write", tmp_path / "out").stdout
+
+
 def test_images_with_unreadable_boxes_are_left_out(tmp_path):
     folder = make_folder(tmp_path / "boxes", 2, near=False)
     (folder / "image0001.txt").write_text("0 0.5 0.5 0.1 0.1\nbroken\n")

@@ -80,7 +80,7 @@ class Detections:
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON, with the fields of a line of vm-detect: points, detections, field, timing_ms [ms].
 
-        `field` is missing where it is None.
+        Without field features, the key `field` is missing.
         """
         data: dict[str, Any] = {
             "points": len(self.pixels),

@@ -30,8 +30,8 @@ class FrameViews:
     def __init__(self, fps: float) -> None:
         self.latest: Detections | None = None
         self._period = 1.0 / fps
-        self._shown: tuple[Detections, bytes] | None = None
-        self._mapped: tuple[Detections, bytes] | None = None
+        self._shown: tuple[Detections | None, bytes | None] = None, None
+        self._mapped: tuple[Detections | None, bytes] = None, b"null"
         self._changed = asyncio.Event()
         self._drawing = asyncio.Lock()
         self._mapping = asyncio.Lock()
@@ -44,10 +44,10 @@ class FrameViews:
     async def map(self, _: Query) -> Response:
         """The overhead map as JSON, see overhead_map.py; null before the first frame."""
         async with self._mapping:
-            if self.latest is not None and (self._mapped is None or self._mapped[0] is not self.latest):
-                detections = self.latest
-                self._mapped = detections, await asyncio.to_thread(_map_json, detections)
-        return Response("application/json", b"null" if self._mapped is None else self._mapped[1])
+            latest = self.latest
+            if latest is not None and latest is not self._mapped[0]:
+                self._mapped = latest, await asyncio.to_thread(_map_json, latest)
+            return Response("application/json", self._mapped[1])
 
     async def preview(self, detections: Detections) -> Response:
         """A frame with other detections, as JSON: accepted, rejected (numbers), and the picture (base64)."""
@@ -80,12 +80,12 @@ class FrameViews:
                     await asyncio.wait_for(self._changed.wait(), _REPEAT)
 
     async def _picture(self) -> bytes | None:
-        """The latest image as a JPEG."""
+        """The latest image as a JPEG; None before the first frame."""
         async with self._drawing:
-            if self.latest is not None and (self._shown is None or self._shown[0] is not self.latest):
-                detections = self.latest
-                self._shown = detections, await asyncio.to_thread(_jpeg, detections)
-        return None if self._shown is None else self._shown[1]
+            latest = self.latest
+            if latest is not None and latest is not self._shown[0]:
+                self._shown = latest, await asyncio.to_thread(_jpeg, latest)
+            return self._shown[1]
 
 
 def _jpeg(detections: Detections) -> bytes:
