@@ -14,7 +14,9 @@ import vm_embedded
 from vm_embedded.arrays import Indices, Singles
 from vm_embedded.errors import ModelError
 from vm_embedded.files import write_file
+from vm_embedded.mesh.dilation import with_dilations
 from vm_embedded.mesh.grids import lattice_neighbors
+from vm_embedded.mesh.mesh import Groups
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import ModelFile, parse_model
@@ -128,16 +130,22 @@ def largest_difference(content: bytes, network: Network, manifest: Manifest) -> 
     """
     session = Session(ModelFile(Path("the new model"), content, replace(manifest, self_test=None), ""))
     steps = manifest.model.steps if manifest.layout == "lattice" else None
-    tests = (random_example(network, points, seed, steps) for seed, points in enumerate(_CHECKED_POINTS))
+    groups = manifest.model.groups
+    tests = (random_example(network, points, seed, groups, steps) for seed, points in enumerate(_CHECKED_POINTS))
     return float(np.max([np.abs(session.answer(test) - test.probabilities[:-1]).max() for test in tests]))
 
 
 def random_example(
-    network: Network, points: int, seed: int, steps: tuple[tuple[int, int], ...] | None = None
+    network: Network,
+    points: int,
+    seed: int,
+    groups: Groups = (),
+    steps: tuple[tuple[int, int], ...] | None = None,
 ) -> SelfTest:
     """A random graph of `points` points with random colors, rounded as SelfTest.as_dict rounds, and torch's answer.
 
-    steps: with them, for the layout `lattice`, the graph is a random part of a lattice with these `MeshModel.steps`.
+    groups: `MeshModel.groups`, for a network with dilations. steps: with them, for the layout `lattice`, the graph is a
+    random part of a lattice with these `MeshModel.steps`.
     """
     random = np.random.default_rng(seed)
     colors: Singles = np.full((points + 1, 3), OFF_SCREEN, dtype=np.float32)
@@ -150,6 +158,7 @@ def random_example(
         chosen = np.sort(random.choice(side * side, points, replace=False))
         cells = np.stack([chosen % side, chosen // side], axis=1).astype(np.int32)
         neighbors = lattice_neighbors(cells, steps)
+    around = with_dilations(neighbors, groups, network.shape.dilations)
     with torch.inference_mode():
-        answer = network(torch.from_numpy(colors), torch.from_numpy(neighbors)).numpy()
+        answer = network(torch.from_numpy(colors), torch.from_numpy(around)).numpy()
     return SelfTest(colors, neighbors, answer, cells)

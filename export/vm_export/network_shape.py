@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from vm_embedded.errors import InputError, unknown
+from vm_embedded.mesh.dilation import distinct_dilations
+from vm_embedded.network.manifest import MOST_DILATION
 
 ACTIVATIONS = ("selu", "relu", "elu", "tanh")
 HEADS = ("softmax", "sigmoid")
@@ -15,11 +17,15 @@ KINDS = ("convolution", "separable", "dense")
 
 @dataclass(frozen=True)
 class Layer:
-    """One layer: its kind (one of KINDS), its width, and its activation (of ACTIVATIONS; the last layer: of HEADS)."""
+    """One layer: its kind (one of KINDS), its width, and its activation (of ACTIVATIONS; the last layer: of HEADS).
+
+    dilation: how many steps away a convolution looks (mesh/dilation.py); 1 for its point's neighbors and dense layers.
+    """
 
     kind: str
     width: int
     activation: str
+    dilation: int = 1
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -28,6 +34,10 @@ class Layer:
             raise InputError(unknown("activation", self.activation, (*ACTIVATIONS, *HEADS)))
         if self.width < 1:
             raise InputError(f"the width of a layer must be at least 1, not {self.width}")
+        if not 1 <= self.dilation <= MOST_DILATION or (self.kind == "dense" and self.dilation > 1):
+            raise InputError(
+                f"the dilation of a layer must be from 1 to {MOST_DILATION}, and 1 if it is dense, not {self.dilation}"
+            )
 
 
 @dataclass(frozen=True)
@@ -57,18 +67,34 @@ class NetworkShape:
         head: str = "softmax",
         kind: str = "convolution",
         neighbors: int = 6,
+        dilations: Sequence[int] = (),
     ) -> NetworkShape:
         """`depth` convolutions, all but the last one of `width` channels.
 
-        The networks of the paper (section "Network Architecture").
+        The networks of the paper (section "Network Architecture"). dilations: one for each convolution; empty if all
+        are 1, as in the paper. Raises InputError for another number of them.
         """
-        inner = (Layer(kind, width, activation),) * (depth - 1)
-        return cls((*inner, Layer(kind, classes, head)), neighbors)
+        if len(dilations) not in (0, depth):
+            raise InputError(f"a network of {depth} layers needs {depth} dilations, not {len(dilations)}")
+        wide = (Layer(kind, width, activation),) * (depth - 1)
+        layers = (*wide, Layer(kind, classes, head))
+        return cls(tuple(map(_with_dilation, layers, dilations or (1,) * depth)), neighbors)
 
     @property
     def classes(self) -> int:
         """Number of outputs."""
         return self.layers[-1].width
+
+    @property
+    def layer_dilations(self) -> tuple[int, ...]:
+        """The dilations of the convolutions, as in the manifest: empty if all are 1."""
+        each = tuple(layer.dilation for layer in self.layers if layer.kind != "dense")
+        return each if max(each) > 1 else ()
+
+    @property
+    def dilations(self) -> tuple[int, ...]:
+        """The different dilations, as with_dilations takes them."""
+        return distinct_dilations(self.layer_dilations)
 
     @property
     def operations(self) -> int:
@@ -93,3 +119,7 @@ class NetworkShape:
             return cls(tuple(Layer(**layer) for layer in data["layers"]), int(data["neighbors"]))
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"can't read the shape of a network: {error}") from error
+
+
+def _with_dilation(layer: Layer, dilation: int) -> Layer:
+    return replace(layer, dilation=dilation)

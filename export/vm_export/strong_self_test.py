@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from vm_embedded.arrays import Indices, Singles
+from vm_embedded.mesh.dilation import links_across, with_dilations
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
@@ -17,8 +18,9 @@ from vm_embedded.network.self_test import SelfTest
 
 from .network import Network
 
-_HOPS = 3
-"""Links from the middle of a patch to its edge: ring6 gets patches of about 37 points."""
+_HOPS, _MOST_HOPS = 3, 6
+"""Links from the middle of a patch to its edge, without and with dilations: ring6 gets patches of about 37 points, and
+of at most 127. In them, a large dilation leads to missing points only."""
 
 _STEPS, _RATE = 150, 0.2
 """Number of steps, and the size of the first one. They become shorter. A step takes only the gradient's signs: points
@@ -37,9 +39,10 @@ def strong_self_test(network: Network, manifest: Manifest) -> SelfTest:
     wanted = _wanted(len(manifest.classes))
     patch = _patch(manifest)
     neighbors, cells = _repeated(patch, len(wanted))
-    colors = _fitted_colors(network, neighbors, np.repeat(wanted, len(patch), axis=0), _RANGES[manifest.colors])
+    around = with_dilations(neighbors, manifest.model.groups, manifest.dilations)
+    colors = _fitted_colors(network, around, np.repeat(wanted, len(patch), axis=0), _RANGES[manifest.colors])
     with torch.inference_mode():
-        answer = network(torch.from_numpy(colors), torch.from_numpy(neighbors)).numpy()
+        answer = network(torch.from_numpy(colors), torch.from_numpy(around)).numpy()
     return SelfTest(colors, neighbors, answer, cells if manifest.layout == "lattice" else None)
 
 
@@ -50,12 +53,12 @@ def _wanted(classes: int) -> Singles:
 
 
 def _patch(manifest: Manifest) -> Mesh:
-    """The points of a small mesh that are at most _HOPS links from one in its middle."""
+    """The points of a small mesh that are a few links from one in its middle."""
     height = manifest.object_height + 10.0 * manifest.radius
     reach = min(manifest.max_distance, 100.0 * manifest.radius)
     mesh = manifest.model.build(manifest.mesh_shape, height, manifest.intersections, reach)
     kept = np.array([len(mesh) // 2])
-    for _ in range(_HOPS):
+    for _ in range(min(max(_HOPS, links_across(manifest.dilations[-1])), _MOST_HOPS)):
         kept = np.unique([*kept, *mesh.links(kept).ravel()])
         kept = kept[kept < len(mesh)]
     return mesh.part(kept)
@@ -78,7 +81,7 @@ def _repeated(patch: Mesh, count: int) -> tuple[Indices, Indices | None]:
 def _fitted_colors(network: Network, neighbors: Indices, wanted: Singles, limits: tuple[float, float]) -> Singles:
     """Colors (n + 1, 3), rounded as SelfTest.as_dict rounds, whose answers are close to `wanted` (n, C).
 
-    limits: smallest and largest color.
+    neighbors: (n + 1, D N), with_dilations. limits: smallest and largest color.
     """
     low, high = limits
     links, target = torch.from_numpy(neighbors), torch.from_numpy(wanted)

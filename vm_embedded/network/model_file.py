@@ -17,6 +17,7 @@ from pathlib import Path
 
 from ..errors import ModelError
 from ..files import check_regular
+from ..mesh.dilation import links_across
 from .canary import CANARY_KEY, Canary
 from .look_contract import GLANCE_KEY, LOOK_KEY, LookContract
 from .manifest import METADATA_KEY, Manifest
@@ -81,10 +82,13 @@ class ModelFile:
 
     @cached_property
     def depth(self) -> int:
-        """How many links away a point may be on which an answer depends: the number of the network's convolutions.
+        """How many links away a point may be on which an answer depends: without dilations, the number of the network's
+        convolutions.
 
         Only for the layouts plain and runs.
         """
+        if self.manifest.layer_dilations:
+            return sum(map(links_across, self.manifest.layer_dilations))
         return _look_ups(memoryview(self.content))
 
 

@@ -108,9 +108,9 @@ def _interface(manifest: Manifest) -> Interface:
         "probabilities": ("tensor(float)", [len(manifest.classes)]),
     }
     if manifest.layout == "plain":
-        interface["neighbors"] = ("tensor(int32)", [manifest.neighbors])
+        interface["neighbors"] = ("tensor(int32)", [manifest.neighbor_columns])
     elif manifest.layout == "runs":
-        interface["columns"] = ("tensor(int64)", [len(manifest.model.groups)])
+        interface["columns"] = ("tensor(int64)", [len(manifest.dilations) * len(manifest.model.groups)])
     else:
         interface["shown"] = ("tensor(bool)", [])
     return interface

@@ -53,7 +53,9 @@ def mirror_image(graph: LabeledGraph, model: MeshModel) -> LabeledGraph:
 
     Left and right neighbors change places; `pixels` keeps the places in the picture itself.
     """
-    return replace(graph, neighbors=np.ascontiguousarray(graph.neighbors[:, mirrored_columns(model)]))
+    columns = mirrored_columns(model)
+    first = np.arange(0, graph.neighbors.shape[1], model.neighbors)[:, None]  # of each dilation
+    return replace(graph, neighbors=np.ascontiguousarray(graph.neighbors[:, (first + columns).ravel()]))
 
 
 def mirrored_columns(model: MeshModel) -> npt.NDArray[np.intp]:

@@ -29,7 +29,7 @@ from .labeled_graph import LabeledGraph
 
 _HEADER = struct.Struct("<8s32sII")  # magic, fingerprint of the picture's files, number of points, neighbors of a point
 _MAGIC = b"vmviews1"
-_OF_MESH = ("shape", "radius", "object_height", "intersections", "mesh", "max_distance", "sampling")
+_OF_MESH = ("shape", "radius", "object_height", "intersections", "mesh", "max_distance", "sampling", "dilations")
 """Entries of a manifest that decide the points of a view."""
 
 

@@ -73,7 +73,7 @@ class GraphRecipe:
         try:
             return graph_of(picture, manifest, self.grid)
         except GeometryError:  # the camera is too low to see any point of the mesh
-            return empty_graph(manifest.neighbors)
+            return empty_graph(manifest.neighbor_columns)
 
 
 def ball_radius(files: PictureFiles) -> float:

@@ -14,6 +14,7 @@ from vm_embedded.detection.color_normalization import normalized
 from vm_embedded.detection.footprint import Levels, levels_for, uniform_levels
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.sampling import sample
+from vm_embedded.mesh.dilation import with_dilations
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import VISUAL, Grid
@@ -27,9 +28,9 @@ from .seen_points import seen_points
 class LabeledGraph:
     """n points of one picture, or of several joined.
 
-    points (n + 1, 3): colors, RGB from 0 to 1; row n is the off-screen point. neighbors (n + 1, N): rows of points.
-    labels (n,): positions of classes, -1 for unlabeled. distances (n,): along the plane, from the camera to an object
-    at the point [m]. pixels (n, 2): places of the points in their pictures, (x, y) [px].
+    points (n + 1, 3): colors, RGB from 0 to 1; row n is the off-screen point. neighbors (n + 1, D N): rows of points,
+    as with_dilations gives them. labels (n,): positions of classes, -1 for unlabeled. distances (n,): along the plane,
+    from the camera to an object at the point [m]. pixels (n, 2): places of the points in their pictures, (x, y) [px].
     """
 
     points: Singles
@@ -58,7 +59,8 @@ def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> Label
     points[:-1] = normalized(sample(Pyramid(picture.image, "bgr"), shown.pixels, levels), manifest.colors).T
     x, y = np.rint(shown.pixels).astype(np.intp).T
     distances = plane_distances(shown.graph.rays, picture.orientation.height)
-    return LabeledGraph(points, shown.graph.neighbors, picture.labels[y, x], distances, shown.pixels)
+    neighbors = with_dilations(shown.graph.neighbors, manifest.model.groups, manifest.dilations)
+    return LabeledGraph(points, neighbors, picture.labels[y, x], distances, shown.pixels)
 
 
 def levels_of(picture: Picture, rays: Floats, manifest: Manifest, grid: Grid) -> Levels:
@@ -77,11 +79,11 @@ def plane_distances(rays: Floats, height: float) -> Floats:
         return np.asarray(np.where(down > 0.0, height * across / down, np.inf))
 
 
-def empty_graph(neighbors: int) -> LabeledGraph:
-    """A graph without points, whose off-screen point has that many neighbors."""
+def empty_graph(columns: int) -> LabeledGraph:
+    """A graph without points, whose off-screen point has that many columns of neighbors."""
     return LabeledGraph(
         np.full((1, 3), OFF_SCREEN, dtype=np.float32),
-        np.zeros((1, neighbors), dtype=np.int32),
+        np.zeros((1, columns), dtype=np.int32),
         np.empty(0, dtype=np.int8),
         np.empty(0),
         np.empty((0, 2)),

@@ -9,9 +9,10 @@ from vm_embedded.config.entries import check_entries, number, one_of, share
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
-from vm_embedded.network.manifest import POINT_COLORS, POINT_SAMPLINGS, Manifest
+from vm_embedded.network.manifest import MOST_DILATION, POINT_COLORS, POINT_SAMPLINGS, Manifest
 from vm_export.grid import GRIDS, Grid
 from vm_export.network_shape import ACTIVATIONS, NetworkShape
+from vm_workstation.ranges import whole_numbers
 
 from ..graphs.augmentation import Augmentation
 from .class_table import ClassTable
@@ -82,9 +83,16 @@ class NetworkSettings:
     width: int = number(8, "channels of each convolution", "", (1, 1024))
     activation: str = one_of(tuple(ACTIVATIONS), "selu", "activation after each convolution; the paper found selu best")
     kind: str = one_of(("convolution", "separable"), "convolution", "kind of convolution; separable has fewer weights")
+    dilations: tuple[int, ...] = whole_numbers(
+        "how many steps away each convolution looks, one number for each; empty: 1 for all", (1, MOST_DILATION)
+    )
 
     def __post_init__(self) -> None:
         check_entries(self)
+        if len(self.dilations) not in (0, self.depth):
+            raise InputError(
+                f"dilations must be {self.depth} numbers, one for each convolution, not {len(self.dilations)}"
+            )
 
 
 HEADER = """Configuration of vm-train. `vm-train config` prints this file.
@@ -125,6 +133,7 @@ class TrainConfiguration:
             any_radius=mesh.radius_of == "scene",
             sampling=mesh.sampling,
             colors=mesh.colors,
+            layer_dilations=self.network_shape.layer_dilations,
         )
 
     @property
@@ -143,4 +152,5 @@ class TrainConfiguration:
             network.activation,
             kind=network.kind,
             neighbors=MESH_MODELS[self.mesh.model].neighbors,
+            dilations=network.dilations,
         )

@@ -93,9 +93,10 @@ def _network_entries(shape: NetworkShape) -> dict[str, Any]:
     """The section [network]. For layers of several widths or kinds, it describes the first one; `check` refuses it."""
     first = shape.layers[0]
     activation = {} if len(shape.layers) == 1 else {"activation": first.activation}
-    return {"depth": len(shape.layers), "width": first.width, "kind": first.kind, **activation}
+    dilations = list(shape.layer_dilations)
+    return {"depth": len(shape.layers), "width": first.width, "kind": first.kind, "dilations": dilations, **activation}
 
 
 def _listed(shape: NetworkShape) -> str:
-    layers = ", ".join(f"{each.kind} {each.width} {each.activation}" for each in shape.layers)
+    layers = ", ".join(f"{each.kind} {each.width} {each.activation} {each.dilation}" for each in shape.layers)
     return f"[{layers}] with {shape.neighbors} neighbors"
