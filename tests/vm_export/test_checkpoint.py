@@ -40,3 +40,5 @@ def test_foreign_and_mismatched_checkpoints_are_refused(tmp_path):
         Checkpoint.load(tmp_path / "model.pt")
     with pytest.raises(ModelError, match="outputs"):
         Checkpoint(checkpoint().network, manifest(("ball", "line", "field")))
+    with pytest.raises(ModelError, match=r"the dilations \(\), but the manifest \(1, 2, 1\)"):
+        Checkpoint(checkpoint().network, manifest(layer_dilations=(1, 2, 1)))

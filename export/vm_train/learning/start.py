@@ -12,7 +12,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_embedded.network.model_file import read_model
 from vm_export.checkpoint import Checkpoint
-from vm_export.network_shape import NetworkShape
+from vm_export.network_shape import Layer, NetworkShape
 from vm_export.network_weights import network_of
 
 from .class_table import ClassTable
@@ -93,10 +93,14 @@ def _network_entries(shape: NetworkShape) -> dict[str, Any]:
     """The section [network]. For layers of several widths or kinds, it describes the first one; `check` refuses it."""
     first = shape.layers[0]
     activation = {} if len(shape.layers) == 1 else {"activation": first.activation}
-    dilations = list(shape.layer_dilations)
-    return {"depth": len(shape.layers), "width": first.width, "kind": first.kind, "dilations": dilations, **activation}
+    dilations = {"dilations": [each.dilation for each in shape.layers]} if shape.layer_dilations else {}
+    return {"depth": len(shape.layers), "width": first.width, "kind": first.kind, **dilations, **activation}
 
 
 def _listed(shape: NetworkShape) -> str:
-    layers = ", ".join(f"{each.kind} {each.width} {each.activation} {each.dilation}" for each in shape.layers)
+    layers = ", ".join(f"{each.kind} {each.width} {each.activation}{_far(each)}" for each in shape.layers)
     return f"[{layers}] with {shape.neighbors} neighbors"
+
+
+def _far(layer: Layer) -> str:
+    return f" with dilation {layer.dilation}" if layer.dilation > 1 else ""

@@ -14,7 +14,15 @@ from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import MESH_MODELS
-from vm_embedded.network.manifest import EDGES, FORMAT_VERSION, KINDS, LAYOUTS, Manifest, ObjectClass
+from vm_embedded.network.manifest import (
+    EDGES,
+    FORMAT_VERSION,
+    KINDS,
+    LAYOUTS,
+    MOST_DILATION,
+    Manifest,
+    ObjectClass,
+)
 from vm_embedded.network.self_test import SelfTest
 
 from ..strategies import attempt, reals, seeds
@@ -45,9 +53,11 @@ orders = st.sampled_from(
 """Edges and the layouts that there are for them."""
 
 
-def _manifest(order, tall, **entries):
-    """A cylinder has a height; layout lattice is for grids only."""
+def _manifest(order, tall, layer_dilations, **entries):
+    """A cylinder has a height; layout lattice is for grids only. Not all orders allow dilations."""
     edge, layout = order
+    if edge == "hard" and layout != "lattice":
+        entries["layer_dilations"] = layer_dilations
     mesh = "xygrid6" if layout == "lattice" else entries.pop("mesh")
     entries = entries | {"mesh": mesh, "object_height": tall if entries["shape"] == "cylinder" else 0.0}
     return Manifest(edge=edge, layout=layout, **entries)
@@ -57,6 +67,7 @@ manifests = st.builds(
     _manifest,
     order=orders,
     tall=reals(0.01, 3.0),
+    layer_dilations=st.lists(st.integers(1, MOST_DILATION), max_size=4).map(tuple),
     shape=st.sampled_from(sorted(SHAPES)),
     radius=reals(1e-3, 10.0),
     object_radius=reals(1e-3, 10.0),
@@ -125,6 +136,28 @@ def test_an_unknown_class_names_the_nearest():
 def test_a_missing_entry_is_refused_by_name(entry):
     with pytest.raises(ModelError, match=rf"lacks {entry}$"):
         Manifest.from_json(changed(**{entry: ...}))
+
+
+def test_files_without_dilations_lack_their_entry_as_before():
+    assert "layer_dilations" not in json.loads(BALL.as_json())
+    assert Manifest.from_json(changed(layer_dilations=[1, 4, 2, 4])).dilations == (1, 2, 4)
+
+
+@pytest.mark.parametrize(
+    ("entries", "said"),
+    [
+        ({"layer_dilations": 2}, "must be a list, not 2"),
+        ({"layer_dilations": [0]}, "whole numbers up to 64, not 0"),
+        ({"layer_dilations": [1, 65]}, "whole numbers up to 64, not 65"),
+        ({"layer_dilations": [1.5]}, "not 1.5"),
+        ({"layer_dilations": [True]}, "not True"),
+        ({"layer_dilations": [2], "edge": "same"}, "edge hard and layout plain or runs, not same and plain"),
+        ({"layer_dilations": [2], "layout": "lattice", "mesh": "xygrid6"}, "not hard and lattice"),
+    ],
+)
+def test_impossible_dilations_are_refused(entries, said):
+    with pytest.raises(ModelError, match=said):
+        Manifest.from_json(changed(**entries))
 
 
 def test_an_unknown_entry_names_itself_and_the_nearest_known_one():

@@ -47,6 +47,9 @@ def test_classes_come_in_their_order_with_their_colors(write):
         ("[training]\nselection = 'balance'\n", "did you mean 'balanced'"),
         ("[mesh]\nradius = 'big'\n", "radius must be a number"),
         ("[mesh]\ngrid = 'hexagonal'\nmodel = 'ring8'\n", "six neighbors"),
+        ("[network]\ndilations = [1, 2]\n", "dilations must be 9 numbers, one for each convolution, not 2"),
+        ("[network]\ndepth = 1\ndilations = [65]\n", r"whole numbers from 1 to 64, not \[65\]"),
+        ("[network]\ndepth = 1\ndilations = 2\n", "dilations must be a list of whole numbers"),
         ("[classes]\nball = 3\n", "ball must be like"),
         ("[classes]\nball = { kind = 'thing', colors = [[1, 2, 3]] }\n", "kind must be one of"),
         ("[classes]\nball = { kind = 'object', colors = [[1, 2]] }\n", r"a color is \[red, green, blue\]"),
@@ -67,7 +70,9 @@ def test_what_is_wrong_is_said(write, text, said):
 def test_entries_can_be_overridden(write):
     path = write("[training]\nepochs = 3\nbatch = 2\n")
     given = parse_overrides(["training.epochs=7", "training.selection=balanced", "mesh.radius = 0.1"], "a.b=c")
+    given |= parse_overrides(["network.depth=3", "network.dilations=[1, 4, 2]"], "a.b=c")
     found = read_sections(TrainConfiguration, path, given)
+    assert found.network_shape.layer_dilations == found.manifest.layer_dilations == (1, 4, 2)
     assert (found.training.epochs, found.training.batch) == (7, 2)
     assert (found.training.selection, found.mesh.radius) == ("balanced", 0.1)
 

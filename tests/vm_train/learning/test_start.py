@@ -4,6 +4,8 @@ import hashlib
 import shutil
 from dataclasses import replace
 
+import cv2
+import numpy as np
 import pytest
 import torch
 
@@ -11,6 +13,7 @@ from tests.vm_export.checkpoints import manifest
 from tests.vm_train.commands import run
 from tests.vm_train.drawn import CLASSES
 from tests.vm_train.weights import weights_of
+from vm_embedded import Detector, read_lens_file
 from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import SHIPPED, model_path
@@ -51,6 +54,23 @@ def test_with_a_tiny_rate_the_network_stays_the_same_from_a_checkpoint_and_from_
         assert hashlib.sha256(copy.read_bytes()).hexdigest() == digest
         assert Checkpoint.load(folder / "model.pt").manifest.provenance["start_sha256"] == digest
     assert Checkpoint.load(first).manifest.provenance["start_sha256"] == "none"
+
+
+def test_dilations_are_trained_exported_and_trained_further(data, configuration, tmp_path):
+    """Both layouts answer alike, and a training from a model file has the same layers without being told."""
+    made, tables, model = tmp_path / "run" / "model.pt", tmp_path / "classes.toml", tmp_path / "model.onnx"
+    settings = ("--config", configuration, "--set", "network.dilations=[1,3,2]")
+    run(data, "-o", made.parent, *settings, *ONE_EPOCH)
+    image, shown = cv2.imread(str(next(data.glob("image*")))), read_lens_file(next(data.glob("lens*.yaml")))
+    answers = []
+    for layout in ("plain", "runs"):
+        export(Checkpoint.load(made), model, layout)
+        found = Detector.from_file(model).detect(image, shown.orientation, shown.lens)
+        answers.append(found.probabilities[np.lexsort(found.pixels.T)])
+    np.testing.assert_allclose(*answers, atol=1e-4)
+    tables.write_text(CLASSES)
+    run(data, "-o", tmp_path / "further", "--from", model, "--config", tables, *ONE_EPOCH, *STILL)
+    assert Checkpoint.load(tmp_path / "further" / "model.pt").network.shape.layer_dilations == (1, 3, 2)
 
 
 @pytest.mark.long
