@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_embedded.network.model_file import read_model
 from vm_export.checkpoint import Checkpoint
-from vm_export.network_shape import Layer, NetworkShape
+from vm_export.network_shape import NetworkShape
 from vm_export.network_weights import network_of
 
 from .class_table import ClassTable
@@ -63,9 +63,12 @@ class Start:
         }
 
     def check(self, configuration: TrainConfiguration) -> None:
-        """Raise InputError if a configuration describes a network with another mesh, other classes or layers."""
+        """Raise InputError if a configuration describes a network with another mesh, other classes or layers.
+
+        Other dilations are allowed: the weights fit, and the training adapts them.
+        """
         check_same_mesh(self.path, self.checkpoint, configuration.manifest, configuration.grid)
-        theirs, ours = self.checkpoint.network.shape, configuration.network_shape
+        theirs, ours = _undilated(self.checkpoint.network.shape), _undilated(configuration.network_shape)
         if theirs != ours:
             raise InputError(f"{self.path} has other layers: {_listed(theirs)}, not {_listed(ours)} as in [network]")
 
@@ -98,9 +101,9 @@ def _network_entries(shape: NetworkShape) -> dict[str, Any]:
 
 
 def _listed(shape: NetworkShape) -> str:
-    layers = ", ".join(f"{each.kind} {each.width} {each.activation}{_far(each)}" for each in shape.layers)
+    layers = ", ".join(f"{each.kind} {each.width} {each.activation}" for each in shape.layers)
     return f"[{layers}] with {shape.neighbors} neighbors"
 
 
-def _far(layer: Layer) -> str:
-    return f" with dilation {layer.dilation}" if layer.dilation > 1 else ""
+def _undilated(shape: NetworkShape) -> NetworkShape:
+    return replace(shape, layers=tuple(replace(each, dilation=1) for each in shape.layers))

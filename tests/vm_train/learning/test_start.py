@@ -57,7 +57,7 @@ def test_with_a_tiny_rate_the_network_stays_the_same_from_a_checkpoint_and_from_
 
 
 def test_dilations_are_trained_exported_and_trained_further(data, configuration, tmp_path):
-    """Both layouts answer alike, and a training from a model file has the same layers without being told."""
+    """Both layouts answer alike. A training from a model file has the same dilations, or others that are given."""
     made, tables, model = tmp_path / "run" / "model.pt", tmp_path / "classes.toml", tmp_path / "model.onnx"
     settings = ("--config", configuration, "--set", "network.dilations=[1,3,2]")
     run(data, "-o", made.parent, *settings, *ONE_EPOCH)
@@ -69,8 +69,10 @@ def test_dilations_are_trained_exported_and_trained_further(data, configuration,
         answers.append(found.probabilities[np.lexsort(found.pixels.T)])
     np.testing.assert_allclose(*answers, atol=1e-4)
     tables.write_text(CLASSES)
-    run(data, "-o", tmp_path / "further", "--from", model, "--config", tables, *ONE_EPOCH, *STILL)
-    assert Checkpoint.load(tmp_path / "further" / "model.pt").network.shape.layer_dilations == (1, 3, 2)
+    for folder, others in (("same", ()), ("others", ("--set", "network.dilations=[2,1,1]"))):
+        run(data, "-o", tmp_path / folder, "--from", model, "--config", tables, *others, *ONE_EPOCH, *STILL)
+        shape = Checkpoint.load(tmp_path / folder / "model.pt").network.shape
+        assert shape.layer_dilations == ((2, 1, 1) if others else (1, 3, 2))
 
 
 @pytest.mark.long
