@@ -12,7 +12,6 @@ BUILD ?= build/networks
 PICTURES ?= data/soccer
 FURTHER ?= data/further
 THIRD ?= data/third
-FOURTH ?= data/fourth
 CALIBRATION ?= data/calibration
 UPRIGHTS := goal robot
 CALIBRATE := $(BIN)/vm-evaluate calibrate --radius-of scene
@@ -92,7 +91,6 @@ networks: need-HDRI .venv/dev ## train the networks of the package from their se
 	$(MAKE) data OUT=data/soccer COUNT=16000 SEED=1 SCENES=export/vm_synth/soccer.toml
 	$(MAKE) data OUT=$(FURTHER) COUNT=3650 SEED=3 SCENES=export/vm_synth/soccer.toml
 	$(MAKE) data OUT=$(THIRD) COUNT=4423 SEED=5 SCENES=export/vm_synth/soccer.toml
-	$(MAKE) data OUT=$(FOURTH) COUNT=3569 SEED=7 SCENES=export/vm_synth/soccer.toml
 	$(BIN)/python -m benchmarks.calibration_data $(HDRI) $(CALIBRATION)
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 	$(BIN)/python -c "from pathlib import Path; from vm_train.tuning.rendered_patches import RENDERED, write_rendered; \
@@ -103,9 +101,6 @@ train = if test -e $(@D)/run.json; then $(BIN)/vm-train resume $(@D); else $(BIN
 
 $(BUILD)/mesh/model.pt $(BUILD)/soccer/model.pt: $(BUILD)/%/model.pt: export/networks/%.toml
 	$(call train,$(PICTURES) --unpacked $(BUILD)/unpacked)
-
-$(BUILD)/soccer-further/model.pt: export/networks/soccer-further.toml $(BUILD)/soccer/model.pt
-	$(call train,$(FOURTH) --from $(BUILD)/soccer/model.pt --unpacked $(BUILD)/unpacked)
 
 $(BUILD)/glance/look.pt: export/networks/glance.toml $(BUILD)/mesh/model.pt
 	$(call train,look $(PICTURES) --from $(BUILD)/mesh/model.pt)
@@ -143,7 +138,7 @@ $(BUILD)/robot-further/look.pt: export/networks/robot-further.toml $(BUILD)/robo
 $(BUILD)/robot-third/look.pt: export/networks/robot-further.toml $(BUILD)/robot-further/look.pt
 	$(call train,look $(THIRD) --from $(BUILD)/soccer/model.pt --start $(BUILD)/robot-further/look.pt --set data.validation=0.05)
 
-vm_embedded/models/soccer.onnx: $(BUILD)/soccer-further/model.pt $(BUILD)/wide-look/look.pt $(BUILD)/goal-look/look.pt $(BUILD)/robot-third/look.pt
+vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt $(BUILD)/wide-look/look.pt $(BUILD)/goal-look/look.pt $(BUILD)/robot-third/look.pt
 	$(BIN)/vm-export $< --look $(BUILD)/wide-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $(BUILD)/balls.onnx
 	$(BIN)/vm-export $(BUILD)/balls.onnx --look $(BUILD)/goal-look/look.pt -o $(BUILD)/balls-and-posts.onnx
 	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-third/look.pt -o $(BUILD)/soccer-uncalibrated.onnx

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import textwrap
 import tomllib
 from typing import Any
 
@@ -206,24 +205,6 @@ def _wide_data(look: LookContract) -> str:
     )
 
 
-def _mesh_data(manifest: Manifest, recipe: str) -> str:
-    """What a mesh network learned from; that of soccer began with the weights of another one."""
-    made = manifest.provenance
-    chosen = (
-        f"Validation on {made['validation_pictures']} other pictures chose epoch {made['epoch']} of {made['epochs']}. "
-        f"Seed {made['seed']}, configuration"
-    )
-    rendered = "rendered pictures (`export/vm_synth/soccer.toml`, seed 1)"
-    if made.get("start_sha256", "none") == "none":
-        text = f"{made['training_pictures']} {rendered}. {chosen} `{recipe}`."
-    else:
-        text = (
-            f"15220 {rendered}, with the configuration `{recipe}`. Then {made['training_pictures']} other pictures of "
-            f"the same kind (seed 7). {chosen} `export/networks/soccer-further.toml`."
-        )
-    return textwrap.fill(f"- **Training data of the mesh network:** {text}", 88, subsequent_indent="  ")
-
-
 def _further(look: LookContract) -> str:
     """How a look was trained that began with the weights of another one."""
     if "start_sha256" not in look.provenance:
@@ -253,7 +234,7 @@ def card(found: dict[str, Any], name: str) -> str:
             for each in RANGES
         ],
     )
-    used = scores["used 0.5"]["0.5 to 6 m"]
+    made, used = manifest.provenance, scores["used 0.5"]["0.5 to 6 m"]
     last = manifest.look
     assert last is not None
     look, glance = last.chain[-2:]
@@ -271,7 +252,9 @@ decides on patches of {look.size} x {look.size} samples.{_wide_contents(last)}
 All suit balls of any radius (`--object-radius`, default {manifest.object_radius:g} m).
 {kilobytes:.0f} kB. Classes: {", ".join(each.name for each in manifest.classes)}.
 
-{_mesh_data(manifest, mesh_recipe)}
+- **Training data of the mesh network:** {made["training_pictures"]} rendered pictures
+  (`export/vm_synth/soccer.toml`, seed 1). Validation on {made["validation_pictures"]} other pictures chose epoch
+  {made["epoch"]} of {made["epochs"]}. Seed {made["seed"]}, configuration `{mesh_recipe}`.
 - **Training data of the glance and the close look:** {look.provenance["training_pictures"]} pictures of the same kind,
   under 55 panoramas. Seed {look.provenance["seed"]}, configurations `{glance_recipe}` and
   `{look_recipe}`.
