@@ -33,8 +33,8 @@ def atomic_write(path: Path) -> Iterator[Path]:
     target = Path(os.path.realpath(path))
     part = target.with_name(target.name + ".part")
     try:
-        if target.exists() and not target.is_file() and not target.is_dir():
-            yield target
+        if path.exists() and not path.is_file() and not path.is_dir():
+            yield path  # not the target: that of /dev/stdout in a pipeline has no path
             return
         if target.is_file() and not os.access(target, os.W_OK):
             raise PermissionError(0, "the file is read-only")

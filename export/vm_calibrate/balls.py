@@ -80,7 +80,8 @@ def read_balls(path: Path, radius: float | None, label: str | None, size: Size |
     else:
         if size is None:
             raise InputError(
-                "the lens file does not have the size of its pictures; add an entry `size: [width, height]`"
+                "the lens file does not have the size of its pictures; give --size, or add an entry "
+                "`size: [width, height]`"
             )
         balls = _read_json(path, radius, label)
     if not balls:

@@ -115,7 +115,7 @@ def board_from(
     """The board of the options --board, --square, --charuco, --marker and --legacy. Raises InputError."""
     sides = re.fullmatch(r"(\d{1,3})x(\d{1,3})", size)
     if sides is None or min(columns := int(sides[1]), rows := int(sides[2])) < 3:
-        raise InputError(f"--board must be COLUMNSxROWS of at least 3 each, as in 9x6, not {size!r}")
+        raise InputError(f"--board must be COLUMNSxROWS from 3 to 999 each, as in 9x6, not {size!r}")
     _check_length("--square", square)
     if dictionary is None:
         if marker is not None or legacy:

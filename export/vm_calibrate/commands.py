@@ -76,6 +76,13 @@ def pose(options: argparse.Namespace) -> None:
     _check_lens_path(options.output)
     if (options.balls is None) == (options.board is None):
         raise InputError("give either --balls, or --board with a video or pictures of the board on the floor")
+    names = (
+        ("radius", "label", "size") if options.balls is None else ("square", "charuco", "marker", "legacy", "thickness")
+    )
+    unused = [f"--{name}" for name in names if getattr(options, name)]
+    if unused:
+        method = "--board" if options.balls is None else "--balls"
+        raise InputError(f"{method} does not use {', '.join(unused)}; leave out one of them")
     file = read_lens_file(options.lens)
     fit = _pose_from_balls(options, file.lens) if options.board is None else _pose_from_board(options, file.lens)
     _write(options.output, file.lens, fit.orientation, pose_lines(fit))

@@ -56,16 +56,16 @@ def pose_fit(
     height, pitch, roll = (float(each) for each in fit.deviations())
     warnings = []
     if not height < 0.03:
-        warnings.append(f"the height is only known to {_percent(height)}; {advice}")
+        warnings.append(f"the height is {_percent(height)}; {advice}")
     for name, angle in (("pitch", pitch), ("roll", roll)):
         if not angle < math.radians(0.7):
-            warnings.append(f"the {name} is only known to {_degrees(angle)}; {advice}")
+            warnings.append(f"the {name} is {_degrees(angle)}; {advice}")
     return PoseFit(orientation, height * orientation.height, pitch, roll, error, residuals, left_out, tuple(warnings))
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.0f} %" if share < 1.0 else "nothing better than a factor of two"
+    return f"only known to {100.0 * share:.0f} %" if share < 1.0 else "not determined"
 
 
 def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle):.1f} degrees" if angle < 1.0 else "nothing better than a radian"
+    return f"only known to {math.degrees(angle):.1f} degrees" if angle < 1.0 else "not determined"

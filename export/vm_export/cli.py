@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
 from vm_embedded.errors import InputError, VisualMeshError, not_installed
 from vm_embedded.files import check_writable
-from vm_embedded.network.bundled import SHIPPED, model_path
+from vm_embedded.network.bundled import model_path
 from vm_embedded.network.manifest import EDGES, LAYOUTS, Manifest
 from vm_embedded.network.model_file import read_model
 
@@ -107,9 +107,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    for name in ("model", "look"):
-        if str(getattr(options, name)) in SHIPPED:
-            setattr(options, name, model_path(getattr(options, name)))
+    options.model = model_path(options.model)
+    if options.look is not None:
+        options.look = model_path(options.look)
     _check_options(options)
     # Imported here: without torch, --help still works and the error is one clear line.
     import torch

@@ -97,7 +97,8 @@ class LookCheckpoint:
         content = load_values(path, "a checkpoint of a look network")
         if not isinstance(content, dict) or content.get("format") != LOOK_FORMAT:
             found = content.get("format") if isinstance(content, dict) else None
-            raise InputError(f"{path} is not a checkpoint of format {LOOK_FORMAT!r}; its format is {found!r}")
+            expected = f"its format must be {LOOK_FORMAT!r}, not {found!r}"
+            raise InputError(f"{path} is not a close look, which vm-train look writes: {expected}")
         try:
             return cls._from_dict(content)
         except (RuntimeError, KeyError, TypeError, ValueError, AttributeError) as error:

@@ -83,10 +83,15 @@ def read_reference(path: str | Path, overrides: Overrides) -> Checkpoint:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError) as error:
         raise InputError(f"{path} is not YAML: {one_line(error)}") from error
+    lacking = [each for each in ("geometry", "mesh", "network") if not isinstance(data, Mapping) or each not in data]
+    if lacking:
+        raise InputError(f"{path} is not a network of the reference implementation: it lacks {', '.join(lacking)}")
     try:
         return _checkpoint(data, overrides, {"made_from": path.name, "sha256": hashlib.sha256(text).hexdigest()})
-    except (KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path} is not a network of the reference implementation: {error!r}") from error
+    except KeyError as error:
+        raise InputError(f"{path}: a part of the network lacks its {error.args[0]}; the file may be damaged") from error
+    except (TypeError, AttributeError, ValueError, OverflowError) as error:
+        raise InputError(f"{path} is damaged, or no network of the reference: {one_line(error)}") from error
     except VisualMeshError as error:
         raise InputError(f"{path}: {error}") from error
 
@@ -139,8 +144,7 @@ def _network(convolutions: Sequence[Sequence[Mapping[str, Any]]], neighbors: int
     kernels: list[tuple[np.ndarray, np.ndarray]] = []
     for group in convolutions:
         for position, entry in enumerate(group):
-            kernel = np.array(entry["weights"], dtype=np.float64)
-            bias = np.array(entry["biases"], dtype=np.float64)
+            kernel, bias = (_numbers(entry, part, len(layers)) for part in ("weights", "biases"))
             if kernel.ndim != 2 or bias.shape != kernel.shape[1:] or not np.isfinite(kernel).all():
                 raise InputError(f"layer {len(layers)}: weights and biases do not fit each other, or are not finite")
             if not layers:
@@ -159,6 +163,14 @@ def _network(convolutions: Sequence[Sequence[Mapping[str, Any]]], neighbors: int
             layer.linear.weight.copy_(torch.from_numpy(kernel.T))
             layer.linear.bias.copy_(torch.from_numpy(bias))
     return network
+
+
+def _numbers(entry: Mapping[str, Any], part: str, layer: int) -> np.ndarray:
+    """The weights or biases of a layer. Raises InputError for rows of different lengths, and for text."""
+    try:
+        return np.array(entry[part], dtype=np.float64)
+    except ValueError as error:
+        raise InputError(f"the {part} of layer {layer} must be numbers, in rows of equal length") from error
 
 
 def _without_alpha(kernel: np.ndarray, neighbors: int) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import pickle
 import warnings
@@ -33,6 +34,8 @@ def load_values(path: str | Path, what: str) -> Any:
             warnings.simplefilter("ignore")
             return torch.load(path, map_location="cpu", weights_only=True)
     except OSError as error:
+        if error.errno == errno.EINVAL:  # torch looks for a part where a file that was cut short has none
+            raise InputError(f"{path} is not {what}: it is damaged or cut short") from error
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
     except pickle.UnpicklingError as error:
         reason = "it is damaged, or contains more than plain values and tensors; use only files that you trust"

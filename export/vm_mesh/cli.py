@@ -30,7 +30,12 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
         "--object", type=float, action="append", metavar="M", help="draw an object at this distance [m]; repeatable"
     )
     picture = show.add_argument_group("on a picture")
-    picture.add_argument("--image", type=Path, metavar="FILE", help="picture to draw on; needs --lens")
+    picture.add_argument(
+        "--image",
+        type=Path,
+        metavar="FILE",
+        help="picture to draw on; needs --lens, and takes no --view, --reach and --object",
+    )
     _add_camera(picture)
 
     quality = _parser(
@@ -52,7 +57,7 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
         "Show pixels and points on an object over distance, and the distance beyond which neighboring mesh points are "
         "less than a pixel apart, so that they repeat each other's colors.",
     )
-    _add_camera(far)
+    far.add_argument("--lens", type=Path, metavar="FILE", help="lens file; its Hoc is the default of --height")
     _add_size(far)
     far.add_argument(
         "--distance",
@@ -90,7 +95,9 @@ def _parser(command: str, description: str) -> argparse.ArgumentParser:
     )
     plan.add_argument("--shape", choices=tuple(SHAPES), help="shape of the object; default sphere")
     plan.add_argument("--radius", type=float, metavar="M", help="radius of the object [m]; default 0.095")
-    plan.add_argument("--object-height", type=float, metavar="M", help="height of a cylinder [m]")
+    plan.add_argument(
+        "--object-height", type=float, metavar="M", help="height of the object [m]; only a cylinder takes it"
+    )
     plan.add_argument(
         "--height",
         metavar="M",

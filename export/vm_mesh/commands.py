@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -43,14 +43,13 @@ def show(options: argparse.Namespace) -> None:
     _check_figure(options.output, options)
     if options.model and len(options.model) > 1:
         raise InputError("vm-mesh show draws one mesh; give one --model")
+    _check_view(options)
     file = lens_file(options)
     plan, model = plan_and_model(options, file)
     built = BuiltMesh.build((options.model or [model])[0], plan)
     if options.image is not None:
         if file is None:
             raise InputError("--image needs the lens of the picture; give --lens")
-        if file.orientation is None and (options.height is None or options.pitch is None):
-            raise InputError(f"{options.lens} does not have the orientation of the camera; give --height and --pitch")
         orientation = orientation_of(options, file, plan.height)
         figure = figure_on_picture(built, read_image(options.image), file.lens, orientation)
     else:
@@ -59,7 +58,7 @@ def show(options: argparse.Namespace) -> None:
         if options.reach is not None:
             reach = positive("--reach", options.reach)
         objects = tuple(options.object or ())
-        check_distances(objects)
+        check_distances("--object", objects)
         figure = figure_from_above(built, view, reach, objects)
     save_figure(figure, options.output)
     print(f"{options.output}: {built.model}, {len(built.mesh)} points")
@@ -109,6 +108,8 @@ def range_(options: argparse.Namespace) -> None:
 def compare(options: argparse.Namespace) -> None:
     """Print and write the properties of several models."""
     file = lens_file(options)
+    if file is None:
+        _refuse(options, ("size", "pitch", "roll"), "needs --lens: only a camera with a lens sees points")
     plan, _ = plan_and_model(options, file)
     distances = 0.8 * plan.max_distance * np.linspace(0.0, 1.0, 25) ** 2
     size = None if file is None else image_size(options, file)
@@ -179,6 +180,21 @@ def _points_on_screen(built: BuiltMesh, options: argparse.Namespace, file: LensF
     """The number of points that a camera sees."""
     orientation = orientation_of(options, file, built.plan.height)
     return int(project(built.mesh, orientation.level, file.lens.for_image(size), size).on_screen.sum())
+
+
+def _check_view(options: argparse.Namespace) -> None:
+    """Raise InputError for options of the view from above with --image, and for those of a picture without it."""
+    if options.image is None:
+        _refuse(options, ("pitch", "roll"), "is for a drawing on a picture; give --image, or leave it out")
+    else:
+        _refuse(options, ("view", "reach", "object"), "is for a drawing without --image; leave one of them out")
+
+
+def _refuse(options: argparse.Namespace, names: Sequence[str], reason: str) -> None:
+    """Raise InputError if one of these options is given."""
+    for name in names:
+        if getattr(options, name) is not None:
+            raise InputError(f"--{name} {reason}")
 
 
 def _check_figure(path: Path, options: argparse.Namespace) -> None:

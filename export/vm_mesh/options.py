@@ -42,6 +42,8 @@ def plan_and_model(options: argparse.Namespace, file: LensFile | None) -> tuple[
     if given["shape"] not in (None, "cylinder"):
         entries["object_height"] = 0.0  # the network may be for a cylinder
     entries |= {name: value for name, value in given.items() if value is not None}
+    if entries["shape"] == "cylinder" and given["object_height"] is None and not entries["object_height"]:
+        raise InputError("a cylinder needs its height; give --object-height")
     shape = make_shape(entries["shape"], entries["radius"], entries["object_height"])
     height = 1.0 if file is None or file.orientation is None else file.orientation.height
     if options.height is not None:
@@ -75,7 +77,12 @@ def lens_file(options: argparse.Namespace) -> LensFile | None:
 
 
 def orientation_of(options: argparse.Namespace, file: LensFile, height: float) -> Orientation:
-    """The orientation from --roll and --pitch, or else from the lens file, at a height [m]. Raises InputError."""
+    """The orientation from --roll and --pitch, or else from the lens file, at a height [m].
+
+    Raises InputError if neither gives the height and the pitch.
+    """
+    if file.orientation is None and (options.height is None or options.pitch is None):
+        raise InputError(f"{options.lens} does not have the orientation of the camera; give --height and --pitch")
     pitch, roll = (0.0, 0.0) if file.orientation is None else (file.orientation.pitch, file.orientation.roll)
     return Orientation.from_roll_pitch(
         height,
@@ -92,17 +99,18 @@ def image_size(options: argparse.Namespace, file: LensFile) -> Size:
     return size
 
 
-def check_distances(given: Sequence[float]) -> None:
-    """Raise InputError unless all distances are numbers from 0 to a million meters."""
-    if not all(0.0 <= each < 1e6 for each in given):
-        raise InputError(f"distances must be numbers from 0 to a million meters, not {list(given)}")
+def check_distances(name: str, given: Sequence[float]) -> None:
+    """Raise InputError unless all distances of an option are numbers from 0 to a million meters."""
+    for each in given:
+        if not 0.0 <= each < 1e6:
+            raise InputError(f"{name} must be a number from 0 to a million meters, not {each:g}")
 
 
 def distances_or(given: Sequence[float] | None, default: Floats) -> Floats:
-    """The given distances [m] in order, or the default without any. Raises InputError."""
+    """The distances [m] of --distance in order, or the default without any. Raises InputError."""
     if not given:
         return default
-    check_distances(given)
+    check_distances("--distance", given)
     return np.array(sorted(given))
 
 

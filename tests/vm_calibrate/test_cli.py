@@ -57,7 +57,8 @@ def test_the_command_line_knows_the_kinds_of_lenses():
     ("arguments", "problem"),
     [
         (("9",), "--board must be COLUMNSxROWS"),
-        (("9x2",), "--board must be COLUMNSxROWS of at least 3 each"),
+        (("9x2",), "--board must be COLUMNSxROWS from 3 to 999 each"),
+        (("1000x6",), "--board must be COLUMNSxROWS from 3 to 999 each"),
         (("9x6", "--square", "0"), "--square must be a length above 0 m"),
         (("9x6", "--square", "nan"), "--square must be a length above 0 m"),
         (("9x6", "--square", "30"), "--square must be a length in meters, at most 1, not 30; 30 mm are 0.03"),

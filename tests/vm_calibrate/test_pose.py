@@ -15,6 +15,7 @@ from tests.vm_embedded.strategies import lenses, reals, seeds
 from vm_calibrate import ball_fit
 from vm_calibrate.ball_fit import fit_balls
 from vm_calibrate.balls import SeenBall, read_balls
+from vm_calibrate.cli import main
 from vm_calibrate.shared_fit import fit_shared
 from vm_embedded.cli import detect
 from vm_embedded.errors import InputError
@@ -287,8 +288,22 @@ def test_options_that_do_not_belong_together_are_errors(tmp_path, capsys):
     assert "give --radius" in run(capsys, *pose, "--balls", tmp_path, code=1)
     assert "no picture with a label file NAME.txt" in run(capsys, *pose, "--balls", tmp_path, "--radius", "0.1", code=1)
     assert "--radius must be a length" in run(capsys, *pose, "--balls", tmp_path, "--radius", "-1", code=1)
+    pictures = run(capsys, *pose, "--balls", tmp_path, "--radius", "0.1", "--square", "0.1", "--legacy", code=1)
+    assert "--balls does not use --square, --legacy; leave out" in pictures
     folder = write(tmp_path / "floor", [np.zeros((480, 640), np.uint8)])
+    board = run(capsys, *pose, folder, "--board", "8x5", "--square", "0.1", "--radius", "0.1", code=1)
+    assert "--board does not use --radius; leave out" in board
     assert "the size of the board is missing" in run(capsys, *pose, folder, "--board", "8x5", code=1)
+
+
+def test_the_size_of_the_pictures_can_be_given(tmp_path, capsys):
+    path, lens = tmp_path / "balls.json", tmp_path / "lens.yaml"
+    path.write_text(json.dumps({"a.jpg": [{"cx": 90, "cy": 80, "r_px": 9, "radius": 0.1}] * 3}))
+    lens.write_text("projection: equisolid\nfocal_length: 90.0\nfov: 2.0\n")
+    command = ("pose", "--lens", lens, "--balls", path, "-o", tmp_path / "new.yaml")
+    assert "give --size, or add an entry" in run(capsys, *command, code=1)
+    assert main([*map(str, command), "--size", "200x200"]) == 0
+    assert "warning: the height is not determined; the balls are" in capsys.readouterr().err
 
 
 def test_the_height_of_real_robots_is_found(shared, tmp_path, capsys):

@@ -122,3 +122,14 @@ def test_a_text_file_is_read_without_its_byte_order_mark_or_named(tmp_path):
     path.write_bytes(b"\xff\xfe")
     with pytest.raises(InputError, match=r"can't read .*file: it is not UTF-8 text"):
         read_text(path)
+
+
+def test_a_pipe_that_has_only_a_descriptor_is_written():
+    """As /dev/stdout in a pipeline, and what bash passes for >(command)."""
+    reader, writer = os.pipe()
+    path = Path(f"/dev/fd/{writer}")
+    check_writable(path)
+    write_file(path, "text")
+    os.close(writer)
+    with os.fdopen(reader) as file:
+        assert file.read() == "text"

@@ -124,6 +124,8 @@ def test_command_takes_class_names(tmp_path):
         (("missing.pt",), "missing.pt"),
         (("missing.yaml",), "missing.yaml"),
         (("model.txt",), "checkpoint"),
+        (("soccr", "--no-look"), "unknown network 'soccr'; did you mean 'soccer'?"),
+        (("model.pt", "--look", "bal"), "unknown network 'bal'; did you mean 'ball'?"),
         (("model.pt", "-o", "model.pt"), "would be overwritten; give another output"),
         (("model.pt", "-o", "no/such/folder/model.onnx"), "can't write"),
         (("model.pt", "--intersections", "-1"), "intersections"),

@@ -8,7 +8,7 @@ import torch
 
 from tests.vm_export.checkpoints import checkpoint
 from tests.vm_export.looks import look_checkpoint
-from vm_embedded.errors import VisualMeshError
+from vm_embedded.errors import InputError, VisualMeshError
 from vm_export.checkpoint import Checkpoint
 from vm_export.cli import main
 from vm_export.look_checkpoint import LookCheckpoint
@@ -74,3 +74,14 @@ def test_attack_8_damaged_checkpoints_raise_nothing_else(kind, made, tmp_path):
             messages.append(str(error))
     assert len(messages) > 20
     assert "weights_only" not in "".join(messages)
+
+
+@pytest.mark.parametrize(("kind", "made"), [(Checkpoint, checkpoint), (LookCheckpoint, look_checkpoint)])
+def test_a_checkpoint_that_was_cut_short_is_not_called_unreadable(kind, made, tmp_path):
+    path = tmp_path / "model.pt"
+    made().save(path)
+    whole = path.read_bytes()
+    for share in (0.05, 0.2, 0.4, 0.6, 0.8, 0.95):
+        path.write_bytes(whole[: int(share * len(whole))])
+        with pytest.raises(InputError, match="is not a checkpoint"):
+            kind.load(path)

@@ -98,7 +98,7 @@ def test_command_attaches_a_look_to_a_network_of_the_package(folder):
     ("arguments", "message"),
     [
         (("model.pt", "--look", "missing.pt"), "can't read"),
-        (("model.pt", "--look", "model.pt"), "is not a checkpoint of format 'vm-embedded look"),
+        (("model.pt", "--look", "model.pt"), "model.pt is not a close look, which vm-train look writes"),
         (("look.pt",), "is a close look; attach it to a network: vm-export MODEL --look"),
         (("model.pt", "--look", "look.pt", "--to-yaml"), "--look is for ONNX files"),
         (("model.pt", "--look", "look.pt", "-o", "look.pt"), "would be overwritten"),

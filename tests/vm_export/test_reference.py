@@ -78,6 +78,11 @@ def reference_file(path, **changes):
         ({"class_map": {"ball": 0, "field": 5}}, "--classes"),
         ({"class_map": {"ball": 0, "penguin": 1}}, "penguin"),
         ({"class_map": 3}, "--classes"),
+        ({"class_map": {"ball": "first", "field": 1}}, "'first'"),
+        ({"geometry": {"shape": "SPHERE", "radius": "wide", "intersections": 4}}, "'wide'"),
+        ({"network": [[{"weights": [[1.0, 2.0], [3.0]], "biases": [0.0]}]]}, "the weights of layer 0 must be numbers"),
+        ({"network": [[{"weights": [[1.0]], "biases": ["none"]}]]}, "the biases of layer 0 must be numbers"),
+        ({"network": [[{"weights": [[1.0]]}]]}, "lacks its biases"),
     ],
 )
 def test_wrong_reference_files_are_refused_with_what_is_wrong(tmp_path, changes, message):
@@ -92,6 +97,23 @@ def test_a_network_that_reads_alpha_is_refused(tmp_path):
     path.write_text(yaml.safe_dump(data))
     with pytest.raises(InputError, match="fourth input channel"):
         read_reference(path, Overrides())
+
+
+@pytest.mark.parametrize("content", ["", "[1, 2]", "projection: RECTILINEAR"])
+def test_a_yaml_file_of_another_kind_is_refused_with_what_it_lacks(tmp_path, content):
+    path = tmp_path / "lens.yaml"
+    path.write_text(content)
+    with pytest.raises(InputError, match="is not a network of the reference implementation: it lacks geometry, mesh"):
+        read_reference(path, Overrides())
+
+
+def test_a_file_that_was_cut_short_is_refused(tmp_path):
+    path = reference_file(tmp_path / "model.yaml")
+    whole = path.read_bytes()
+    for share in (0.2, 0.5, 0.8, 0.95):
+        path.write_bytes(whole[: int(share * len(whole))])
+        with pytest.raises(InputError):
+            read_reference(path, Overrides())
 
 
 @given(st.text(max_size=200))

@@ -71,8 +71,9 @@ def test_show_draws_on_a_picture(tmp_path, capsys):
         (("show", "--model", "ring6", "--model", "cap6", "-o", "mesh.png"), "one"),
         (("quality", "--radius", "-1"), "radius"),
         (("quality", "--height", "0.1"), "height"),
-        (("quality", "--distance", "-1"), "distances"),
-        (("quality", "--shape", "cylinder"), "cylinder"),
+        (("quality", "--distance", "1", "--distance", "-1"), "--distance must be .* not -1"),
+        (("quality", "--shape", "cylinder"), "--object-height"),
+        (("quality", "--shape", "cylinder", "--object-height", "0"), "height must be a number above 0"),
         (("quality", "--object-height", "2"), "sphere"),
         (("range",), "--lens"),
         (("range", "--lens", "nowhere.yaml"), "nowhere"),
@@ -81,7 +82,12 @@ def test_show_draws_on_a_picture(tmp_path, capsys):
         (("compare", "--network", "ball-6x4"), "ball"),
         (("show", "--intersections", "1e300", "-o", "mesh.png"), "at most 8,000,000 are allowed"),
         (("show", "--reach", "nan", "-o", "mesh.png"), "--reach"),
-        (("show", "--object", "-1", "-o", "mesh.png"), "distances"),
+        (("show", "--object", "-1", "-o", "mesh.png"), "--object must be .* not -1"),
+        (("show", "--pitch", "20deg", "-o", "mesh.png"), "--pitch is for a drawing on a picture; give --image"),
+        (("show", "--image", IMAGE, "--lens", LENS, "--object", "1", "-o", "mesh.png"), "--object is for .* without"),
+        (("show", "--image", IMAGE, "--lens", LENS, "--reach", "1", "-o", "mesh.png"), "--reach is for .* without"),
+        (("compare", "--size", "640x512"), "--size needs --lens"),
+        (("compare", "--roll", "0.1"), "--roll needs --lens"),
         (("range", "--lens", LENS, "--intersections", "nan"), "--intersections"),
         (("range", "--lens", LENS, "--height", "0.1"), "height"),
         (("compare", "--lens", LENS, "--size", "²x²"), "640x512"),
@@ -129,6 +135,14 @@ def test_a_picture_needs_a_pose(tmp_path, capsys):
     shown = ("show", "--image", IMAGE, "--lens", lens, "-o", tmp_path / "x.png")
     assert "--height and --pitch" in run(capsys, *shown, code=1)
     run(capsys, *shown, "--height", 0.7, "--pitch", "20deg")
+    compared = ("compare", "--lens", lens, "--size", "640x512")
+    assert "--height and --pitch" in run(capsys, *compared, code=1)
+
+
+def test_range_takes_no_pitch_because_it_measures_on_the_axis_of_the_lens(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["range", "--lens", str(LENS), "--pitch", "20deg"])
+    assert "unknown option --pitch" in capsys.readouterr().err
 
 
 def test_figures_are_json_whatever_they_are(tmp_path, capsys):

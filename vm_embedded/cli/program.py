@@ -14,7 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NoReturn, ParamSpec
 
-from ..errors import VisualMeshError
+from ..errors import VisualMeshError, unknown
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
@@ -40,7 +40,8 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, commands: Sequence[str] = (), **more: Any) -> None:
         super().__init__(**more)
-        self.register("type", Path, _path)
+        for kind, read in ((Path, _path), (int, _whole_number), (float, _number)):
+            self.register("type", kind, read)
         self._negative_number_matcher = re.compile(r"-\.?\d")  # "-5deg", too, is a value and no option
         self._given: Sequence[str] = ()
         self._commands = commands
@@ -65,6 +66,11 @@ class Parser(argparse.ArgumentParser):
         """Print what is wrong as one line, and exit with status 2."""
         message = self._unknown_option() or self._unknown_command(message) or message
         self.exit(2, f"{self.prog}: {' '.join(message.split())}; {self.prog} --help lists the options\n")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """As argparse does; the message names the nearest allowed value, too."""
+        if action.choices is not None and value not in action.choices:
+            raise argparse.ArgumentError(action, unknown("value", value, map(str, action.choices)))
 
     def completions(self, words: Sequence[str]) -> list[str]:
         """What the last of the words may become: values of an option, options, or commands."""
@@ -111,6 +117,22 @@ def _path(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("the path is empty")
     return Path(text)
+
+
+def _whole_number(text: str) -> int:
+    """The whole number in an argument. Raises ArgumentTypeError for another text."""
+    try:
+        return int(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"must be a whole number, not {text!r}") from error
+
+
+def _number(text: str) -> float:
+    """The number in an argument. Raises ArgumentTypeError for another text."""
+    try:
+        return float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"must be a number, not {text!r}") from error
 
 
 def is_completing() -> bool:

@@ -100,6 +100,9 @@ def _numbers(first: str, last: str) -> list[str]:
 def _file(name: str) -> str:
     if name == "-":
         raise InputError("standard input can't be read again in each epoch: give files, addresses or pipe:COMMAND")
+    if name and Path(name).is_dir():
+        example = Path(name) / "pictures-{000000..000009}.tar"
+        raise InputError(f"shard {name!r} is a folder: give the tar files in it, as in {example}")
     if not Path(name).is_file():
         raise InputError(f"shard {name!r} does not exist")
     return str(Path(name).resolve())

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vm_embedded.errors import InputError
+from vm_embedded.files import exists
 
 IMAGES = (".jpg", ".jpeg", ".png")
 
@@ -60,6 +61,14 @@ class PictureFiles:
     def place(self, part: str) -> Place | None:
         """The place of a part in the shard; None if it is missing."""
         return dict(self.places).get(part)
+
+    def size(self, part: str) -> int | None:
+        """Size of one of PARTS [bytes]; None if it is missing."""
+        if self.shard is None:
+            path = self.path(part)
+            return path.stat().st_size if exists(path) else None
+        place = self.place(part)
+        return None if place is None else place.size
 
     def read(self, part: str) -> bytes:
         """The bytes of one of PARTS. Raises PictureFault naming the file."""

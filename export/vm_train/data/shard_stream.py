@@ -138,10 +138,11 @@ def _opened(shard: str) -> Iterator[IO[bytes]]:
             assert process.stdout is not None
             try:
                 yield _unzipped(process.stdout)
-                _end(process)
-            except tarfile.TarError:  # a command that fails writes no valid archive
+            except (tarfile.TarError, OSError, EOFError, zlib.error):  # a command that fails writes no valid archive
                 _end(process)
                 raise
+            else:
+                _end(process)
             finally:
                 process.kill()  # also if the reader stops early
     elif shard.startswith(("http://", "https://")):

@@ -17,7 +17,7 @@ from pathlib import Path
 from vm_embedded.errors import InputError
 from vm_embedded.files import atomic_write, write_file
 
-from ..data.picture_files import PARTS, PictureFiles
+from ..data.picture_files import PARTS, PictureFault, PictureFiles
 
 _FORMAT = 1
 """Version of shards.json."""
@@ -27,11 +27,16 @@ def write_shards(pictures: Sequence[PictureFiles], out: Path, per_shard: int, re
     """Write pictures as out/pictures-000000.tar and so on, except the shards that are there already.
 
     report: is called after each picture. Returns the paths of all shards. Raises InputError for a file that can't be
-    read or written, for a number with a dot, and for a folder that holds shards of other pictures.
+    read or written, for a number with a dot, and for a folder that holds shards of other pictures. A picture that lacks
+    a file is found before anything is written.
     """
     for picture in pictures:
         if "." in picture.number or not picture.number:
             raise InputError(f"picture {picture.number!r} can't go into a shard: its number must have no dot")
+        for part in PARTS:
+            if picture.size(part) is None:
+                reason = "is missing; vm-train check lists all damaged pictures"
+                raise PictureFault(f"{picture.path(part).name}: {reason}", "missing")
     _prepare(out, pictures, per_shard)
     shards = []
     for position, start in enumerate(range(0, len(pictures), per_shard)):
@@ -65,7 +70,7 @@ def _prepare(out: Path, pictures: Sequence[PictureFiles], per_shard: int) -> Non
         raise InputError(f"{out} is the folder of the pictures: write to another folder")
     path = out / "shards.json"
     try:
-        facts = [f"{each.number} {_size(each.image)} {_size(each.mask)}" for each in pictures]
+        facts = [f"{each.number} {each.size('image')} {each.size('mask')}" for each in pictures]
         digest = hashlib.sha256("\n".join(facts).encode("utf-8", "surrogateescape")).hexdigest()
         plan = {"format": _FORMAT, "pictures": len(pictures), "per_shard": per_shard, "files_sha256": digest}
         out.mkdir(parents=True, exist_ok=True)
@@ -79,8 +84,3 @@ def _prepare(out: Path, pictures: Sequence[PictureFiles], per_shard: int) -> Non
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is damaged: write to another folder") from error
     write_file(path, json.dumps(plan, indent=1) + "\n")
-
-
-def _size(path: Path) -> int:
-    """Size of a file [bytes]; 0 if it is missing, which the writer tells."""
-    return path.stat().st_size if path.exists() else 0

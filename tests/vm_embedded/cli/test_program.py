@@ -79,6 +79,24 @@ def test_an_empty_path_is_not_the_current_folder(command, status, told, tmp_path
     assert told in line
 
 
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ("vm-mesh show --model cap7", "argument --model: unknown value 'cap7'; did you mean 'cap6'? (allowed: ring4, "),
+        ("vm-calibrate lens film.mp4 --lens fishey", "did you mean 'fisheye'? (allowed: auto, pinhole, fisheye, "),
+        ("vm-export model.pt --edge round", "argument --edge: unknown value 'round' (allowed: hard, same)"),
+        ("vm-train data -o run --device cud", "unknown value 'cud'; did you mean 'cuda'? (allowed: auto, cpu, cuda)"),
+        ("vm-export model.pt --radius wide", "argument --radius: must be a number, not 'wide'"),
+        ("vm-bench --frames 1.5", "argument --frames: must be a whole number, not '1.5'"),
+    ],
+)
+def test_a_wrong_value_is_one_line_with_what_is_allowed(command, told):
+    done = run(*command.split())
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    assert told in line
+
+
 def test_a_mistyped_command_is_one_line_with_the_nearest():
     done = run("vm-train", "resum", "runs/ball")
     assert (done.returncode, done.stdout) == (2, "")

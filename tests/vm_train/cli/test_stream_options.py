@@ -22,6 +22,7 @@ def test_ranges_stand_for_all_their_numbers(tmp_path, monkeypatch):
         (["--stream", "http://a/{3..1}.tar", "--epoch-pictures", "9"], "the range {3..1} ends before it begins"),
         (["--stream", "nowhere.tar", "--epoch-pictures", "9"], "shard 'nowhere.tar' does not exist"),
         (["--stream", "", "--epoch-pictures", "9"], "shard '' does not exist"),
+        (["--stream", "/usr/", "--epoch-pictures", "9"], "as in /usr/pictures-{000000..000009}.tar"),
         (["--stream", "-", "--epoch-pictures", "9"], "standard input can't be read again"),
         (["--stream", "http://a/1.tar", "http://a/1.tar", "--epoch-pictures", "9"], "named twice"),
         (["--stream", "http://a/1.tar"], "--stream needs --epoch-pictures"),

@@ -69,6 +69,7 @@ def test_streams_come_from_servers(shards, pictures):
     [
         ("pipe:exit 3", "status 3"),
         ("pipe:cat {shard}; exit 4", "status 4"),
+        ("pipe:gzip -c {shard} | head -c 900; exit 5", "status 5"),
         ("nowhere.tar", "nowhere.tar: can't be read after its start, at byte 0"),
         ("http://127.0.0.1:9/a.tar", "can't be read after its start"),
     ],

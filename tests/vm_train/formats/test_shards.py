@@ -48,7 +48,17 @@ def test_a_picture_that_lacks_a_file_leaves_no_shard(tmp_path):
     (tmp_path / "mask1.png").unlink()
     with pytest.raises(PictureFault, match=r"mask1\.png: is missing"):
         write_shards(find_pictures(tmp_path), tmp_path / "out", 3, lambda: None)
-    assert [each.name for each in (tmp_path / "out").iterdir()] == ["shards.json"]
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_can_be_used_again_after_a_missing_file_was_added(tmp_path):
+    write_pictures(tmp_path, ["1", "2", "3"])
+    mask = (tmp_path / "mask3.png").read_bytes()
+    (tmp_path / "mask3.png").unlink()
+    with pytest.raises(PictureFault, match="vm-train check lists all"):
+        write_shards(find_pictures(tmp_path), tmp_path / "out", 1, lambda: None)
+    (tmp_path / "mask3.png").write_bytes(mask)
+    assert len(write_shards(find_pictures(tmp_path), tmp_path / "out", 1, lambda: None)) == 3
 
 
 def test_numbers_with_a_dot_are_refused(tmp_path):
@@ -64,6 +74,15 @@ def test_pictures_of_another_set_with_the_same_numbers_are_refused(shards, pictu
         (tmp_path / pictures[0].image.name).write_bytes(file.read() + b"\0")
     with pytest.raises(InputError, match="shards of other pictures"):
         write_shards(find_pictures(tmp_path), shards[0].parent, 3, lambda: None)
+
+
+def test_shards_of_other_shards_with_the_same_numbers_are_refused(shards, pictures, tmp_path):
+    write_shards(find_pictures(shards[0].parent), tmp_path / "out", 3, lambda: None)
+    for each in (pictures[0].image.parent).iterdir():
+        (tmp_path / each.name).write_bytes(each.read_bytes() + (b"\0" if each.suffix == ".jpg" else b""))
+    others = write_shards(find_pictures(tmp_path), tmp_path / "others", 3, lambda: None)
+    with pytest.raises(InputError, match="shards of other pictures"):
+        write_shards(find_pictures(others[0].parent), tmp_path / "out", 3, lambda: None)
 
 
 def test_the_folder_of_the_pictures_gets_no_shards(pictures):
