@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Mask
 from vm_embedded.detection.looking import look_closely
@@ -70,13 +71,23 @@ class Judge:
         except (InputError, GeometryError):  # was reported when the patches were collected
             return Found(np.empty(0), np.empty(0, dtype=np.bool_), 0, 0)
         judged = look_closely(seen.observation, self.look, seen.probabilities, self.settings, Stopwatch())
-        kept = [each for each in judged if each.reason is None]
+        kept = sorted((each for each in judged if each.reason is None), key=lambda each: -each.confidence)
         centers = np.array([each.center for each in kept]).reshape(-1, 3)
-        labels = label_places(Tangents.at(seen.observation.view, centers), seen.truths).labels
+        found = label_places(Tangents.at(seen.observation.view, centers), seen.truths)
         logits = logits_from(np.array([each.confidence for each in kept], dtype=np.float64))
-        clear = labels != UNLABELED
+        counted = (found.labels != UNLABELED) & ~repeated(found.of)
         visible = int((seen.truths.visible >= VISIBLE).sum())
-        return Found(logits[clear], labels[clear] == OBJECT, visible, 1)
+        return Found(logits[counted], found.labels[counted] == OBJECT, visible, 1)
+
+
+def repeated(objects: npt.NDArray[np.int64]) -> Mask:
+    """Which of n places show an object that a place before them shows, too: a robot reports one place of each.
+
+    objects (n,): number of the object at each place, -1 without one.
+    """
+    again = objects >= 0
+    again[np.unique(objects, return_index=True)[1]] = False
+    return again
 
 
 def judge_validation(
