@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import numbers_or_nan
 from ..config.toml_reader import parse_toml
 from ..config.units import parse_angle
 from ..config.yaml_reader import read_yaml
@@ -228,13 +229,10 @@ def _number(value: Any, name: str) -> float:
 
 def _numbers(value: Any, name: str, count: int | None = None) -> list[float]:
     """A flat list of `count` numbers from a list, or from a list of lists."""
-    try:
-        numbers = np.asarray(value, dtype=np.float64).ravel()
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} must be a list of numbers, not {str(value)[:60]}") from error
+    numbers = numbers_or_nan(value).ravel()
     if not np.isfinite(numbers).all() or (count is not None and len(numbers) != count):
         raise InputError(f"{name} must be {count or 'finite'} numbers, not {str(value)[:60]}")
-    return [float(number) for number in numbers]
+    return numbers.tolist()
 
 
 def _pair(value: Any, name: str) -> tuple[float, float]:
