@@ -61,7 +61,7 @@ class Lens(ABC):
         numbers = numbers_or_nan(given).ravel()
         if not np.isfinite(numbers).all() or (count is not None and len(numbers) != count):
             wanted = "finite" if count is None else f"{count} finite"
-            raise InputError(f"lens {name} must be {wanted} numbers, not {given}")
+            raise InputError(f"lens {name} must be {wanted} numbers, not {str(given)[:60]}")
         stored = tuple(numbers.tolist())
         object.__setattr__(self, name, stored)
         return stored
