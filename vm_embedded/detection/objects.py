@@ -80,9 +80,8 @@ def _describe_candidate(observation: Observation, candidate: Candidate) -> Detec
         candidate.center,
         confidence=float(inside.mean()) if len(inside) else 0.0,
         scale=scale,
-        # The outline that fits best is at most one ring spacing larger or smaller; scale - 1 and spacing are both in
-        # expected radii.
-        distances_agree=abs(scale - 1.0) <= view.spacing,
+        # The outline that fits best is at most one ring spacing larger or smaller. Both sides are in expected radii.
+        distances_agree=abs(scale - 1.0) <= view.ring_spacing,
         points=len(inside),
         reason=candidate.reason,
     )
@@ -122,7 +121,7 @@ def _detection(
     """
     view = observation.view
     distance = float(np.linalg.norm(center))
-    outline = view.pixels(view.shape.outline(center, view.height))
+    outline = view.outline(center)
     if len(outline) > 2:
         middle, radius = _disk(outline)
     else:
