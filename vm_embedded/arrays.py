@@ -31,6 +31,17 @@ Number = Any
 """A float or an array of floats; formulas of this type work on both."""
 
 
+def numbers_or_nan(values: object) -> Floats:
+    """A new array of these numbers, of any shape; a single NaN, of shape (), for anything else.
+
+    So the check of a caller for finite numbers also rejects what is no array of numbers.
+    """
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return np.array(np.nan)
+
+
 def frozen(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The same array, made read-only."""
     array.flags.writeable = False

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..live.memory import resident_bytes
 from ..network.onnx_model import RUNTIME_VERSION
+from .processor import read_processor
 
 _SGEMM = """
 import time
@@ -28,16 +29,13 @@ print(2 * 768**3 / best)
 """
 
 
-def describe_machine() -> dict[str, Any]:
+def describe_machine(cpuinfo: Path = Path("/proc/cpuinfo")) -> dict[str, Any]:
     """Processor, number of usable cores, vector instructions, and versions of Python and the libraries."""
-    info = Path("/proc/cpuinfo")
-    lines = info.read_text().splitlines() if info.exists() else []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    flags = next((line.split() for line in lines if line.startswith("flags")), [])
+    name, flags, _ = read_processor(cpuinfo)
     return {
-        "processor": names[0] if names else platform.processor(),
+        "processor": name,
         "cores": len(os.sched_getaffinity(0)),
-        "vectors": next((each for each in ("avx512f", "avx2", "avx", "sse4_2") if each in flags), "unknown"),
+        "vectors": next((each for each in ("avx512f", "avx2", "avx", "sse4_2", "asimd") if each in flags), "unknown"),
         "python": platform.python_version(),
         "numpy": np.__version__,
         "opencv": cv2.__version__,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..errors import one_line
 from .finding import BAD, GOOD, WARNING, Finding
+from .processor import read_processor
 
 _OPENCV_PACKAGES = (
     "opencv-python",
@@ -23,19 +24,14 @@ _EARLIEST_TIME = 1735689600.0
 def check_processor(cpuinfo: Path) -> Finding:
     """Whether the processor has the vector instructions that make ONNX Runtime fast."""
     try:
-        lines = cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines()
+        name, flags, is_arm = read_processor(cpuinfo)
     except OSError as error:
         return Finding("processor", WARNING, f"{cpuinfo} can't be read: {error.strerror}")
-    fields = dict(line.split(":", 1) for line in lines if ":" in line)
-    named = {name.strip(): value.strip() for name, value in fields.items()}
-    is_arm = "Features" in named  # there, x86 has "flags"
-    flags = set(named.get("Features" if is_arm else "flags", "").split())
-    model = named.get("model name", "ARM" if is_arm else "unknown")
     needed = ("asimd",) if is_arm else ("avx2", "fma")
-    missing = [name for name in needed if name not in flags]
+    missing = [each for each in needed if each not in flags]
     if missing:
-        return Finding("processor", WARNING, f"{model} has no {' and no '.join(missing)}; detection will be slow")
-    return Finding("processor", GOOD, f"{model}: {', '.join(needed)}{', avx512' if 'avx512f' in flags else ''}")
+        return Finding("processor", WARNING, f"{name} has no {' and no '.join(missing)}; detection will be slow")
+    return Finding("processor", GOOD, f"{name}: {', '.join(needed)}{', avx512' if 'avx512f' in flags else ''}")
 
 
 def check_threads(threads: int, allowed: int, cores: int) -> Finding:

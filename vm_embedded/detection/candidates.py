@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Mask, Singles
-from .clustering import Members, clusters, wider_than
+from ..arrays import Chosen, Floats, Mask, Singles
+from .clustering import clusters, wider_than
 from .observation import Observation
 from .projection import along
 from .settings import Settings
@@ -36,7 +36,7 @@ class Candidate:
 
     class_name: str
     center: Floats
-    near: Members
+    near: Chosen
     probabilities: Floats
     log_odds: Floats
     reason: str | None = None
@@ -61,7 +61,7 @@ def propose(observation: Observation, class_name: str, probabilities: Singles, s
     return candidates
 
 
-def _on_screen(observation: Observation, chosen: Mask) -> Members:
+def _on_screen(observation: Observation, chosen: Mask) -> Chosen:
     """The chosen slots (m,) that are on screen, in the order of the mesh.
 
     In this order, sums over them have the same digits for every layout.
@@ -70,14 +70,14 @@ def _on_screen(observation: Observation, chosen: Mask) -> Members:
     return members[np.argsort(observation.layout.slots[members])]
 
 
-def _middle(observation: Observation, cluster: Members) -> Floats:
+def _middle(observation: Observation, cluster: Chosen) -> Floats:
     """Center (3,) [m] of an object in the direction of a cluster's mean ray."""
     view = observation.view
     axis = view.layout.rays[cluster].mean(axis=0, keepdims=True)
     return np.asarray(view.shape.center_along(axis / np.linalg.norm(axis), view.height)[0])
 
 
-def _around(observation: Observation, cluster: Members, center: Floats) -> Members:
+def _around(observation: Observation, cluster: Chosen, center: Floats) -> Chosen:
     """All points on screen that are at most three object radii farther from `center` than the cluster's farthest."""
     rays, radius = observation.layout.rays, observation.view.shape.radius
     distance = float(np.linalg.norm(center))
@@ -88,7 +88,7 @@ def _around(observation: Observation, cluster: Members, center: Floats) -> Membe
 
 
 def _wrong_size(
-    observation: Observation, cluster: Members, center: Floats, near: Members, settings: Settings
+    observation: Observation, cluster: Chosen, center: Floats, near: Chosen, settings: Settings
 ) -> str | None:
     """Why a cluster around `center` has too few points or a too large graph diameter for an object, or None.
 

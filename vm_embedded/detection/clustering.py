@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Chosen
 from ..mesh.mesh import PointGraph
 
-Members = npt.NDArray[np.intp]
-"""Positions of points in a mesh."""
-
-_Edges = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
+_Edges = tuple[Chosen, Chosen]
 
 
-def clusters(graph: PointGraph, members: Members) -> list[Members]:
+def clusters(graph: PointGraph, members: Chosen) -> list[Chosen]:
     """The connected components of the points `members`, largest first. Points keep their order.
 
     Two points are connected if either is a neighbor of the other. In each round the smallest label spreads along all
@@ -35,7 +32,7 @@ def clusters(graph: PointGraph, members: Members) -> list[Members]:
     return sorted(parts, key=len, reverse=True)
 
 
-def graph_diameter(graph: PointGraph, members: Members, limit: int) -> int:
+def graph_diameter(graph: PointGraph, members: Chosen, limit: int) -> int:
     """Steps between the two members farthest apart, on ways through members only; at most limit + 1.
 
     Two breadth-first sweeps, the second from the end of the first: exact for chains, at most a step or two short for
@@ -46,7 +43,7 @@ def graph_diameter(graph: PointGraph, members: Members, limit: int) -> int:
     return int(_steps(edges, len(members), far, limit).max())
 
 
-def wider_than(graph: PointGraph, members: Members, middle: int, limit: int) -> bool:
+def wider_than(graph: PointGraph, members: Chosen, middle: int, limit: int) -> bool:
     """Whether the graph diameter of `members` is above `limit`.
 
     One sweep from the member in the `middle` usually decides: no two members are farther apart than twice its reach.
@@ -55,7 +52,7 @@ def wider_than(graph: PointGraph, members: Members, middle: int, limit: int) -> 
     return 2 * reach > limit and graph_diameter(graph, members, limit) > limit
 
 
-def _edges(graph: PointGraph, members: Members) -> _Edges:
+def _edges(graph: PointGraph, members: Chosen) -> _Edges:
     """Links between members, as positions in `members`, in both directions."""
     position = np.full(len(graph) + 1, -1)
     position[members] = np.arange(len(members))
@@ -66,7 +63,7 @@ def _edges(graph: PointGraph, members: Members) -> _Edges:
     return np.concatenate([starts, ends]), np.concatenate([ends, starts])
 
 
-def _steps(edges: _Edges, count: int, start: int, limit: int) -> npt.NDArray[np.intp]:
+def _steps(edges: _Edges, count: int, start: int, limit: int) -> Chosen:
     """Steps (count,) from `start`; -1 for members more than limit + 1 steps away."""
     a, b = edges
     steps = np.full(count, -1)

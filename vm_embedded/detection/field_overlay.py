@@ -16,7 +16,7 @@ _LINE, _BORDER, _POST, _ROBOT = (255, 0, 255), (255, 210, 0), (255, 190, 90), (6
 _PIECES = 16
 """Pieces of a straight line on the plane; most lenses bend it."""
 
-_FARTHEST = 1e4
+FARTHEST = 1e4
 """Largest pixel that is drawn: OpenCV cannot draw far outside of an image."""
 
 
@@ -85,14 +85,14 @@ def _draw_paths(canvas: Image, view: PreparedView, paths: Floats, color: Color, 
     """Draw p lines through n places each (p, n, 2) [m]; what the lens does not see is left out."""
     pixels = view.plane_pixels(paths.reshape(-1, 2)).reshape(paths.shape)
     with np.errstate(invalid="ignore"):
-        seen = np.asarray((np.abs(pixels) < _FARTHEST).all(axis=2))
+        seen = np.asarray((np.abs(pixels) < FARTHEST).all(axis=2))
     pieces = np.stack([pixels[:, :-1], pixels[:, 1:]], axis=2)[seen[:, :-1] & seen[:, 1:]]
     cv2.polylines(canvas, list(np.rint(pieces * 16).astype(np.int32)), False, color, thickness, cv2.LINE_AA, shift=4)
 
 
 def _draw_letter(canvas: Image, letter: str, pixel: Floats, scale: float) -> None:
     """Write a letter in magenta on a white disk, its middle at a pixel (2,)."""
-    if not (np.abs(pixel) < _FARTHEST).all():
+    if not (np.abs(pixel) < FARTHEST).all():
         return
     font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.5 * scale, max(1, round(1.5 * scale))
     (width, height), _ = cv2.getTextSize(letter, font, size, thickness)

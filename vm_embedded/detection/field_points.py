@@ -54,7 +54,7 @@ def ground_points(observation: Observation) -> GroundPoints:
     return GroundPoints(
         positions=rays[:, :2] * (-view.height / rays[:, 2:]),
         height=view.height,
-        across=view.shape.radius * view.spacing,
+        across=view.shape.radius * view.ring_spacing,
         classes={each.name: probabilities[:, number] for number, each in enumerate(classes) if each.name in ROLES},
         outside=outside,
         ahead=view.heading[:2, 0],

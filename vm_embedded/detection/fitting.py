@@ -61,4 +61,4 @@ def _share_inside(offset: Floats, view: PreparedView) -> Floats:
     the outline, as `Shape.offset` gives it, or 1 on another outline that is tried. The ring spacing is that of the
     expected size.
     """
-    return np.clip(0.5 + (1.0 - offset) / (0.5 * view.spacing), 0.0, 1.0)
+    return np.clip(0.5 + (1.0 - offset) / (0.5 * view.ring_spacing), 0.0, 1.0)

@@ -45,13 +45,13 @@ def _misfit(view: PreparedView, candidate: Candidate, settings: Settings) -> str
     visible = int((offset < 1.0).sum())
     if visible < settings.min_visible * whole:
         return f"{visible} of its points on screen, where a whole object has about {whole:.0f}"
-    inside = p[offset < 1.0 + _INSIDE_ENDS * view.spacing]
+    inside = p[offset < 1.0 + _INSIDE_ENDS * view.ring_spacing]
     if len(inside) == 0 or inside.mean() < settings.min_inside:
         share = inside.mean() if len(inside) else 0.0
         return f"mean probability inside its outline is {share:.2f}, below {settings.min_inside:g}"
     inclination = math.atan2(math.hypot(center[0], center[1]), -center[2])
     band_offset = offset / (math.sqrt(2.0) if view.shape.n(inclination, view.height) < 1.0 else 1.0)
-    first, last = 1.0 + _BAND_BEGINS * view.spacing, 1.0 + _BAND_ENDS * view.spacing
+    first, last = 1.0 + _BAND_BEGINS * view.ring_spacing, 1.0 + _BAND_ENDS * view.ring_spacing
     around = p[(band_offset > first) & (band_offset < last)]
     if len(around) and around.mean() > settings.max_around:
         return f"mean probability around its outline is {around.mean():.2f}, above {settings.max_around:g}"

@@ -19,7 +19,7 @@ from ..arrays import Chosen, Floats, Image, Mask, Singles
 from ..network.look_contract import LookContract
 from .judging import repeated
 from .observation import Observation
-from .patches import Tangents, apparent_radii, cut_patches, patch_nodes
+from .places import Places, PlanePlaces, mean_center
 from .prepared_view import PreparedView
 from .proposals import best_apart, propose_places
 from .settings import Settings
@@ -60,9 +60,6 @@ _EARLIER = 0.3
 _SUREST = 1.0 - 1e-6
 """Limit of a probability: one that is rounded to 1 would outvote all others in a mean, and pass a threshold of 1."""
 
-NEAR = 0.3
-"""Places within this share of an object's radius around its center were meant to be its center."""
-
 _LARGEST_SIZE = 3.0
 """Limit of the logarithm of a size: with a bad network, math.exp would overflow, and JSON has no infinity."""
 
@@ -82,72 +79,6 @@ class Look(Protocol):
         They are the object's probability, the shift of its center to the right and down, in expected radii, and the
         logarithm of its apparent radius over the expected one. Raises ModelError.
         """
-
-
-class Places(Protocol):
-    """Places in a picture to look at."""
-
-    def __len__(self) -> int: ...
-
-    def cut(self, rows: Chosen, contract: LookContract, zoom: float = 1.0) -> Image:
-        """Patches (k, size, size, 3), RGB, of the places with the numbers `rows` (k,), as a contract describes them.
-
-        zoom: their sides, as a share of those in the contract.
-        """
-
-    def radii(self, rows: Chosen) -> Floats:
-        """Radii (k,) that the objects expected there would have in the picture [px]."""
-
-    def near(self, rows: Chosen) -> Mask:
-        """Which of the places (k,) are so near each other (k, k) that they show one object; each is near itself."""
-
-    def move(self, rows: Chosen, right: Floats, down: Floats) -> Mask:
-        """Move places by shifts (k,) in expected radii. Returns which of them (k,) may hold an object there."""
-
-
-class PlanePlaces:
-    """Places on the plane that a camera of known lens and pose sees.
-
-    centers (n, 3): of the objects that are expected there, relative to the camera in the mesh frame [m]; a copy is
-    moved.
-    """
-
-    def __init__(self, observation: Observation, centers: Floats) -> None:
-        self.centers = centers.copy()
-        self._observation = observation
-        self._tangents: Tangents | None = None  # of all places, until one moves
-
-    def __len__(self) -> int:
-        return len(self.centers)
-
-    def cut(self, rows: Chosen, contract: LookContract, zoom: float = 1.0) -> Image:
-        """See Places."""
-        view = self._observation.view
-        nodes = patch_nodes(view, self._planes(rows), zoom * contract.extent)
-        return cut_patches(self._observation.pyramid, nodes, contract.size)
-
-    def radii(self, rows: Chosen) -> Floats:
-        """See Places."""
-        return apparent_radii(self._observation.view, self._planes(rows))
-
-    def near(self, rows: Chosen) -> Mask:
-        """See Places."""
-        centers = self.centers[rows]
-        return _near(self._observation.view, centers, centers)
-
-    def move(self, rows: Chosen, right: Floats, down: Floats) -> Mask:
-        """See Places. A place that moves to the horizon or above it can't hold an object."""
-        view = self._observation.view
-        rays = self._planes(rows).rays(right, down)
-        self.centers[rows] = view.shape.center_along(rays, view.height)
-        self._tangents = None
-        return np.asarray(rays[:, 2] < 0.0)
-
-    def _planes(self, rows: Chosen) -> Tangents:
-        """The planes of the patches around places with the numbers `rows` (k,)."""
-        if self._tangents is None:
-            self._tangents = Tangents.at(self._observation.view, self.centers)
-        return self._tangents.part(rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +112,7 @@ def look_closely(
     watch.lap("propose")
     places = PlanePlaces(observation, centers)
     answers = look_at(places, look)
-    judged = _judged(observation, places.centers, answers, settings, explain)
+    judged = _judged(observation.view, places.centers, answers, settings, explain)
     watch.lap("look")
     return judged
 
@@ -282,11 +213,8 @@ def _second_opinion(places: Places, rows: Chosen, look: Look, zooms: tuple[float
     return np.asarray(mean, dtype=np.float32)
 
 
-def _judged(
-    observation: Observation, centers: Floats, answers: Singles, settings: Settings, explain: bool
-) -> list[Judgment]:
+def _judged(view: PreparedView, centers: Floats, answers: Singles, settings: Settings, explain: bool) -> list[Judgment]:
     """Judgments of places with centers (c, 3) [m] and the network's answers (c, 4), most probable first."""
-    view = observation.view
     kept: list[Floats] = []
     judged: list[Judgment] = []
     for number in np.argsort(-answers[:, 0], kind="stable"):
@@ -308,21 +236,3 @@ def _judged(
             scale = math.exp(min(max(log_size, -_LARGEST_SIZE), _LARGEST_SIZE))
             judged.append(Judgment(center, probability, scale, reason))
     return judged
-
-
-def mean_center(view: PreparedView, centers: Floats, probabilities: Singles, number: int) -> Floats:
-    """The center (3,) [m] of an object at a place: the mean of all places (c, 3) [m] near it, weighted by their
-    probabilities (c,).
-
-    Several proposals move to the same object, each with an error of its own. number: of the place.
-    """
-    rays = centers / np.linalg.norm(centers, axis=1, keepdims=True)
-    near = _near(view, centers[[number]], centers)[0]
-    return np.asarray(view.shape.center_along(((near * probabilities) @ rays)[None], view.height)[0])
-
-
-def _near(view: PreparedView, objects: Floats, centers: Floats) -> Mask:
-    """Which places (c, 3) [m] were meant to be the center of each object (n, 3) [m]; (n, c)."""
-    rays = centers / np.linalg.norm(centers, axis=1, keepdims=True)
-    itself = (objects[:, None] == centers).all(axis=2)  # far away, rounding may leave it out
-    return np.asarray(view.shape.covers(rays, objects, view.height, NEAR) | itself)

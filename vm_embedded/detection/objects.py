@@ -43,14 +43,13 @@ def locate(
         if object_class.kind != "object":
             continue
         if look is not None and look.contract.object_class == name:
-            # With `explain`, look_closely also returns the rejected proposals.
             judged = look_closely(observation, look, probabilities, settings, watch, explain)
-            objects += [_describe_judgment(observation, name, each) for each in judged if each.reason is None]
-            rejected += [_describe_judgment(observation, name, each) for each in judged if each.reason]
+            found = [_describe_judgment(observation, name, each) for each in judged]
         else:
             candidates = _candidates(observation, name, probabilities, settings)
-            objects += [_describe_candidate(observation, each) for each in candidates if each.reason is None]
-            rejected += [_describe_candidate(observation, each) for each in candidates if explain and each.reason]
+            found = [_describe_candidate(observation, each) for each in candidates if explain or each.reason is None]
+        objects += [each for each in found if each.reason is None]
+        rejected += [each for each in found if each.reason is not None]
     watch.lap("cluster")
     return tuple(sorted(objects, key=lambda each: -each.confidence)), tuple(rejected)
 
@@ -60,13 +59,13 @@ def _candidates(
 ) -> list[Candidate]:
     """The candidates of a class without a close look; those that are not objects have a reason."""
     view = observation.view
-    accepted: list[Candidate] = []
-    rejected: list[Candidate] = []
+    found: list[Candidate] = []
     for candidate in propose(observation, class_name, probabilities, settings):
         if candidate.reason is None:
+            accepted = [each for each in found if each.reason is None]
             candidate = judge(view, fit(view, candidate), accepted, settings)
-        (accepted if candidate.reason is None else rejected).append(candidate)
-    return accepted + rejected
+        found.append(candidate)
+    return found
 
 
 def _describe_candidate(observation: Observation, candidate: Candidate) -> Detection:
@@ -81,9 +80,8 @@ def _describe_candidate(observation: Observation, candidate: Candidate) -> Detec
         candidate.center,
         confidence=float(inside.mean()) if len(inside) else 0.0,
         scale=scale,
-        # The outline that fits best is at most one ring spacing larger or smaller; scale - 1 and spacing are both in
-        # expected radii.
-        distances_agree=abs(scale - 1.0) <= view.spacing,
+        # The outline that fits best is at most one ring spacing larger or smaller. Both sides are in expected radii.
+        distances_agree=abs(scale - 1.0) <= view.ring_spacing,
         points=len(inside),
         reason=candidate.reason,
     )
@@ -123,7 +121,7 @@ def _detection(
     """
     view = observation.view
     distance = float(np.linalg.norm(center))
-    outline = view.pixels(view.shape.outline(center, view.height))
+    outline = view.outline(center)
     if len(outline) > 2:
         middle, radius = _disk(outline)
     else:

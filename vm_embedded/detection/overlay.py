@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Image
 from ..field.features import FieldFeatures
 from .detection import Detection
-from .field_overlay import draw_field, label_field
+from .field_overlay import FARTHEST, draw_field, label_field
 from .labels import INK, Color, Labels
 from .observation import Observation
 from .prepared_view import PreparedView
@@ -22,9 +22,6 @@ _AREAS = ((255, 255, 255), (190, 255, 170), (230, 160, 230), (220, 220, 120))
 
 _AHEAD = 0.5
 """Arrows of tracks lead to where the objects will be after this time [s]."""
-
-_FARTHEST = 1e4
-"""Largest pixel of an outline that is drawn: OpenCV cannot draw far outside of an image."""
 
 
 def draw_overlay(
@@ -49,7 +46,7 @@ def draw_overlay(
     if field is not None:
         draw_field(canvas, field, observation.view, scale)
     drawn = [(each, _OBJECT) for each in objects] + [(each, _REJECTED) for each in rejected]
-    drawn = [(each, color) for each, color in drawn if np.abs(each.outline).max(initial=0.0) < _FARTHEST]
+    drawn = [(each, color) for each, color in drawn if np.abs(each.outline).max(initial=0.0) < FARTHEST]
     for each, color in reversed(drawn):
         _draw_outline(canvas, each, color, scale)
         _draw_arrow(canvas, each, observation.view, scale)
@@ -98,7 +95,7 @@ def _draw_arrow(canvas: Image, detection: Detection, view: PreparedView, scale: 
         return
     places = np.array([track.position[:2], track.position_at(track.time + _AHEAD)[:2]])
     pixels = view.plane_pixels(places)
-    if (np.abs(pixels) < _FARTHEST).all():
+    if (np.abs(pixels) < FARTHEST).all():
         start, end = np.rint(pixels).astype(int).tolist()
         thickness = max(1, round(2 * scale))
         cv2.arrowedLine(canvas, start, end, INK, thickness + 2, cv2.LINE_AA, tipLength=0.2)

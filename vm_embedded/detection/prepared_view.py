@@ -36,13 +36,16 @@ class PreparedView(NamedTuple):
     size: Size
 
     @property
-    def spacing(self) -> float:
+    def ring_spacing(self) -> float:
         """Distance between two rings, in the units of `Shape.offset`: the object's outline is at 1."""
         return 2.0 / self.rings
 
-    def pixels(self, rays: Floats) -> Floats:
-        """Pixels (m, 2) of those of the rays (n, 3), in the mesh frame, that the lens sees, on screen or not."""
-        camera = to_camera(rays, self.rotation)
+    def outline(self, center: Floats) -> Floats:
+        """Pixels (m, 2) of the part of an object's outline that the lens sees, on screen or not.
+
+        center (3,): of the object, relative to the camera in the mesh frame [m].
+        """
+        camera = to_camera(self.shape.outline(center, self.height), self.rotation)
         return self.lens.project(camera[self.lens.sees(camera)], self.size)
 
     def ray_pixels(self, rays: Floats) -> Floats:

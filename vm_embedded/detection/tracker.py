@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats
+from ..arrays import Floats, numbers_or_nan
 from ..errors import InputError
 from ..geometry.orientation import rotation_z
 from .detection import Detection
@@ -159,10 +159,7 @@ def _continued(track: Track, detection: Detection, time: float, state: Floats, c
 
 def _checked_move(moved: npt.ArrayLike) -> Move:
     """The three numbers of a move. Raises InputError."""
-    try:
-        numbers = np.asarray(moved, dtype=np.float64)
-    except (TypeError, ValueError):
-        numbers = np.array([math.nan])
+    numbers = numbers_or_nan(moved)
     if numbers.shape != (3,) or not np.isfinite(numbers).all():
         raise InputError(f"moved must be finite x, y [m] and turn [rad], not {moved!r}")
     x, y, turn = numbers.tolist()

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import Floats, Mask
+from ..arrays import Floats, Mask, numbers_or_nan
 from ..errors import InputError
 
 if TYPE_CHECKING:
@@ -58,13 +58,10 @@ class Lens(ABC):
         count: how many there must be, or None for any number. Raises InputError.
         """
         given = getattr(self, name)
-        try:
-            numbers = np.asarray(given, dtype=np.float64).ravel()
-        except (TypeError, ValueError):
-            numbers = np.array([math.nan])
+        numbers = numbers_or_nan(given).ravel()
         if not np.isfinite(numbers).all() or (count is not None and len(numbers) != count):
             wanted = "finite" if count is None else f"{count} finite"
-            raise InputError(f"lens {name} must be {wanted} numbers, not {given}")
+            raise InputError(f"lens {name} must be {wanted} numbers, not {str(given)[:60]}")
         stored = tuple(numbers.tolist())
         object.__setattr__(self, name, stored)
         return stored

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import numbers_or_nan
 from ..config.toml_reader import parse_toml
 from ..config.units import parse_angle
 from ..config.yaml_reader import read_yaml
@@ -141,13 +142,13 @@ def lens_from_table(table: Mapping[str, Any]) -> RadialLens:
     missing = [key for key in ("projection", "focal_length", "fov") if key not in table]
     if missing:
         raise InputError(f"lens needs {', '.join(missing)}")
-    size = _numbers(table["size"], "size", 2) if "size" in table else None
+    size: Any = _numbers(table["size"], "size", 2) if "size" in table else None
     return projection_named(table["projection"])(
         focal_length=_number(table["focal_length"], "focal_length"),
         fov=parse_angle(table["fov"], "fov"),
-        center=_pair(table.get("center", (0.0, 0.0)), "center"),
-        distortion=_pair(table.get("distortion", (0.0, 0.0)), "distortion"),
-        size=None if size is None else (int(size[0]), int(size[1])),
+        center=table.get("center", (0.0, 0.0)),
+        distortion=table.get("distortion", (0.0, 0.0)),
+        size=size,
     )
 
 
@@ -158,25 +159,22 @@ def lens_from_calibration(table: Mapping[str, Any]) -> Lens:
         raise InputError("found neither `projection`, as in a lens, nor `camera_matrix`, as in a calibration")
     k = _numbers(_data(matrix), "camera_matrix", 9)
     coefficients = _numbers(_data(_coefficients(table)), "distortion")
-    width = _first(table, "image_width", "width")
-    height = _first(table, "image_height", "height")
+    width, height = (_first(table, f"image_{side}", side) for side in ("width", "height"))
     model = _distortion_model(table, len(coefficients))
-    common = {
+    common: dict[str, Any] = {
         "focal_lengths": (k[0], k[4]),
         "optical_center": (k[2], k[5]),
-        "size": None
-        if width is None or height is None
-        else (int(_number(width, "width")), int(_number(height, "height"))),
+        "size": None if width is None or height is None else (_number(width, "width"), _number(height, "height")),
     }
     if abs(k[1]) > 1e-6 * k[0]:
         raise InputError(f"camera_matrix has a skew of {k[1]:g}, but only calibrations without skew are supported")
     if model.lower() in _FISHEYE:
-        return FisheyeLens(fov=2.0 * math.pi, coefficients=tuple(coefficients), **common)  # type: ignore[arg-type]
+        return FisheyeLens(fov=2.0 * math.pi, coefficients=tuple(coefficients), **common)
     if model.lower() in _BROWN:
         while len(coefficients) > 8 and coefficients[-1] == 0.0:
             coefficients.pop()  # OpenCV writes 12 or 14 coefficients even if the last ones are zero
         # Calibrations have no field of view. 160 degrees is as wide as a rectilinear picture gets.
-        return BrownLens(fov=math.radians(160.0), coefficients=tuple(coefficients), **common)  # type: ignore[arg-type]
+        return BrownLens(fov=math.radians(160.0), coefficients=tuple(coefficients), **common)
     raise InputError(unknown("distortion_model", model, (*_BROWN, *_FISHEYE)))
 
 
@@ -228,15 +226,7 @@ def _number(value: Any, name: str) -> float:
 
 def _numbers(value: Any, name: str, count: int | None = None) -> list[float]:
     """A flat list of `count` numbers from a list, or from a list of lists."""
-    try:
-        numbers = np.asarray(value, dtype=np.float64).ravel()
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} must be a list of numbers, not {str(value)[:60]}") from error
+    numbers = numbers_or_nan(value).ravel()
     if not np.isfinite(numbers).all() or (count is not None and len(numbers) != count):
         raise InputError(f"{name} must be {count or 'finite'} numbers, not {str(value)[:60]}")
-    return [float(number) for number in numbers]
-
-
-def _pair(value: Any, name: str) -> tuple[float, float]:
-    first, second = _numbers(value, name, 2)
-    return first, second
+    return numbers.tolist()

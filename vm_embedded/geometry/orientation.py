@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats, frozen
+from ..arrays import Floats, frozen, numbers_or_nan
 from ..errors import GeometryError
 
 OPTICAL_TO_CAMERA: Floats = frozen(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))
@@ -32,10 +32,7 @@ def rotation_z(angle: float) -> Floats:
 
 def rotation_from_quaternion(quaternion: npt.ArrayLike) -> Floats:
     """Rotation (3, 3) of a quaternion (w, x, y, z). Raises GeometryError if its length differs from 1 by over 1e-3."""
-    try:
-        q = np.asarray(quaternion, dtype=np.float64)
-    except (TypeError, ValueError):
-        q = np.array([math.nan])
+    q = numbers_or_nan(quaternion)
     if q.shape != (4,) or not np.isfinite(q).all() or abs(float(q @ q) - 1.0) > 2e-3:
         raise GeometryError(f"quaternion must be (w, x, y, z) of length 1, not {quaternion!r}")
     w, x, y, z = q / np.linalg.norm(q)
@@ -79,7 +76,7 @@ class Orientation:
     rotation: Floats
 
     def __post_init__(self) -> None:
-        rotation = np.array(self.rotation, dtype=np.float64)
+        rotation = numbers_or_nan(self.rotation)
         if not math.isfinite(self.height) or self.height <= 0:
             raise GeometryError(f"camera height must be a number above 0 m, not {self.height}")
         if rotation.shape != (3, 3) or not np.isfinite(rotation).all():
@@ -100,12 +97,9 @@ class Orientation:
 
         Raises GeometryError if it is not 4 x 4 numbers.
         """
-        try:
-            matrix = np.asarray(hoc, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise GeometryError(f"Hoc must be 4 x 4 numbers, not {str(hoc)[:60]}") from error
+        matrix = numbers_or_nan(hoc)
         if matrix.shape != (4, 4):
-            raise GeometryError(f"Hoc must be 4 x 4 numbers, not of shape {matrix.shape}")
+            raise GeometryError(f"Hoc must be 4 x 4 numbers, not {str(hoc)[:60]}")
         return cls(float(matrix[2, 3]), matrix[:3, :3])
 
     @classmethod

@@ -13,17 +13,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats, frozen
+from ..arrays import Floats, frozen, numbers_or_nan
 from ..errors import GeometryError
 from .orientation import Orientation
-
-
-def _numbers(values: object) -> Floats:
-    """An array of these numbers. Raises GeometryError if they are something else."""
-    try:
-        return np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise GeometryError(f"expected numbers, not {values!r}: {error}") from error
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +29,7 @@ class Pose:
     position: Floats
 
     def __post_init__(self) -> None:
-        position = _numbers(self.position)
+        position = numbers_or_nan(self.position)
         if position.shape != (3,) or not np.isfinite(position).all():
             raise GeometryError(f"camera position must be three finite numbers [m], not {self.position}")
         # Orientation checks the rotation; the height does not matter here.
@@ -47,7 +39,7 @@ class Pose:
     @classmethod
     def from_hwc(cls, hwc: npt.ArrayLike) -> Pose:
         """From the 4 x 4 transform H_wc ("world from camera"). Raises GeometryError."""
-        matrix = _numbers(hwc)
+        matrix = numbers_or_nan(hwc)
         if matrix.shape != (4, 4) or not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), atol=1e-6):
             raise GeometryError("Hwc must be 4 x 4 numbers with last row 0, 0, 0, 1; check whether it is transposed")
         return cls(matrix[:3, :3], matrix[:3, 3])
@@ -69,18 +61,20 @@ class Plane:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        normal, offset = _numbers(self.normal), float(_numbers(self.offset).reshape(-1)[0])
+        normal, offset = numbers_or_nan(self.normal), numbers_or_nan(self.offset)
         length = float(np.linalg.norm(normal)) if normal.shape == (3,) else math.nan
-        if not (math.isfinite(length) and length > 1e-9 and math.isfinite(offset)):
-            raise GeometryError(f"plane {self.name!r} needs a normal and an offset [m], not {self.normal}, {offset}")
+        if not (math.isfinite(length) and length > 1e-9 and offset.shape == () and np.isfinite(offset)):
+            raise GeometryError(
+                f"plane {self.name!r} needs a normal and an offset [m], not {self.normal}, {self.offset}"
+            )
         x, y, z = (normal / length).tolist()
         object.__setattr__(self, "normal", (x, y, z))
-        object.__setattr__(self, "offset", offset / length)
+        object.__setattr__(self, "offset", float(offset) / length)
 
     @classmethod
     def through(cls, name: str, point: npt.ArrayLike, normal: npt.ArrayLike) -> Plane:
         """The plane through a point [m] of the world, with this normal. Raises GeometryError."""
-        place, direction = _numbers(point), _numbers(normal)
+        place, direction = numbers_or_nan(point), numbers_or_nan(normal)
         if place.shape != (3,) or direction.shape != (3,):
             raise GeometryError(
                 f"plane {name!r} needs three numbers for its point and its normal, not {point!r}, {normal!r}"
@@ -96,7 +90,7 @@ class Plane:
 
         Raises GeometryError if both are the same point.
         """
-        here, there = _numbers(camera), _numbers(target)
+        here, there = numbers_or_nan(camera), numbers_or_nan(target)
         if here.shape != (3,) or there.shape != (3,):
             raise GeometryError(
                 f"spotlight {name!r} needs three numbers for target and camera, not {target!r}, {camera!r}"

@@ -33,7 +33,7 @@ from ..arrays import Chosen, Floats, Indices, Mask, frozen
 from ..geometry.shape import Shape
 from .mesh import SELF, Groups, Mesh, MeshModel, check_size
 
-_STEPS = {
+STEPS = {
     4: ((-1, 0), (0, 1), (1, 0), (0, -1)),
     6: ((-1, 0), (-1, 1), (0, 1), (1, 0), (1, -1), (0, -1)),
     8: ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1)),
@@ -67,8 +67,8 @@ class Grid(MeshModel):
     def __init__(self, kind: str, neighbors: int) -> None:
         self.kind = kind
         self.neighbors = neighbors
-        self.steps = _STEPS[neighbors]
-        self.groups = _row_groups(self.steps)
+        self.steps = STEPS[neighbors]
+        self.groups = row_groups(self.steps)
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         shape.spacing(height)  # raises GeometryError for a height without a mesh
@@ -115,7 +115,7 @@ class Grid(MeshModel):
         return found[0].reshape(rows, halves), found[1].reshape(rows, halves)
 
 
-def _row_groups(steps: tuple[tuple[int, int], ...]) -> Groups:
+def row_groups(steps: tuple[tuple[int, int], ...]) -> Groups:
     """`MeshModel.groups` of a lattice: the neighbors in a point's own row, the row above and the row below."""
     place = {(0, 0): SELF} | {step: number for number, step in enumerate(steps)}
     return tuple(tuple(place[step] for step in sorted(place) if step[1] == row) for row in (0, 1, -1))
@@ -220,19 +220,13 @@ def _connected_to_nadir(column: Indices, row: Indices, neighbors: int) -> Mask:
 
     The cells become pixels, and OpenCV finds their connected components.
     """
-    y = row - row.min()
-    if neighbors == 6:
-        # Pixels are half columns: neighbors in other rows touch at corners. Neighbors in a row are two pixels apart, so
-        # the pixel between them is set, too.
-        x = 2 * column + row
-        x -= x.min()
-        present = np.zeros((y.max() + 1, x.max() + 1), dtype=np.uint8)
-        present[y, x] = 1
+    # With six neighbors, pixels are half columns, so neighbors in other rows touch at corners.
+    x, y = 2 * column + row if neighbors == 6 else column, row
+    x, y = x - x.min(), y - y.min()
+    present = np.zeros((y.max() + 1, x.max() + 1), dtype=np.uint8)
+    present[y, x] = 1
+    if neighbors == 6:  # neighbors in a row are two pixels apart, so the pixel between them is set, too
         present[:, 1:-1] |= present[:, :-2] & present[:, 2:]
-    else:
-        x = column - column.min()
-        present = np.zeros((y.max() + 1, x.max() + 1), dtype=np.uint8)
-        present[y, x] = 1
     _, label = cv2.connectedComponents(present, connectivity=4 if neighbors == 4 else 8)
     labels = label[y, x]
     return np.asarray(labels == labels[(column == 0) & (row == 0)])

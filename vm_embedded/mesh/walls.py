@@ -19,7 +19,7 @@ from ..arrays import Floats, Indices, frozen
 from ..errors import GeometryError
 from ..geometry.cylinder import Cylinder
 from ..geometry.shape import Shape
-from .grids import Grid
+from .grids import STEPS, row_groups
 from .mesh import Mesh, MeshModel, check_size, rays_from_polar
 
 NEAREST = 0.3
@@ -29,11 +29,11 @@ NEAREST = 0.3
 class Walls(MeshModel):
     """Walls around the camera, the nearest first; in each wall row by row, the lowest row first.
 
-    The six neighbors have the order of a lattice's: `Grid.steps`. Walls are not linked to each other.
+    The six neighbors have the order of a lattice's, `STEPS`. Walls are not linked to each other.
     """
 
     neighbors = 6
-    groups = Grid("xy", 6).groups
+    groups = row_groups(STEPS[neighbors])
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         tall = _checked(shape, height).object_height
@@ -42,18 +42,18 @@ class Walls(MeshModel):
         counts = wall_counts(shape, intersections, max_distance)
         up = (np.arange(rows) + 0.5) / rows * tall - height  # height of the rows above the camera [m]
 
-        rays, walls, first = [], [], 0
+        off_screen = rows * int(counts.sum())
+        neighbors = np.full((off_screen + 1, self.neighbors), off_screen, dtype=np.int32)
+        rays, first = [], 0
         for distance, count in zip(distances.tolist(), counts.tolist(), strict=True):
             row, place = (axis.reshape(-1) for axis in np.mgrid[:rows, :count].astype(np.int32))
             rays.append(rays_from_polar(np.arctan2(distance, -up[row]), 2.0 * np.pi * (place + 0.5 * row) / count))
-            walls.append((row, place, count, first))
-            first += rows * count
-        neighbors = np.full((first + 1, self.neighbors), first, dtype=np.int32)
-        for row, place, count, start in walls:
-            for column, (right, above) in enumerate(Grid("xy", 6).steps):
+            wall = slice(first, first + len(row))
+            for column, (right, above) in enumerate(STEPS[self.neighbors]):
                 to_row, to_place = row + above, (place + right) % count
                 there = (to_row >= 0) & (to_row < rows)
-                neighbors[start : start + len(row), column] = np.where(there, start + to_row * count + to_place, first)
+                neighbors[wall, column] = np.where(there, first + to_row * count + to_place, off_screen)
+            first = wall.stop
         return Mesh(frozen(np.asfortranarray(np.concatenate(rays))), frozen(neighbors))
 
     def mesh_height(self, shape: Shape, height: float, intersections: float, tolerance: float) -> float:

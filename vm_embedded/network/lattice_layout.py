@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from ..arrays import Indices, Mask, Singles, frozen
 from ..mesh.mesh import Mesh
-from .layout import OFF_SCREEN, Feeds, WholeLayout
+from .layout import OFF_SCREEN, Feeds, WholeLayout, rays_in
 
 BELOW = 3
 """Rows of gaps before the first point. The second slot of the second row has only gaps around it, so in every layer it
@@ -32,7 +32,7 @@ class LatticeLayout(WholeLayout):
         self.slots = frozen(slots)
         self.places = frozen(places.astype(np.int32))
         self.original = frozen(slots < len(mesh))
-        self.rays = frozen(np.take(np.append(mesh.rays.T, np.full((3, 1), np.nan), axis=1), slots, axis=1)).T
+        self.rays = rays_in(mesh, slots)
 
     def links(self, members: npt.NDArray[np.integer]) -> Indices:
         shifts = np.array([up * self._shape[1] + right for right, up in self._steps], dtype=np.int32)

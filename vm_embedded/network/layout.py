@@ -13,7 +13,8 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats, Indices, Mask, Singles
+from ..arrays import Floats, Indices, Mask, Singles, frozen
+from ..mesh.mesh import Mesh
 
 Feeds = dict[str, npt.NDArray[np.generic]]
 """A network's inputs by name."""
@@ -73,3 +74,8 @@ class WholeLayout(Layout):
     @abstractmethod
     def probabilities(self, output: Singles) -> Singles:
         """Probabilities (m, C) of the slots from the network's output."""
+
+
+def rays_in(mesh: Mesh, slots: npt.NDArray[np.integer]) -> Floats:
+    """Rays (m, 3) of the points in slots (m,), column by column in memory; NaN in gaps."""
+    return frozen(np.take(np.append(mesh.rays.T, np.full((3, 1), np.nan), axis=1), slots, axis=1)).T

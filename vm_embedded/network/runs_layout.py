@@ -49,7 +49,7 @@ import numpy.typing as npt
 from ..arrays import Indices, Mask, Singles, frozen
 from ..mesh.dilation import dilated
 from ..mesh.mesh import SELF, Groups, Mesh
-from .layout import OFF_SCREEN, Feeds, WholeLayout
+from .layout import OFF_SCREEN, Feeds, WholeLayout, rays_in
 
 _Positions = npt.NDArray[np.int64]
 
@@ -70,7 +70,7 @@ class RunsLayout(WholeLayout):
         original = np.zeros(count, dtype=bool)
         original[places] = True
         self.original = frozen(original)
-        self.rays = frozen(np.take(np.append(mesh.rays.T, np.full((3, 1), np.nan), axis=1), slots, axis=1)).T
+        self.rays = rays_in(mesh, slots)
         self._gap = _gap(dilations)
         # Of each group: the column of the sum around slot 0.
         spacing, group = np.array(dilations)[:, None], np.arange(len(groups))

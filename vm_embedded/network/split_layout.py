@@ -17,18 +17,16 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Indices, Mask, Singles, frozen
+from ..arrays import Chosen, Indices, Mask, Singles, frozen
 from ..mesh.mesh import Mesh
 from .layout import Layout, Run, WholeLayout
-
-Points = npt.NDArray[np.intp]
 
 
 class Sector(NamedTuple):
     """Points of a mesh, in ascending order: those that belong to a sector, and these with their surroundings."""
 
-    own: Points
-    members: Points
+    own: Chosen
+    members: Chosen
 
 
 class SplitLayout(Layout):
@@ -89,7 +87,7 @@ def sectors_of(mesh: Mesh, count: int, depth: int) -> list[Sector]:
     return [Sector(own, with_surroundings(mesh, own, depth)) for own in owned]
 
 
-def with_surroundings(mesh: Mesh, own: Points, depth: int) -> Points:
+def with_surroundings(mesh: Mesh, own: Chosen, depth: int) -> Chosen:
     """Points (k,) of a mesh, in ascending order, and all points that are at most `depth` links away from them."""
     reached: Mask = np.zeros(len(mesh) + 1, dtype=bool)
     reached[own] = True

@@ -18,9 +18,10 @@ from vm_embedded.arrays import Floats, Mask, Singles
 from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.field_points import locate_features
-from vm_embedded.detection.looking import Look, PlanePlaces, chain_of, look_at, worth_of
+from vm_embedded.detection.looking import Look, chain_of, look_at, worth_of
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Network, Observation, classify
+from vm_embedded.detection.places import PlanePlaces
 from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.detection.projection import Projection
 from vm_embedded.detection.proposals import propose_places

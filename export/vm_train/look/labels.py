@@ -177,7 +177,7 @@ def true_bases(
 
 def _visible_share(view: PreparedView, center: Floats, shown: TrueObject) -> float:
     """Visible share of an object, from the area of its mask and that of the outline that it should have."""
-    outline = view.pixels(view.shape.outline(center, view.height))
+    outline = view.outline(center)
     x, y = outline.T
     area = 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
     return min(math.pi * shown.radius**2 / area, 1.0) if area > 0.0 else 0.0

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Image, Mask
-from vm_embedded.detection.looking import NEAR
 from vm_embedded.detection.patches import cut_patches
+from vm_embedded.detection.places import NEAR
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.geometry.lens import Size
 from vm_embedded.network.look_contract import LookContract
@@ -55,7 +55,7 @@ class Windows:
         return Windows(self.centers + np.stack([right, down], axis=1) * self.radii[:, None], self.radii)
 
     def cut(self, pyramid: Pyramid, contract: LookContract, zoom: float = 1.0) -> Image:
-        """Patches (n, size, size, 3), RGB, of a frame, as a network needs them. zoom: see looking.Places."""
+        """Patches (n, size, size, 3), RGB, of a frame, as a network needs them. zoom: see places.Places."""
         if not len(self):
             return np.empty((0, contract.size, contract.size, 3), dtype=np.uint8)
         reach = zoom * contract.extent * self.radii[:, None, None]
@@ -92,22 +92,22 @@ class WindowPlaces:
         return len(self.windows)
 
     def cut(self, rows: npt.NDArray[np.intp], contract: LookContract, zoom: float = 1.0) -> Image:
-        """See looking.Places."""
+        """See places.Places."""
         return self.windows.part(rows).cut(self._pyramid, contract, zoom)
 
     def radii(self, rows: npt.NDArray[np.intp]) -> Floats:
-        """See looking.Places."""
+        """See places.Places."""
         return self.windows.radii[rows]
 
     def near(self, rows: npt.NDArray[np.intp]) -> Mask:
-        """See looking.Places. Windows of objects of another size show another object."""
+        """See places.Places. Windows of objects of another size show another object."""
         windows = self.windows.part(rows)
         shift = windows.centers - windows.centers[:, None]
         radii = windows.radii[:, None]
         return (np.hypot(shift[..., 0], shift[..., 1]) < NEAR * radii) & np.isclose(radii, windows.radii)
 
     def move(self, rows: npt.NDArray[np.intp], right: Floats, down: Floats) -> Mask:
-        """See looking.Places. An object may be anywhere."""
+        """See places.Places. An object may be anywhere."""
         self.windows.centers[rows] = self.windows.part(rows).moved(right, down).centers
         return np.ones(len(rows), dtype=np.bool_)
 

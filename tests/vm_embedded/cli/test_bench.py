@@ -9,6 +9,7 @@ import pytest
 from tests.drawn_scenes import FOLDER, IMAGES, MODEL
 from tests.programs import run_program
 from vm_embedded import read_lens_file
+from vm_embedded.cli.machine import describe_machine
 from vm_embedded.live.configuration import read_configuration
 from vm_embedded.network.model_file import read_model
 
@@ -46,6 +47,13 @@ def test_command_takes_the_user_s_frame_lens_and_orientation():
     assert found["walk"]["height_m"] == 0.6
     assert found["walk"]["swing_rad"] == pytest.approx(math.radians(2.0))
     assert len(found["runs"]) == 1
+
+
+def test_the_vector_instructions_of_arm_are_known(tmp_path):
+    cpuinfo = tmp_path / "cpuinfo"
+    cpuinfo.write_text("processor : 0\nFeatures : fp asimd evtstrm\n")
+    described = describe_machine(cpuinfo)
+    assert (described["processor"], described["vectors"]) == ("ARM", "asimd")
 
 
 @pytest.mark.long

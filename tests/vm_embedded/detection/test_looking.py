@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.detection.looking import PlanePlaces, look_at, mean_center
+from vm_embedded.detection.looking import look_at
 from vm_embedded.detection.objects import locate
+from vm_embedded.detection.places import PlanePlaces, mean_center
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.network.look_contract import LookContract
@@ -236,7 +237,7 @@ def test_the_answer_of_a_first_glance_does_not_count(scene, passes, weight):
 def test_places_tell_how_large_an_object_is_in_the_picture(scene, column, row):
     view = scene.view
     center = center_at(view, (column, row))
-    outline = view.pixels(view.shape.outline(center, view.height))
+    outline = view.outline(center)
     (radius,) = PlanePlaces(scene, center[None]).radii(np.arange(1))
     x, y = outline.T
     area = 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))

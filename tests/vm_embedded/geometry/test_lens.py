@@ -150,6 +150,7 @@ def test_lenses_take_what_opencv_calibrates():
     [
         ({"center": 5.0}, "lens center must be 2 finite numbers, not 5.0"),
         ({"center": (1.0, 2.0, 3.0)}, "lens center must be 2 finite numbers"),
+        ({"center": (10**400, 0)}, "lens center must be 2 finite numbers"),
         ({"distortion": (0.0,)}, "lens distortion must be 2 finite numbers"),
         ({"size": (640,)}, "lens size must be 2 finite numbers"),
         ({"size": 640}, "lens size must be 2 finite numbers, not 640"),

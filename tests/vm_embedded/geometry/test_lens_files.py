@@ -382,6 +382,7 @@ WRONG_TOML = {
     "infinite": (TOML.replace("500", "inf"), "focal_length"),
     "more digits than a float has": (TOML.replace("500", "5" * 400), "focal_length"),
     "a size of one": (TOML.replace("[640, 480]", "[1, 480]"), "1 x 480"),
+    "a size that is not whole": (TOML.replace("[640, 480]", "[640.5, 480]"), "whole numbers"),
     "a size that is none": (TOML.replace("[640, 480]", "640"), "size must be 2"),
 }
 

@@ -140,10 +140,18 @@ def test_a_level_ros_camera_has_the_quaternion_that_ros_gives_it():
     np.testing.assert_allclose(found.rotation, np.eye(3), atol=1e-15)
 
 
-@pytest.mark.parametrize("quaternion", [(1.0, 0.0, 0.0), (2.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0), None, "wxyz"])
+@pytest.mark.parametrize(
+    "quaternion", [(1.0, 0.0, 0.0), (2.0, 0.0, 0.0, 0.0), (10**400, 0, 0, 0), (math.nan, 0.0, 0.0, 0.0), None, "wxyz"]
+)
 def test_what_is_not_a_quaternion_is_refused(quaternion):
     with pytest.raises(GeometryError, match=r"quaternion must be \(w, x, y, z\) of length 1, not "):
         Orientation.from_quaternion(1.0, quaternion)
+
+
+@pytest.mark.parametrize("rotation", [None, "level", np.eye(2), [[1.0, 0.0], [0.0]], np.full((3, 3), math.nan)])
+def test_what_is_not_3_x_3_numbers_is_not_a_rotation(rotation):
+    with pytest.raises(GeometryError, match="camera rotation must be 3 x 3 finite numbers"):
+        Orientation(1.0, rotation)
 
 
 @given(orientations(), seeds)

@@ -86,8 +86,14 @@ def test_a_normal_of_any_length_is_the_same_plane():
 
 @pytest.mark.parametrize("normal", [(0.0, 0.0, 0.0), (math.nan, 0.0, 1.0), (0.0, 1.0), "up"])
 def test_a_normal_without_direction_is_refused(normal):
-    with pytest.raises(GeometryError, match=r"'table'|'up'"):
+    with pytest.raises(GeometryError, match="'table'"):
         Plane("table", normal)
+
+
+@pytest.mark.parametrize("offset", [(), (1.0, 2.0), None, math.inf])
+def test_an_offset_that_is_not_one_number_is_refused(offset):
+    with pytest.raises(GeometryError, match=r"'table' needs a normal and an offset \[m\], not "):
+        Plane("table", offset=offset)
 
 
 def test_a_camera_behind_a_plane_is_told_so():

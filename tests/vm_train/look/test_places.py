@@ -47,7 +47,7 @@ def test_random_places_are_in_the_picture_and_on_the_mesh(seed):
     found = random_places(observation, PatchSettings(random=5), random(seed))
     assert len(found) <= 5
     assert (np.hypot(*found.centers.T[:2]) < observation.manifest.max_distance).all()
-    pixels = VIEW.pixels(found.centers / np.linalg.norm(found.centers, axis=1, keepdims=True))
+    pixels = VIEW.ray_pixels(found.centers / np.linalg.norm(found.centers, axis=1, keepdims=True))
     assert ((pixels >= -0.5) & (pixels <= np.array(VIEW.size) - 0.5)).all()
 
 
