@@ -28,7 +28,7 @@ from .onnx_graph import FLOAT, INT64, OnnxGraph
 def runs_model(network: Network, manifest: Manifest) -> bytes:
     """The bytes of an ONNX model in the layout `runs`.
 
-    Inputs: points (3, m) float32 and columns (L G, m) int64, as RunsLayout gives them. Output: probabilities (C, m)
+    Inputs: points (3, m) float32 and columns (D G, m) int64, as RunsLayout gives them. Output: probabilities (C, m)
     float32.
     """
     graph, groups, dilations = OnnxGraph(), manifest.model.groups, manifest.dilations

@@ -35,8 +35,8 @@ A copy looks up the same sums as its original, and a gap the same sums as the of
 values in all layers, without masks or special cases.
 
 For a convolution with dilation d, the members of a group (mesh/dilation.py) are d slots apart, and so are the slots of
-a window. So each dilation has its own columns, of m - d for each group: column s + d is the window around slot s. With
-a largest dilation D, D gaps follow each run, 2 D + 1 gaps come first and 2 D last. The example has D = 1.
+a window. So each dilation has its own columns, m - d for each group: column s + d is the window around slot s. With g
+as the largest dilation, g gaps follow each run, 2 g + 1 gaps come first and 2 g last. In the example, g is 1.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ _Positions = npt.NDArray[np.int64]
 class RunsLayout(WholeLayout):
     """The slots of a mesh in the layout `runs`, and the columns in which each slot finds the sums of its groups.
 
-    columns: (L G, m) positions in a layer's table. The first G are those for the first one of L `dilations`, which is
-    1; a table for dilation d has G (m - d) sums.
+    dilations: see with_dilations; the first one is 1. columns: (D G, m) positions in a layer's table, for one of D
+    dilations after the other. A table for dilation d has G (m - d) sums.
     """
 
     def __init__(self, mesh: Mesh, groups: Groups, dilations: Sequence[int] = (1,)) -> None:
@@ -119,8 +119,8 @@ def _arranged(
 ) -> tuple[_Positions, _Positions, _Positions]:
     """Arranges a mesh's points in slots, from their neighbors (n + 1, N).
 
-    Returns three arrays: the point in each slot (m,), n in gaps; the slot of each point (n,); and middles (L G, m): for
-    the point in each slot, the slot of the middle of each of its groups, for one dilation after the other, _gap in
+    Returns three arrays: the point in each slot (m,), n in gaps; the slot of each point (n,); and middles (D G, m): for
+    the point in each slot, the slot of the middle of each of its groups, for one dilation after the other, and _gap in
     gaps.
     """
     n, most = len(neighbors) - 1, max(dilations)
