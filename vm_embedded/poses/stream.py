@@ -23,6 +23,10 @@ _OLDEST, _EARLY = 10.0, 0.05
 _MOST_LINES = 64
 """Lines of a datagram that are read: it may have 32,000, and frames wait meanwhile."""
 
+_MOST, _WINDOW = 256, 0.064
+"""Lines of a source that are read within so many seconds, four for each millisecond. A robot sends fewer. With a flood
+of them, the thread of the camera would hardly ever get Python's lock, and the camera would count as lost."""
+
 Report = Callable[[str], None]
 """Gets the reason why a pose was rejected."""
 
@@ -89,11 +93,13 @@ class PoseStream:
 
     async def _take_lines(self, reader: asyncio.StreamReader, at_pose: Callable[[], None] = lambda: None) -> None:
         """Take lines until the end, except those that are too long. at_pose: called after each accepted pose."""
+        lines = _Lines()
         with suppress(ConnectionError):
             while line := await self._read_line(reader):
                 if self.take(line):
                     at_pose()
-                await asyncio.sleep(0)  # readline only yields if its buffer has no line: a flood would stop the frames
+                # readline only yields if its buffer has no line: a flood would stop the frames
+                await asyncio.sleep(0 if lines.admit() else lines.left)
 
     async def _read_line(self, reader: asyncio.StreamReader) -> bytes:
         try:
@@ -167,15 +173,38 @@ def _is_waitable(descriptor: int) -> bool:
     return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode) or os.isatty(descriptor)
 
 
+class _Lines:
+    """Counts the lines of a source in the present window of time."""
+
+    def __init__(self) -> None:
+        self._begun, self._count = time.monotonic(), 0
+
+    @property
+    def left(self) -> float:
+        """Time until the next window [s]."""
+        return max(self._begun + _WINDOW - time.monotonic(), 0.0)
+
+    def admit(self) -> bool:
+        """Count a line, and return whether it is one of the first _MOST of its window."""
+        if self.left == 0.0:
+            self._begun, self._count = time.monotonic(), 0
+        self._count += 1
+        return self._count <= _MOST
+
+
 class _Datagrams(asyncio.DatagramProtocol):
-    """Passes on the lines of each datagram."""
+    """Passes on the lines of datagrams, except those that are too many."""
 
     def __init__(self, stream: PoseStream) -> None:
         self._stream = stream
+        self._lines = _Lines()
 
     def datagram_received(self, data: bytes, _: object) -> None:
         lines = data.split(b"\n", _MOST_LINES)
         for line in lines[:_MOST_LINES]:
+            if not self._lines.admit():
+                self._stream.reject(f"more than {_MOST} pose lines in {1e3 * _WINDOW:.0f} ms")
+                return
             self._stream.take(line)
         if any(lines[_MOST_LINES:]):
             self._stream.reject(f"datagram has more than {_MOST_LINES} lines")

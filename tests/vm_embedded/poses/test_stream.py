@@ -1,5 +1,6 @@
 """Poses over real sockets: a camera that turns fast, poses that come late and shaken, and what is no pose."""
 
+import asyncio
 import json
 import random
 import socket
@@ -286,3 +287,47 @@ def test_another_reason_of_the_same_state_is_logged_but_not_another_number_in_it
     assert len(reasons()) == 2
     # On a busy core, the first frames may be late.
     assert found.states[found.states.index("pose_stale") :] == ["pose_stale", "stopping"]
+
+
+OLD = b'{"t": 1.0, "height": 0.8, "quaternion": [1, 0, 0, 0]}\n'
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock that only sleeps move."""
+    now, yielded = [1000.0], asyncio.sleep
+
+    async def sleep(seconds):
+        now[0] += seconds
+        await yielded(0)
+
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(asyncio, "sleep", sleep)
+    return now
+
+
+def test_lines_of_a_flood_are_read_at_four_in_a_millisecond(clock):
+    """Without pauses, the thread of the camera would not get Python's lock."""
+
+    async def read():
+        poses, reader = stream.PoseStream(PoseSettings(source="stdin"), lambda reason: None), asyncio.StreamReader()
+        reader.feed_data(4000 * OLD)
+        reader.feed_eof()
+        await poses._take_lines(reader)
+        return poses.bad
+
+    assert asyncio.run(read()) == 4000
+    assert 0.9 < clock[0] - 1000.0 < 1.1
+
+
+def test_datagrams_beyond_four_lines_in_a_millisecond_are_dropped(clock):
+    reasons = []
+    poses = stream.PoseStream(PoseSettings(source="udp:127.0.0.1:5600"), reasons.append)
+    datagrams = stream._Datagrams(poses)
+    for _ in range(10):
+        datagrams.datagram_received(64 * OLD, None)
+    assert poses.bad == 256 + 6
+    assert reasons[-1] == "more than 256 pose lines in 64 ms"
+    clock[0] += 0.1
+    datagrams.datagram_received(pose_line(MOTION, clock[0]), None)
+    assert poses.received == 1
