@@ -23,7 +23,7 @@ _OLDEST, _EARLY = 10.0, 0.05
 _MOST_LINES = 64
 """Lines of a datagram that are read: it may have 32,000, and frames wait meanwhile."""
 
-_MOST, _WINDOW = 256, 0.064
+_MOST_IN_WINDOW, _WINDOW = 256, 0.064
 """Lines of a source that are read within so many seconds, four for each millisecond. A robot sends fewer. With a flood
 of them, the thread of the camera would hardly ever get Python's lock, and the camera would count as lost."""
 
@@ -185,11 +185,11 @@ class _Lines:
         return max(self._begun + _WINDOW - time.monotonic(), 0.0)
 
     def admit(self) -> bool:
-        """Count a line, and return whether it is one of the first _MOST of its window."""
+        """Count a line, and return whether it is one of the first _MOST_IN_WINDOW of its window."""
         if self.left == 0.0:
             self._begun, self._count = time.monotonic(), 0
         self._count += 1
-        return self._count <= _MOST
+        return self._count <= _MOST_IN_WINDOW
 
 
 class _Datagrams(asyncio.DatagramProtocol):
@@ -203,7 +203,7 @@ class _Datagrams(asyncio.DatagramProtocol):
         lines = data.split(b"\n", _MOST_LINES)
         for line in lines[:_MOST_LINES]:
             if not self._lines.admit():
-                self._stream.reject(f"more than {_MOST} pose lines in {1e3 * _WINDOW:.0f} ms")
+                self._stream.reject(f"more than {_MOST_IN_WINDOW} pose lines in {1e3 * _WINDOW:.0f} ms")
                 return
             self._stream.take(line)
         if any(lines[_MOST_LINES:]):
