@@ -59,13 +59,13 @@ def _candidates(
 ) -> list[Candidate]:
     """The candidates of a class without a close look; those that are not objects have a reason."""
     view = observation.view
-    found: list[Candidate] = []
+    accepted: list[Candidate] = []
+    rejected: list[Candidate] = []
     for candidate in propose(observation, class_name, probabilities, settings):
         if candidate.reason is None:
-            accepted = [each for each in found if each.reason is None]
             candidate = judge(view, fit(view, candidate), accepted, settings)
-        found.append(candidate)
-    return found
+        (accepted if candidate.reason is None else rejected).append(candidate)
+    return accepted + rejected
 
 
 def _describe_candidate(observation: Observation, candidate: Candidate) -> Detection:
