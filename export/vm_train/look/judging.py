@@ -75,12 +75,12 @@ class Judge:
         centers = np.array([each.center for each in kept]).reshape(-1, 3)
         found = label_places(Tangents.at(seen.observation.view, centers), seen.truths)
         logits = logits_from(np.array([each.confidence for each in kept], dtype=np.float64))
-        counted = (found.labels != UNLABELED) & ~repeated(found.of)
+        counted = (found.labels != UNLABELED) & ~shown_before(found.of)
         visible = int((seen.truths.visible >= VISIBLE).sum())
         return Found(logits[counted], found.labels[counted] == OBJECT, visible, 1)
 
 
-def repeated(objects: npt.NDArray[np.int64]) -> Mask:
+def shown_before(objects: npt.NDArray[np.int64]) -> Mask:
     """Which of n places show an object that a place before them shows, too: a robot reports one place of each.
 
     objects (n,): number of the object at each place, -1 without one.

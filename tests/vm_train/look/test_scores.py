@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_train.look.judging import Found, repeated
+from vm_train.look.judging import Found, shown_before
 from vm_train.look.labels import NOTHING, OBJECT
 from vm_train.look.patch_set import PatchSet
 from vm_train.look.scores import LookResult, LookScore, average_precision
@@ -95,6 +95,6 @@ def test_the_result_counts_what_is_reported_and_what_is_missed():
 
 @given(st.lists(st.integers(-1, 4), max_size=12))
 def test_of_several_places_of_an_object_only_the_first_counts(objects):
-    counted = np.array(objects, dtype=np.int64)[~repeated(np.array(objects, dtype=np.int64))].tolist()
+    counted = np.array(objects, dtype=np.int64)[~shown_before(np.array(objects, dtype=np.int64))].tolist()
     assert [each for each in counted if each >= 0] == list(dict.fromkeys(each for each in objects if each >= 0))
     assert counted.count(-1) == objects.count(-1)
