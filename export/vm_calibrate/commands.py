@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -76,13 +76,10 @@ def pose(options: argparse.Namespace) -> None:
     _check_lens_path(options.output)
     if (options.balls is None) == (options.board is None):
         raise InputError("give either --balls, or --board with a video or pictures of the board on the floor")
-    names = (
-        ("radius", "label", "size") if options.balls is None else ("square", "charuco", "marker", "legacy", "thickness")
-    )
-    unused = [f"--{name}" for name in names if getattr(options, name)]
-    if unused:
-        method = "--board" if options.balls is None else "--balls"
-        raise InputError(f"{method} does not use {', '.join(unused)}; leave out one of them")
+    if options.board is not None:
+        _refuse_unused(options, "--board", ("radius", "label", "size"))
+    else:
+        _refuse_unused(options, "--balls", ("square", "charuco", "marker", "legacy", "thickness"))
     file = read_lens_file(options.lens)
     fit = _pose_from_balls(options, file.lens) if options.board is None else _pose_from_board(options, file.lens)
     _write(options.output, file.lens, fit.orientation, pose_lines(fit))
@@ -116,6 +113,13 @@ def _fit(kind: str, sightings: list[Sighting], size: Size) -> LensFit:
         raise problems[0]
     print("tried           " + ", ".join(f"{fit.kind} {fit.typical_error:.2f} px" for fit in fits))
     return min(fits, key=lambda fit: fit.typical_error)
+
+
+def _refuse_unused(options: argparse.Namespace, method: str, names: Sequence[str]) -> None:
+    """Raise InputError if an option is given that only the other method takes."""
+    unused = [f"--{name}" for name in names if getattr(options, name)]
+    if unused:
+        raise InputError(f"{method} does not use {', '.join(unused)}; leave out one of them")
 
 
 def _pose_from_balls(options: argparse.Namespace, lens: Lens) -> PoseFit:

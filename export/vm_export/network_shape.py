@@ -72,13 +72,11 @@ class NetworkShape:
         """`depth` convolutions, all but the last one of `width` channels.
 
         The networks of the paper (section "Network Architecture"). dilations: one for each convolution; empty if all
-        are 1, as in the paper. Raises InputError for another number of them.
+        are 1, as in the paper.
         """
-        if len(dilations) not in (0, depth):
-            raise InputError(f"a network of {depth} layers needs {depth} dilations, not {len(dilations)}")
-        wide = (Layer(kind, width, activation),) * (depth - 1)
-        layers = (*wide, Layer(kind, classes, head))
-        return cls(tuple(map(_with_dilation, layers, dilations or (1,) * depth)), neighbors)
+        layers = (*(Layer(kind, width, activation),) * (depth - 1), Layer(kind, classes, head))
+        spaced = zip(layers, dilations or (1,) * depth, strict=True)
+        return cls(tuple(replace(layer, dilation=dilation) for layer, dilation in spaced), neighbors)
 
     @property
     def classes(self) -> int:
@@ -119,7 +117,3 @@ class NetworkShape:
             return cls(tuple(Layer(**layer) for layer in data["layers"]), int(data["neighbors"]))
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"can't read the shape of a network: {error}") from error
-
-
-def _with_dilation(layer: Layer, dilation: int) -> Layer:
-    return replace(layer, dilation=dilation)

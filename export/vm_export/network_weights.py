@@ -91,7 +91,10 @@ def _network(layers: list[_Weights], neighbors: int) -> Network:
 
 
 def _dilated(layers: list[_Weights], dilations: Sequence[int]) -> list[_Weights]:
-    """Layers whose convolutions have these dilations, in their order; 1 if there are none. Raises ValueError."""
+    """The layers, with the dilations of their convolutions; without any, all are 1.
+
+    Raises ValueError for another number of dilations than of convolutions.
+    """
     convolutions = [index for index, each in enumerate(layers) if each.layer.kind != "dense"]
     found = list(layers)
     for index, dilation in zip(convolutions, dilations or [1] * len(convolutions), strict=True):

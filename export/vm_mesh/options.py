@@ -42,7 +42,8 @@ def plan_and_model(options: argparse.Namespace, file: LensFile | None) -> tuple[
     if given["shape"] not in (None, "cylinder"):
         entries["object_height"] = 0.0  # the network may be for a cylinder
     entries |= {name: value for name, value in given.items() if value is not None}
-    if entries["shape"] == "cylinder" and given["object_height"] is None and not entries["object_height"]:
+    has_height = given["object_height"] is not None or entries["object_height"] > 0.0
+    if entries["shape"] == "cylinder" and not has_height:
         raise InputError("a cylinder needs its height; give --object-height")
     shape = make_shape(entries["shape"], entries["radius"], entries["object_height"])
     height = 1.0 if file is None or file.orientation is None else file.orientation.height
@@ -81,7 +82,7 @@ def orientation_of(options: argparse.Namespace, file: LensFile, height: float) -
 
     Raises InputError if neither gives the height and the pitch.
     """
-    if file.orientation is None and (options.height is None or options.pitch is None):
+    if file.orientation is None and None in (options.height, options.pitch):
         raise InputError(f"{options.lens} does not have the orientation of the camera; give --height and --pitch")
     pitch, roll = (0.0, 0.0) if file.orientation is None else (file.orientation.pitch, file.orientation.roll)
     return Orientation.from_roll_pitch(
