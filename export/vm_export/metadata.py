@@ -10,6 +10,11 @@ from onnx import helper
 from vm_embedded.network.model_file import SEAL_KEY, sealed
 
 
+def metadata_of(content: bytes) -> dict[str, str]:
+    """The entries of a model file by key, without its seal. content: its bytes."""
+    return {each.key: each.value for each in onnx.load_from_string(content).metadata_props if each.key != SEAL_KEY}
+
+
 def with_metadata(content: bytes, entries: Mapping[str, str | None]) -> bytes:
     """A model file's bytes with other entries of metadata, and a new seal. All else stays as it is.
 

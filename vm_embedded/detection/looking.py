@@ -108,7 +108,9 @@ def look_closely(
     explain: also the rejected proposals, with their reasons. watch: gets the stages propose and look. Raises
     ModelError if the network does not run.
     """
-    centers = propose_places(observation, probabilities, look.contract.above, settings.max_proposals)
+    contract = look.contract
+    shifts = observation.shifts_to(contract.object_class)
+    centers = propose_places(observation, probabilities, contract.above, settings.max_proposals, shifts)
     watch.lap("propose")
     places = PlanePlaces(observation, centers)
     answers = look_at(places, look)

@@ -25,7 +25,8 @@ class Network(Protocol):
     """Anything that gives points their probabilities: a Session, or a network in torch."""
 
     def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
-        """Probabilities (m, C) of a layout's slots, from their colors (3, m) and which slots (m,) are on screen."""
+        """Probabilities and shifts (m, manifest.outputs) of a layout's slots, from their colors (3, m) and which slots
+        (m,) are on screen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +35,8 @@ class Observation:
 
     pyramid: the frame. view: its mesh points, lens and orientation. manifest: of the network. projected: pixels of the
     m slots of the layout. A slot is one place in the network's input; it holds a point, a copy of a point, or nothing.
-    Only original points count as on screen. slot_probabilities (m, C): the network's output; it has no meaning for
-    slots off screen. timing_ms: time of each stage [ms].
+    Only original points count as on screen. slot_probabilities (m, C), slot_shifts (m, 2 or 0): the network's outputs;
+    they have no meaning for slots off screen. timing_ms: time of each stage [ms].
     """
 
     pyramid: Pyramid
@@ -43,6 +44,7 @@ class Observation:
     manifest: Manifest
     projected: Projection[Layout]
     slot_probabilities: Singles
+    slot_shifts: Singles
     timing_ms: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -52,6 +54,10 @@ class Observation:
     def layout(self) -> Layout:
         """The network's order of the points."""
         return self.view.layout
+
+    def shifts_to(self, class_name: str) -> Singles | None:
+        """Shifts (m, 2) of the slots to the centers of objects of a class, as propose_places takes them, if any."""
+        return self.slot_shifts if class_name == self.manifest.shifts else None
 
     @cached_property
     def _shown(self) -> Indices:
@@ -102,6 +108,7 @@ def classify(
     shown = projected.only(layout.original)
     colors = normalized(sample(pyramid, projected.pixels, view.levels), manifest.colors, shown.on_screen)
     watch.lap("sample")
-    probabilities = network.run(layout, colors, projected.on_screen)
+    answers = network.run(layout, colors, projected.on_screen)
     watch.lap("infer")
-    return Observation(pyramid, view, manifest, shown, probabilities, watch.stages)
+    classes = len(manifest.classes)
+    return Observation(pyramid, view, manifest, shown, answers[:, :classes], answers[:, classes:], watch.stages)

@@ -3,6 +3,9 @@
 A likely place is one that an object would fill with likely points. Its score is the sum of their probabilities. The
 place with the highest score comes first; then the best place outside of the first object, and so on. In the end each
 place moves to the mean of the points in it, weighted by their probabilities.
+
+A network may also shift each point to where it sees the center of its object. (The reference trains such networks as
+"seekers".) Then the places are where the points are shifted to, and points that agree on a center count.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ import numpy as np
 
 from ..arrays import Floats, Mask, Singles
 from .observation import Observation
+from .patches import Tangents
 
 _MOST_POINTS = 256
 """Largest number of points that are compared in pairs: a frame of noise must not cost a second."""
@@ -18,11 +22,20 @@ _MOST_POINTS = 256
 _WHOLE_AND_CORE = np.array([1.0, 0.9])[:, None, None]
 """Shares of an object's radius. Only points in its core count for its score: those at the outline show both sides."""
 
+_WHOLE_AND_SAME = np.array([1.0, 0.5])[:, None, None]
+"""Shares of a radius, for shifted points. Points in the second one agree on a center."""
 
-def propose_places(observation: Observation, probabilities: Singles, above: float, most: int) -> Floats:
+_FARTHEST = 3.0
+"""Limit of a shift [expected radii]: a damaged network must not lead behind the camera."""
+
+
+def propose_places(
+    observation: Observation, probabilities: Singles, above: float, most: int, shifts: Singles | None = None
+) -> Floats:
     """Centers (c, 3) of at most `most` places, best first, from the slots' probabilities (m,) of a class.
 
     The centers are relative to the camera in the mesh frame [m]. above: probability of a point from which it counts.
+    shifts (m, 2): of the points to the right and down, to the centers of their objects [expected radii].
     """
     view = observation.view
     likely = np.flatnonzero((probabilities > above) & observation.projected.on_screen)
@@ -33,10 +46,18 @@ def propose_places(observation: Observation, probabilities: Singles, above: floa
     likely = likely[np.argsort(observation.layout.slots[likely])]  # the same digits for every layout
     rays, p = view.layout.rays[likely], probabilities[likely]
     centers = view.shape.center_along(rays, view.height)
-    near, core = view.shape.covers(rays, centers, view.height, _WHOLE_AND_CORE)
+    if shifts is None:
+        near, core = view.shape.covers(rays, centers, view.height, _WHOLE_AND_CORE)
+        together = near
+    else:
+        right, down = np.clip(shifts[likely].astype(np.float64), -_FARTHEST, _FARTHEST).T
+        rays = Tangents.at(view, centers).rays(right, down)
+        centers = view.shape.center_along(rays, view.height)
+        near, core = view.shape.covers(rays, centers, view.height, _WHOLE_AND_SAME)
+        together = core
     chosen = best_apart(core.astype(np.float32) @ p, near, most)
     # Once only: a second move would lead away to larger things near by, and fewer balls would be found.
-    middle = (near[chosen] * p) @ rays
+    middle = (together[chosen] * p) @ rays
     return view.shape.center_along(middle / np.linalg.norm(middle, axis=1, keepdims=True), view.height)
 
 
