@@ -88,7 +88,7 @@ def check_writable(path: Path, inputs: Iterable[Path | None] = ()) -> None:
     inputs: as for `check_not_input`.
     """
     try:
-        if not path.resolve().parent.is_dir():
+        if not Path(os.path.realpath(path)).parent.is_dir():  # Path.resolve raises RuntimeError for a loop of links
             raise InputError(f"can't write {path}: there is no folder {path.parent}")
         if path.is_dir():
             raise InputError(f"can't write {path}: this is a folder")

@@ -95,6 +95,14 @@ def test_an_output_that_replaces_no_input_passes(tmp_path):
     check_writable(Path(os.devnull), [Path(os.devnull)])
 
 
+def test_an_output_may_replace_a_link_to_itself(tmp_path):
+    path = tmp_path / "a.json"
+    path.symlink_to(path)
+    check_writable(path)
+    write_file(path, "new")
+    assert path.read_text() == "new"
+
+
 @pytest.mark.parametrize(("content", "written"), [("Bäll\n", "Bäll\n".encode()), (b"\x00\xff", b"\x00\xff"), ("", b"")])
 def test_a_file_is_written_as_a_whole(tmp_path, content, written):
     path = tmp_path / "file"

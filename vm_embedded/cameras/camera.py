@@ -22,6 +22,10 @@ EARLY = 0.005
 """How far in the future a frame's time may be [s]: the two clocks are read one after the other."""
 
 
+_DIGITS = 9
+"""Most digits of a camera's number: OpenCV takes one of 32 bits."""
+
+
 class CameraError(VisualMeshError):
     """A camera that can't be opened or has disappeared. Opening it again may help."""
 
@@ -103,6 +107,11 @@ class CameraSettings:
 
     def __post_init__(self) -> None:
         check_entries(self)
+
+
+def camera_number(source: str) -> int | None:
+    """The number of a device, as in /dev/videoN; None for any other source."""
+    return int(source) if source.isascii() and source.isdigit() and len(source) <= _DIGITS else None
 
 
 def without_password(source: str) -> str:

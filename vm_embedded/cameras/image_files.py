@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..files import check_regular, exists, is_file
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
+from .camera import camera_number
 from .decoding import decode
 from .image_header import MAX_MEGAPIXELS
 from .video_size import check_frame, check_video
@@ -124,7 +125,7 @@ def _open(name: str, path: Path, raw: bool, max_megapixels: float) -> Source:
         return _images(_without_companions(found), read, _recorded_times(path / MESSAGES))
     if path.is_file() and path.suffix.lower() in IMAGE_SUFFIXES:
         return _images([path], read)
-    if path.exists() or name.isdigit():
+    if path.exists() or camera_number(name) is not None:
         return _video(name, max_megapixels)
     if glob.has_magic(name):
         matches = glob.glob(name, recursive=True)  # noqa: PTH207 (the pattern may begin anywhere, at / too)
@@ -224,8 +225,9 @@ def _video(name: str, max_megapixels: float) -> Source:
     files = (Path(name),) if is_file(Path(name)) else ()
     for path in files:
         path.open("rb").close()  # OpenCV does not say why it can't read a file
-    capture = cv2.VideoCapture(int(name) if name.isdigit() else name)
-    live = name.isdigit() or Path(name).is_char_device()
+    number = camera_number(name)
+    capture = cv2.VideoCapture(name if number is None else number)
+    live = number is not None or Path(name).is_char_device()
     if not capture.isOpened():
         if live:
             raise InputError(f"can't open camera {name}")

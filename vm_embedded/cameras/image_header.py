@@ -32,7 +32,7 @@ def check_pixels(width: int, height: int, max_megapixels: float) -> None:
     """Raise InputError for more pixels than this [Mpx]."""
     if width * height > 1e6 * max_megapixels:
         raise InputError(
-            f"has {width} x {height} px, {1e-6 * width * height:.0f} Mpx; at most {max_megapixels:g} Mpx are decoded"
+            f"has {width} x {height} px, {1e-6 * width * height:.4g} Mpx; at most {max_megapixels:g} Mpx are decoded"
         )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import exists
-from .camera import EARLY, BrokenFrameError, CameraError, CameraSettings, Shot, without_password
+from .camera import EARLY, BrokenFrameError, CameraError, CameraSettings, Shot, camera_number, without_password
 from .decoding import decode_frame
 from .frame_clock import FrameClock
 from .video_size import check_frame, check_video
@@ -138,8 +138,9 @@ class OpenCvCamera:
 
 def device_path(source: str) -> Path | None:
     """The path of a V4L2 device given by number or path; None for any other source."""
-    if source.isascii() and source.isdigit():
-        return Path(f"/dev/video{int(source)}")
+    number = camera_number(source)
+    if number is not None:
+        return Path(f"/dev/video{number}")
     return Path(source) if source.startswith("/dev/") else None
 
 

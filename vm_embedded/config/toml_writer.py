@@ -27,7 +27,7 @@ def to_commented_toml(configuration: Any, header: str = "") -> str:
 def _commented_entry(entry: Field[Any], value: Any) -> str:
     unit = f" [{entry.metadata['unit']}]" if entry.metadata.get("unit") else ""
     comment = f"# {entry.metadata['help']}{unit}{_limits(entry)}"
-    return f"{comment}\n" + (f"# {entry.name} =" if value is None else f"{entry.name} = {_toml(value)}")
+    return f"{comment}\n" + (f"# {entry.name} =" if value is None else f"{entry.name} = {toml_value(value)}")
 
 
 def _limits(entry: Field[Any]) -> str:
@@ -39,12 +39,13 @@ def _limits(entry: Field[Any]) -> str:
     return f"; {low:g} to {high:g}" if high != float("inf") else f"; at least {low:g}"
 
 
-def _toml(value: Any) -> str:
+def toml_value(value: Any) -> str:
+    """A text, number, boolean, list or table as TOML, in one line."""
     if isinstance(value, Mapping):
-        pairs = ", ".join(f"{_toml(name)} = {_toml(each)}" for name, each in value.items())
+        pairs = ", ".join(f"{toml_value(name)} = {toml_value(each)}" for name, each in value.items())
         return f"{{ {pairs} }}" if pairs else "{}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(_toml(each) for each in value) + "]"
+        return "[" + ", ".join(toml_value(each) for each in value) + "]"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):

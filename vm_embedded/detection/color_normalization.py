@@ -23,8 +23,10 @@ def normalized(colors: Singles, kind: str, counted: Mask | None = None) -> Singl
 
     Sums are in double precision, so the digits don't depend on the order of the points.
     """
+    if kind == "absolute":
+        return colors
     seen = colors if counted is None else colors.compress(counted, axis=1)
-    if kind == "absolute" or not seen.size:
+    if not seen.size:
         return colors
     deviations = seen.astype(np.float64)
     mean = deviations.mean(axis=1, keepdims=True)

@@ -114,9 +114,12 @@ class Detections:
         if suffix == ".json":
             content = self.to_json().encode() + b"\n"
         elif suffix in _PICTURES:
-            content = cv2.imencode(suffix, self.draw(), _ENCODING.get(suffix, ()))[1].tobytes()
+            good, encoded = cv2.imencode(suffix, self.draw(), _ENCODING.get(suffix, ()))
+            content = encoded.tobytes() if good else b""
         else:
             raise InputError(f"can't write {path}: {unknown('suffix', suffix, (*_PICTURES, '.json'))}")
+        if not content:
+            raise InputError(f"can't write {path}: OpenCV can't encode it; a .webp has at most 16383 px on each side")
         write_file(path, content)
 
     @property

@@ -22,9 +22,12 @@ _BAYER = {
 FORMATS = (*_CHANNELS, "gray", *_BAYER)
 """Pixel formats of a frame."""
 
+_LARGEST_SIDE = 32766
+"""Largest width and height that OpenCV's remap takes [px]."""
+
 
 def checked_image(image: AnyImage | None, format: str) -> Image:
-    """The image, if it has that format: uint8, (height, width, channels), at least 2 x 2 px.
+    """The image, if it has that format: uint8, (height, width, channels), with sides of 2 to 32766 px.
 
     A gray or Bayer image may come without its last axis, and loses it. Raises InputError.
     """
@@ -41,8 +44,11 @@ def checked_image(image: AnyImage | None, format: str) -> Image:
     flat = image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 1)
     if not (image.ndim == 3 and image.shape[2] == channels) and not (channels == 1 and flat):
         raise InputError(f"a {format} image must have the shape (height, width, {channels}), not {image.shape}")
-    if min(image.shape[:2]) < 2:
-        raise InputError(f"image must have at least 2 x 2 px, not {image.shape[1]} x {image.shape[0]}")
+    if min(image.shape[:2]) < 2 or max(image.shape[:2]) > _LARGEST_SIDE:
+        raise InputError(
+            f"image must have from 2 x 2 to {_LARGEST_SIDE} x {_LARGEST_SIDE} px, not {image.shape[1]} x "
+            f"{image.shape[0]}"
+        )
     return image.reshape(*image.shape[:2]) if channels == 1 else image
 
 

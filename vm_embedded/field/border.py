@@ -27,8 +27,8 @@ resolve."""
 _ENOUGH = 0.95
 """A hull that this share of the places agrees with is good enough."""
 
-_MOST_REMOVED = 8
-"""Largest number of corners that are removed from the hull."""
+_MOST_HULLS = 8
+"""Largest number of hulls that are tried, each without a corner of the one before."""
 
 
 def find_border(points: GroundPoints) -> Floats:
@@ -41,7 +41,7 @@ def find_border(points: GroundPoints) -> Floats:
     limit = max(_AGREES, points.across / points.height)
     left = np.arange(len(places))
     best, most = left[:0], -1
-    for _ in range(_MOST_REMOVED):
+    for _ in range(_MOST_HULLS):
         corners = left[_hull(places[left])]
         agreeing = int((np.abs(_beyond(places, corners)) < limit).sum())
         if agreeing > most + 1:  # one place more may agree by chance; then the hull with more corners stays

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Chosen, Floats, Mask
+from .ground_points import cross
 from .lines import LinePoints
 
 _TRIES = 120
@@ -103,31 +104,34 @@ def _tolerance(points: LinePoints) -> Floats:
 
 def _on(points: LinePoints, center: Floats, radius: float) -> Mask:
     """Which points (n,) are on a circle."""
+    lengths, normals = _from_center(points, center)
+    return np.asarray(np.abs(lengths - radius) < points.tolerance(normals))
+
+
+def _from_center(points: LinePoints, center: Floats) -> tuple[Floats, Floats]:
+    """Distances (n,) [m] of points from a center, and unit vectors (n, 2) from it to them."""
     away = points.positions - center
-    off = np.abs(np.hypot(away[:, 0], away[:, 1]) - radius)
-    normals = away / np.maximum(np.hypot(away[:, 0], away[:, 1]), 1e-9)[:, None]
-    return np.asarray(off < points.tolerance(normals))
+    lengths = np.hypot(away[:, 0], away[:, 1])
+    return lengths, away / np.maximum(lengths, 1e-9)[:, None]
 
 
 def _through(triples: Floats) -> tuple[Floats, Floats]:
     """Centers (t, 2) and radii (t,) of circles through three points each (t, 3, 2); infinite for points in a row."""
     a, b = triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0]
-    cross = 2.0 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-    cross[np.abs(cross) < 1e-6] = np.nan
+    area = 2.0 * cross(a, b)
+    area[np.abs(area) < 1e-6] = np.nan
     aa, bb = (a**2).sum(axis=1), (b**2).sum(axis=1)
-    x = (b[:, 1] * aa - a[:, 1] * bb) / cross
-    y = (a[:, 0] * bb - b[:, 0] * aa) / cross
+    x = (b[:, 1] * aa - a[:, 1] * bb) / area
+    y = (a[:, 0] * bb - b[:, 0] * aa) / area
     return triples[:, 0] + np.stack([x, y], axis=1), np.nan_to_num(np.hypot(x, y), nan=np.inf)
 
 
 def _fit(points: LinePoints, center: Floats, radius: float) -> tuple[Floats, float]:
     """One step of Gauss and Newton towards the circle with the least squares of distances, weighted by precision."""
-    away = points.positions - center
-    length = np.hypot(away[:, 0], away[:, 1])
-    normals = away / np.maximum(length, 1e-9)[:, None]
+    lengths, normals = _from_center(points, center)
     precision = np.sqrt(points.weights) / points.tolerance(normals)
-    slopes = np.column_stack([normals, np.ones(len(away))]) * precision[:, None]
-    step = np.linalg.lstsq(slopes, (length - radius) * precision, rcond=None)[0]
+    slopes = np.column_stack([normals, np.ones(len(lengths))]) * precision[:, None]
+    step = np.linalg.lstsq(slopes, (lengths - radius) * precision, rcond=None)[0]
     return center + step[:2], radius + float(step[2])
 
 

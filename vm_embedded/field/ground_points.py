@@ -67,10 +67,9 @@ def split(columns: npt.NDArray[np.integer[Any]], values: Floats) -> tuple[Chosen
     For one column with the values 1, 1, -1, -1 these are 1 and 2.
     """
     starts = np.flatnonzero(np.diff(columns, prepend=-1))
-    sums = np.cumsum(values)
-    before = (sums[starts] - values[starts])[np.cumsum(np.diff(columns, prepend=-1) > 0) - 1]
-    sums = sums - before
-    best = np.maximum.reduceat(sums, starts)
     counts = np.diff(np.append(starts, len(values)))
+    sums = np.cumsum(values)
+    sums = sums - np.repeat(sums[starts] - values[starts], counts)
+    best = np.maximum.reduceat(sums, starts)
     last = np.maximum.reduceat(np.where(sums == np.repeat(best, counts), np.arange(len(values)), -1), starts)
     return np.where(best > 0.0, last, -1), best

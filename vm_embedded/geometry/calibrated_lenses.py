@@ -117,17 +117,21 @@ class BrownLens(CalibratedLens):
 
     def unproject(self, pixels: Floats, size: Size) -> Floats:
         distorted = self._normalized(pixels)
+        table = np.linspace(0.0, math.tan(self.limit), 4096)
+        radii = table * self._radial(table * table), table
         undistorted = distorted
         for _ in range(20):  # subtract the shift at the last estimate; converges because the tangential shift is small
-            undistorted = self._without_radial(distorted - self._tangential(undistorted))
+            undistorted = self._without_radial(distorted - self._tangential(undistorted), radii)
         rays = np.column_stack([np.ones(len(pixels)), -undistorted])
         return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
-    def _without_radial(self, distorted: Floats) -> Floats:
-        """Coordinates (n, 2) without their radial distortion; NaN beyond the limit."""
-        table = np.linspace(0.0, math.tan(self.limit), 4096)
+    def _without_radial(self, distorted: Floats, radii: tuple[Floats, Floats]) -> Floats:
+        """Coordinates (n, 2) without their radial distortion; NaN beyond the limit.
+
+        radii: a table of distorted and undistorted ones (m,) up to the limit.
+        """
         radius = np.hypot(distorted[:, 0], distorted[:, 1])
-        found = np.interp(radius, table * self._radial(table * table), table, right=np.nan)
+        found = np.interp(radius, *radii, right=np.nan)
         for _ in range(4):  # Newton's method, starting from the table's value
             step = 1e-6
             value, ahead = ((r * self._radial(r * r)) for r in (found, found + step))

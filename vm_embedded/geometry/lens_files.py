@@ -166,7 +166,7 @@ def lens_from_calibration(table: Mapping[str, Any]) -> Lens:
         "optical_center": (k[2], k[5]),
         "size": None if width is None or height is None else (_number(width, "width"), _number(height, "height")),
     }
-    if abs(k[1]) > 1e-6 * k[0]:
+    if abs(k[1]) > 1e-6 * abs(k[0]):
         raise InputError(f"camera_matrix has a skew of {k[1]:g}, but only calibrations without skew are supported")
     if model.lower() in _FISHEYE:
         return FisheyeLens(fov=2.0 * math.pi, coefficients=tuple(coefficients), **common)

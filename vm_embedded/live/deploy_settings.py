@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import binascii
 from dataclasses import Field, dataclass
 from typing import Any
 
@@ -21,7 +20,7 @@ def _checked_signer(entry: Field[Any], value: Any) -> str:
         return ""
     try:
         key = base64.b64decode(words[1], validate=True) if words[0] == "ssh-ed25519" else b""
-    except (IndexError, binascii.Error):
+    except (IndexError, ValueError):
         key = b""
     if not key.startswith(_ED25519) or len(key) != len(_ED25519) + 32:
         raise InputError(

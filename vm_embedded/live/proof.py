@@ -83,9 +83,9 @@ def _difference(found: Canary, expected: Canary) -> str:
         if same is None:
             return f"no {each.class_name} at ({x:.0f}, {y:.0f}) px"
         left.remove(same)
-    for each in left:
-        x, y = each.center
-        return f"a {each.class_name} at ({x:.0f}, {y:.0f}) px, where the exporter saw none"
+    if left:
+        x, y = left[0].center
+        return f"a {left[0].class_name} at ({x:.0f}, {y:.0f}) px, where the exporter saw none"
     if set(found.points) != set(expected.points):
         return f"points of the classes {sorted(expected.points)}, the model has {sorted(found.points)}"
     for name, count in expected.points.items():

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
 
+from ..config.toml_writer import toml_value
 from ..config.units import parse_angle
 from ..errors import InputError
 from ..geometry.lens_files import LensFile, lens_from_table
@@ -24,7 +24,7 @@ def read_model_entry(value: object) -> str:
 def commented_model(value: str) -> str:
     """The entry as TOML, with a comment."""
     comment = f"# the network: a file written by vm-export, or one that comes with the package: {', '.join(SHIPPED)}"
-    return f"{comment}\nmodel = {json.dumps(value)}"
+    return f"{comment}\nmodel = {toml_value(value)}"
 
 
 def read_lens_entry(value: object) -> Path | LensFile:
@@ -63,7 +63,7 @@ def commented_lens(value: LensFile | None) -> str:
         "# distortion and size [px]\n"
     )
     if value is not None and value.path is not None:  # absolute, because the new file may be in another folder
-        return comment + f"lens = {json.dumps(str(value.path.absolute()))}"
+        return comment + f"lens = {toml_value(str(value.path.absolute()))}"
     lens = value.lens if value is not None else None
     if not isinstance(lens, RadialLens):
         return comment + '# lens = "lens.yaml"'

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from ..errors import InputError, unknown
+from ..files import exists
 
 SHIPPED = ("ball", "ball-small", "soccer")
 """Their names. `ball-small` is for the slowest machines; `soccer` also finds the features of a field."""
@@ -30,8 +30,8 @@ def model_path(model: str | Path, folder: Path = Path()) -> Path:
             )
         return path
     path = folder / model
-    # Path takes an empty name for the current folder, and Path.exists raises for long names.
-    if not str(model) or (not path.suffix and not os.path.exists(path)):  # noqa: PTH110
+    # Path takes an empty name for the current folder.
+    if not str(model) or (not path.suffix and not exists(path)):
         raise InputError(f"{unknown('network', str(model), SHIPPED)}, or the path of a model file")
     return path
 

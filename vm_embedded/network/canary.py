@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import binascii
 import hashlib
 import json
 import math
@@ -65,15 +64,7 @@ class Canary:
                 tuple(_object(each) for each in data["objects"]),
                 {_text(name): int(count) for name, count in data["points"].items()},
             )
-        except (
-            KeyError,
-            TypeError,
-            ValueError,
-            OverflowError,
-            AttributeError,
-            RecursionError,
-            binascii.Error,
-        ) as error:
+        except (KeyError, TypeError, ValueError, OverflowError, AttributeError, RecursionError) as error:
             raise ModelError(f"its canary can't be read: {error}") from error
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import binascii
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import permutations
@@ -50,7 +49,7 @@ class LookTest:
             answers = np.array(data["answers"], dtype=np.float32).reshape(-1, len(ANSWERS))
             content = np.frombuffer(base64.b64decode(data["patches"], validate=True), dtype=np.uint8)
             patches = content.reshape(-1, size, size, 3)
-        except (KeyError, TypeError, ValueError, OverflowError, binascii.Error) as error:
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise ModelError(f"self-test of the close look can't be read: {error}") from error
         made = len(answers) - len(patches)
         if not 0 <= made <= (_MOST_MADE if len(patches) else 0):

@@ -8,7 +8,6 @@ wire format and the few fields that matter here.
 from __future__ import annotations
 
 import base64
-import binascii
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -150,7 +149,7 @@ def _inner_file(metadata: dict[str, str], key: str) -> bytes:
     try:
         content = base64.b64decode(metadata[key], validate=True)
         _read_fields(content)
-    except (ModelError, binascii.Error, ValueError) as error:
+    except (ModelError, ValueError) as error:
         raise ModelError(f"{_in_words(key)} can't be read: {error}") from error
     return content
 

@@ -15,7 +15,7 @@ from tests.vm_embedded.cli.commands import one_complaint, run
 from tests.vm_embedded.live.running import DEMO
 from vm_embedded.cameras.camera import BrokenFrameError
 from vm_embedded.cameras.decoding import decode, decode_frame
-from vm_embedded.cameras.image_header import image_size
+from vm_embedded.cameras.image_header import check_pixels, image_size
 from vm_embedded.cameras.library_messages import library_messages
 from vm_embedded.cameras.synthetic import SIZE
 from vm_embedded.errors import InputError
@@ -125,6 +125,13 @@ def test_attack_2_an_image_that_declares_a_huge_size_is_refused_before_it_is_dec
         decode_frame(content)
     with pytest.raises(InputError, match="at most 100 Mpx"):
         decode(content, max_megapixels=100.0)
+
+
+def test_a_size_just_above_the_limit_does_not_read_like_the_limit():
+    with pytest.raises(InputError, match=r"0\.3072 Mpx; at most 0\.3 Mpx"):
+        check_pixels(640, 480, 0.3)
+    with pytest.raises(InputError, match=r"50\.2 Mpx; at most 50 Mpx"):
+        check_pixels(8000, 6275, 50.0)
 
 
 def test_a_png_whose_chunk_declares_gigabytes_is_refused_before_it_is_decoded():

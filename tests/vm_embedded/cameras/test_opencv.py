@@ -204,6 +204,7 @@ def test_names_of_devices():
     assert str(device_path("/dev/v4l/by-id/usb-x")) == "/dev/v4l/by-id/usb-x"
     assert device_path("http://a/0") is None
     assert device_path("²") is None
+    assert device_path("9" * 5000) is None
 
 
 def test_what_no_camera_of_opencv_can_be_asked_is_refused():

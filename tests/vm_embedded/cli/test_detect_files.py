@@ -422,7 +422,7 @@ def test_a_broken_image_is_named(tmp_path, content, lens):
     assert done.stdout == ""
 
 
-@pytest.mark.parametrize("name", ["missing.jpg", "missing/", "none*.jpg"])
+@pytest.mark.parametrize("name", ["missing.jpg", "missing/", "none*.jpg", "²"])
 def test_a_missing_source_is_named(name, tmp_path):
     one_complaint(detect(name, code=1, cwd=tmp_path), name)
 

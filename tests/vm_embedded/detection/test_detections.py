@@ -5,10 +5,11 @@ import subprocess
 import sys
 
 import cv2
+import numpy as np
 import pytest
 
 from tests.drawn_scenes import IMAGES, MODEL
-from vm_embedded import Detector, InputError, Settings, read_lens_file
+from vm_embedded import Detector, InputError, Orientation, Rectilinear, Settings, read_lens_file
 
 LENS = IMAGES[0].with_name(IMAGES[0].name.replace("image", "lens")).with_suffix(".yaml")
 
@@ -83,6 +84,19 @@ def test_what_can_not_be_drawn_or_saved_is_refused(image, detections, tmp_path):
     with pytest.raises(InputError, match="can't write"):
         detections.save(tmp_path / "nowhere" / "found.jpg")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_picture_that_is_too_large_for_its_format_or_for_opencv_is_refused(tmp_path):
+    detector, pose = Detector.from_file(MODEL), Orientation.from_roll_pitch(0.6, pitch=0.4)
+    lens = Rectilinear(focal_length=9000.0, fov=1.5)
+    wide = detector.detect(np.zeros((2, 16384, 3), np.uint8), pose, lens)
+    with pytest.raises(InputError, match=r"can't write .*found.webp: .* at most 16383 px"):
+        wide.save(tmp_path / "found.webp")
+    assert not list(tmp_path.iterdir())
+    detector.detect(np.zeros((32766, 2, 3), np.uint8), pose, lens)
+    for shape in ((32767, 2, 3), (2, 32767, 3)):
+        with pytest.raises(InputError, match=rf"to 32766 x 32766 px, not {shape[1]} x {shape[0]}"):
+            detector.detect(np.zeros(shape, np.uint8), pose, lens)
 
 
 @pytest.mark.parametrize(("format", "code"), [("rgb", cv2.COLOR_BGR2RGB), ("rgba", cv2.COLOR_BGR2RGBA)])

@@ -358,6 +358,7 @@ WRONG = {
         "fisheye_model must be 0 or 1, not '7'",
     ),
     "skew": (camera_info("plumb_bob", PLUMB_BOB).replace("[612.25, 0,", "[612.25, 0.5,"), "skew"),
+    "mirrored": (camera_info("plumb_bob", PLUMB_BOB).replace("[612.25, 0,", "[-612.25, 0,"), "focal lengths .*-612"),
     "cut matrix": (camera_info("plumb_bob", PLUMB_BOB).replace(", 0, 0, 1]", "]"), "camera_matrix must be 9"),
     "matrix without data": ("camera_matrix: {rows: 3, cols: 3}\n", "camera_matrix"),
     "words for a matrix": ("camera_matrix: words\n", "camera_matrix"),

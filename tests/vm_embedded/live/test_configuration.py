@@ -4,12 +4,14 @@ from dataclasses import asdict
 
 import pytest
 
+from vm_embedded.config.toml_reader import parse_toml
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens_files import format_lens_file
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.live.configuration import Configuration, read_configuration
+from vm_embedded.live.top_level_entries import commented_model
 from vm_embedded.network.bundled import DEFAULT, model_path
 
 FULL = """\
@@ -219,3 +221,8 @@ def test_the_orientation_comes_from_the_lens_file_unless_a_height_is_given(write
     assert read_configuration(write("")).fixed_orientation() is None
     with pytest.raises(InputError, match="pitch and roll need a height"):
         read_configuration(write(lens + "[orientation]\npitch = 0.1\n")).fixed_orientation()
+
+
+def test_a_printed_model_has_the_name_that_it_was_given():
+    name = "/home/\N{ROBOT FACE}/model.onnx"
+    assert parse_toml(commented_model(name)) == {"model": name}
