@@ -19,6 +19,9 @@ from .binary_form import to_binary
 from .file_channel import DescriptorChannel, FileChannel
 from .messages import Message, to_json_line, to_ros
 
+_PAUSE = 0.1
+"""Time between two reads of what a reader sends [s]: a flood of it would take the processor from the frames."""
+
 FORMATS = ("json", "ros")
 UNIX_FORMATS = ("lines", "binary")
 
@@ -160,7 +163,7 @@ class UnixChannel:
         self.failure = ""
         self._listener, self._backlog = UnixListener(path, "--output-unix"), backlog
         self._writers: set[asyncio.StreamWriter] = set()
-        self._acceptor = Acceptor(self._listener.socket, self._serve, 4096)
+        self._acceptor = Acceptor(self._listener.socket, self._serve, limit=1)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._writers) >= MOST_CONNECTIONS:
@@ -169,12 +172,12 @@ class UnixChannel:
         self._writers.add(writer)
         try:
             while await reader.read(4096):  # readers send nothing; an empty read means that they left
-                pass
+                await asyncio.sleep(_PAUSE)
         except (ConnectionError, asyncio.CancelledError):  # asyncio would report the latter as a failure
             pass
         finally:
             self._writers.discard(writer)
-            writer.close()
+            writer.transport.abort()  # close would wait for a reader that only stopped sending, with an open descriptor
 
     def send(self, line: bytes) -> None:
         """Send a line, or a message in the binary form, to all readers that keep up."""
