@@ -8,6 +8,7 @@ import ipaddress
 import os
 import socket
 import stat
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import Field
 from pathlib import Path
@@ -18,8 +19,15 @@ from .errors import InputError, InUseError, NetworkError
 _MAX_PATH_BYTES = 107
 """Longest path of a Unix socket on Linux [bytes]."""
 
-BACKLOG = 16
-"""Connections that may wait to be accepted, and that are accepted at a time."""
+_BACKLOG = 16
+"""Connections to a Unix socket that may wait to be accepted."""
+
+_AT_A_TIME, _PAUSE = 4, 0.032
+"""Connections after which there is a pause, and its length [s]. A flood of them would take the processor from the
+frames."""
+
+_RETRY_PAUSE = 1.0
+"""Time after which a connection is accepted again if the system had no descriptor for it [s]."""
 
 MOST_CONNECTIONS = 64
 """Largest number of connections to a socket."""
@@ -116,7 +124,7 @@ class UnixListener:
                 self.socket.bind(str(self.path))
             finally:
                 os.umask(mask)
-            self.socket.listen(BACKLOG)
+            self.socket.listen(_BACKLOG)
             self.socket.setblocking(False)
             self._inode = self.path.stat().st_ino
         except OSError as error:
@@ -134,6 +142,42 @@ class UnixListener:
                 self.path.unlink()
         except OSError:
             return
+
+
+Serve = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
+"""Serves a connection until its end."""
+
+
+class Acceptor:
+    """Accepts the connections to a socket that listens, _AT_A_TIME before each _PAUSE, and serves each in a task.
+
+    limit: largest line or head that is read from a connection [bytes]. Create it while the loop runs.
+    """
+
+    def __init__(self, listening: socket.socket, serve: Serve, limit: int) -> None:
+        self._listening, self._serve, self._limit = listening, serve, limit
+        listening.setblocking(False)
+        self._task = asyncio.ensure_future(self._accept())
+
+    async def _accept(self) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            try:
+                for _ in range(_AT_A_TIME):
+                    connection, _ = await loop.sock_accept(self._listening)
+                    await loop.connect_accepted_socket(self._protocol, connection)
+            except OSError as error:
+                loop.call_exception_handler({"message": "can't accept a connection", "exception": error})
+                await asyncio.sleep(_RETRY_PAUSE)
+            await asyncio.sleep(_PAUSE)
+
+    def _protocol(self) -> asyncio.StreamReaderProtocol:
+        return asyncio.StreamReaderProtocol(asyncio.StreamReader(self._limit), self._serve)
+
+    def close(self) -> None:
+        """Stop accepting. Open connections remain."""
+        self._task.cancel()
+        self._listening.close()
 
 
 class Connections:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..errors import InputError
-from ..sockets import BACKLOG, Connections, UnixListener, socket_path
+from ..sockets import Acceptor, Connections, UnixListener, socket_path
 
 NAME = "vm-detect.sock"
 
@@ -38,13 +38,13 @@ class ControlServer:
     def __init__(self, path: Path, commands: Mapping[str, Command]) -> None:
         self._path, self._commands = path, commands
         self._file: UnixListener | None = None
-        self._server: asyncio.Server | None = None
+        self._acceptor: Acceptor | None = None
         self._connections = Connections()
 
     async def open(self) -> None:
         """Listen. Raises InputError."""
         self._file = UnixListener(self._path, "--status-socket")
-        self._server = await asyncio.start_unix_server(self._reply, sock=self._file.socket, limit=1024, backlog=BACKLOG)
+        self._acceptor = Acceptor(self._file.socket, self._reply, 1024)
 
     async def _reply(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if not self._connections.admit(writer):
@@ -64,8 +64,8 @@ class ControlServer:
 
     async def close(self) -> None:
         """Stop listening."""
-        if self._server is not None:
-            self._server.close()
+        if self._acceptor is not None:
+            self._acceptor.close()
         if self._file is not None:
             self._file.close()
 

@@ -15,10 +15,16 @@ from ipaddress import ip_address
 from urllib.parse import parse_qsl
 
 from ..errors import VisualMeshError
-from ..sockets import BACKLOG, Connections, UnixListener, bound_sockets, cant_listen
+from ..sockets import Acceptor, Connections, UnixListener, bound_sockets, cant_listen
 
 _TIMEOUT = 5.0
 """How long a browser may take to send its request, and to receive each part of the response [s]."""
+
+_LARGEST_HEAD = 8192
+"""Of a request [bytes]."""
+
+_BACKLOG = 100
+"""Browsers that may wait to be accepted."""
 
 _MOST_STREAMS = 16
 
@@ -64,7 +70,7 @@ class HttpServer:
         self._streams, self._actions = streams or {}, actions or {}
         self._token = token
         self._file: UnixListener | None = None
-        self._servers: list[asyncio.Server] = []
+        self._acceptors: list[Acceptor] = []
         self._tasks: set[asyncio.Task[None]] = set()
         self._connections = Connections()
         self._streaming = 0  # number of streams
@@ -73,15 +79,15 @@ class HttpServer:
         """Listen. Raises InputError, and NetworkError for what may work later."""
         if self._where.startswith("unix:"):
             self._file = UnixListener(self._where.removeprefix("unix:"), self._option)
-            self._servers.append(
-                await asyncio.start_unix_server(self._serve, sock=self._file.socket, limit=8192, backlog=BACKLOG)
-            )
-            return
-        try:
-            for each in bound_sockets(self._where, socket.SOCK_STREAM):
-                self._servers.append(await asyncio.start_server(self._serve, sock=each, limit=8192))
-        except OSError as error:  # another process has begun to listen since
-            raise cant_listen(self._where, error) from error
+            listening = [self._file.socket]
+        else:
+            listening = bound_sockets(self._where, socket.SOCK_STREAM)
+            try:
+                for each in listening:
+                    each.listen(_BACKLOG)
+            except OSError as error:  # another process has begun to listen since
+                raise cant_listen(self._where, error) from error
+        self._acceptors = [Acceptor(each, self._serve, _LARGEST_HEAD) for each in listening]
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if not self._connections.admit(writer):
@@ -137,7 +143,7 @@ class HttpServer:
 
     async def close(self) -> None:
         """Stop listening and end all streams."""
-        for each in self._servers:
+        for each in self._acceptors:
             each.close()
         # More than once: until Python 3.11, wait_for may swallow a cancellation.
         while self._tasks:

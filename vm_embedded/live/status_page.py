@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import math
 import secrets
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +23,9 @@ from .temperatures import read_temperatures
 from .threshold import threshold_name, with_settings, with_threshold
 
 _PAGE = Path(__file__).with_name("status_page.html")
+
+_REST = 4.0
+"""Pause after a preview, in times of its duration: frames wait for a preview, and browsers may ask for many."""
 
 
 class StatusPage:
@@ -44,6 +49,8 @@ class StatusPage:
         self._html = _PAGE.read_bytes()
         self._views = FrameViews(answerer.configuration.status.picture_fps)
         self._pose: Message | None = None  # of the last frame
+        self._previewing = asyncio.Lock()
+        self._next_preview = 0.0  # when the next one may begin [s]
 
     def servers(self) -> Iterator[HttpServer]:
         """The servers that the configuration asks for."""
@@ -81,11 +88,17 @@ class StatusPage:
 
     async def _preview(self, query: Query) -> Response:
         """The latest frame with the threshold of a query; null before the first one. Raises VisualMeshError."""
-        detector, detections = self._answerer.detector, self._views.latest
-        if detections is None:
-            return Response("application/json", b"null")
-        # Here, and not in a thread: the detector belongs to the thread of the loop.
-        found = with_settings(detector, detections, with_threshold(detector, query.get("value", "")))
+        async with self._previewing:
+            await asyncio.sleep(max(self._next_preview - time.monotonic(), 0.0))
+            detector, detections = self._answerer.detector, self._views.latest
+            if detections is None:
+                return Response("application/json", b"null")
+            settings = with_threshold(detector, query.get("value", ""))
+            started = time.monotonic()
+            # Here, and not in a thread: the detector belongs to the thread of the loop.
+            found = with_settings(detector, detections, settings)
+            ended = time.monotonic()
+            self._next_preview = ended + _REST * (ended - started)
         return await self._views.preview(found)
 
     def _metrics_page(self, _: Query) -> Response:

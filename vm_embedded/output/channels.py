@@ -14,10 +14,13 @@ from typing import Protocol
 
 from ..config.entries import check_entries, entry, number, one_of, switch, text_line
 from ..errors import InputError
-from ..sockets import BACKLOG, MOST_CONNECTIONS, UnixListener, checked_addresses, datagram_socket, parse_address
+from ..sockets import MOST_CONNECTIONS, Acceptor, UnixListener, checked_addresses, datagram_socket, parse_address
 from .binary_form import to_binary
 from .file_channel import DescriptorChannel, FileChannel
 from .messages import Message, to_json_line, to_ros
+
+_PAUSE = 0.1
+"""Time between two reads of what a reader sends [s]: a flood of it would take the processor from the frames."""
 
 FORMATS = ("json", "ros")
 UNIX_FORMATS = ("lines", "binary")
@@ -89,7 +92,7 @@ class Channels:
                 self._line_channels.append(DatagramChannel(each))
             if settings.unix:
                 chosen = self._binary_channels if settings.unix_format == "binary" else self._line_channels
-                chosen.append(await UnixChannel.open(settings.unix, backlog))
+                chosen.append(UnixChannel(settings.unix, backlog))
         except InputError:
             await self.close()
             raise
@@ -150,23 +153,17 @@ class DatagramChannel:
 
 
 class UnixChannel:
-    """A Unix socket with up to MOST_CONNECTIONS readers; it disconnects further ones at once."""
+    """A Unix socket with up to MOST_CONNECTIONS readers; it disconnects further ones at once.
 
-    def __init__(self, listener: UnixListener, backlog: int) -> None:
+    Raises InputError if it can't listen at the path. Create it while the loop runs.
+    """
+
+    def __init__(self, path: str | Path, backlog: int) -> None:
         self.dropped = 0
         self.failure = ""
-        self._listener, self._backlog = listener, backlog
+        self._listener, self._backlog = UnixListener(path, "--output-unix"), backlog
         self._writers: set[asyncio.StreamWriter] = set()
-        self._server: asyncio.Server | None = None
-
-    @classmethod
-    async def open(cls, path: str | Path, backlog: int) -> UnixChannel:
-        """Listen at a path. Raises InputError."""
-        channel = cls(UnixListener(path, "--output-unix"), backlog)
-        channel._server = await asyncio.start_unix_server(
-            channel._serve, sock=channel._listener.socket, backlog=BACKLOG
-        )
-        return channel
+        self._acceptor = Acceptor(self._listener.socket, self._serve, limit=1)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._writers) >= MOST_CONNECTIONS:
@@ -175,12 +172,12 @@ class UnixChannel:
         self._writers.add(writer)
         try:
             while await reader.read(4096):  # readers send nothing; an empty read means that they left
-                pass
+                await asyncio.sleep(_PAUSE)
         except (ConnectionError, asyncio.CancelledError):  # asyncio would report the latter as a failure
             pass
         finally:
             self._writers.discard(writer)
-            writer.close()
+            writer.transport.abort()  # close would wait for a reader that only stopped sending, with an open descriptor
 
     def send(self, line: bytes) -> None:
         """Send a line, or a message in the binary form, to all readers that keep up."""
@@ -192,8 +189,7 @@ class UnixChannel:
 
     async def close(self) -> None:
         """Stop listening and disconnect the readers."""
-        if self._server is not None:
-            self._server.close()
+        self._acceptor.close()
         for writer in list(self._writers):
             writer.close()
         self._listener.close()

@@ -12,7 +12,7 @@ from contextlib import suppress
 
 from ..errors import InputError, VisualMeshError
 from ..geometry.orientation import Orientation
-from ..sockets import BACKLOG, Connections, UnixListener, datagram_socket, parse_address
+from ..sockets import Acceptor, Connections, UnixListener, datagram_socket, parse_address
 from .buffer import PoseBuffer
 from .parsing import MAX_LINE_BYTES, parse_pose_line
 from .settings import UDP_EXAMPLE, PoseSettings
@@ -48,7 +48,7 @@ class PoseStream:
         self._report = report
         self._transports: list[asyncio.BaseTransport] = []
         self._listener: UnixListener | None = None
-        self._server: asyncio.Server | None = None
+        self._acceptor: Acceptor | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._connections = Connections()
 
@@ -58,9 +58,7 @@ class PoseStream:
         loop = asyncio.get_running_loop()
         if kind == "unix":
             self._listener = UnixListener(rest, "--pose-source")
-            self._server = await asyncio.start_unix_server(
-                self._serve, sock=self._listener.socket, limit=MAX_LINE_BYTES, backlog=BACKLOG
-            )
+            self._acceptor = Acceptor(self._listener.socket, self._serve, MAX_LINE_BYTES)
         elif kind == "udp":
             host, port = parse_address(rest, "pose source", UDP_EXAMPLE)
             listening, _ = datagram_socket(host, port, "can't receive poses at", listen=True)
@@ -162,8 +160,8 @@ class PoseStream:
             transport.close()
         if self.settings.source == "stdin" and sys.stdin is not None:
             os.set_blocking(sys.stdin.fileno(), True)  # programs that run later share the terminal
-        if self._server is not None:
-            self._server.close()
+        if self._acceptor is not None:
+            self._acceptor.close()
         if self._listener is not None:
             self._listener.close()
 

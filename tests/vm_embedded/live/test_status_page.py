@@ -1,8 +1,11 @@
-"""The status page in a real browser, without a screen."""
+"""The status page in a real browser, without a screen, and pauses between its previews."""
 
+import asyncio
 import re
 import socket
+import time
 from pathlib import Path
+from types import SimpleNamespace
 from urllib.request import Request, urlopen
 
 import pytest
@@ -11,6 +14,7 @@ from tests.soak.faults import QUICK
 from tests.vm_embedded.live.running import running
 from tests.vm_embedded.live.test_faults import script
 from tests.waiting import wait
+from vm_embedded.live import status_page
 
 DAEMON = Path(__file__).parents[3] / "docs" / "daemon.md"
 
@@ -140,3 +144,33 @@ def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_cam
         assert moves()
         found.stop()
         wait(lambda: text("state") == "no response")
+
+
+def test_frames_get_four_times_the_time_of_previews(monkeypatch):
+    """Many browsers, or a program, may ask for many previews at once."""
+    now, begun, yielded = [1000.0], [], asyncio.sleep
+
+    async def sleep(seconds):
+        now[0] += seconds
+        await yielded(0)
+
+    def compute(*_):
+        begun.append(now[0])
+        now[0] += 0.05
+
+    async def send(_):
+        return None
+
+    answerer = SimpleNamespace(configuration=SimpleNamespace(status=SimpleNamespace(picture_fps=5.0)), detector=None)
+    page = status_page.StatusPage(answerer, *4 * (dict,))
+    page._views = SimpleNamespace(latest="a frame", preview=send)
+
+    async def ask():
+        await asyncio.gather(*(page._preview({"value": "0.4"}) for _ in range(5)))
+
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(asyncio, "sleep", sleep)
+    monkeypatch.setattr(status_page, "with_settings", compute)
+    monkeypatch.setattr(status_page, "with_threshold", lambda *_: None)
+    asyncio.run(ask())
+    assert begun == pytest.approx([1000.0 + 0.25 * index for index in range(5)])

@@ -2,9 +2,11 @@
 
 import asyncio
 import os
+import select
 import signal
 import socket
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -12,7 +14,7 @@ from tests.messages import read_message
 from tests.vm_embedded.live.running import counts, running
 from vm_embedded.errors import InputError
 from vm_embedded.live.control import ask
-from vm_embedded.output.channels import OutputSettings
+from vm_embedded.output.channels import OutputSettings, UnixChannel
 from vm_embedded.output.file_channel import FileChannel
 
 
@@ -38,6 +40,54 @@ def test_many_read_the_socket_and_one_that_sleeps_holds_nobody_up(tmp_path):
         for each in (*heard, *readers, sleeper):
             each.close()
         found.stop()
+
+
+def test_a_reader_that_stops_sending_and_reads_nothing_is_disconnected(tmp_path):
+    """Otherwise each one would cost a descriptor and a backlog, without limit."""
+
+    async def serve():
+        channel = UnixChannel(tmp_path / "lines", 2**20)
+        with socket.socket(socket.AF_UNIX) as reader:
+            reader.connect(str(tmp_path / "lines"))
+            await _until(lambda: channel._writers)
+            while not any(each.transport.get_write_buffer_size() for each in channel._writers):
+                channel.send(bytes(65536))
+            reader.shutdown(socket.SHUT_WR)
+            ended = select.poll()
+            ended.register(reader, select.POLLHUP)
+            await _until(lambda: ended.poll(0))
+        await channel.close()
+
+    asyncio.run(serve())
+
+
+def test_what_readers_send_is_read_with_pauses(tmp_path, monkeypatch):
+    """A flood of it would take the processor from the frames."""
+    monkeypatch.setattr("vm_embedded.output.channels._PAUSE", 3600.0)
+
+    async def serve():
+        channel = UnixChannel(tmp_path / "lines", 2**20)
+        with socket.socket(socket.AF_UNIX) as reader:
+            reader.connect(str(tmp_path / "lines"))
+            reader.setblocking(False)
+            await _until(lambda: channel._writers)
+            for _ in range(20):  # the first times, there is room in buffers
+                with suppress(BlockingIOError):
+                    while True:
+                        reader.send(bytes(65536))
+                await asyncio.sleep(0.01)
+            with pytest.raises(BlockingIOError):
+                reader.send(bytes(65536))
+        await channel.close()
+
+    asyncio.run(serve())
+
+
+async def _until(what):
+    deadline = time.monotonic() + 60.0
+    while not what():
+        assert time.monotonic() < deadline
+        await asyncio.sleep(0.02)
 
 
 def test_lines_also_go_to_a_file_and_by_udp(tmp_path):
