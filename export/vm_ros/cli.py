@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Sequence
 
@@ -15,7 +16,7 @@ from vm_embedded.cli.check_configuration import check_configuration
 from vm_embedded.cli.options import ANGLES, add_live, add_model, add_pose, add_settings, add_track, read_options
 from vm_embedded.cli.program import EXIT_FAILED, EXIT_OK, Parser, program
 from vm_embedded.cli.run_daemon import run_daemon
-from vm_embedded.errors import VisualMeshError
+from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.live.configuration import Configuration, with_overrides
 from vm_embedded.live.daemon import Daemon
 from vm_embedded.live.log import EventLog
@@ -25,6 +26,8 @@ from .node import Node
 
 ROS_ARGUMENTS = "--ros-args"
 """Everything behind this option is for ROS."""
+
+_TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -89,7 +92,24 @@ def configuration(options: argparse.Namespace) -> Configuration:
         ros["camera"] = {"source": ROS}
     if (given.camera.source or ROS) == ROS and given.pose.source == "fixed" and given.fixed_orientation() is None:
         ros["pose"] = {"source": "tf"}
+    _check_topics(given)
     return with_overrides(given, ros)
+
+
+def _check_topics(given: Configuration) -> None:
+    """Raise InputError for a name that no topic of ROS can have."""
+    kind, _, pose = given.pose.source.partition(":")
+    topics = {
+        "--ros-image": given.ros.image,
+        "--ros-camera-info": given.ros.camera_info,
+        "--ros-namespace": given.ros.namespace.rstrip("/"),
+        "--pose-source topic:": pose if kind == "topic" else "",
+    }
+    for option, topic in topics.items():
+        if topic and not _TOPIC.fullmatch(topic):
+            raise InputError(
+                f"{option} must be a name of letters, digits, _ and /, as in /camera/image_raw, not {topic!r}"
+            )
 
 
 if __name__ == "__main__":

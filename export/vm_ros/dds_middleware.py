@@ -85,7 +85,8 @@ class DdsMiddleware:
         return DdsPublisher(DataWriter(self._participant, self._topic(topic, message), _QOS[kind]))
 
     def _topic(self, topic: str, message: str) -> Topic[Any]:
-        return Topic(self._participant, f"rt{topic}", getattr(self.types, message))
+        absolute = topic.removeprefix("/")  # as a node of ROS without a namespace resolves it
+        return Topic(self._participant, f"rt/{absolute}", getattr(self.types, message))
 
     def start(self) -> None:
         """Begin to receive."""

@@ -13,6 +13,7 @@ import pytest
 
 from vm_embedded import __version__
 from vm_embedded.cameras.ros.message_fields import FIELDS
+from vm_embedded.errors import InputError
 from vm_ros.cli import configuration, parser
 
 from .loopback import COMMAND
@@ -60,6 +61,20 @@ def test_a_wrong_configuration_of_dds_is_named():
 def test_images_come_from_ros_and_poses_from_tf_unless_given(words, camera, pose):
     given = configuration(parser().parse_args(words))
     assert (given.camera.source, given.pose.source) == (camera, pose)
+
+
+@pytest.mark.parametrize("name", ["/bad name", "/camera//image_raw", "/camera/image_raw/", "/4", "/a-b", "/"])
+@pytest.mark.parametrize("option", ["--ros-image", "--ros-camera-info", "--pose-source"])
+def test_a_topic_that_ros_can_not_have_is_named(option, name):
+    value = f"topic:{name}" if option == "--pose-source" else name
+    with pytest.raises(InputError, match=f"{option}.* must be a name of letters.* not '{name}'"):
+        configuration(parser().parse_args([option, value]))
+
+
+@pytest.mark.parametrize("namespace", ["", "/", "/vm_ros", "/robot1/vm_ros/", "vm_ros"])
+def test_topics_of_ros_are_accepted(namespace):
+    words = ["--ros-namespace", namespace, "--ros-image", "left/image_raw/compressed", "--pose-source", "topic:/a1/_b"]
+    assert configuration(parser().parse_args(words)).ros.namespace == namespace
 
 
 def test_vm_detect_names_vm_ros_for_topics():

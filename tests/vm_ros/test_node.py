@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from tests.vm_embedded.cameras.ros.rolling_ball import LENS, OFFSET, SIZE
+from tests.waiting import wait
 from vm_embedded import Detector, Settings
 from vm_embedded.cameras.ros.stamps import seconds_of, stamp_of
 from vm_embedded.cameras.ros.transforms import transform_message
@@ -169,6 +170,14 @@ def test_another_camera_may_be_fixed_in_tf(tmp_path, peer):
             position = vector(each.results[0].pose.pose.position)
             assert 4.0 < position[0] < 6.5  # the ball rolls 1.3 to 2.7 m before the camera
             assert abs(position[1]) < 2.0
+
+
+def test_a_relative_topic_is_the_same_topic(peer):
+    peer.listen("camera/tf", "TFMessage")
+    peer.middleware.start()
+    publisher = peer.middleware.publisher("/camera/tf", "TFMessage")
+    publisher.publish(peer.types.TFMessage(transforms=[]))
+    wait(lambda: peer.received("camera/tf"))
 
 
 @pytest.mark.long

@@ -146,7 +146,9 @@ class _TimedTracker:
     def time(self, frame: Frame) -> float:
         """The time of a frame [s]. Raises InputError if it is not known."""
         if frame.stamp is None and not self.rate:
-            raise InputError("--track needs the time of each frame: give --camera-fps, the frame rate of the images")
+            raise InputError(
+                "--track needs the time of each frame: give --camera-fps, the frame rate of the images, or --no-track"
+            )
         return frame.index / self.rate if frame.stamp is None else frame.stamp
 
 

@@ -51,7 +51,7 @@ def split_by_seed(numbers: Sequence[str], validation: float, test: float, seed: 
         part = "validation" if drawn < validation else "test" if drawn < validation + test else "training"
         parts[part].append(number)
     split = Split(**{name: tuple(each) for name, each in parts.items()})
-    return _checked(split, len(numbers), "change its share or the seed, or list its pictures in a file")
+    return _checked(split, len(numbers), "change data.validation or data.split_seed")
 
 
 def _draw(seed: int, number: str) -> float:

@@ -94,7 +94,7 @@ def test_a_video_has_times_and_images_need_their_rate(film):
         assert len(tracks(found)) == 8
         velocity = (Motion(0.0).ball(0.7) - Motion(0.0).ball(0.5))[:2] / 0.2
         assert np.linalg.norm(tracks(found)[-1]["velocity"] - velocity) < 0.3
-    one_complaint(run(film / "images", "--track", *pose(film), code=1), "--track", "--camera-fps")
+    one_complaint(run(film / "images", "--track", *pose(film), code=1), "--track", "--camera-fps", "--no-track")
     assert "track" not in lines(run(film / "images", *pose(film)))[0]["detections"][0]
 
 
