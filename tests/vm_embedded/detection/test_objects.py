@@ -39,7 +39,8 @@ def scene_at(height=0.9, pitch=0.6, shape=None, mesh_shape=None, lens=None):
     rings = K * float(shape.spacing(height) / mesh_shape.spacing(height))
     view = PreparedView(layout, None, shape, rings, height, orientation.level, np.eye(3), lens, SIZE)
     projected = project(layout, orientation.level, lens, SIZE)
-    return Observation(PICTURE, view, BALLS, projected, np.zeros((len(layout), 1), dtype=np.float32))
+    nothing = np.zeros((len(layout), 1), dtype=np.float32)
+    return Observation(PICTURE, view, BALLS, projected, nothing, nothing[:, :0])
 
 
 def reordered(scene, order):
