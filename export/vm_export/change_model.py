@@ -54,8 +54,8 @@ def change_looks(model: str | Path, path: str | Path, looks: Sequence[LookCheckp
 def change_shifts(model: str | Path, path: str | Path, changed: Checkpoint) -> bool:
     """Write a copy of a model file whose mesh network has other shifts, or none; its look networks stay.
 
-    changed: the mesh network with them. The canary gets the new answers. Returns whether it was removed, because the
-    networks do not find every class in it any more. Raises ModelError if an answer differs from torch by more than
+    changed: the mesh network with them. The canary gets the new answers; if the networks miss a class in it, it is
+    removed. Returns whether it was. Raises ModelError if an answer differs from torch by more than
     LARGEST_DIFFERENCE, and InputError if the file can't be written.
     """
     read, network = read_model(model), changed.network

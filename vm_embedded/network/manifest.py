@@ -53,8 +53,8 @@ MOST_DILATION = 64
 SHIFTS = 2
 """Number of outputs that shift a point to the center of its object: to the right and down."""
 
-_IN_FEW: Mapping[str, Any] = {"layer_dilations": (), "shifts": None}
-"""Entries that are left out where they are empty, as in files of earlier releases, and what empty ones are."""
+_OPTIONAL: Mapping[str, Any] = {"layer_dilations": [], "shifts": None}
+"""Entries that a file lacks if they have these values, as files of earlier releases lack them."""
 
 _SMALLEST_CIRCLE = 0.01
 """Smallest `upright_radius` of a look at uprights [m]."""
@@ -302,7 +302,7 @@ class Manifest:
         data["look"] = self.look.as_dict() if self.look else None
         data["upright_looks"] = [each.as_dict() for each in self.upright_looks]
         data["self_test"] = None if self.self_test is None else self.self_test.as_dict()
-        for name in _IN_FEW:
+        for name in _OPTIONAL:
             if not data[name]:
                 del data[name]
         return json.dumps(data, sort_keys=True, separators=(",", ":"))
@@ -326,7 +326,7 @@ class Manifest:
         for key in data:
             if key not in known:
                 raise ModelError(unknown("entry in the model's manifest", key, known))
-        data = {**_IN_FEW, **data}
+        data = {**_OPTIONAL, **data}
         missing = [name for name in known if name not in data]
         if missing:
             raise ModelError(f"the model's manifest lacks {', '.join(missing)}")
@@ -340,7 +340,7 @@ class Manifest:
         if not isinstance(data["upright_looks"], list):
             raise ModelError(f"upright_looks in the model's manifest must be a list, not {data['upright_looks']!r}")
         data["upright_looks"] = tuple(map(LookContract.from_dict, data["upright_looks"]))
-        if not isinstance(data["layer_dilations"], list | tuple):
+        if not isinstance(data["layer_dilations"], list):
             raise ModelError(f"layer_dilations in the model's manifest must be a list, not {data['layer_dilations']!r}")
         data["layer_dilations"] = tuple(data["layer_dilations"])
         if data["self_test"] is not None:

@@ -28,7 +28,7 @@ def shifts_parser() -> argparse.ArgumentParser:
         prog="vm-train shifts",
         description="Give a mesh network two more outputs, which shift each point of an object to the object's center. "
         "They make the proposals for the close look more exact; the other answers stay the same. It takes about 0.1 s "
-        "for each picture; 2,000 pictures are enough.",
+        "for each picture; a thousand pictures are enough.",
     )
     made.add_argument(
         "model",
@@ -89,7 +89,7 @@ def run_shifts(options: argparse.Namespace) -> int:
 
 
 def _object_class(manifest: Manifest, chosen: str | None) -> str:
-    """The class of the objects. Raises InputError if there is none, or if it is not clear which one."""
+    """The class of the objects: the chosen one, or the only one. Raises InputError without one, or with several."""
     names = [each.name for each in manifest.classes if each.kind == "object"]
     if chosen is not None and chosen not in names:
         raise InputError(unknown("class of kind object", chosen, names))

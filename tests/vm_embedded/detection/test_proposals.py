@@ -29,17 +29,22 @@ def shifts_to(observation, *centers):
     return found.targets[:, :2]
 
 
-@given(st.lists(places, min_size=1, max_size=5), st.floats(0.4, 1.5), st.floats(0.2, 1.2))
-def test_every_ball_has_a_proposal_close_to_its_center(pixels, height, pitch):
-    view = view_at(height, pitch)
+def apart(view, pixels):
+    """Centers (c, 3) of balls at these pixels that are near enough and apart; the example is left out without any."""
     centers = [center_at(view, pixel) for pixel in pixels]
     centers = np.array([each for each in centers if np.isfinite(each).all() and np.linalg.norm(each) < 6.0])
     assume(len(centers))
     rays = centers / np.linalg.norm(centers, axis=1, keepdims=True)
-    apart = BALL.offset(rays, centers, height) + 10.0 * np.eye(len(centers))
-    assume(apart.min() > 4.0)
+    assume((BALL.offset(rays, centers, view.height) + 10.0 * np.eye(len(centers))).min() > 4.0)
     # A ball that covers the point below the camera has too few points there to have a middle.
     assume((np.hypot(centers[:, 0], centers[:, 1]) > 0.3).all())
+    return centers
+
+
+@given(st.lists(places, min_size=1, max_size=5), st.floats(0.4, 1.5), st.floats(0.2, 1.2))
+def test_every_ball_has_a_proposal_close_to_its_center(pixels, height, pitch):
+    view = view_at(height, pitch)
+    centers = apart(view, pixels)
     found = proposed(observation_of(view, *centers, image=BLACK))
     offset = BALL.offset(found / np.linalg.norm(found, axis=1, keepdims=True), centers, height)
     assert (offset.min(axis=1) < 0.5).all()
@@ -80,12 +85,7 @@ def test_the_most_likely_place_comes_first():
 @given(st.lists(places, min_size=1, max_size=4), st.floats(0.4, 1.5), st.floats(0.2, 1.2))
 def test_shifts_to_the_centers_give_one_exact_proposal_for_each_ball(pixels, height, pitch):
     view = view_at(height, pitch)
-    centers = [center_at(view, pixel) for pixel in pixels]
-    centers = np.array([each for each in centers if np.isfinite(each).all() and np.linalg.norm(each) < 6.0])
-    assume(len(centers))
-    rays = centers / np.linalg.norm(centers, axis=1, keepdims=True)
-    assume((BALL.offset(rays, centers, height) + 10.0 * np.eye(len(centers))).min() > 4.0)
-    assume((np.hypot(centers[:, 0], centers[:, 1]) > 0.3).all())
+    centers = apart(view, pixels)
     observation = observation_of(view, *centers, image=BLACK)
     points = observation.layout.rays[observation.projected.on_screen]
     assume((BALL.offset(points, centers, height) < 0.6).any(axis=1).all())
