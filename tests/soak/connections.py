@@ -33,12 +33,13 @@ _PAUSE = 0.05
 class ConnectionsReport:
     """What connections to one socket did.
 
-    connections: that were made. before, during: frames per second. status_s: longest time that the status took to
-    answer [s]. lines: that were logged. unexpected: as of a detector.
+    connections: that were made, in connecting_s [s]. before, during: frames per second. status_s: longest time that the
+    status took to answer [s]. lines: that were logged. unexpected: as of a detector.
     """
 
     socket: str
     connections: int
+    connecting_s: float
     before: float
     during: float
     status_s: float
@@ -48,9 +49,10 @@ class ConnectionsReport:
     def __str__(self) -> str:
         return "\n".join(
             [
-                f"{self.socket:8} {self.connections} connections: {self.before:.1f} frames per second before, "
-                f"{self.during:.1f} during ({100.0 * self.during / self.before:.0f} %), status within "
-                f"{1e3 * self.status_s:.0f} ms, {self.lines} lines logged",
+                f"{self.socket:8} {self.connections} connections in {self.connecting_s:.0f} s: "
+                f"{self.before:.1f} frames per second before, {self.during:.1f} during "
+                f"({100.0 * self.during / self.before:.0f} %), status within {1e3 * self.status_s:.0f} ms, "
+                f"{self.lines} lines logged",
                 *self.unexpected[:10],
             ]
         )
@@ -58,8 +60,8 @@ class ConnectionsReport:
 
 def soak_connections(folder: Path, count: int = 5000, seconds: float = 10.0) -> list[ConnectionsReport]:
     """Open `count` connections to each socket, with a detector of its own for each. seconds: how long the frame rate is
-    measured before the first connection and from it on [s]. Raises TimeoutError, or OSError if the detector refuses to
-    be connected to."""
+    measured before the first connection, and at least from it on [s]; a detector takes its time to accept them all.
+    Raises TimeoutError, or OSError if the detector refuses to be connected to."""
     allow_descriptors(count + 200)
     return [_soak_socket(folder / name, name, count, seconds) for name in SOCKETS]
 
@@ -90,23 +92,29 @@ def _soak_socket(folder: Path, name: str, count: int, seconds: float) -> Connect
         poses = Sender(_connected(addresses["poses"], stack).sendall, MOTION)
         poses.start()
         found.wait(found.is_ok)
-        before = _rate(found, seconds, lambda: None)
+        before = _rate(found, time.monotonic() + seconds, lambda: True)
         waits: list[float] = []
-        opened = iter(range(count))
+        began = time.monotonic()
+        connecting_s = 0.0
+        left = count
 
-        def act() -> None:
-            for _ in zip(range(_AT_ONCE), opened, strict=False):
-                _connected(addresses[name], stack)
+        def connect() -> bool:
+            nonlocal left, connecting_s
+            if left:
+                for _ in range(min(_AT_ONCE, left)):
+                    _connected(addresses[name], stack)
+                    left -= 1
+                connecting_s = time.monotonic() - began
             asked = time.monotonic()
             status(folder)
             waits.append(time.monotonic() - asked)
+            return not left
 
-        during = _rate(found, seconds, act)
-        left = len(list(opened))
+        during = _rate(found, began + seconds, connect)
         poses.on = False
         found.stop()
     lines = sum(found.events.values())
-    return ConnectionsReport(name, count - left, before, during, max(waits), lines, found.unexpected)
+    return ConnectionsReport(name, count - left, connecting_s, before, during, max(waits), lines, found.unexpected)
 
 
 def _free_addresses(count: int) -> list[tuple[str, int]]:
@@ -118,13 +126,12 @@ def _free_addresses(count: int) -> list[tuple[str, int]]:
         return [each.getsockname() for each in made]
 
 
-def _rate(found: Detector, seconds: float, act: Callable[[], None]) -> float:
-    """Frames per second while something is done again and again."""
+def _rate(found: Detector, until: float, act: Callable[[], bool]) -> float:
+    """Frames per second while something is done again and again, until then and until it says that all is done."""
     frames, began = found.frames, time.monotonic()
-    while (passed := time.monotonic() - began) < seconds:
-        act()
+    while not act() or time.monotonic() < until:
         time.sleep(_PAUSE)
-    return (found.frames - frames) / passed
+    return (found.frames - frames) / (time.monotonic() - began)
 
 
 def _connected(address: Any, stack: ExitStack) -> socket.socket:
