@@ -5,7 +5,7 @@ place with the highest score comes first; then the best place outside of the fir
 place moves to the mean of the points in it, weighted by their probabilities.
 
 A network may also shift each point to where it sees the center of its object. (The reference trains such networks as
-"seekers".) Then the places are where the points are shifted to, and points that agree on a center count.
+"seekers".) Then the places are where the points are shifted to, and points that agree on a place count for it.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ _MOST_POINTS = 256
 _WHOLE_AND_CORE = np.array([1.0, 0.9])[:, None, None]
 """Shares of an object's radius. Only points in its core count for its score: those at the outline show both sides."""
 
-_WHOLE_AND_SAME = np.array([1.0, 0.5])[:, None, None]
-"""Shares of a radius, for shifted points. Points in the second one agree on a center."""
+_SAME = np.array([0.5])[:, None, None]
+"""Share of a radius within which shifted points agree on a place."""
 
 _FARTHEST = 3.0
 """Limit of a shift [expected radii]: a damaged network must not lead behind the camera."""
@@ -48,16 +48,14 @@ def propose_places(
     centers = view.shape.center_along(rays, view.height)
     if shifts is None:
         near, core = view.shape.covers(rays, centers, view.height, _WHOLE_AND_CORE)
-        together = near
     else:
         right, down = np.clip(shifts[likely].astype(np.float64), -_FARTHEST, _FARTHEST).T
         rays = Tangents.at(view, centers).rays(right, down)
         centers = view.shape.center_along(rays, view.height)
-        near, core = view.shape.covers(rays, centers, view.height, _WHOLE_AND_SAME)
-        together = core
+        near = core = view.shape.covers(rays, centers, view.height, _SAME)[0]
     chosen = best_apart(core.astype(np.float32) @ p, near, most)
     # Once only: a second move would lead away to larger things near by, and fewer balls would be found.
-    middle = (together[chosen] * p) @ rays
+    middle = (near[chosen] * p) @ rays
     return view.shape.center_along(middle / np.linalg.norm(middle, axis=1, keepdims=True), view.height)
 
 

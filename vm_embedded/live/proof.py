@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ..cameras.decoding import decode
+from ..detection.detection import Detection
 from ..detection.detector import Detector
 from ..detection.settings import Settings
 from ..errors import ModelError, VisualMeshError
@@ -58,12 +59,15 @@ def find_canary(detector: Detector, picture: bytes, camera: LensFile) -> Canary:
     if camera.orientation is None:
         raise ModelError("the lens file of a canary needs Hoc, the camera's pose")
     found = detector.detect(decode(picture, max_megapixels=_MOST_MEGAPIXELS), camera.orientation, camera.lens)
-    objects = tuple(
-        CanaryObject(each.class_name, (round(float(each.center[0]), 1), round(float(each.center[1]), 1)), each.radius)
-        for each in found
-    )
+    objects = tuple(_rounded(each) for each in found)
     points = {each.name: len(found.points_of(each.name)) for each in detector.manifest.classes}
     return Canary(picture, format_lens_file(camera.lens, camera.orientation), objects, points)
+
+
+def _rounded(found: Detection) -> CanaryObject:
+    """Rounded to a tenth of a pixel: processors differ in the last digits, but the file shall be the same."""
+    (x, y), radius = found.center, found.radius
+    return CanaryObject(found.class_name, (round(float(x), 1), round(float(y), 1)), round(radius, 1))
 
 
 def _in_words(canary: Canary) -> str:

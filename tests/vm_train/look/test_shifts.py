@@ -24,6 +24,9 @@ from vm_train.look.shifts import ShiftFit
 
 FITTED = re.compile(r"(\d+) points on (\d+) objects of class ball: ([\d.]+) instead of ([\d.]+) radii from the center")
 
+_FEW = 8
+"""Proposals per picture for networks with and without shifts: more of them are nearer to the centers."""
+
 
 @given(st.integers(0, 10**6), st.integers(1, 6), st.integers(1, 5))
 @settings(max_examples=50)
@@ -81,12 +84,10 @@ def test_proposals_are_nearer_to_the_centers(shifted, folder):
     near = []
     for model in (model_path("ball-small"), path):
         classes = classes_with_colors(read_model(model).manifest, default_colors(model, None), [])
-        job = Job(model, Settings(), False, classes, Rules("scene"))
+        job = Job(model, Settings(max_proposals=_FEW), False, classes, Rules("scene"))
         scores = evaluate(job, job.subject(), find_pictures(folder), 1, lambda: None).proposals["ball"]
-        offsets = np.array([each.offset for each in scores._truths])
-        near.append((float(np.median(offsets)), scores.mean_count))
-    assert near[1][0] < 0.8 * near[0][0]
-    assert near[1][1] <= near[0][1]
+        near.append(float(np.median([each.offset for each in scores._truths])))
+    assert near[1] < 0.8 * near[0]
 
 
 def test_a_checkpoint_gets_the_same_shifts_as_its_model_file(shifted, folder, tmp_path):
