@@ -1,4 +1,4 @@
-"""A model file with other look networks, another canary, or another mesh network; all else stays as it is."""
+"""A model file with other look networks or another canary; its mesh network stays as it is."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from vm_embedded.errors import ModelError
 from vm_embedded.files import write_file
 from vm_embedded.network.canary import CANARY_KEY
 from vm_embedded.network.manifest import METADATA_KEY
-from vm_embedded.network.model_file import ModelFile, read_model
+from vm_embedded.network.model_file import read_model
 
 from .attach_canary import CanaryPicture, NotFoundError, with_canary
 from .attach_look import detached, tested_contract
-from .checkpoint import Checkpoint
-from .export import check_difference, largest_difference, onnx_model, with_looks
+from .export import with_looks
 from .look_checkpoint import LookCheckpoint
 from .look_weights import look_of, upright_looks_of
-from .metadata import metadata_of, with_metadata
+from .metadata import with_metadata
 from .network_weights import network_of
 from .strong_self_test import strong_self_test
 
@@ -43,43 +42,18 @@ def change_looks(model: str | Path, path: str | Path, looks: Sequence[LookCheckp
     file's classes, or if there is no look to remove. Raises InputError if the file can't be written.
     """
     read = read_model(model)
-    content, difference = with_looks(path, read.content, looks)
+    (content, difference), lost = with_looks(path, read.content, looks), False
     if not looks:
         if read.look is None and not read.upright_looks:
             raise ModelError(f"{model} has no close look to remove")
         content = detached(read.content, read.manifest)
-    return ChangedLooks(difference, _write_with_canary(path, content, read))
-
-
-def change_shifts(model: str | Path, path: str | Path, changed: Checkpoint) -> bool:
-    """Write a copy of a model file whose mesh network has other shifts, or none; its look networks stay.
-
-    changed: the mesh network with them. The canary gets the new answers; if the networks miss a class in it, it is
-    removed. Returns whether it was. Raises ModelError if an answer differs from torch by more than
-    LARGEST_DIFFERENCE, and InputError if the file can't be written.
-    """
-    read, network = read_model(model), changed.network
-    manifest = replace(read.manifest, shifts=changed.manifest.shifts, operations=network.shape.operations)
-    manifest = replace(manifest, self_test=strong_self_test(network, manifest))
-    content = onnx_model(network, manifest)
-    check_difference(path, "answers", largest_difference(content, network, manifest))
-    content = with_metadata(content, metadata_of(read.content) | {METADATA_KEY: manifest.as_json()})
-    return _write_with_canary(path, content, read)
-
-
-def _write_with_canary(path: str | Path, content: bytes, read: ModelFile) -> bool:
-    """Write a model file, with the answers of its networks to the canary of the file that it was made of.
-
-    Returns whether it has none any more, because the networks do not find every class in it.
-    """
-    lost = False
     if read.canary is not None:
         try:
             content = with_canary(content, CanaryPicture.of(read.canary))
         except NotFoundError:
             content, lost = with_metadata(content, {CANARY_KEY: None}), True
     write_file(Path(path), content)
-    return lost
+    return ChangedLooks(difference, lost)
 
 
 def lost_canary_message(output: Path, model: str | Path) -> str:

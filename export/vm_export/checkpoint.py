@@ -38,11 +38,6 @@ class Checkpoint:
             raise ModelError(
                 f"the network is for {shape.neighbors} neighbors, but mesh {manifest.mesh} has {manifest.neighbors}"
             )
-        if shape.shifts != (manifest.shifts is not None):
-            raise ModelError(
-                f"the network has {'' if shape.shifts else 'no '}shifts, but the manifest has them for class "
-                f"{manifest.shifts}"
-            )
         if shape.layer_dilations != manifest.layer_dilations:
             raise ModelError(
                 f"the network has the dilations {shape.layer_dilations}, but the manifest {manifest.layer_dilations}"

@@ -253,7 +253,6 @@ def _description(checkpoint: Checkpoint) -> str:
         f"{len(checkpoint.network.shape.layers)} layers, {manifest.mesh}, {manifest.shape}\n"
         f"  radius {manifest.radius:g} m, {manifest.intersections:g} intersections, to {manifest.max_distance:g} m\n"
         f"  object radius {manifest.object_radius:g} m, edge {manifest.edge}, classes: {classes}"
-        + (f", shifts to the class {manifest.shifts}" if manifest.shifts else "")
     )
 
 

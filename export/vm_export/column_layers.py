@@ -17,12 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.network.manifest import SHIFTS
 
 from .network import GraphConvolution, GraphLayer, Network, SeparableConvolution
-from .network_shape import NetworkShape
 from .onnx_graph import OnnxGraph
-from .output import write_output
 
 Convolve = Callable[[str, str, Floats, int], str]
 """Writes the nodes of a convolution without its bias: from a name for the nodes, the name of its input (inputs, m), a
@@ -63,7 +60,7 @@ ACTIVATION_PARTS = {
 
 
 def write_layers(graph: OnnxGraph, network: Network, convolve: Convolve) -> None:
-    """Write all layers of a network, from the input `points` (3, m) to the output `probabilities` (outputs, m).
+    """Write all layers of a network, from the input `points` (3, m) to the output `probabilities` (C, m).
 
     `convolve` writes the convolutions, which look at neighbors.
     """
@@ -73,7 +70,7 @@ def write_layers(graph: OnnxGraph, network: Network, convolve: Convolve) -> None
         last = index == len(network.shape.layers) - 1
         kernel, bias = _weights(layer)
         if last and spec.activation == "softmax" and spec.width == 2:
-            kernel, bias = _with_difference(kernel), _with_difference(bias)
+            kernel, bias = kernel[1:] - kernel[:1], bias[1:] - bias[:1]
         activation = Activation() if last else ACTIVATION_PARTS[spec.activation]
         bias = bias + activation.bias + before.constant * kernel.sum(axis=(1, 2))
         kernel = before.scale * kernel
@@ -82,16 +79,11 @@ def write_layers(graph: OnnxGraph, network: Network, convolve: Convolve) -> None
         else:
             sums = convolve(name, x, kernel, spec.dilation)
         z = graph.node("Add", [sums, graph.constant(f"{name}.bias", bias[:, None])], f"{name}.linear")
-        x = z if last else _write_activation(graph, name, spec.activation, z)
+        if last:
+            _write_head(graph, spec.activation, spec.width, z)
+        else:
+            x = _write_activation(graph, name, spec.activation, z)
         before = activation
-
-    shape, logits = network.shape, len(bias) - SHIFTS * network.shape.shifts
-    write_output(graph, x, logits, shape.shifts, 0, lambda each, output: _write_head(graph, shape, each, output))
-
-
-def _with_difference(weights: Floats) -> Floats:
-    """Weights (outputs, ...) with the difference of the first two outputs in place of them."""
-    return np.concatenate([weights[1:2] - weights[:1], weights[2:]])
 
 
 def _weights(layer: GraphLayer) -> tuple[Floats, Floats]:
@@ -115,15 +107,15 @@ def _write_activation(graph: OnnxGraph, name: str, activation: str, z: str) -> s
     return graph.node("Add", [straight, curved], f"{name}.activation")
 
 
-def _write_head(graph: OnnxGraph, shape: NetworkShape, logits: str, output: str) -> None:
-    """Write the head: probabilities (C, m) from logits (C, m), or from the difference (1, m) of two classes."""
-    if shape.layers[-1].activation == "sigmoid":
-        graph.node("Sigmoid", [logits], output)
-    elif shape.classes == 2:
+def _write_head(graph: OnnxGraph, activation: str, classes: int, logits: str) -> None:
+    """Write the head: `probabilities` (C, m) from logits (C, m), or from the difference (1, m) of two classes."""
+    if activation == "sigmoid":
+        graph.node("Sigmoid", [logits], "probabilities")
+    elif classes == 2:
         other = graph.node("Neg", [logits], "head.other")
-        graph.node("Sigmoid", [graph.node("Concat", [other, logits], "head.both", axis=0)], output)
+        graph.node("Sigmoid", [graph.node("Concat", [other, logits], "head.both", axis=0)], "probabilities")
     else:
         largest = graph.node("ReduceMax", [logits], "head.largest", axes=[0])
         powers = graph.node("Exp", [graph.node("Sub", [logits, largest], "head.shifted")], "head.powers")
         total = graph.node("ReduceSum", [powers, graph.constant("first", [0])], "head.total")
-        graph.node("Div", [powers, total], output)
+        graph.node("Div", [powers, total], "probabilities")

@@ -54,7 +54,7 @@ def lattice_model(network: Network, manifest: Manifest) -> bytes:
     write_layers(graph, network, convolve)
     return graph.model(
         {"points": (FLOAT, [3, "places"]), "shown": (BOOL, ["rows", "columns"])},
-        {"probabilities": (FLOAT, [manifest.outputs, "places"])},
+        {"probabilities": (FLOAT, [network.shape.classes, "places"])},
         {METADATA_KEY: manifest.as_json()},
         "Visual Mesh network on a lattice, laid out as a picture. vm_embedded prepares it.",
     )

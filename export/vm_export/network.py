@@ -6,7 +6,7 @@ import torch
 from torch import nn
 
 from .neighborhood import Neighborhood
-from .network_shape import NetworkShape
+from .network_shape import Layer, NetworkShape
 
 # The paper compares SELU, ELU and ReLU (section "Network Architecture").
 _ACTIVATIONS: dict[str, type[nn.Module]] = {"selu": nn.SELU, "relu": nn.ReLU, "elu": nn.ELU, "tanh": nn.Tanh}
@@ -24,13 +24,9 @@ class GraphConvolution(nn.Module):
         self.neighbors = neighbors
         self.linear = nn.Linear((neighbors + 1) * inputs, outputs)
 
-    def field(self, x: torch.Tensor, neighborhood: Neighborhood) -> torch.Tensor:
-        """What the linear layer takes: (n + 1, (N + 1) * inputs) from x (n + 1, inputs)."""
-        return neighborhood.gather(x).flatten(1)
-
     def forward(self, x: torch.Tensor, neighborhood: Neighborhood) -> torch.Tensor:
         """(n + 1, outputs) from x (n + 1, inputs)."""
-        return self.linear(self.field(x, neighborhood))  # type: ignore[no-any-return]
+        return self.linear(neighborhood.gather(x).flatten(1))  # type: ignore[no-any-return]
 
 
 class SeparableConvolution(nn.Module):
@@ -41,13 +37,10 @@ class SeparableConvolution(nn.Module):
         self.depthwise = nn.Parameter(torch.randn(neighbors + 1, inputs) / (neighbors + 1) ** 0.5)
         self.linear = nn.Linear(inputs, outputs)
 
-    def field(self, x: torch.Tensor, neighborhood: Neighborhood) -> torch.Tensor:
-        """What the linear layer takes: the weighted sums (n + 1, inputs) from x (n + 1, inputs)."""
-        return (neighborhood.gather(x) * self.depthwise).sum(dim=1)
-
     def forward(self, x: torch.Tensor, neighborhood: Neighborhood) -> torch.Tensor:
         """(n + 1, outputs) from x (n + 1, inputs)."""
-        return self.linear(self.field(x, neighborhood))  # type: ignore[no-any-return]
+        mixed = (neighborhood.gather(x) * self.depthwise).sum(dim=1)
+        return self.linear(mixed)  # type: ignore[no-any-return]
 
 
 class Dense(nn.Module):
@@ -57,13 +50,9 @@ class Dense(nn.Module):
         super().__init__()
         self.linear = nn.Linear(inputs, outputs)
 
-    def field(self, x: torch.Tensor, neighborhood: Neighborhood) -> torch.Tensor:
-        """What the linear layer takes: x (n + 1, inputs); the neighbors are not used."""
-        return x
-
     def forward(self, x: torch.Tensor, neighborhood: Neighborhood) -> torch.Tensor:
-        """(n + 1, outputs) from x (n + 1, inputs)."""
-        return self.linear(self.field(x, neighborhood))  # type: ignore[no-any-return]
+        """(n + 1, outputs) from x (n + 1, inputs); the neighbors are not used."""
+        return self.linear(x)  # type: ignore[no-any-return]
 
 
 GraphLayer = GraphConvolution | SeparableConvolution | Dense
@@ -78,10 +67,9 @@ class Network(nn.Module):
     def __init__(self, shape: NetworkShape) -> None:
         super().__init__()
         self.shape = shape
-        inputs = [3, *shape.outputs[:-1]]
+        widths = [3, *(layer.width for layer in shape.layers)]
         self.layers = nn.ModuleList(
-            _make(layer.kind, taken, given, shape.neighbors)
-            for layer, taken, given in zip(shape.layers, inputs, shape.outputs, strict=True)
+            _make(layer, inputs, shape.neighbors) for layer, inputs in zip(shape.layers, widths, strict=False)
         )
         self.activations = nn.ModuleList(_ACTIVATIONS[layer.activation]() for layer in shape.layers[:-1])
         for module in self.modules():
@@ -95,35 +83,22 @@ class Network(nn.Module):
         return [layer for layer in self.layers if isinstance(layer, GraphLayer)]
 
     def logits(self, points: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
-        """Outputs before the head, and shifts: (n + 1, C) or (n + 1, C + 2), from the inputs of `forward`."""
-        x, around = self._before_last(points, neighbors)
-        return self.layers[-1](x, around)  # type: ignore[no-any-return]
-
-    def fields(self, points: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
-        """The receptive fields (n + 1, F) of the last layer's points, from the inputs of `forward`."""
-        x, around = self._before_last(points, neighbors)
-        return self.typed_layers[-1].field(x, around)
-
-    def _before_last(self, points: torch.Tensor, neighbors: torch.Tensor) -> tuple[torch.Tensor, Neighborhood]:
-        """The last layer's input (n + 1, channels) and neighborhood."""
+        """Outputs (n + 1, C) before the head, from points (n + 1, 3) and neighbors (n + 1, D N), with_dilations."""
         parts = torch.split(neighbors, self.shape.neighbors, dim=1)
         around = dict(zip(self.shape.dilations, map(Neighborhood, parts), strict=True))
         x = points
         for spec, layer, activation in zip(self.shape.layers, self.layers, self.activations, strict=False):
             x = activation(layer(x, around[spec.dilation]))
-        return x, around[self.shape.layers[-1].dilation]
+        return self.layers[-1](x, around[self.shape.layers[-1].dilation])  # type: ignore[no-any-return]
 
     def forward(self, points: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
-        """Probabilities, and shifts: (n + 1, C) or (n + 1, C + 2), from points (n + 1, 3) and neighbors (n + 1, D N),
-        with_dilations."""
-        answers = self.logits(points, neighbors)
-        logits, shifts = answers[:, : self.shape.classes], answers[:, self.shape.classes :]
-        is_softmax = self.shape.layers[-1].activation == "softmax"
-        return torch.cat([logits.softmax(dim=1) if is_softmax else logits.sigmoid(), shifts], dim=1)
+        """Probabilities (n + 1, C) from points (n + 1, 3) and neighbors (n + 1, D N), with_dilations."""
+        logits = self.logits(points, neighbors)
+        return logits.softmax(dim=1) if self.shape.layers[-1].activation == "softmax" else logits.sigmoid()
 
 
-def _make(kind: str, inputs: int, outputs: int, neighbors: int) -> GraphLayer:
-    if kind == "dense":
-        return Dense(inputs, outputs)
-    made = GraphConvolution if kind == "convolution" else SeparableConvolution
-    return made(inputs, outputs, neighbors)
+def _make(layer: Layer, inputs: int, neighbors: int) -> GraphLayer:
+    if layer.kind == "dense":
+        return Dense(inputs, layer.width)
+    kind = GraphConvolution if layer.kind == "convolution" else SeparableConvolution
+    return kind(inputs, layer.width, neighbors)

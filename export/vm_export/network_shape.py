@@ -8,7 +8,7 @@ from typing import Any
 
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.mesh.dilation import distinct_dilations
-from vm_embedded.network.manifest import MOST_DILATION, SHIFTS
+from vm_embedded.network.manifest import MOST_DILATION
 
 ACTIVATIONS = ("selu", "relu", "elu", "tanh")
 HEADS = ("softmax", "sigmoid")
@@ -44,15 +44,11 @@ class Layer:
 class NetworkShape:
     """The layers of a network for points with three color channels and `neighbors` neighbors each.
 
-    The last layer is as wide as there are classes. shifts: whether it has two further outputs, without an activation:
-    the shifts of detection/proposals.py.
-
     Raises InputError if the first layer is dense, or if a head is not the last layer.
     """
 
     layers: tuple[Layer, ...]
     neighbors: int = 6
-    shifts: bool = False
 
     def __post_init__(self) -> None:
         if not self.layers or self.layers[0].kind == "dense":
@@ -84,14 +80,8 @@ class NetworkShape:
 
     @property
     def classes(self) -> int:
-        """Number of classes."""
+        """Number of outputs."""
         return self.layers[-1].width
-
-    @property
-    def outputs(self) -> tuple[int, ...]:
-        """Number of outputs of each layer."""
-        *widths, last = (layer.width for layer in self.layers)
-        return (*widths, last + SHIFTS if self.shifts else last)
 
     @property
     def layer_dilations(self) -> tuple[int, ...]:
@@ -108,12 +98,12 @@ class NetworkShape:
     def operations(self) -> int:
         """Multiplications and additions for each point, without activations."""
         total, inputs = 0, 3
-        for layer, outputs in zip(self.layers, self.outputs, strict=True):
+        for layer in self.layers:
             # With six neighbors 7 places, where a 3 x 3 convolution has 9 (paper: section "Network").
             places = 1 if layer.kind == "dense" else self.neighbors + 1
-            mixed = places * inputs * outputs if layer.kind == "convolution" else inputs * outputs
+            mixed = places * inputs * layer.width if layer.kind == "convolution" else inputs * layer.width
             total += 2 * (mixed + (places * inputs if layer.kind == "separable" else 0))
-            inputs = outputs
+            inputs = layer.width
         return total
 
     def as_dict(self) -> dict[str, Any]:
@@ -124,7 +114,6 @@ class NetworkShape:
     def from_dict(cls, data: Mapping[str, Any]) -> NetworkShape:
         """Inverse of `as_dict`. Raises InputError."""
         try:
-            layers = tuple(Layer(**layer) for layer in data["layers"])
-            return cls(layers, int(data["neighbors"]), bool(data.get("shifts", False)))
+            return cls(tuple(Layer(**layer) for layer in data["layers"]), int(data["neighbors"]))
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"can't read the shape of a network: {error}") from error

@@ -21,7 +21,6 @@ from .column_layers import ACTIVATION_PARTS, Activation
 from .export import LARGEST_DIFFERENCE, largest_difference
 from .network import Network
 from .network_shape import Layer, NetworkShape
-from .output import PROBABILITIES
 from .runs_graph import kernel_places
 
 _OPERATORS = {"Selu": "selu", "Relu": "relu", "Elu": "elu", "Tanh": "tanh", "Softmax": "softmax", "Sigmoid": "sigmoid"}
@@ -47,12 +46,7 @@ class _Graph:
     def __init__(self, content: bytes) -> None:
         graph = onnx.load_from_string(content).graph
         self.constants = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
-        self.nodes: dict[str, onnx.NodeProto] = {each.output[0]: each for each in graph.node}
-
-    @property
-    def head(self) -> onnx.NodeProto:
-        """The node that gives the probabilities of classes. Raises KeyError."""
-        return self.nodes[PROBABILITIES if PROBABILITIES in self.nodes else "probabilities"]
+        self.nodes = {each.output[0]: each for each in graph.node}
 
     @property
     def layers(self) -> list[str]:
@@ -74,8 +68,8 @@ def network_of(model: ModelFile) -> Checkpoint:
     manifest, foreign = model.manifest, f"{model.path}: its mesh network has other layers than vm-export writes"
     try:
         graph = _Graph(model.content)
-        layers = _plain(graph, manifest) if manifest.layout == "plain" else _columns(graph, manifest)
-        network = _network(_dilated(layers, manifest.layer_dilations), manifest)
+        layers = _plain(graph) if manifest.layout == "plain" else _columns(graph, manifest)
+        network = _network(_dilated(layers, manifest.layer_dilations), manifest.neighbors)
         difference = largest_difference(model.content, network, manifest)
     except (KeyError, IndexError, ValueError, RuntimeError, InputError) as error:
         raise ModelError(f"{foreign}: {error}") from error
@@ -85,9 +79,8 @@ def network_of(model: ModelFile) -> Checkpoint:
     return Checkpoint(network, bare)
 
 
-def _network(layers: list[_Weights], manifest: Manifest) -> Network:
-    shape = NetworkShape(tuple(each.layer for each in layers), manifest.neighbors, manifest.shifts is not None)
-    network = Network(shape)
+def _network(layers: list[_Weights], neighbors: int) -> Network:
+    network = Network(NetworkShape(tuple(each.layer for each in layers), neighbors))
     state: dict[str, Floats] = {}
     for index, each in enumerate(layers):
         state |= {f"layers.{index}.linear.weight": each.kernel, f"layers.{index}.linear.bias": each.bias}
@@ -109,21 +102,19 @@ def _dilated(layers: list[_Weights], dilations: Sequence[int]) -> list[_Weights]
     return found
 
 
-def _plain(graph: _Graph, manifest: Manifest) -> list[_Weights]:
+def _plain(graph: _Graph) -> list[_Weights]:
     """The layers of plain_graph.plain_model. Raises KeyError for other graphs."""
     found = []
     for name in graph.layers:
         kernel, bias = graph.weights(f"{name}.kernel").T, graph.weights(f"{name}.bias")
-        is_last = name == graph.layers[-1]
-        node = graph.head if is_last else graph.nodes[f"{name}.activation"]
+        node = graph.nodes["probabilities" if name == graph.layers[-1] else f"{name}.activation"]
         depthwise = None
         if f"{name}.around" in graph.constants:
             kind = "separable"
             depthwise = np.vstack([graph.weights(f"{name}.self"), graph.weights(f"{name}.around")])
         else:
             kind = "convolution" if f"{name}.gathered" in graph.nodes else "dense"
-        width = len(manifest.classes) if is_last else len(bias)
-        found.append(_Weights(Layer(kind, width, _OPERATORS[node.op_type]), kernel, bias, depthwise))
+        found.append(_Weights(Layer(kind, len(bias), _OPERATORS[node.op_type]), kernel, bias, depthwise))
     return found
 
 
@@ -140,17 +131,11 @@ def _columns(graph: _Graph, manifest: Manifest) -> list[_Weights]:
         parts = Activation() if is_last else ACTIVATION_PARTS[activation]
         bias = bias - parts.bias - before.constant * kernel.sum(axis=(1, 2))
         if is_last and _is_difference(graph):
-            kernel, bias = _without_difference(kernel), _without_difference(bias)
-        width = len(manifest.classes) if is_last else len(bias)
-        layer = Layer("dense" if is_dense else "convolution", width, activation)
+            kernel, bias = np.concatenate([-kernel, kernel]) / 2.0, np.concatenate([-bias, bias]) / 2.0
+        layer = Layer("dense" if is_dense else "convolution", len(bias), activation)
         found.append(_Weights(layer, kernel.reshape(len(kernel), -1), bias))
         before = parts
     return found
-
-
-def _without_difference(weights: Floats) -> Floats:
-    """Weights (outputs, ...) of two logits in place of their difference, the first output."""
-    return np.concatenate([-weights[:1] / 2.0, weights[:1] / 2.0, weights[1:]])
 
 
 def _from_runs(groups: Groups) -> Callable[[Floats], Floats]:
@@ -180,9 +165,9 @@ def _activation(graph: _Graph, name: str) -> str:
 
 def _head(graph: _Graph) -> str:
     """The activation of the last layer."""
-    return "softmax" if graph.head.op_type == "Div" or _is_difference(graph) else "sigmoid"
+    return "softmax" if graph.nodes["probabilities"].op_type == "Div" or _is_difference(graph) else "sigmoid"
 
 
 def _is_difference(graph: _Graph) -> bool:
     """Whether the last layer gives only the difference of two logits, for a softmax of two classes."""
-    return bool(graph.head.input[0] == "head.both")
+    return bool(graph.nodes["probabilities"].input[0] == "head.both")

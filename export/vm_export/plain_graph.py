@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
 from .network import GraphConvolution, GraphLayer, Network, SeparableConvolution
-from .network_shape import NetworkShape
 from .onnx_graph import FLOAT, INT32, OnnxGraph
-from .output import write_output
 
-_OPERATORS = {"selu": "Selu", "relu": "Relu", "elu": "Elu", "tanh": "Tanh"}
+_OPERATORS = {"selu": "Selu", "relu": "Relu", "elu": "Elu", "tanh": "Tanh", "softmax": "Softmax", "sigmoid": "Sigmoid"}
 
 
 def plain_model(network: Network, manifest: Manifest) -> bytes:
     """The bytes of an ONNX model in the layout `plain`.
 
     Inputs: points (n + 1, 3) float32 and neighbors (n + 1, D N) int32 for D dilations, as PlainLayout gives them, where
-    row n is the off-screen point. Output: probabilities and shifts (n + 1, outputs) float32.
+    row n is the off-screen point. Output: probabilities (n + 1, C) float32.
     """
     graph, width, dilations = OnnxGraph(), network.shape.neighbors, manifest.dilations
     neighbors = {each: graph.part("neighbors", at, len(dilations), width, 1) for at, each in enumerate(dilations)}
@@ -27,26 +27,18 @@ def plain_model(network: Network, manifest: Manifest) -> bytes:
         kernel = graph.constant(f"{name}.kernel", layer.linear.weight.detach().numpy().T)
         bias = graph.constant(f"{name}.bias", layer.linear.bias.detach().numpy())
         x = graph.node("Gemm", [x, kernel, bias], f"{name}.linear")
-        if index < len(network.shape.layers) - 1:
-            x = graph.node(_OPERATORS[spec.activation], [x], f"{name}.activation")
-    shape = network.shape
-    write_output(graph, x, shape.classes, shape.shifts, 1, lambda each, output: _write_head(graph, shape, each, output))
+        last = index == len(network.shape.layers) - 1
+        attributes: dict[str, Any] = {"axis": 1} if spec.activation == "softmax" else {}
+        output = "probabilities" if last else f"{name}.activation"
+        x = graph.node(_OPERATORS[spec.activation], [x], output, **attributes)
 
     rows = "points_and_off_screen"
     return graph.model(
         {"points": (FLOAT, [rows, 3]), "neighbors": (INT32, [rows, manifest.neighbor_columns])},
-        {"probabilities": (FLOAT, [rows, manifest.outputs])},
+        {"probabilities": (FLOAT, [rows, network.shape.classes])},
         {METADATA_KEY: manifest.as_json()},
         "Visual Mesh network. Row n of points and neighbors is the off-screen point: -1, linked to itself.",
     )
-
-
-def _write_head(graph: OnnxGraph, shape: NetworkShape, logits: str, output: str) -> None:
-    """Write the activation of the last layer, from logits (n + 1, C) to probabilities (n + 1, C)."""
-    if shape.layers[-1].activation == "softmax":
-        graph.node("Softmax", [logits], output, axis=1)
-    else:
-        graph.node("Sigmoid", [logits], output)
 
 
 def _receptive_field(graph: OnnxGraph, name: str, layer: GraphLayer, x: str, neighbors: str, count: int) -> str:

@@ -26,7 +26,6 @@ from vm_embedded.network.manifest import Manifest, ObjectClass
 from .checkpoint import Checkpoint
 from .network import Dense, GraphConvolution, Network, SeparableConvolution
 from .network_shape import Layer, NetworkShape
-from .shifts import without_shifts
 
 DEFAULT_CLASSES = ("ball", "goal", "line", "field", "environment")
 """The classes of a file that has five outputs and no class_map: those of the reference's networks, in their order."""
@@ -64,11 +63,7 @@ class Overrides:
         """The checkpoint with these entries in its manifest. Raises ModelError for wrong ones."""
         given = {each.name: getattr(self, each.name) for each in fields(self)}
         changed = {name: value for name, value in given.items() if value is not None}
-        manifest = checkpoint.manifest
-        if self.classes is not None and manifest.shifts is not None:
-            old, new = ([each.name for each in classes] for classes in (manifest.classes, self.classes))
-            changed["shifts"] = dict(zip(old, new, strict=False)).get(manifest.shifts)
-        return replace(checkpoint, manifest=replace(manifest, **changed))
+        return replace(checkpoint, manifest=replace(checkpoint.manifest, **changed))
 
 
 def named_class(name: str, kind: str | None = None) -> ObjectClass:
@@ -195,10 +190,10 @@ def _without_alpha(kernel: np.ndarray, neighbors: int) -> np.ndarray:
 def write_reference(checkpoint: Checkpoint, path: str | Path) -> None:
     """Write a checkpoint in the reference's format.
 
-    Separable convolutions become full ones, and the fourth channel gets zero weights. Shifts are left out. Raises
-    InputError for a network that the format can't describe, or if the file can't be written.
+    Separable convolutions become full ones, and the fourth channel gets zero weights. Raises InputError for a network
+    that the format can't describe, or if the file can't be written.
     """
-    network, manifest = without_shifts(checkpoint).network, checkpoint.manifest
+    network, manifest = checkpoint.network, checkpoint.manifest
     if (manifest.sampling, manifest.colors) != ("bilinear", "absolute"):
         kind = f"{manifest.sampling} points and {manifest.colors} colors"
         raise InputError(f"networks of the reference take bilinear points and absolute colors; this one takes {kind}")

@@ -28,8 +28,8 @@ from .onnx_graph import FLOAT, INT64, OnnxGraph
 def runs_model(network: Network, manifest: Manifest) -> bytes:
     """The bytes of an ONNX model in the layout `runs`.
 
-    Inputs: points (3, m) float32 and columns (D G, m) int64, as RunsLayout gives them. Output: probabilities and
-    shifts (outputs, m) float32.
+    Inputs: points (3, m) float32 and columns (D G, m) int64, as RunsLayout gives them. Output: probabilities (C, m)
+    float32.
     """
     graph, groups, dilations = OnnxGraph(), manifest.model.groups, manifest.dilations
     columns = {each: graph.part("columns", at, len(dilations), len(groups), 0) for at, each in enumerate(dilations)}
@@ -40,7 +40,7 @@ def runs_model(network: Network, manifest: Manifest) -> bytes:
     write_layers(graph, network, convolve)
     return graph.model(
         {"points": (FLOAT, [3, "slots"]), "columns": (INT64, [len(dilations) * len(groups), "slots"])},
-        {"probabilities": (FLOAT, [manifest.outputs, "slots"])},
+        {"probabilities": (FLOAT, [network.shape.classes, "slots"])},
         {METADATA_KEY: manifest.as_json()},
         "Visual Mesh network, laid out in runs. The slots and their columns are prepared by vm_embedded.",
     )

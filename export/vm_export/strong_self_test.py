@@ -96,8 +96,7 @@ def _fitted_colors(network: Network, neighbors: Indices, wanted: Singles, limits
     functional = torch.nn.functional
     loss = functional.cross_entropy if softmax else functional.binary_cross_entropy_with_logits
     for step in range(_STEPS):
-        logits = network.logits(colors(), links)[:-1, : network.shape.classes]
-        (gradient,) = torch.autograd.grad(loss(logits, target), free)
+        (gradient,) = torch.autograd.grad(loss(network.logits(colors(), links)[:-1], target), free)
         with torch.no_grad():
             free -= _RATE * (1.0 - step / _STEPS) * gradient.sign()
     return np.round(colors().detach().numpy().astype(float), 4).astype(np.float32)

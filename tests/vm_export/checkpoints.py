@@ -16,7 +16,5 @@ def manifest(classes=("ball", "environment"), mesh="ring6", **changes):
 def checkpoint(seed=0, shape=None, mesh="ring6"):
     torch.manual_seed(seed)
     shape = shape or NetworkShape.uniform(3, 4, 2, neighbors=MESH_MODELS[mesh].neighbors)
-    classes = ["class0:object", *(f"class{i}" for i in range(1, shape.classes))]
-    shifts = "class0" if shape.shifts else None
-    facts = manifest(classes, mesh, layer_dilations=shape.layer_dilations, shifts=shifts)
+    facts = manifest([f"class{i}" for i in range(shape.classes)], mesh, layer_dilations=shape.layer_dilations)
     return Checkpoint(Network(shape).eval(), facts)

@@ -41,13 +41,13 @@ layers = st.lists(
 
 @st.composite
 def network_shapes(draw, most=1):
-    """Networks, with and without shifts, whose convolutions have dilations of at most `most`."""
+    """Networks whose convolutions have dilations of at most `most`."""
     inner = draw(layers)
     first = Layer(draw(st.sampled_from(["convolution", "separable"])), draw(st.integers(1, 8)), "selu")
     last = Layer(draw(st.sampled_from(["convolution", "dense"])), draw(st.integers(1, 5)), draw(st.sampled_from(HEADS)))
     dilations = [1 if each.kind == "dense" else draw(st.integers(1, most)) for each in (first, *inner, last)]
     dilated = (replace(each, dilation=d) for each, d in zip((first, *inner, last), dilations, strict=True))
-    return NetworkShape(tuple(dilated), draw(st.sampled_from([4, 6, 8])), draw(st.booleans()))
+    return NetworkShape(tuple(dilated), draw(st.sampled_from([4, 6, 8])))
 
 
 @in_all_layouts

@@ -108,9 +108,7 @@ def look_closely(
     explain: also the rejected proposals, with their reasons. watch: gets the stages propose and look. Raises
     ModelError if the network does not run.
     """
-    contract = look.contract
-    shifts = observation.shifts_to(contract.object_class)
-    centers = propose_places(observation, probabilities, contract.above, settings.max_proposals, shifts)
+    centers = propose_places(observation, probabilities, look.contract.above, settings.max_proposals)
     watch.lap("propose")
     places = PlanePlaces(observation, centers)
     answers = look_at(places, look)

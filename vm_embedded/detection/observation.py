@@ -25,8 +25,7 @@ class Network(Protocol):
     """Anything that gives points their probabilities: a Session, or a network in torch."""
 
     def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
-        """Probabilities and shifts (m, manifest.outputs) of a layout's slots, from their colors (3, m) and which slots
-        (m,) are on screen."""
+        """Probabilities (m, C) of a layout's slots, from their colors (3, m) and which slots (m,) are on screen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +34,8 @@ class Observation:
 
     pyramid: the frame. view: its mesh points, lens and orientation. manifest: of the network. projected: pixels of the
     m slots of the layout. A slot is one place in the network's input; it holds a point, a copy of a point, or nothing.
-    Only original points count as on screen. slot_probabilities (m, C), slot_shifts (m, 2 or 0): the network's outputs;
-    they have no meaning for slots off screen. timing_ms: time of each stage [ms].
+    Only original points count as on screen. slot_probabilities (m, C): the network's output; it has no meaning for
+    slots off screen. timing_ms: time of each stage [ms].
     """
 
     pyramid: Pyramid
@@ -44,7 +43,6 @@ class Observation:
     manifest: Manifest
     projected: Projection[Layout]
     slot_probabilities: Singles
-    slot_shifts: Singles
     timing_ms: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -54,10 +52,6 @@ class Observation:
     def layout(self) -> Layout:
         """The network's order of the points."""
         return self.view.layout
-
-    def shifts_to(self, class_name: str) -> Singles | None:
-        """Shifts (m, 2) of the slots to the centers of objects of a class, as propose_places takes them, if any."""
-        return self.slot_shifts if class_name == self.manifest.shifts else None
 
     @cached_property
     def _shown(self) -> Indices:
@@ -108,7 +102,6 @@ def classify(
     shown = projected.only(layout.original)
     colors = normalized(sample(pyramid, projected.pixels, view.levels), manifest.colors, shown.on_screen)
     watch.lap("sample")
-    answers = network.run(layout, colors, projected.on_screen)
+    probabilities = network.run(layout, colors, projected.on_screen)
     watch.lap("infer")
-    classes = len(manifest.classes)
-    return Observation(pyramid, view, manifest, shown, answers[:, :classes], answers[:, classes:], watch.stages)
+    return Observation(pyramid, view, manifest, shown, probabilities, watch.stages)

@@ -3,9 +3,6 @@
 A likely place is one that an object would fill with likely points. Its score is the sum of their probabilities. The
 place with the highest score comes first; then the best place outside of the first object, and so on. In the end each
 place moves to the mean of the points in it, weighted by their probabilities.
-
-A network may also shift each point to where it sees the center of its object. (The reference trains such networks as
-"seekers".) Then the places are where the points are shifted to, and points that agree on a place count for it.
 """
 
 from __future__ import annotations
@@ -14,7 +11,6 @@ import numpy as np
 
 from ..arrays import Floats, Mask, Singles
 from .observation import Observation
-from .patches import Tangents
 
 _MOST_POINTS = 256
 """Largest number of points that are compared in pairs: a frame of noise must not cost a second."""
@@ -22,20 +18,11 @@ _MOST_POINTS = 256
 _WHOLE_AND_CORE = np.array([1.0, 0.9])[:, None, None]
 """Shares of an object's radius. Only points in its core count for its score: those at the outline show both sides."""
 
-_SAME = np.array([0.5])[:, None, None]
-"""Share of a radius within which shifted points agree on a place."""
 
-_FARTHEST = 3.0
-"""Limit of a shift [expected radii]: a damaged network must not lead behind the camera."""
-
-
-def propose_places(
-    observation: Observation, probabilities: Singles, above: float, most: int, shifts: Singles | None = None
-) -> Floats:
+def propose_places(observation: Observation, probabilities: Singles, above: float, most: int) -> Floats:
     """Centers (c, 3) of at most `most` places, best first, from the slots' probabilities (m,) of a class.
 
     The centers are relative to the camera in the mesh frame [m]. above: probability of a point from which it counts.
-    shifts (m, 2): of the points to the right and down, to the centers of their objects [expected radii].
     """
     view = observation.view
     likely = np.flatnonzero((probabilities > above) & observation.projected.on_screen)
@@ -46,13 +33,7 @@ def propose_places(
     likely = likely[np.argsort(observation.layout.slots[likely])]  # the same digits for every layout
     rays, p = view.layout.rays[likely], probabilities[likely]
     centers = view.shape.center_along(rays, view.height)
-    if shifts is None:
-        near, core = view.shape.covers(rays, centers, view.height, _WHOLE_AND_CORE)
-    else:
-        right, down = np.clip(shifts[likely].astype(np.float64), -_FARTHEST, _FARTHEST).T
-        rays = Tangents.at(view, centers).rays(right, down)
-        centers = view.shape.center_along(rays, view.height)
-        near = core = view.shape.covers(rays, centers, view.height, _SAME)[0]
+    near, core = view.shape.covers(rays, centers, view.height, _WHOLE_AND_CORE)
     chosen = best_apart(core.astype(np.float32) @ p, near, most)
     # Once only: a second move would lead away to larger things near by, and fewer balls would be found.
     middle = (near[chosen] * p) @ rays

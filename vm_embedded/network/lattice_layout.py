@@ -42,5 +42,5 @@ class LatticeLayout(WholeLayout):
     def feeds(self, colors: Singles, on_screen: Mask) -> Feeds:
         return {"points": np.where(on_screen, colors, OFF_SCREEN), "shown": on_screen.reshape(self._shape)}
 
-    def in_slots(self, output: Singles) -> Singles:
+    def probabilities(self, output: Singles) -> Singles:
         return output.T

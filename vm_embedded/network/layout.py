@@ -1,7 +1,7 @@
 """The base class of layouts: a mesh in the order that a network takes it.
 
 A layout is prepared once for a mesh. For each frame it only needs to know which points are on screen. It turns the
-links to all other points into links to the off-screen point. All layouts give the same answers. The manifest
+links to all other points into links to the off-screen point. All layouts give the same probabilities. The manifest
 names the layout that a model file was written for.
 """
 
@@ -55,7 +55,7 @@ class Layout(ABC):
 
     @abstractmethod
     def answers(self, network: Run, colors: Singles, on_screen: Mask) -> Singles:
-        """The network's outputs (m, outputs) for the slots, valid only on screen.
+        """Probabilities (m, C) of the slots, valid only on screen.
 
         colors (3, m): of the slots, as the network takes them. on_screen (m,): which slots are on screen.
         """
@@ -65,15 +65,15 @@ class WholeLayout(Layout):
     """A layout that the network takes in one call."""
 
     def answers(self, network: Run, colors: Singles, on_screen: Mask) -> Singles:
-        return self.in_slots(network(self.feeds(colors, on_screen)))
+        return self.probabilities(network(self.feeds(colors, on_screen)))
 
     @abstractmethod
     def feeds(self, colors: Singles, on_screen: Mask) -> Feeds:
         """The network's inputs, with the color OFF_SCREEN where it needs the off-screen point; see `answers`."""
 
     @abstractmethod
-    def in_slots(self, output: Singles) -> Singles:
-        """The outputs (m, outputs) for the slots from what the network returned."""
+    def probabilities(self, output: Singles) -> Singles:
+        """Probabilities (m, C) of the slots from the network's output."""
 
 
 def rays_in(mesh: Mesh, slots: npt.NDArray[np.integer]) -> Floats:

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from types import UnionType
-from typing import Any
 
 from ..errors import GeometryError, InputError, ModelError, unknown
 from ..geometry.make_shape import SHAPES, make_shape
@@ -49,12 +48,6 @@ _LARGEST = 1e9
 
 MOST_DILATION = 64
 """Largest dilation of a convolution: a picture has about a hundred points from one side to the other."""
-
-SHIFTS = 2
-"""Number of outputs that shift a point to the center of its object: to the right and down."""
-
-_OPTIONAL: Mapping[str, Any] = {"layer_dilations": [], "shifts": None}
-"""Entries that a file lacks if they have these values, as files of earlier releases lack them."""
 
 _SMALLEST_CIRCLE = 0.01
 """Smallest `upright_radius` of a look at uprights [m]."""
@@ -104,8 +97,6 @@ class Manifest:
     upright_looks: descriptions of the look networks for classes of kind upright.
     layer_dilations: of the convolutions, in their order, at most MOST_DILATION; empty if all are 1. Others need edge
         hard, and layout plain or runs.
-    shifts: class of kind object to whose centers the network's two further outputs shift each point, as
-        detection/proposals.py says; None without these outputs.
     provenance: origin of the file; the runtime does not use it.
 
     Raises ModelError for unknown values.
@@ -131,7 +122,6 @@ class Manifest:
     look: LookContract | None = None
     upright_looks: tuple[LookContract, ...] = ()
     layer_dilations: tuple[int, ...] = ()
-    shifts: str | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -199,10 +189,6 @@ class Manifest:
 
     def _check_looks(self) -> None:
         objects = [each.name for each in self.classes if each.kind == "object"]
-        if self.shifts is not None and self.shifts not in objects:
-            raise ModelError(
-                f"shifts in the model's manifest must be a class of kind object, of {objects}, not {self.shifts!r}"
-            )
         if self.look is not None and self.look.object_class not in objects:
             raise ModelError(
                 f"the close look judges class {self.look.object_class!r}, but the classes of kind object are {objects}"
@@ -258,11 +244,6 @@ class Manifest:
         return names.index(class_name)
 
     @property
-    def outputs(self) -> int:
-        """The network's outputs for each point: a probability for each class, and two shifts, if it has them."""
-        return len(self.classes) + (0 if self.shifts is None else SHIFTS)
-
-    @property
     def neighbors(self) -> int:
         """Neighbors of each point, N."""
         return self.model.neighbors
@@ -302,9 +283,8 @@ class Manifest:
         data["look"] = self.look.as_dict() if self.look else None
         data["upright_looks"] = [each.as_dict() for each in self.upright_looks]
         data["self_test"] = None if self.self_test is None else self.self_test.as_dict()
-        for name in _OPTIONAL:
-            if not data[name]:
-                del data[name]
+        if not self.layer_dilations:  # as in files of earlier releases
+            del data["layer_dilations"]
         return json.dumps(data, sort_keys=True, separators=(",", ":"))
 
     @classmethod
@@ -326,7 +306,7 @@ class Manifest:
         for key in data:
             if key not in known:
                 raise ModelError(unknown("entry in the model's manifest", key, known))
-        data = {**_OPTIONAL, **data}
+        data.setdefault("layer_dilations", [])
         missing = [name for name in known if name not in data]
         if missing:
             raise ModelError(f"the model's manifest lacks {', '.join(missing)}")

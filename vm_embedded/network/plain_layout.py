@@ -44,5 +44,5 @@ class PlainLayout(WholeLayout):
         instead = np.arange(missing + 1, dtype=np.int32)[:, None] if self._edge == "same" else missing
         return {"points": points, "neighbors": np.where(shown, neighbors, instead)}
 
-    def in_slots(self, output: Singles) -> Singles:
+    def probabilities(self, output: Singles) -> Singles:
         return output[:-1]

@@ -99,7 +99,7 @@ class RunsLayout(WholeLayout):
         np.copyto(columns, self._gap + self._first_columns, where=~on_screen)
         return {"points": np.where(on_screen, colors, OFF_SCREEN), "columns": columns}
 
-    def in_slots(self, output: Singles) -> Singles:
+    def probabilities(self, output: Singles) -> Singles:
         return output.T
 
 

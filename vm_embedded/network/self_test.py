@@ -14,8 +14,7 @@ from ..errors import ModelError
 
 @dataclass(frozen=True, eq=False)
 class SelfTest:
-    """A small graph and the network's answer: points (n + 1, 3), neighbors (n + 1, N), and probabilities and,
-    if the network has them, shifts (n + 1, outputs).
+    """A small graph and the network's answer: points (n + 1, 3), neighbors (n + 1, N), probabilities (n + 1, C).
 
     The last row is the off-screen point. cells (n, 2): columns and rows of points on a lattice, as in Mesh, else None.
     """

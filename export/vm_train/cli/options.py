@@ -17,12 +17,10 @@ from .import_boxes import import_boxes_parser
 from .import_pictures import import_parser
 from .look import look_config_parser, look_parser
 from .shards import shards_parser
-from .shifts import shifts_parser
 from .stream_options import add_stream
 
 _EPILOG = """\
 other commands (add --help for their options):
-  vm-train shifts MODEL DATA   make the proposals of a network more exact
   vm-train look DATA           train the close look of a network: it judges the network's proposals
   vm-train look --boxes DIR    fine-tune the close look of a model file on your own frames
   vm-train look-config         print a look.toml with all entries and their defaults
@@ -123,7 +121,6 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
     """All parsers, by command."""
     made = (
         parser(),
-        shifts_parser(),
         look_parser(),
         look_config_parser(),
         tune_config_parser(),

@@ -26,7 +26,6 @@ from .import_pictures import run_import
 from .look import print_look_config, resume_look, run_look
 from .options import parsers
 from .shards import run_shards
-from .shifts import run_shifts
 from .training import find_good_pictures, read_configuration, run_resume, run_training
 
 _TRAININGS = (None, "look", "resume")
@@ -38,7 +37,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-train and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     commands: dict[str, Callable[[argparse.Namespace], int]] = {
-        "shifts": run_shifts,
         "look": run_look,
         "resume": _resume,
         "check": _check,

@@ -7,7 +7,7 @@ robot shares meshes between similar poses, so its points differ.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -44,8 +44,6 @@ from ..graphs.labeled_graph import levels_of, plane_distances
 from ..graphs.seen_points import seen_points
 
 if TYPE_CHECKING:
-    import torch
-
     from vm_export.checkpoint import Checkpoint
 
 
@@ -160,8 +158,7 @@ def _answer(
     if look is not None:
         contract = look.contract
         probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
-        shifts = observation.shifts_to(contract.object_class)
-        centers = propose_places(observation, probabilities, contract.above, settings.max_proposals, shifts)
+        centers = propose_places(observation, probabilities, contract.above, settings.max_proposals)
         proposals[contract.object_class] = centers @ observation.view.heading.T
         chain = chain_of(look)
         if len(chain) > 1:
@@ -238,25 +235,15 @@ class TorchNetwork:
         import torch
 
         torch.set_num_threads(1)
-        self.network = checkpoint.network
+        self._network = checkpoint.network
 
     def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
-        """The network's outputs (m, outputs) for the slots of a plain layout, from their colors (3, m)."""
-        return self.outputs(self.network, layout, colors, on_screen)
-
-    def outputs(
-        self,
-        function: Callable[[torch.Tensor, torch.Tensor], torch.Tensor],
-        layout: Layout,
-        colors: Singles,
-        on_screen: Mask,
-    ) -> Singles:
-        """What a function of the network's inputs gives for the slots of a plain layout (m, ...); see `run`."""
+        """Probabilities (m, C) of the slots of a plain layout, from their colors (3, m)."""
         import torch
 
-        def run(feeds: Feeds) -> Singles:
+        def network(feeds: Feeds) -> Singles:
             with torch.inference_mode():
-                output = function(torch.from_numpy(feeds["points"]), torch.from_numpy(feeds["neighbors"]))
+                output = self._network(torch.from_numpy(feeds["points"]), torch.from_numpy(feeds["neighbors"]))
             return np.asarray(output.numpy(), dtype=np.float32)
 
-        return layout.answers(run, colors, on_screen)
+        return layout.answers(network, colors, on_screen)

@@ -14,7 +14,6 @@ from vm_embedded.network.model_file import read_model
 from vm_export.checkpoint import Checkpoint
 from vm_export.network_shape import NetworkShape
 from vm_export.network_weights import network_of
-from vm_export.shifts import without_shifts
 
 from .class_table import ClassTable
 from .configuration import TrainConfiguration
@@ -26,8 +25,7 @@ _RATE = 0.001
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A trained network to begin with, without shifts. path: its file, a checkpoint or a model file. sha256: digest of
-    that file."""
+    """A trained network to begin with. path: its file, a checkpoint or a model file. sha256: digest of that file."""
 
     path: Path
     checkpoint: Checkpoint
@@ -37,7 +35,7 @@ class Start:
     def load(cls, path: Path) -> Start:
         """Read a checkpoint (.pt) or a model file (.onnx). Raises InputError or ModelError."""
         is_model = path.suffix.lower() == ".onnx"
-        checkpoint = without_shifts(network_of(read_model(path)) if is_model else Checkpoint.load(path))
+        checkpoint = network_of(read_model(path)) if is_model else Checkpoint.load(path)
         return cls(path, checkpoint, hashlib.sha256(path.read_bytes()).hexdigest())
 
     @property

@@ -60,18 +60,13 @@ class Places:
 
 
 def proposed_places(
-    observation: Observation,
-    probabilities: Singles,
-    shifts: Singles | None,
-    settings: PatchSettings,
-    glance: Look | None,
-    share: float,
+    observation: Observation, probabilities: Singles, settings: PatchSettings, glance: Look | None, share: float
 ) -> Places:
-    """The proposals of a class from the slots' probabilities (m,) and shifts (m, 2), if any, best first.
+    """The proposals of a class from the slots' probabilities (m,), best first.
 
     share: of the probability above which the glance passes a proposal on. Raises ModelError if the glance does not run.
     """
-    centers = propose_places(observation, probabilities, settings.above, settings.proposals, shifts)
+    centers = propose_places(observation, probabilities, settings.above, settings.proposals)
     if glance is not None:
         centers = passed_on(observation, centers, glance, share * worth_of(glance.contract))
     return Places.of(centers)

@@ -39,8 +39,7 @@ def scene_at(height=0.9, pitch=0.6, shape=None, mesh_shape=None, lens=None):
     rings = K * float(shape.spacing(height) / mesh_shape.spacing(height))
     view = PreparedView(layout, None, shape, rings, height, orientation.level, np.eye(3), lens, SIZE)
     projected = project(layout, orientation.level, lens, SIZE)
-    nothing = np.zeros((len(layout), 1), dtype=np.float32)
-    return Observation(PICTURE, view, BALLS, projected, nothing, nothing[:, :0])
+    return Observation(PICTURE, view, BALLS, projected, np.zeros((len(layout), 1), dtype=np.float32))
 
 
 def reordered(scene, order):

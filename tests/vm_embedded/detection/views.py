@@ -57,4 +57,4 @@ def observation_of(view, *centers, image=None, background=0.0):
         seen[BALL.offset(view.layout.rays, center[None], view.height)[0] < 1.0] = 0.97
     pyramid = Pyramid(picture_of(view, *centers) if image is None else image, "bgr")
     probabilities = np.maximum(seen, np.float32(background))[:, None]
-    return Observation(pyramid, view, ball_manifest(), projected, probabilities, np.empty((len(seen), 0), np.float32))
+    return Observation(pyramid, view, ball_manifest(), projected, probabilities)

@@ -52,14 +52,13 @@ heads = st.sampled_from(
 
 @st.composite
 def network_shapes(draw, model, most=1):
-    """Networks for a mesh model, with and without shifts, whose convolutions have dilations of at most `most`."""
+    """Networks for a mesh model whose convolutions have dilations of at most `most`."""
     first = Layer(draw(st.sampled_from(["convolution", "separable"])), draw(st.integers(1, 8)), draw(activations))
     inner = draw(st.lists(st.builds(Layer, kinds, st.integers(1, 8), activations), max_size=4))
     layers = (first, *inner, Layer(draw(kinds), *draw(heads)))
     return NetworkShape(
         tuple(each if each.kind == "dense" else replace(each, dilation=draw(st.integers(1, most))) for each in layers),
         MESH_MODELS[model].neighbors,
-        draw(st.booleans()),
     )
 
 
@@ -126,7 +125,7 @@ def masks(draw, count, seen=None):
 
 
 def torch_logits(network, model, mesh, colors, on_screen):
-    """Logits and shifts (n, outputs) of the points on screen, from torch and the mesh of just those."""
+    """Logits (n, C) of the points on screen, from torch and the mesh of just those."""
     kept = np.flatnonzero(on_screen)
     points = np.vstack([colors[kept], np.full((1, 3), -1.0)]).astype(np.float32)
     farther = Mesh(mesh.rays, with_dilations(mesh.neighbors, MESH_MODELS[model].groups, network.shape.dilations))
@@ -158,23 +157,19 @@ def slot_colors(layout, colors, shown):
 
 
 def session_of(network, model, layout, **changes):
-    shape = network.shape
-    entries = {"layer_dilations": shape.layer_dilations, "shifts": "class0" if shape.shifts else None} | changes
-    manifest = manifest_of(model, layout, shape.classes, **entries)
+    dilations = network.shape.layer_dilations
+    manifest = manifest_of(model, layout, network.shape.classes, layer_dilations=dilations, **changes)
     return Session(ModelFile(Path(f"{layout}.onnx"), onnx_model(network, manifest), manifest, ""))
 
 
-def logits_of(answers, shape):
-    """Logits and shifts (n, outputs) of a network's answers, logits of softmax up to a constant for each point."""
-    p, shifts = np.split(answers.astype(np.float64), [shape.classes], axis=1)
-    if shape.layers[-1].activation == "sigmoid":
-        return np.hstack([np.log(p) - np.log(1.0 - p), shifts])
-    return _centered(np.hstack([np.log(p), shifts]), shape)
+def logits_of(probabilities, head):
+    """Logits (n, C), those of softmax up to a constant for each point."""
+    p = probabilities.astype(np.float64)
+    return np.log(p) - np.log(1.0 - p) if head == "sigmoid" else _centered(np.log(p))
 
 
-def _centered(logits, shape):
-    head, shifts = np.split(logits, [shape.classes], axis=1)
-    return np.hstack([head - head.mean(axis=1, keepdims=True), shifts])
+def _centered(logits):
+    return logits - logits.mean(axis=1, keepdims=True)
 
 
 def layouts_of(mesh, network=None):
@@ -184,21 +179,21 @@ def layouts_of(mesh, network=None):
 
 
 def assert_same_answers(network, model, mesh, on_screen, seed):
-    """All layouts that there are for the mesh, and torch, agree on the logits and shifts of every point on screen."""
-    shape = network.shape
+    """All layouts that there are for the mesh, and torch, agree on the logits of every point on screen."""
+    head = network.shape.layers[-1].activation
     colors = np.random.default_rng(seed).random((len(mesh), 3))
     expected = tamed(network, torch_logits(network, model, mesh, colors, on_screen))
     found = {}
     for layout in layouts_of(mesh, network):
-        given, arranged = answers(session_of(network, model, layout), mesh, colors, on_screen)
-        assert given.shape == (len(arranged.slots), shape.outputs[-1])
-        found[layout] = logits_of(given[arranged.places][on_screen], shape)
+        probabilities, arranged = answers(session_of(network, model, layout), mesh, colors, on_screen)
+        assert probabilities.shape == (len(arranged.slots), network.shape.classes)
+        found[layout] = logits_of(probabilities[arranged.places][on_screen], head)
         assert np.isfinite(found[layout]).all()
-        copies = given[np.append(on_screen, False)[arranged.slots]]
-        first = given[arranged.places[arranged.slots[np.append(on_screen, False)[arranged.slots]]]]
+        copies = probabilities[np.append(on_screen, False)[arranged.slots]]
+        first = probabilities[arranged.places[arranged.slots[np.append(on_screen, False)[arranged.slots]]]]
         np.testing.assert_allclose(copies, first, atol=1e-6, err_msg="a copy of a point has another answer")
     np.testing.assert_allclose(found["runs"], found["plain"], rtol=0, atol=1e-5)
-    reference = expected if shape.layers[-1].activation == "sigmoid" else _centered(expected, shape)
+    reference = expected if head == "sigmoid" else _centered(expected)
     for layout in found:
         np.testing.assert_allclose(found[layout], reference, rtol=0, atol=1e-5, err_msg=layout)
 
@@ -281,10 +276,10 @@ def test_the_edge_policy_same_links_what_is_off_screen_to_the_point_itself(data,
     itself = np.arange(len(kept) + 1, dtype=np.int32)[:, None]
     alone = Mesh(part.rays, np.where(part.neighbors == len(kept), itself, part.neighbors))
     expected = tamed(network, torch_logits(network, model, alone, colors[kept], np.ones(len(kept), dtype=bool)))
-    given, layout = answers(session_of(network, model, "plain", edge="same"), mesh, colors, on_screen)
-    shape = network.shape
-    reference = expected if shape.layers[-1].activation == "sigmoid" else _centered(expected, shape)
-    found = logits_of(given[layout.places][on_screen], shape)
+    probabilities, layout = answers(session_of(network, model, "plain", edge="same"), mesh, colors, on_screen)
+    head = network.shape.layers[-1].activation
+    reference = expected if head == "sigmoid" else _centered(expected)
+    found = logits_of(probabilities[layout.places][on_screen], head)
     np.testing.assert_allclose(found, reference, rtol=0, atol=1e-5)
 
 

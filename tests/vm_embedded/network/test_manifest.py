@@ -138,19 +138,6 @@ def test_a_missing_entry_is_refused_by_name(entry):
         Manifest.from_json(changed(**{entry: ...}))
 
 
-def test_files_without_shifts_lack_their_entry_and_other_files_have_two_more_outputs():
-    assert "shifts" not in json.loads(BALL.as_json())
-    found = Manifest.from_json(changed(shifts="ball"))
-    assert (found.shifts, found.outputs) == ("ball", BALL.outputs + 2)
-    assert Manifest.from_json(found.as_json()) == found
-
-
-@pytest.mark.parametrize("value", ["robot", "environment", "", 2])
-def test_shifts_to_anything_but_a_class_of_objects_are_refused(value):
-    with pytest.raises(ModelError, match=rf"must be a class of kind object, of \['ball'\], not {value!r}"):
-        Manifest.from_json(changed(shifts=value))
-
-
 def test_files_without_dilations_lack_their_entry_as_before():
     assert "layer_dilations" not in json.loads(BALL.as_json())
     assert Manifest.from_json(changed(layer_dilations=[1, 4, 2, 4])).dilations == (1, 2, 4)

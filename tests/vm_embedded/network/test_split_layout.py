@@ -75,7 +75,7 @@ def test_sectors_give_the_answers_of_the_whole_mesh(others, data, model, count, 
         parts = split(session, mesh, count, others)
         shown = np.append(on_screen, False)[parts.slots]
         found = session.run(parts, slot_colors(parts, colors, shown), shown)
-        assert found.shape == (len(parts), network.shape.outputs[-1])
+        assert found.shape == (len(parts), network.shape.classes)
         np.testing.assert_allclose(
             found[parts.places][on_screen], expected[whole.places][on_screen], rtol=0, atol=1e-6, err_msg=layout
         )
