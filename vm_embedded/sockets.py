@@ -243,8 +243,10 @@ def parse_address(text: str, name: str, example: str) -> tuple[str, int]:
     """
     host, colon, port = text.strip().rpartition(":")
     host = host.removeprefix("[").removesuffix("]")
-    if not (colon and host and "," not in host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):
-        raise InputError(f"{name} must be ADDRESS:PORT, as in {example}, not {text!r}")
+    # Python refuses to read thousands of digits as a number.
+    is_port = port.isascii() and port.isdigit() and len(port) < 6 and 0 < int(port) < 65536
+    if not (colon and host and "," not in host and is_port):
+        raise InputError(f"{name} must be ADDRESS:PORT, as in {example}, with a port of at most 65535, not {text!r}")
     return host, int(port)
 
 

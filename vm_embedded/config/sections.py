@@ -38,7 +38,8 @@ def read_sections(
     try:
         table = parse_toml(text)
     except InputError as error:
-        raise InputError(f"{where}: {error}") from error
+        is_yaml = path is not None and path.suffix.lower() in (".yaml", ".yml")
+        raise InputError(f"{where}: {'it must be TOML, not YAML: ' if is_yaml else ''}{error}") from error
     for name, entries in (overrides or {}).items():
         table[name] = {**_checked_section(name, table.get(name, {})), **entries}
     _fill_in(kind, table, defaults or {})

@@ -179,6 +179,13 @@ def test_what_is_wrong_is_said(write, text, says):
         read_configuration(write(text))
 
 
+def test_a_lens_file_is_no_configuration(tmp_path):
+    path = tmp_path / "lens.yaml"
+    path.write_text(format_lens_file(Rectilinear(focal_length=400.0, fov=1.5)))
+    with pytest.raises(InputError, match=r"lens\.yaml: it must be TOML, not YAML: .*line 1"):
+        read_configuration(path)
+
+
 def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InputError, match=r"none\.toml.*No such file"):
         read_configuration(tmp_path / "none.toml")

@@ -136,6 +136,12 @@ def test_datagrams_have_no_unix_socket():
         OutputSettings(udp="127.0.0.1:5600,unix:lines.sock")
 
 
+@pytest.mark.parametrize("port", ["0", "65536", "9" * 5000, "-1", "²", ""])
+def test_a_port_is_a_number_to_65535(port):
+    with pytest.raises(InputError, match=r"udp must be ADDRESS:PORT, as in .*, with a port of at most 65535, not"):
+        OutputSettings(udp=f"127.0.0.1:{port}")
+
+
 def test_a_file_that_was_moved_or_deleted_is_begun_anew(tmp_path):
     path = tmp_path / "lines.jsonl"
     with running(tmp_path, "--camera", "synthetic", "--output-file", path) as found:
