@@ -181,7 +181,7 @@ def test_what_is_wrong_is_said(write, text, says):
 
 def test_a_lens_file_is_no_configuration(tmp_path):
     path = tmp_path / "lens.yaml"
-    path.write_text(format_lens_file(Rectilinear(focal_length=400.0, fov=1.5)))
+    path.write_text(format_lens_file(Rectilinear(focal_length=400.0, fov=1.5), None))
     with pytest.raises(InputError, match=r"lens\.yaml: it must be TOML, not YAML: .*line 1"):
         read_configuration(path)
 
