@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,19 @@ AnyImage = npt.NDArray[Any]
 
 Number = Any
 """A float or an array of floats; formulas of this type work on both."""
+
+
+def number_or_nan(value: object) -> float:
+    """A number of a JSON, TOML or YAML file; NaN for any other value, also for true, and for one too large for a float.
+
+    So the check of a caller for its limits also rejects what is no number.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.nan
 
 
 def numbers_or_nan(values: object) -> Floats:

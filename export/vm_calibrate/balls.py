@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vm_embedded.arrays import Floats
+from vm_embedded.arrays import Floats, number_or_nan
 from vm_embedded.cameras.image_files import IMAGE_SUFFIXES, read_image
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.files import read_text
@@ -141,9 +141,10 @@ def _ball(entry: Any, name: str, radius: float | None, path: Path) -> SeenBall:
 
 
 def _number(value: Any, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    number = number_or_nan(value)
+    if not math.isfinite(number):
         raise InputError(f"{what} must be a number, not {str(value)[:40]}")
-    return float(value)
+    return number
 
 
 def _read_yolo(folder: Path, radius: float, label: str | None) -> tuple[list[SeenBall], Size]:

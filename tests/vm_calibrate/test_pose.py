@@ -228,6 +228,7 @@ def test_the_lens_file_may_be_completed_in_place(yolo, capsys):
         ('{"a.jpg": [3]}', "a.jpg, ball 1 must be a table"),
         ('{"a.jpg": [{"cx": 1, "cy": 2}]}', "a.jpg, ball 1 has no 'r_px'"),
         ('{"a.jpg": [{"cx": 1, "cy": "2", "r_px": 3}]}', "cy of a.jpg, ball 1 must be a number"),
+        (f'{{"a.jpg": [{{"cx": 1, "cy": {10**400}, "r_px": 3}}]}}', "cy of a.jpg, ball 1 must be a number"),
         ('{"a.jpg": [{"cx": 1, "cy": 2, "r_px": 3}]}', "has no radius in meters; give --radius"),
         ('{"a.jpg": [{"cx": 1, "cy": 2, "r_px": -3, "radius": 0.1}]}', "is not larger than nothing"),
         ('{"a.jpg": [{"x0": 9, "y0": 2, "x1": 8, "y1": 4, "radius": 0.1}]}', "is not larger than nothing"),

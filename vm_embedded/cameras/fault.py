@@ -20,6 +20,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ..arrays import number_or_nan
 from ..config.entries import check_entries, number
 from ..config.sections import read_sections
 from ..errors import InputError, unknown
@@ -108,7 +109,7 @@ def _read_fault(value: object) -> Fault:
     if value["kind"] not in KINDS:
         raise InputError(unknown("kind of fault", value["kind"], KINDS))
     times = [value["at"], value["seconds"]]
-    if not all(isinstance(each, int | float) and not isinstance(each, bool) and 0 <= each < 1e6 for each in times):
+    if not all(0.0 <= number_or_nan(each) < 1e6 for each in times):
         raise InputError(f"at and seconds of a fault must be numbers from 0 s to 1e6 s, not {times}")
     return Fault(value["kind"], float(value["at"]), float(value["seconds"]))
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import numbers_or_nan
+from ..arrays import number_or_nan, numbers_or_nan
 from ..config.toml_reader import parse_toml
 from ..config.units import parse_angle
 from ..config.yaml_reader import read_yaml
@@ -215,10 +215,7 @@ def _data(value: Any) -> Any:
 
 
 def _number(value: Any, name: str) -> float:
-    try:
-        number = math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
-    except OverflowError:
-        number = math.inf
+    number = number_or_nan(value)
     if not math.isfinite(number):
         raise InputError(f"{name} must be a number, not {repr(value)[:60]}")
     return number

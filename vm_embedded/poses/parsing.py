@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import number_or_nan
 from ..errors import InputError, VisualMeshError, unknown
 from ..geometry.orientation import OPTICAL_TO_CAMERA, Orientation
 
@@ -66,9 +67,10 @@ def _orientation(data: dict[str, Any], optical: bool) -> Orientation:
 
 
 def _number(value: Any, name: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 1e15:
+    number = number_or_nan(value)
+    if not abs(number) <= 1e15:
         raise InputError(f"{name} must be a finite number, not {str(value)[:40]}")
-    return float(value)
+    return number
 
 
 def _list(value: Any, name: str, count: int) -> list[Any]:

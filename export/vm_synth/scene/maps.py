@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from vm_embedded.arrays import number_or_nan
 from vm_embedded.errors import InputError
 
 SUFFIXES = (".hdr", ".exr", ".pfm")
@@ -37,7 +38,7 @@ class MapRanges:
         if not isinstance(self.floors, Mapping):
             raise InputError(f"floors must be a table of map names and angles, not {self.floors!r}")
         for name, angle in self.floors.items():
-            if isinstance(angle, bool) or not isinstance(angle, int | float) or not 1.0 <= angle <= 80.0:
+            if not 1.0 <= number_or_nan(angle) <= 80.0:
                 raise InputError(f"the floor of map {name} must begin 1 to 80 deg below the horizon, not {angle!r}")
 
 
