@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from vm_embedded.arrays import number_or_nan
 from vm_embedded.config.yaml_reader import read_yaml
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.files import read_text
@@ -81,7 +82,7 @@ def _lens(table: Mapping[str, Any]) -> CalibratedLens:
 
 def _numbers(table: Mapping[str, Any], key: str, count: int) -> list[float]:
     values = table.get(key)
-    good = isinstance(values, list) and len(values) == count
-    if not good or not all(isinstance(each, int | float) and math.isfinite(each) for each in values or ()):
+    numbers = [number_or_nan(each) for each in values] if isinstance(values, list) else []
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
         raise InputError(f"{key} must be {count} numbers, not {str(values)[:60]}")
-    return [float(each) for each in values or ()]
+    return numbers

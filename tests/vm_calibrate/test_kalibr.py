@@ -94,6 +94,8 @@ def test_no_distortion_is_a_plain_pinhole(convert):
         ("[458.6, 457.3, 367.2, 248.4]", "[458.6, 457.3]", "intrinsics must be 4 numbers, not [458.6, 457.3]"),
         ("458.6", "-458.6", "focal lengths must be above 0 px"),
         ("[752, 480]", "[752, wide]", "resolution must be 2 numbers"),
+        ("[752, 480]", "[752, true]", "resolution must be 2 numbers, not [752, True]"),
+        ("458.6", str(10**400), "intrinsics must be 4 numbers"),
         ("camera_model", "model", "has no camera of Kalibr"),
         ("cam0:", "  cam0:", "line 15: unexpected indentation"),
     ],

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from vm_embedded.arrays import Image
+from vm_embedded.arrays import Image, number_or_nan
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.errors import InputError, VisualMeshError, one_line
 from vm_embedded.geometry.lens import Size
@@ -212,7 +212,7 @@ def _object_facts(shown: dict[str, Any], kind: str) -> ObjectFacts:
 
 
 def _number(value: Any) -> float:
-    number = float(value)
+    number = number_or_nan(value)
     if not math.isfinite(number):
         raise ValueError(f"{value!r} is not a finite number")
     return number

@@ -83,7 +83,7 @@ def read_field(path: Path) -> FieldScene | None:
         found = None if standing is None else tuple(map(_standing, standing))
         model = table.get("field")
         return FieldScene(found, "field" in table, None if model is None else FieldModel.from_table(model))
-    except (OSError, AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
+    except (OSError, AttributeError, KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(f"{path.name}: is not a scene file of vm-synth: {error!r}") from error
 
 

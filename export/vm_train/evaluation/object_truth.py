@@ -76,7 +76,7 @@ def read_scene(path: Path) -> SceneTruth | None:
             ball = None if in_mask else table["ball"]
             found = () if ball is None else (_read_object(ball, 0.0),)
             truth = SceneTruth(float(table["ball_radius"]), found, in_mask=in_mask)
-    except (OSError, AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
+    except (OSError, AttributeError, KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(f"{path.name}: is not a scene file of vm-synth: {error!r}") from error
     if not _is_valid(truth):
         raise InputError(

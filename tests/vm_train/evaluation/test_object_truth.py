@@ -97,6 +97,13 @@ def test_what_is_above_the_horizon_has_no_place(pictures):
     assert np.isnan(found.offsets(found.bearing[None])).all()
 
 
+def test_a_radius_that_no_number_can_hold_is_a_fault_of_the_file(tmp_path):
+    path = tmp_path / "scene0.json"
+    path.write_text(json.dumps({"ball_radius": 10**400, "ball": None}))
+    with pytest.raises(InputError, match=r"scene0\.json: is not a scene file of vm-synth"):
+        read_scene(path)
+
+
 def test_a_scene_without_a_ball_and_a_hidden_one(pictures):
     picture, _ = pictures[0]
     assert true_objects(picture, SceneTruth(RADIUS, ()), MANIFEST)["ball"] == []
