@@ -209,5 +209,8 @@ def _train(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> 
             with stop_requests() as stop_requested:
                 if not train_look(run, collected, hardware, stop_requested):
                     raise KeyboardInterrupt
+    if run.glance_sha256 is None:
+        behind = f"--from {run.mesh} --glance {run.look_path} -o {folder}-look"
+        print(f"next, if this is a glance: vm-train look {run.data} {behind}")
     print(f"next: vm-export {run.mesh} --look {run.look_path} -o {folder / 'model.onnx'}")
     return EXIT_OK

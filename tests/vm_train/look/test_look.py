@@ -53,7 +53,9 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, drawn)
     assert [each.split(":")[0] for each in lines[4:8]] == [f"epoch {number} of 4" for number in (1, 2, 3, 4)]
     assert "look.pt: in " in lines[8]
     output = folder / "model.onnx"
-    assert lines[9] == f"next: vm-export {folder / 'mesh.onnx'} --look {folder / 'look.pt'} -o {output}"
+    behind = f"--from {folder / 'mesh.onnx'} --glance {folder / 'look.pt'} -o {folder}-look"
+    assert lines[9] == f"next, if this is a glance: vm-train look {drawn} {behind}"
+    assert lines[10] == f"next: vm-export {folder / 'mesh.onnx'} --look {folder / 'look.pt'} -o {output}"
     assert {path.name for path in folder.iterdir()} == {
         *("look.toml", "pictures.json", "run.json", "mesh.onnx", "patches", "state.pt", "log.jsonl", "tensorboard"),
         *("look.pt", "result.json"),
