@@ -94,27 +94,24 @@ def _soak_socket(folder: Path, name: str, count: int, seconds: float) -> Connect
         found.wait(found.is_ok)
         before = _rate(found, time.monotonic() + seconds, lambda: True)
         waits: list[float] = []
+        connected: list[float] = []
         began = time.monotonic()
-        connecting_s = 0.0
-        left = count
 
         def connect() -> bool:
-            nonlocal left, connecting_s
-            if left:
-                for _ in range(min(_AT_ONCE, left)):
-                    _connected(addresses[name], stack)
-                    left -= 1
-                connecting_s = time.monotonic() - began
+            for _ in range(min(_AT_ONCE, count - len(connected))):
+                _connected(addresses[name], stack)
+                connected.append(time.monotonic())
             asked = time.monotonic()
             status(folder)
             waits.append(time.monotonic() - asked)
-            return not left
+            return len(connected) == count
 
         during = _rate(found, began + seconds, connect)
         poses.on = False
         found.stop()
     lines = sum(found.events.values())
-    return ConnectionsReport(name, count - left, connecting_s, before, during, max(waits), lines, found.unexpected)
+    took = connected[-1] - began
+    return ConnectionsReport(name, len(connected), took, before, during, max(waits), lines, found.unexpected)
 
 
 def _free_addresses(count: int) -> list[tuple[str, int]]:

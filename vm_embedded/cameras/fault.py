@@ -108,10 +108,11 @@ def _read_fault(value: object) -> Fault:
         raise InputError(f'write a fault like {{ kind = "hang", at = 5.0, seconds = 2.0 }}, not {value!r}')
     if value["kind"] not in KINDS:
         raise InputError(unknown("kind of fault", value["kind"], KINDS))
-    times = [value["at"], value["seconds"]]
-    if not all(0.0 <= number_or_nan(each) < 1e6 for each in times):
-        raise InputError(f"at and seconds of a fault must be numbers from 0 s to 1e6 s, not {times}")
-    return Fault(value["kind"], float(value["at"]), float(value["seconds"]))
+    given = [value["at"], value["seconds"]]
+    at, seconds = map(number_or_nan, given)
+    if not (0.0 <= at < 1e6 and 0.0 <= seconds < 1e6):
+        raise InputError(f"at and seconds of a fault must be numbers from 0 s to 1e6 s, not {given}")
+    return Fault(value["kind"], at, seconds)
 
 
 @dataclass(frozen=True)

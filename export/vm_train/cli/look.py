@@ -211,6 +211,6 @@ def _train(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> 
                     raise KeyboardInterrupt
     if run.glance_sha256 is None:
         behind = f"--from {run.mesh} --glance {run.look_path} -o {folder}-look"
-        print(f"next, if this is a glance: vm-train look {run.data} {behind}")
+        print(f"next, to use it as a glance: vm-train look {run.data} {behind}")
     print(f"next: vm-export {run.mesh} --look {run.look_path} -o {folder / 'model.onnx'}")
     return EXIT_OK

@@ -54,7 +54,7 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, drawn)
     assert "look.pt: in " in lines[8]
     output = folder / "model.onnx"
     behind = f"--from {folder / 'mesh.onnx'} --glance {folder / 'look.pt'} -o {folder}-look"
-    assert lines[9] == f"next, if this is a glance: vm-train look {drawn} {behind}"
+    assert lines[9] == f"next, to use it as a glance: vm-train look {drawn} {behind}"
     assert lines[10] == f"next: vm-export {folder / 'mesh.onnx'} --look {folder / 'look.pt'} -o {output}"
     assert {path.name for path in folder.iterdir()} == {
         *("look.toml", "pictures.json", "run.json", "mesh.onnx", "patches", "state.pt", "log.jsonl", "tensorboard"),
