@@ -272,7 +272,7 @@ class Daemon:
         self._health.add_trouble(time.monotonic(), reason)
 
     def _update_state(self) -> None:
-        """Determine the state; if it has changed, send it."""
+        """Determine the state; send a new one, and a new reason of a bad one."""
         if self._state.update():
             self._send(state_message(self._state.name, self._state.reason))
 

@@ -31,7 +31,7 @@ class DaemonState:
         self._rejected = 0  # frames of the camera that were rejected
 
     def update(self) -> bool:
-        """Determine the state, and return whether it has changed. Log changes, and new reasons of a bad state."""
+        """Determine the state. Log a new one and a new reason of a bad one, and return whether there was one."""
         now, was = time.monotonic(), self.name
         is_lost = self._grabber.supervise(now)
         self._collect_troubles(now)
@@ -45,7 +45,7 @@ class DaemonState:
             return False
         self._logged = self.reason
         self._notifier.send(STATUS=f"{self.name}{': ' if self.reason else ''}{self.reason}")
-        return self.name != was
+        return True
 
     def _collect_troubles(self, now: float) -> None:
         """Tell the health of lost messages and of rejected frames."""

@@ -289,6 +289,28 @@ def test_another_reason_of_the_same_state_is_logged_but_not_another_number_in_it
     assert found.states[found.states.index("pose_stale") :] == ["pose_stale", "stopping"]
 
 
+def test_a_bad_state_with_another_reason_is_sent_while_frames_arrive(tmp_path):
+    path = tmp_path / "poses"
+    with running(tmp_path, "--camera", "synthetic", "--pose-source", f"unix:{path}") as found:
+        with socket.socket(socket.AF_UNIX) as good, socket.socket(socket.AF_UNIX) as bad:
+            found.wait_for_state("pose_stale")
+            good.connect(str(path))
+            bad.connect(str(path))
+            sender = Sender(good.sendall, Motion())
+            sender.start()
+            found.wait_for_state("ok")
+
+            def is_sent(line, reason):
+                bad.sendall(line)
+                return any(reason in each.get("reason", "") for each in found.messages)
+
+            found.wait(lambda: is_sent(b"x\n", "not valid JSON"))
+            found.wait(lambda: is_sent(b'{"height": 0.8, "quaternion": [1, 0, 0, 0]}\n', "pose lacks t"))
+            sender.on = False
+            sender.join()
+        found.stop()
+
+
 OLD = b'{"t": 1.0, "height": 0.8, "quaternion": [1, 0, 0, 0]}\n'
 
 
