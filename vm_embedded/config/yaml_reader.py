@@ -25,6 +25,7 @@ _TAG = re.compile(r"^!\S*\s*")
 _INTEGER = re.compile(r"[-+]?\d+")
 _REAL = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 _PLAIN_IN_FLOW = re.compile(r"[^,\[\]{}:]+(:[^\s,\[\]{}][^,\[\]{}:]*)*")
+_QUOTED = re.compile(r"""(?<![^ \[{,:])("[^"]*"|'[^']*')""")
 _WORDS: dict[str, Any] = {
     "": None,
     "~": None,
@@ -113,7 +114,8 @@ def _joined(lines: list[_Line]) -> list[_Line]:
             joined[-1].text += " " + line.text
         else:
             joined.append(line)
-        depth += sum(line.text.count(c) for c in "[{") - sum(line.text.count(c) for c in "]}")
+        plain = _QUOTED.sub("", line.text)
+        depth += sum(plain.count(c) for c in "[{") - sum(plain.count(c) for c in "]}")
     if depth > 0:
         raise _error(joined[-1], "bracket is not closed")
     return joined

@@ -169,6 +169,17 @@ def test_scalars(scalar, value):
         assert same(read_yaml(f"{{key: {scalar}, other: 1}}"), {"key": value, "other": 1})
 
 
+@pytest.mark.parametrize("quote", list("'\""))
+@given(st.text("[]{},:# ab", max_size=12))
+@example("left [wide")
+@example("]")
+def test_quotes_may_hold_anything(quote, text):
+    scalar = quote + text + quote
+    assert read_yaml(f"key: {scalar}\nother: 1\n") == {"key": text, "other": 1}
+    assert read_yaml(f"- {scalar}\n- 1\n") == [text, 1]
+    assert read_yaml(f"key: [{scalar},\n  1]\n") == {"key": [text, 1]}
+
+
 @pytest.mark.parametrize("text", [".nan", ".NaN"])
 def test_not_a_number_is_a_float(text):
     assert math.isnan(read_yaml(text))
