@@ -11,10 +11,15 @@ from hypothesis import settings
 # times as long. The environment reaches torch, which is imported later, and the programs that tests start.
 os.environ["OMP_NUM_THREADS"] = "1"
 
-settings.register_profile(
-    "repeatable", deadline=None, max_examples=50, derandomize=True, database=None, print_blob=False
-)
-settings.load_profile("repeatable")
+
+def pytest_configure(config):
+    """Random inputs are the same in each run. With the long tests, there are twice as many."""
+    examples = 25 if "not long" in config.option.markexpr else 50
+    settings.register_profile(
+        "repeatable", deadline=None, max_examples=examples, derandomize=True, database=None, print_blob=False
+    )
+    settings.load_profile("repeatable")
+
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 

@@ -195,6 +195,7 @@ def test_a_perfect_peer_has_the_best_scores_and_a_smaller_picture_the_same(pictu
     assert choose(Oracle(), find_pictures(pictures)).threshold == pytest.approx(0.9)
 
 
+@pytest.mark.long
 def test_our_networks_are_scored_in_pixels_of_the_whole_picture(pictures):
     for factor in (1.0, 0.5):
         scores = tally_ours(model_path("ball"), find_pictures(pictures), factor, CANDIDATES).all

@@ -56,7 +56,7 @@ def test_requests_to_the_page_leave_nothing_behind():
         (b"refuse", ""),
         (b"raise", "KeyError: 'another error'"),
         (b"print", "printed b'a line"),
-        (b"hang", "has not ended after"),
+        pytest.param(b"hang", "has not ended after", marks=pytest.mark.long),
         (b"grow", "MiB more memory"),
     ],
 )

@@ -91,6 +91,7 @@ def test_blurred_and_broken_frames_are_left_out(tmp_path):
     assert search.left_out == {"blurred": 1, "unreadable": 1, "similar to others": 0}
 
 
+@pytest.mark.long
 def test_a_wrong_board_size_names_the_right_one(folders, tmp_path, capsys):
     command = ("lens", folders("rectilinear"), "--board", "9x6", "-o", tmp_path / "lens.yaml")
     assert "try --board 8x5" in run(capsys, *command, code=1)

@@ -112,6 +112,7 @@ def test_a_model_that_is_none_is_seen(root, tmp_path):
     assert found(replace(HEALTHY, model=str(tmp_path / "model.onnx")), root)["model"].state == BAD
 
 
+@pytest.mark.long
 def test_a_lens_for_another_size_is_seen(root):
     other = replace(HEALTHY, camera=CameraSettings(source="synthetic", width=640, height=480))
     assert found(other, root)["lens"].state == BAD

@@ -84,6 +84,7 @@ def test_ten_thousand_damaged_models_are_loaded_or_refused_in_a_line(tmp_path):
     assert time.monotonic() - started < 300
 
 
+@pytest.mark.long
 def test_a_damaged_configuration_ends_the_command_with_a_line_and_no_traceback(tmp_path):
     path = tmp_path / "vm.toml"
     chance = random.Random(3)

@@ -76,6 +76,7 @@ if sys.orig_argv[1].endswith("vm-detect"):
 """A module that Python imports at its start."""
 
 
+@pytest.mark.long
 def test_no_frame_says_that_there_is_no_camera(tmp_path):
     """The camera is lost while its last frame is processed."""
     (tmp_path / "sitecustomize.py").write_text(SLOW)

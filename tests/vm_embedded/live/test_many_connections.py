@@ -40,7 +40,9 @@ def connected(address, stack):
     return made
 
 
-@pytest.mark.parametrize("name", ["poses", "lines", "control", "page"])
+@pytest.mark.parametrize(
+    "name", ["lines", *(pytest.param(each, marks=pytest.mark.long) for each in ("poses", "control", "page"))]
+)
 def test_attack_6_hundreds_of_silent_connections_do_no_harm(name, tmp_path):
     options, addresses = sockets(tmp_path)
     with running(tmp_path, *options, preexec_fn=few_descriptors) as found, ExitStack() as stack:

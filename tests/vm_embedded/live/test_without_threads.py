@@ -52,6 +52,7 @@ def test_it_ends_in_order(start, tmp_path):
     assert found.messages[-1]["state"] == "stopping"
 
 
+@pytest.mark.long
 def test_a_camera_that_can_not_be_opened_again_ends_it_with_a_status_that_asks_for_a_new_start(start, tmp_path):
     script = tmp_path / "script.toml"
     script.write_text('faults = [{ kind = "hang", at = 3.0, seconds = 600.0 }]\n')

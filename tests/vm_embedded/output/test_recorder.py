@@ -149,6 +149,7 @@ def test_the_next_detector_finishes_recordings_of_a_killed_one_and_nothing_else(
     assert (kept / left.stem).exists()
 
 
+@pytest.mark.long
 def test_a_recording_larger_than_its_limit_keeps_its_first_frames(tmp_path):
     kept = tmp_path / "recordings"
     with running(

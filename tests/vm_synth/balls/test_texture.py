@@ -58,6 +58,7 @@ def test_the_wrap_around_and_the_poles_do_not_show(kind):
         assert np.abs(np.diff(texture[[0, -1]], axis=1)).max() < 0.15
 
 
+@pytest.mark.long
 def test_a_larger_texture_shows_the_same_ball():
     for kind in PATTERNS:
         design = of_kind(kind)[0]

@@ -98,7 +98,9 @@ def test_shards_join_to_the_same_set(tmp_path, small, whole):
     assert joined == whole
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long), signal.SIGKILL])
+@pytest.mark.parametrize(
+    "how", [signal.SIGINT, *(pytest.param(each, marks=pytest.mark.long) for each in (signal.SIGTERM, signal.SIGKILL))]
+)
 def test_what_is_stopped_goes_on_with_the_same_command(how, tmp_path, small, whole):
     arguments = [*COMMAND, str(tmp_path), *small, "--workers", "1"]
     process = started(arguments)
@@ -188,6 +190,7 @@ def test_a_folder_of_other_pictures_is_left_alone(tmp_path, small, whole):
     assert contents(tmp_path) == {"image0000001.jpg": b"mine"}
 
 
+@pytest.mark.long
 def test_pictures_that_lost_a_file_are_rendered_again(tmp_path, small, whole):
     for name, content in whole.items():
         (tmp_path / name).write_bytes(content)

@@ -137,6 +137,7 @@ def test_a_close_look_s_proposals_have_scores_of_their_own(capsys, looking, data
     assert not list(again.rglob("proposals.*"))
 
 
+@pytest.mark.long
 def test_a_robot_s_proposals_have_scores_too(looking, data, tmp_path):
     assert main([str(each) for each in (looking, data, "-o", tmp_path, "--workers", 1, "--as-robot")]) == 0
     assert json.loads((tmp_path / "scores.json").read_text())["proposals"]["ball"]["pictures"] == 8
@@ -196,6 +197,7 @@ def bad(tmp_path):
     return folder
 
 
+@pytest.mark.long
 def test_the_networks_of_the_package_have_names(capsys, data, tmp_path):
     done = run("ball", data, "-o", tmp_path / "out", "--workers", 1)
     assert "objects of class ball" in done.stdout

@@ -105,7 +105,7 @@ def test_the_same_command_gives_the_same_weights(whole, data, configuration, tmp
 @pytest.mark.parametrize(
     ("how", "steps"),
     [
-        (signal.SIGINT, 2),
+        pytest.param(signal.SIGINT, 2, marks=pytest.mark.long),
         pytest.param(signal.SIGTERM, 9, marks=pytest.mark.long),
         (signal.SIGKILL, 9),
         pytest.param(signal.SIGKILL, 24, marks=pytest.mark.long),

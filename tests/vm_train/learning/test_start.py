@@ -56,6 +56,7 @@ def test_with_a_tiny_rate_the_network_stays_the_same_from_a_checkpoint_and_from_
     assert Checkpoint.load(first).manifest.provenance["start_sha256"] == "none"
 
 
+@pytest.mark.long
 def test_dilations_are_trained_exported_and_trained_further(data, configuration, tmp_path):
     """Both layouts answer alike. A training from a model file has the same dilations, or others that are given."""
     made, tables, model = tmp_path / "run" / "model.pt", tmp_path / "classes.toml", tmp_path / "model.onnx"

@@ -99,6 +99,7 @@ def test_frames_without_validation_measure_nothing_and_those_with_lenses_can_be_
     assert "0 other frames" not in (tmp_path / "run" / "report.html").read_text()
 
 
+@pytest.mark.long
 def test_a_wide_look_is_left_out(tune, tmp_path):
     done = tune(tmp_path / "run", "--from", "ball")
     assert (
