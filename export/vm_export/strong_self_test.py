@@ -58,7 +58,8 @@ def _patch(manifest: Manifest) -> Mesh:
     reach = min(manifest.max_distance, 100.0 * manifest.radius)
     mesh = manifest.model.build(manifest.mesh_shape, height, manifest.intersections, reach)
     kept = np.array([len(mesh) // 2])
-    for _ in range(min(max(_HOPS, links_across(manifest.dilations[-1])), _MOST_HOPS)):
+    hops = links_across(manifest.model.groups, manifest.dilations[-1])
+    for _ in range(min(max(_HOPS, hops), _MOST_HOPS)):
         kept = np.unique([*kept, *mesh.links(kept).ravel()])
         kept = kept[kept < len(mesh)]
     return mesh.part(kept)

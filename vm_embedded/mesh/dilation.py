@@ -44,22 +44,27 @@ def dilated(neighbors: Indices, groups: Groups, dilation: int) -> Indices:
     found = np.empty_like(neighbors)
     for group in groups:
         middle = itself
-        # Steps to the members from the middle of their row.
-        offsets = {1: [0], 2: [-(dilation // 2), dilation - dilation // 2], 3: [-dilation, 0, dilation]}[len(group)]
         if SELF not in group:
             # Of two members, one is half a step to the left and one half a step to the right: taken in turn, they lead
             # straight on.
             ways = group[1:2] if len(group) == 3 else group
             middle = _walk(itself, [neighbors[:, ways[step % len(ways)]] for step in range(dilation)])
-        for member, offset in zip(group, offsets, strict=True):
+        for member, offset in zip(group, _offsets(group, dilation), strict=True):
             if member != SELF:
                 found[:, member] = _walk(middle, [left if offset < 0 else right] * abs(offset))
     return found
 
 
-def links_across(dilation: int) -> int:
+def links_across(groups: Groups, dilation: int) -> int:
     """How many links lead to the farthest of the points of `dilated`, at most."""
-    return 1 if dilation == 1 else dilation + (dilation + 1) // 2
+    if dilation == 1:
+        return 1
+    return max((SELF not in group) * dilation + max(map(abs, _offsets(group, dilation))) for group in groups)
+
+
+def _offsets(group: Sequence[int], dilation: int) -> list[int]:
+    """Steps along a row, from the middle of a group's members to each of them; to the left they are negative."""
+    return {1: [0], 2: [-(dilation // 2), dilation - dilation // 2], 3: [-dilation, 0, dilation]}[len(group)]
 
 
 def _walk(places: Indices, ways: Sequence[Indices]) -> Indices:

@@ -87,7 +87,8 @@ class ModelFile:
         Only for the layouts plain and runs.
         """
         if self.manifest.layer_dilations:
-            return sum(map(links_across, self.manifest.layer_dilations))
+            groups = self.manifest.model.groups
+            return sum(links_across(groups, each) for each in self.manifest.layer_dilations)
         return _look_ups(memoryview(self.content))
 
 

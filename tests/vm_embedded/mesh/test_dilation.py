@@ -61,11 +61,18 @@ def test_on_rings_a_group_lies_so_many_rings_away_and_its_members_as_many_steps_
 @given(st.data(), st.sampled_from(sorted(ALL)), dilations)
 def test_the_points_are_within_so_many_links(data, model, dilation):
     mesh = data.draw(random_meshes(MESH_MODELS[model].neighbors))
-    found = dilated(mesh.neighbors, MESH_MODELS[model].groups, dilation)
+    groups = MESH_MODELS[model].groups
+    found = dilated(mesh.neighbors, groups, dilation)
     assert found.dtype == np.int32
     for point in range(min(len(mesh), 20)):
-        near = with_surroundings(mesh, np.array([point]), links_across(dilation))
+        near = with_surroundings(mesh, np.array([point]), links_across(groups, dilation))
         assert set(found[point].tolist()) <= {*near.tolist(), len(mesh)}
+
+
+@pytest.mark.parametrize(("model", "links"), [("ring6", 5), ("ring8", 5), ("xygrid4", 3), ("xygrid8", 6)])
+def test_the_farthest_points_of_dilation_three(model, links):
+    """Three rows up, and there half of three steps to a side with two members in a group, or three with three."""
+    assert links_across(MESH_MODELS[model].groups, 3) == links
 
 
 @pytest.mark.parametrize("model", sorted(ALL))
