@@ -55,9 +55,9 @@ def test_requests_to_the_page_leave_nothing_behind():
     [
         (b"refuse", ""),
         (b"raise", "KeyError: 'another error'"),
-        (b"print", "printed b'a line"),
+        pytest.param(b"print", "printed b'a line", marks=pytest.mark.long),
         pytest.param(b"hang", "has not ended after", marks=pytest.mark.long),
-        (b"grow", "MiB more memory"),
+        pytest.param(b"grow", "MiB more memory", marks=pytest.mark.long),
     ],
 )
 def test_what_must_not_happen_is_found_and_saved(data, text, tmp_path):

@@ -63,6 +63,7 @@ def test_frames_that_disagree_are_left_out(seed):
     assert fit.lens.scale == pytest.approx(LENSES["rectilinear"].scale, rel=0.005)
 
 
+@pytest.mark.long
 @settings(max_examples=5)
 @given(seed=seeds)
 def test_it_agrees_with_opencv(seed):

@@ -90,7 +90,7 @@ def test_the_pose_over_a_board_is_found(kind, tmp_path, capsys):
     assert re.search("used [123], left out 0", printed)
 
 
-@pytest.mark.parametrize("box", [False, True])
+@pytest.mark.parametrize("box", [False, pytest.param(True, marks=pytest.mark.long)])
 @pytest.mark.parametrize("kind", LENSES)
 @settings(max_examples=2)
 @given(height=reals(0.5, 1.5), pitch=reals(0.2, 0.8), roll=reals(-0.2, 0.2), seed=seeds)

@@ -159,6 +159,7 @@ def test_the_same_run_gives_the_same_files(evaluated, data, tmp_path):
         assert path.read_bytes() == (tmp_path / "again" / path.relative_to(out)).read_bytes(), path.name
 
 
+@pytest.mark.long
 def test_a_hexagonal_checkpoint_has_points_only_and_leaves_no_old_objects(capsys, data, tmp_path):
     checkpoint = Checkpoint.load(CHECKPOINT)
     path, out = tmp_path / "hexagonal.pt", tmp_path / "out"

@@ -35,11 +35,12 @@ def data(tmp_path_factory):
     return draw_set(tmp_path_factory.mktemp("drawn"), 12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("model", "layouts"),
     [
-        pytest.param("cap6", ("plain", "runs"), marks=pytest.mark.long),
-        pytest.param("xmgrid8", ("runs", "lattice"), marks=pytest.mark.long),
+        ("cap6", ("plain", "runs")),
+        ("xmgrid8", ("runs", "lattice")),
         ("wall6", ("plain", "runs")),
     ],
 )
