@@ -65,8 +65,11 @@ def _read(path: Path) -> tuple[str, ...]:
 
 def _yaml_names(text: str) -> list[str]:
     """The entry `names` of a YAML text: a list, or a mapping from the numbers 0, 1, ... Raises InputError."""
-    entry = _ENTRY.search(text)
-    names = read_yaml(entry[0])["names"] if entry else None
+    found = _ENTRY.search(text)
+    entry = read_yaml(found[0]) if found else {"names": None}
+    if not isinstance(entry, dict):
+        raise InputError("names lacks a space after its colon")
+    names = entry["names"]
     if isinstance(names, dict):
         if set(names) != set(map(str, range(len(names)))):
             raise InputError(f"names must have the numbers from 0 to {len(names) - 1}")

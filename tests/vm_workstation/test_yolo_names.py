@@ -38,6 +38,7 @@ def test_tables_of_all_kinds(name, text, tmp_path):
         ("data_yaml", "names: {0: ball, 2: goal}", "names must have the numbers from 0 to 1"),
         ("data_yaml", "nc: 2", "lacks names, the list of class names"),
         ("data_yaml", "names: ball", "lacks names, the list of class names"),
+        ("data_yaml", "names:[ball, goal]", "names lacks a space after its colon"),
         ("data_yaml", "names: [", "line 1: bracket is not closed"),
         ("data_yaml", "names: []", "must give a name for each class number"),
         ("data_yaml", "names:\n  0:\n  1: ball", "must give a name for each class number"),
