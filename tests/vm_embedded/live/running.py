@@ -91,9 +91,8 @@ def counts(tmp_path):
 @contextmanager
 def running(tmp_path, *options, env=None, **more):
     """A process that ends with the block, whatever happens in it."""
-    # A busy core keeps frames waiting. Only what a test is about makes them late.
     process = subprocess.Popen(
-        arguments(tmp_path, "--camera-max-age-ms", 10000, *options),
+        arguments(tmp_path, *options),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env={**os.environ, **(env or {})},

@@ -17,7 +17,7 @@ from vm_embedded.network.bundled import model_path
 
 
 def test_a_drawn_camera_is_watched_and_its_ball_is_where_it_is(tmp_path):
-    with running(tmp_path, "--camera", "synthetic", "--camera-max-age-ms", 250) as found:
+    with running(tmp_path, "--camera", "synthetic") as found:
         found.wait_for_state("ok")
         found.wait(lambda: sum(len(each["detections"]) for each in found.frames) > 10)
         status, seconds = found.stop()

@@ -27,7 +27,7 @@ def video(tmp_path):
 def test_a_detector_five_times_slower_than_its_camera_works_on_the_newest_frame(tmp_path, video):
     (tmp_path / "vm.toml").write_text(LENS)
     # A tiny ball needs a mesh with many points: the detector takes a tenth of a second, on a busy core much more.
-    slow = ("--camera-loop", "--live", "--object-radius", 0.008)
+    slow = ("--camera-loop", "--live", "--object-radius", 0.008, "--camera-max-age-ms", 10000)
     with running(tmp_path, "--config", tmp_path / "vm.toml", "--camera", video, *slow) as found:
         found.wait(lambda: len(found.frames) > 40)
         counted = counts(tmp_path)
