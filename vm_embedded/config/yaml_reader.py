@@ -25,7 +25,8 @@ _TAG = re.compile(r"^!\S*\s*")
 _INTEGER = re.compile(r"[-+]?\d+")
 _REAL = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 _PLAIN_IN_FLOW = re.compile(r"[^,\[\]{}:]+(:[^\s,\[\]{}][^,\[\]{}:]*)*")
-_QUOTED = re.compile(r"""(?<![^ \[{,:])("[^"]*"|'[^']*')""")
+_BEFORE_QUOTE = " [{,:"  # elsewhere, a quote is a character like others: it's
+_QUOTED = re.compile(rf"""(?<![^{re.escape(_BEFORE_QUOTE)}])("[^"]*"|'[^']*')""")
 _WORDS: dict[str, Any] = {
     "": None,
     "~": None,
@@ -96,7 +97,7 @@ def _without_comment(raw: str) -> str:
             if (quote == '"' and character == "\\") or (character == quote == raw[position + 1 : position + 2]):
                 raise ValueError("escapes in quotes are not supported")
             quote = "" if character == quote else quote
-        elif character in "\"'" and (position == 0 or raw[position - 1] in " [{,:"):
+        elif character in "\"'" and (position == 0 or raw[position - 1] in _BEFORE_QUOTE):
             quote = character
         elif character == "#" and (position == 0 or raw[position - 1] in " \t"):
             return raw[:position]

@@ -10,7 +10,7 @@ from vm_embedded.arrays import Singles
 _STEPS = (1, 2, 4)
 _NORMALS = 16.0  # how strongly a difference of directions lowers the weight of a neighbor
 _DEPTHS = 30.0  # the same for a relative difference of distances
-_LEAST = np.float32(1e-6)  # a pixel whose weights add up to less keeps its light
+_LEAST = 1e-6  # a pixel whose weights add up to less keeps its light: their quotient would be rounding errors
 
 
 def denoise(light: Singles, albedo: Singles, normal: Singles, depth: Singles, share: Singles) -> Singles:
@@ -41,7 +41,6 @@ def denoise(light: Singles, albedo: Singles, normal: Singles, depth: Singles, sh
                     weight = same * _shifted(around[1], down, right)
                     total += _shifted(lit, down, right) * weight
                     weights += weight
-        # With hardly any weight, the quotient would be rounding errors.
         falling = np.where(weights > _LEAST, total / np.maximum(weights, _LEAST), falling)
     return np.where(share[..., None] > 0, np.moveaxis(falling * color, 0, -1), light)
 
