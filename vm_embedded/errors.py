@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+from .text import printable
+
 
 class VisualMeshError(Exception):
     """Base of all errors that a user can fix; the message is one line of text.
@@ -13,9 +15,7 @@ class VisualMeshError(Exception):
     """
 
     def __str__(self) -> str:
-        return "".join(
-            each if each.isprintable() else each.encode("unicode_escape").decode() for each in super().__str__()
-        )
+        return printable(super().__str__())
 
 
 class GeometryError(VisualMeshError):
