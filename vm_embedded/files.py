@@ -1,4 +1,4 @@
-"""Reading text files, and writing files without losing the previous content or waiting for a pipe's reader."""
+"""Reading regular files, and writing files without losing the previous content or waiting for a pipe's reader."""
 
 from __future__ import annotations
 
@@ -9,8 +9,14 @@ import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import IO, BinaryIO
 
 from .errors import InputError
+
+LARGEST = 2**30
+"""Most bytes of a file that is read as a whole, unless its reader allows fewer."""
+
+_PIECE = 2**20  # bytes to read at a time
 
 
 def exists(path: Path) -> bool:
@@ -49,31 +55,78 @@ def atomic_write(path: Path) -> Iterator[Path]:
             part.unlink(missing_ok=True)
 
 
-def check_regular(path: Path) -> None:
-    """Raise OSError for a pipe, socket or device: reading it may wait forever, or never end."""
-    mode = path.stat().st_mode
-    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # reading a folder has an error of its own
+def open_regular(path: Path) -> BinaryIO:
+    """Open a regular file for reading.
+
+    Reading a pipe, socket or device may wait forever, or never end. Raises OSError for those, for a folder, for a name
+    that can't be a path, and if the file can't be opened.
+    """
+    try:
+        _check_regular(path, path.stat().st_mode)  # first of all, because some devices act when they are opened
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+    except ValueError as error:  # the name has a zero byte
+        raise OSError(errno.EINVAL, str(error), str(path)) from error
+    try:
+        _check_regular(path, os.fstat(descriptor).st_mode)  # another file may have taken the name
+    except OSError:
+        os.close(descriptor)
+        raise
+    return os.fdopen(descriptor, "rb")
+
+
+def _check_regular(path: Path, mode: int) -> None:
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if not stat.S_ISREG(mode):
         raise OSError(errno.EINVAL, "not a regular file", str(path))
 
 
-def read_text(path: Path, noun: str = "", largest: int | None = None) -> str:
-    """The text of a file in UTF-8, without a byte order mark.
+def read_pieces(stream: IO[bytes], largest: int) -> bytes:
+    """The rest of a stream, in memory only as far as it exists. Raises OSError if it has more than `largest` bytes."""
+    pieces, count = [], 0
+    while count <= largest and (piece := stream.read(min(_PIECE, largest + 1 - count))):
+        pieces.append(piece)
+        count += len(piece)
+    if count > largest:
+        raise OSError(errno.EFBIG, f"it is too large; at most {largest} bytes are allowed")
+    return pieces[0] if len(pieces) == 1 else b"".join(pieces)
+
+
+def read_regular(path: Path, largest: int = LARGEST) -> bytes:
+    """The content of a regular file. Raises OSError as `open_regular`, and if it has more than `largest` bytes."""
+    with open_regular(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > largest:
+            raise OSError(errno.EFBIG, f"it is too large: {size} bytes; at most {largest} are allowed", str(path))
+        return read_pieces(file, largest)
+
+
+def read_bytes(path: Path, noun: str = "", largest: int = LARGEST) -> bytes:
+    """The content of a regular file.
 
     noun: the kind of file, for messages. largest: most bytes that the file may have. Raises InputError with the file
     and the reason.
     """
-    name = f"{noun} {path}" if noun else str(path)
     try:
-        check_regular(path)
-        if largest is not None and path.stat().st_size > largest:
-            raise InputError(f"{name} is too large; at most {largest} bytes are allowed")
-        return path.read_text(encoding="utf-8-sig")
+        return read_regular(path, largest)
     except OSError as error:
-        raise InputError(f"can't read {name}: {error.strerror or error}") from error
+        raise InputError(f"can't read {_named(path, noun)}: {error.strerror or error}") from error
+
+
+def read_text(path: Path, noun: str = "", largest: int = LARGEST) -> str:
+    """The text of a regular file in UTF-8, without a byte order mark; all its lines end with a line feed.
+
+    noun, largest and InputError as for `read_bytes`.
+    """
+    try:
+        text = read_bytes(path, noun, largest).decode("utf-8-sig")
+        return text.replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
-        raise InputError(f"can't read {name}: it is not UTF-8 text") from error
-    except ValueError as error:  # a path with a zero byte
-        raise InputError(f"can't read {name}: {error}") from error
+        raise InputError(f"can't read {_named(path, noun)}: it is not UTF-8 text") from error
+
+
+def _named(path: Path, noun: str) -> str:
+    return f"{noun} {path}" if noun else str(path)
 
 
 def write_file(path: Path, content: str | bytes) -> None:

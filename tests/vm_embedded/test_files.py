@@ -1,6 +1,9 @@
 """Files are written beside and renamed, and stay what they are."""
 
+import errno
+import io
 import os
+import socket
 import stat
 import threading
 from pathlib import Path
@@ -8,7 +11,16 @@ from pathlib import Path
 import pytest
 
 from vm_embedded import InputError
-from vm_embedded.files import atomic_write, check_writable, read_text, write_file
+from vm_embedded.files import (
+    atomic_write,
+    check_writable,
+    open_regular,
+    read_bytes,
+    read_pieces,
+    read_regular,
+    read_text,
+    write_file,
+)
 
 
 def write(path, text="new"):
@@ -115,9 +127,8 @@ def test_a_file_is_written_as_a_whole(tmp_path, content, written):
 def test_a_file_that_can_not_be_written_is_named_and_stays(tmp_path):
     path = tmp_path / "file"
     path.write_text("before")
-    path.with_name("file.part").mkdir()
-    with pytest.raises(InputError, match=r"can't write .*file"):
-        write_file(path, "after")
+    with pytest.raises(InputError, match=r"can't write .*file"), atomic_write(path) as part:
+        part.unlink()
     assert path.read_text() == "before"
 
 
@@ -141,3 +152,75 @@ def test_a_pipe_that_has_only_a_descriptor_is_written():
     os.close(writer)
     with os.fdopen(reader) as file:
         assert file.read() == "text"
+
+
+def no_regular_file(folder, kind):
+    path = folder / kind
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "socket":
+        with socket.socket(socket.AF_UNIX) as made:
+            made.bind(str(path))
+    else:
+        path.symlink_to("/dev/zero")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("kind", "number"),
+    [("folder", errno.EISDIR), ("pipe", errno.EINVAL), ("socket", errno.EINVAL), ("device", errno.EINVAL)],
+)
+def test_only_a_regular_file_is_opened_and_nothing_is_waited_for(tmp_path, kind, number):
+    path = no_regular_file(tmp_path, kind)
+    for read in (open_regular, read_regular):
+        with pytest.raises(OSError, match=kind) as caught:
+            read(path)
+        assert caught.value.errno == number
+    for told in (read_bytes, read_text):
+        with pytest.raises(InputError, match=f"can't read thing .*{kind}: "):
+            told(path, "thing")
+
+
+@pytest.mark.parametrize("name", ["zero\0byte", "half\ud800"])
+def test_a_name_that_no_file_can_have_is_an_error_of_the_file(tmp_path, name):
+    with pytest.raises(OSError):
+        open_regular(tmp_path / name)
+    with pytest.raises(InputError, match=r"can't read .*(zero|half)"):
+        read_bytes(tmp_path / name)
+
+
+def test_a_file_may_have_as_many_bytes_as_allowed_and_none_more(tmp_path):
+    path = tmp_path / "file"
+    path.write_bytes(b"12345")
+    assert read_regular(path, 5) == read_bytes(path, largest=5) == b"12345"
+    with pytest.raises(OSError, match="5 bytes; at most 4") as caught:
+        read_regular(path, 4)
+    assert caught.value.errno == errno.EFBIG
+    with pytest.raises(InputError, match="at most 4 are allowed"):
+        read_text(path, largest=4)
+
+
+def test_a_file_with_a_hole_of_terabytes_is_not_read(tmp_path):
+    path = tmp_path / "file"
+    with path.open("wb") as file:
+        file.truncate(2**42)
+    with pytest.raises(InputError, match=f"{2**42} bytes"):
+        read_bytes(path)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2**20, 2**20 + 1, 3 * 2**20 - 1])
+def test_a_stream_is_read_to_its_end_or_to_the_limit(count):
+    content = bytes(range(256)) * (count // 256 + 1)
+    assert read_pieces(io.BytesIO(content[:count]), count) == content[:count]
+    endless = open("/dev/zero", "rb")  # noqa: SIM115, PTH123
+    with endless, pytest.raises(OSError, match=f"at most {count} bytes") as caught:
+        read_pieces(endless, count)
+    assert caught.value.errno == errno.EFBIG
+
+
+@pytest.mark.parametrize("written", [b"a\nb\n", b"a\r\nb\r\n", b"a\rb\r"])
+def test_lines_of_a_text_end_with_a_line_feed(tmp_path, written):
+    (tmp_path / "file").write_bytes(written)
+    assert read_text(tmp_path / "file") == "a\nb\n"

@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Image
 from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
-from ..files import check_regular, exists, is_file
+from ..files import exists, is_file, open_regular, read_bytes, read_text
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from .camera import camera_number
@@ -172,9 +172,8 @@ def _recorded_times(messages: Path) -> dict[str, float]:
     Empty for other folders. A recording that was cut off may lack the messages of its last images.
     """
     times: list[float] = []
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        check_regular(messages)
-        lines = messages.read_text(encoding="utf-8").splitlines()
+    with suppress(InputError, ValueError, KeyError, TypeError, RecursionError):
+        lines = read_text(messages).splitlines()
         times.extend(float(json.loads(line)["t"]) for line in lines)
     return {f"image{index:07d}": time - times[0] for index, time in enumerate(times)}
 
@@ -190,11 +189,7 @@ def read_image(path: str | Path, raw: bool = False, max_megapixels: float = MAX_
     Raises InputError if it is missing, broken, or larger than `max_megapixels` [Mpx].
     """
     path = Path(path)
-    try:
-        check_regular(path)
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+    content = read_bytes(path)
     try:
         return decode(content, raw, max_megapixels)
     except InputError as error:
@@ -224,7 +219,7 @@ def _video(name: str, max_megapixels: float) -> Source:
     """The frames of a video file; or of a camera, by number or device path. Raises OSError for an unreadable file."""
     files = (Path(name),) if is_file(Path(name)) else ()
     for path in files:
-        path.open("rb").close()  # OpenCV does not say why it can't read a file
+        open_regular(path).close()  # OpenCV does not say why it can't read a file
     number = camera_number(name)
     capture = cv2.VideoCapture(name if number is None else number)
     live = number is not None or Path(name).is_char_device()

@@ -15,7 +15,7 @@ from functools import cached_property
 from pathlib import Path
 
 from ..errors import ModelError
-from ..files import check_regular
+from ..files import read_regular
 from ..mesh.dilation import links_across
 from .canary import CANARY_KEY, Canary
 from .look_contract import GLANCE_KEY, LOOK_KEY, LookContract
@@ -52,8 +52,8 @@ _OP_TYPE = 4
 _LOOK_UPS = (b"ArrayFeatureExtractor", b"Gather")
 """Operators that look up neighbors, in the layouts plain and runs."""
 
-_MOST_MIB = 64
-"""Largest model file [MiB]; the networks of the package have less than two."""
+_LARGEST = 64 * 2**20
+"""Largest model file [bytes]; the networks of the package have less than 2 MiB."""
 
 _MOST_FIELDS = 500_000
 """Most fields of a model file; the networks of the package have a few thousand."""
@@ -101,13 +101,9 @@ def read_content(path: str | Path) -> bytes:
     """The bytes of a model file. Raises ModelError if it is missing, or larger than 64 MiB."""
     path = Path(path)
     try:
-        check_regular(path)
-        size = path.stat().st_size
-        if size > _MOST_MIB * 2**20:
-            raise ModelError(f"{path}: {size / 2**20:.1f} MiB is too large for a model (allowed: {_MOST_MIB} MiB)")
-        return path.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
-        raise ModelError(f"can't read the model {path}: {getattr(error, 'strerror', None) or error}") from error
+        return read_regular(path, _LARGEST)
+    except OSError as error:
+        raise ModelError(f"can't read the model {path}: {error.strerror or error}") from error
 
 
 def parse_model(path: str | Path, content: bytes) -> ModelFile:

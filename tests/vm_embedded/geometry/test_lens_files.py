@@ -312,7 +312,7 @@ def test_a_huge_file_is_not_even_read(tmp_path):
     path = tmp_path / "lens.yaml"
     with path.open("wb") as file:
         file.truncate(3 * 2**20)
-    with pytest.raises(InputError, match=r"lens\.yaml is too large"):
+    with pytest.raises(InputError, match=r"lens\.yaml: it is too large: 3145728 bytes; at most 1048576"):
         read_lens_file(path)
 
 

@@ -133,7 +133,7 @@ def test_a_large_file_is_refused_with_both_sizes_before_it_is_read(folder):
     path = folder / "large.onnx"
     with path.open("wb") as file:
         file.truncate(65 * 2**20)
-    with pytest.raises(ModelError, match=r"large\.onnx: 65\.0 MiB.*64 MiB"):
+    with pytest.raises(ModelError, match=rf"large\.onnx: it is too large: {65 * 2**20} bytes; at most {64 * 2**20} "):
         read_model(path)
 
 
