@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
 import select
+import shutil
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -17,6 +19,7 @@ LARGEST = 2**30
 """Most bytes of a file that is read as a whole, unless its reader allows fewer."""
 
 _PIECE = 2**20  # bytes to read at a time
+_SHOWN = 24  # letters of a name in the name of its unfinished file, so that file systems allow this, too
 
 
 def exists(path: Path) -> bool:
@@ -29,30 +32,88 @@ def is_file(path: Path) -> bool:
     return os.path.isfile(path)  # noqa: PTH113
 
 
+def unused_name(target: Path, ending: str = ".part") -> Path:
+    """A name beside `target` that nothing has, for content that is not complete yet: hidden and random.
+
+    A name that is left shows which run was killed: it begins with that of the target, and has this ending. Create it
+    with the mode that fails if it exists.
+    """
+    return target.parent / f".{target.name[:_SHOWN]}.{secrets.token_hex(8)}{ending}"
+
+
+def put_in_place(part: Path, target: Path) -> None:
+    """Give the file `part` the name `target`, and the mode of the file that it replaces.
+
+    Raises OSError if that one is read-only, or is a folder; both stay as they are then.
+    """
+    _check_replaceable(target)
+    if target.is_file():
+        part.chmod(stat.S_IMODE(target.stat().st_mode))
+    part.replace(target)
+
+
+def _check_replaceable(target: Path) -> None:
+    """Raise OSError if a file can't be replaced, because it is a folder or read-only."""
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+    if target.is_file() and not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, "the file is read-only", str(target))
+
+
 @contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
-    """A temporary path beside `path`, which replaces `path` when the block ends without an error.
+    """A new empty file beside `path`, which replaces `path` when the block ends without an error.
 
-    A symbolic link stays: its target is replaced. The file keeps its mode. A special file, such as a pipe, is written
+    No other run has this file. So if several write one path at once, each file is whole, and the last one stays. A
+    symbolic link stays: its target is replaced. The file keeps its mode. A special file, such as a pipe, is written
     directly. Raises InputError if the file can't be written.
     """
-    target = Path(os.path.realpath(path))
-    part = target.with_name(target.name + ".part")
     try:
         if path.exists() and not path.is_file() and not path.is_dir():
             yield path  # not the target: that of /dev/stdout in a pipeline has no path
             return
-        if target.is_file() and not os.access(target, os.W_OK):
-            raise PermissionError(0, "the file is read-only")
-        yield part
-        if target.is_file():
-            part.chmod(stat.S_IMODE(target.stat().st_mode))
-        part.replace(target)
+        target = real_path(path)
+        _check_replaceable(target)
+        part = unused_name(target)
+        part.touch(exist_ok=False)
+        try:
+            yield part
+            put_in_place(part, target)
+        finally:
+            with suppress(OSError):  # on a disk that can't be written it can't be removed
+                part.unlink(missing_ok=True)
     except OSError as error:
         raise InputError(f"can't write {path}: {error.strerror or error}") from error
-    finally:
-        with suppress(OSError):  # on a disk that can't be written it was never created, or can't be removed
-            part.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_folder(path: Path) -> Iterator[Path]:
+    """A new folder beside `path`, which gets the name `path` when the block ends without an error.
+
+    An empty folder is replaced, and gives its mode to the new one; anything else of that name stays. Missing parent
+    folders are created. Raises InputError if the folder can't be written.
+    """
+    try:
+        target = real_path(path)
+        part = unused_name(target)
+        part.mkdir(parents=True)
+        try:
+            yield part
+            if target.is_dir():
+                part.chmod(stat.S_IMODE(target.stat().st_mode))
+            part.rename(target)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+    except OSError as error:
+        raise InputError(f"can't write {path}: {error.strerror or error}") from error
+
+
+def real_path(path: Path) -> Path:
+    """The path that links lead to, also if nothing is there. Raises OSError for a path with a zero byte."""
+    try:
+        return Path(os.path.realpath(path))  # Path.resolve raises RuntimeError for a loop of links
+    except ValueError as error:
+        raise OSError(errno.EINVAL, str(error), str(path)) from error
 
 
 def open_regular(path: Path) -> BinaryIO:
@@ -141,7 +202,7 @@ def check_writable(path: Path, inputs: Iterable[Path | None] = ()) -> None:
     inputs: as for `check_not_input`.
     """
     try:
-        if not Path(os.path.realpath(path)).parent.is_dir():  # Path.resolve raises RuntimeError for a loop of links
+        if not real_path(path).parent.is_dir():
             raise InputError(f"can't write {path}: there is no folder {path.parent}")
         if path.is_dir():
             raise InputError(f"can't write {path}: this is a folder")

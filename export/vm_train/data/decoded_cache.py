@@ -83,13 +83,12 @@ class DecodedCache:
                 raise OSError
             text = files.read("lens")
             header = _HEADER.pack(_MAGIC, fingerprint(files, classes), width, height, len(text), 0)
-            # Mode x: if two processes add the same picture, neither writes into the other's file.
-            with atomic_write(self._path(files)) as part, part.open("xb") as file:
+            with atomic_write(self._path(files)) as part, part.open("wb") as file:
                 for each in (header, text, picture.image.tobytes(), picture.labels.tobytes()):
                     file.write(each)
         except (OSError, InputError) as error:
             cause = error.__cause__ if isinstance(error, InputError) else error
-            if not isinstance(cause, FileExistsError | FileNotFoundError):
+            if not isinstance(cause, FileNotFoundError):
                 self._full = True
                 with suppress(OSError):
                     self._full_mark.touch()

@@ -81,8 +81,7 @@ class GraphCache:
                 return
             header = _HEADER.pack(_MAGIC, fingerprint(files, self._classes), len(graph), graph.neighbors.shape[1])
             parts = (graph.neighbors, graph.points.astype(np.float16), graph.pixels, graph.distances, graph.labels)
-            # Mode x: if two processes store the same view, neither writes into the other's file.
-            with atomic_write(self._path(files, view)) as part, part.open("xb") as file:
+            with atomic_write(self._path(files, view)) as part, part.open("wb") as file:
                 for each in (header, *(array.tobytes() for array in parts)):
                     file.write(each)
         except (OSError, InputError):
