@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import secrets
 import select
 import shutil
@@ -35,10 +36,11 @@ def is_file(path: Path) -> bool:
 def unused_name(target: Path, ending: str = ".part") -> Path:
     """A name beside `target` that nothing has, for content that is not complete yet: hidden and random.
 
-    A name that is left shows which run was killed: it begins with that of the target, and has this ending. Create it
-    with the mode that fails if it exists.
+    A name that is left shows which run was killed: it begins with that of the target, and has this ending. It is plain
+    ASCII, so that every library takes it. Create it with the mode that fails if it exists.
     """
-    return target.parent / f".{target.name[:_SHOWN]}.{secrets.token_hex(8)}{ending}"
+    shown = re.sub(r"[^A-Za-z0-9._-]", "_", target.name[:_SHOWN])
+    return target.parent / f".{shown}.{secrets.token_hex(8)}{ending}"
 
 
 def put_in_place(part: Path, target: Path) -> None:

@@ -1,0 +1,107 @@
+"""The one place that hands names and text to OpenCV, which takes UTF-8 only: other text ends the process (SIGSEGV)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import cv2
+
+from .arrays import Image
+from .errors import InputError
+
+_LONGEST = 200
+"""Most characters that are drawn; a picture has no room for more."""
+
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+
+@contextmanager
+def opencv_path(path: Path) -> Iterator[str]:
+    """A name by which OpenCV opens exactly the file `path`, in this block; after it, OpenCV has it open.
+
+    It is absolute, because FFmpeg takes "a:b.mp4" for a protocol. A name that is not UTF-8, or that has a %, for which
+    a sequence of images may be read, is replaced by a descriptor: of its folder, or if the last part is such a name, of
+    the file itself, then without a suffix. Raises OSError for such a name if that does not exist.
+    """
+    name = os.path.abspath(path)  # noqa: PTH100 (Path.absolute raises an error in a folder that was removed)
+    if _is_plain(name):
+        yield name
+        return
+    folder, last = os.path.split(name)
+    opened = os.open(folder if _is_plain(last) else name, os.O_PATH)
+    try:
+        yield f"/proc/self/fd/{opened}/{last}" if _is_plain(last) else f"/proc/self/fd/{opened}"
+    finally:
+        os.close(opened)
+
+
+def _is_plain(name: str) -> bool:
+    """Whether OpenCV and the system mean the same file by a name."""
+    try:
+        return "%" not in name and os.fsencode(name) == name.encode()
+    except UnicodeEncodeError:
+        return False
+
+
+def open_capture(source: int | str | Path, backend: int = cv2.CAP_ANY, options: Sequence[int] = ()) -> cv2.VideoCapture:
+    """A video file or device by its path, a stream by its address or pipeline (str), or a camera by its number.
+
+    backend, options: as for cv2.VideoCapture, which may not be open afterwards. A path is never a sequence of images.
+    Raises InputError for an address that is not UTF-8, and OSError as `opencv_path` does.
+    """
+    if isinstance(source, int):
+        return cv2.VideoCapture(source, backend, options)
+    if isinstance(source, str):
+        try:
+            source.encode()
+        except UnicodeEncodeError as error:
+            raise InputError(f"the address of a camera must be UTF-8 text, not {source[:200]!r}") from error
+        return cv2.VideoCapture(source, backend, options)
+    backends = [each for each in cv2.videoio_registry.getStreamBackends() if each != cv2.CAP_IMAGES]
+    with opencv_path(source) as name:
+        for each in backends if backend == cv2.CAP_ANY else [backend]:
+            capture = cv2.VideoCapture(name, each, options)
+            if capture.isOpened():
+                break
+    return capture
+
+
+def open_writer(path: Path, codec: int, rate: float, size: tuple[int, int]) -> cv2.VideoWriter:
+    """A video file to write, as for cv2.VideoWriter, which may not be open afterwards.
+
+    The last part of `path` must be UTF-8 without a %, such as a name of `files.unused_name`: without its suffix, OpenCV
+    does not know the format. Raises OSError as `opencv_path` does.
+    """
+    with opencv_path(path) as name:
+        return cv2.VideoWriter(name, codec, rate, size)
+
+
+def text_size(text: str, size: float, thickness: int = 1, font: int = _FONT) -> tuple[int, int, int]:
+    """Width, height above the base line, and depth below it [px] of text that `draw_text` draws."""
+    (width, height), base = cv2.getTextSize(_drawable(text), font, size, thickness)
+    return width, height, base
+
+
+def draw_text(
+    canvas: Image,
+    text: str,
+    corner: tuple[int, int],
+    size: float,
+    color: Sequence[float] | float,
+    thickness: int = 1,
+    font: int = _FONT,
+) -> None:
+    """Draw one line of text to the right of its lower left corner (x, y) [px]. size: factor of the font's letters.
+
+    Characters that can't be printed appear as "?", as do those that this OpenCV can't draw: OpenCV 4 draws ASCII only.
+    """
+    cv2.putText(canvas, _drawable(text), corner, font, size, color, thickness, cv2.LINE_AA)
+
+
+def _drawable(text: str) -> str:
+    """The text without anything that OpenCV can't take, and without more than anyone could read."""
+    shown = text if len(text) <= _LONGEST else text[: _LONGEST - 2] + ".."
+    return "".join(each if each.isprintable() else "?" for each in shown)
