@@ -57,7 +57,7 @@ def put_in_place(part: Path, target: Path) -> None:
 def _check_replaceable(target: Path) -> None:
     """Raise OSError if a file can't be replaced, because it is a folder or read-only."""
     if target.is_dir():
-        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+        raise IsADirectoryError(errno.EISDIR, "this is a folder", str(target))
     if target.is_file() and not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, "the file is read-only", str(target))
 
@@ -199,15 +199,17 @@ def write_file(path: Path, content: str | bytes) -> None:
 
 
 def check_writable(path: Path, inputs: Iterable[Path | None] = ()) -> None:
-    """Check an output before long work. Raise InputError if its folder is missing, or if it would replace an input.
+    """Check an output before long work.
+
+    Raise InputError if its folder is missing, if it is a folder or read-only, or if it would replace an input.
 
     inputs: as for `check_not_input`.
     """
     try:
-        if not real_path(path).parent.is_dir():
+        target = real_path(path)
+        if not target.parent.is_dir():
             raise InputError(f"can't write {path}: there is no folder {path.parent}")
-        if path.is_dir():
-            raise InputError(f"can't write {path}: this is a folder")
+        _check_replaceable(target)
     except OSError as error:
         raise InputError(f"can't write {path}: {error.strerror or error}") from error
     check_not_input(path, inputs)

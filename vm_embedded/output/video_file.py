@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -11,7 +12,7 @@ import cv2
 from ..arrays import Image
 from ..cameras.library_messages import library_messages
 from ..errors import InputError, unknown
-from ..files import check_writable
+from ..files import check_writable, put_in_place, real_path, unused_name
 
 _CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".webm": "VP80"}
 """FFmpeg's code of the codec for each suffix; OpenCV's wheels have these."""
@@ -23,18 +24,19 @@ _FASTEST = 1000.0
 class VideoFile:
     """Writes BGR pictures of one size to a .mp4, .avi or .webm at a rate [1/s], at most 1000; a context manager.
 
-    The file is written beside its place and renamed at the end, also after an error, so an old file is replaced only by
-    a complete one. Without any picture, no file is written. inputs: files that it must not replace. Raises InputError
-    for one of these, for another suffix, and for a folder that does not exist.
+    The file is written beside its place, under a name that nothing has. It gets its own at the end, also after an
+    error, so an old file is replaced only by a complete one. Without any picture, no file is written. inputs: files
+    that it must not replace. Raises InputError for one of these, for another suffix, and for a folder that does not
+    exist.
     """
 
     def __init__(self, path: Path, rate: float, inputs: Sequence[Path] = ()) -> None:
         suffix = path.suffix.lower()
         if suffix not in _CODECS:
             raise InputError(f"can't write the video {path}: {unknown('suffix', suffix, _CODECS)}")
-        self._path, self._part = path, path.with_name(f"{path.stem}.part{suffix}")
-        for each in (self._path, self._part):
-            check_writable(each, inputs)
+        check_writable(path, inputs)
+        self._path, self._target = path, real_path(path)
+        self._part = unused_name(self._target, f".part{suffix}")
         self._rate, self._codec = min(rate, _FASTEST), cv2.VideoWriter.fourcc(*_CODECS[suffix])
         self._writer: cv2.VideoWriter | None = None
         self._size, self._written = (0, 0), 0
@@ -44,6 +46,10 @@ class VideoFile:
         size = picture.shape[1], picture.shape[0]
         if self._writer is None:
             self._size = size
+            try:
+                self._part.touch(exist_ok=False)
+            except OSError as error:
+                raise InputError(f"can't write the video {self._path}: {error.strerror or error}") from error
             with library_messages():  # one for each .webm: FFmpeg does not list the codec's code, but has it
                 self._writer = cv2.VideoWriter(str(self._part), self._codec, self._rate, size)
         if not self._writer.isOpened():
@@ -60,20 +66,24 @@ class VideoFile:
         return self
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
-        if self._writer is None or not self._written:
+        if self._writer is None:
             return
         self._writer.release()
-        found = _count_frames(self._part, self._written)
-        if found != self._written:
-            self._part.unlink(missing_ok=True)
+        found = _count_frames(self._part, self._written) if self._written else 0
+        if self._written and found == self._written:
+            try:
+                put_in_place(self._part, self._target)
+            except OSError as error:
+                reason = error.strerror or error
+                raise InputError(f"can't write {self._path}: {reason}; it is in {self._part}") from error
+            return
+        with suppress(OSError):  # a disk that failed
+            self._part.unlink()
+        if self._written:
             raise InputError(
                 f"can't write the video {self._path}: only {found} of {self._written} frames were written; "
                 "is the disk full?"
             )
-        try:
-            self._part.replace(self._path)
-        except OSError as error:
-            raise InputError(f"can't write {self._path}: {error.strerror or error}; it is in {self._part}") from error
 
 
 def _count_frames(path: Path, expected: int) -> int:

@@ -15,6 +15,7 @@ import pytest
 from tests.drawn_scenes import FOLDER, IMAGES, MODEL, TRUTH
 from tests.folders import contents
 from tests.programs import heed_permissions, limit_files
+from vm_embedded.errors import InputError
 from vm_embedded.output.video_file import VideoFile
 
 from .commands import COMMAND, detect, lines, one_complaint, run
@@ -221,14 +222,56 @@ def test_overlays_do_not_draw_into_the_images_with_boxes(folder, tmp_path):
 
 
 def test_a_video_never_replaces_a_source(tmp_path, lens):
-    """Neither by its name nor by that of the file that it is written to first."""
-    film(tmp_path / "clip.part.avi", 2)
-    shutil.copy(tmp_path / "clip.part.avi", tmp_path / "clip.avi")
+    film(tmp_path / "clip.avi", 2)
+    (tmp_path / "link.avi").symlink_to("clip.avi")
     before = contents(tmp_path)
-    for source in ("clip.avi", "clip.part.avi"):
+    for source in ("clip.avi", "link.avi"):
         done = detect(source, "--lens", lens, "--height", 0.8, "--save-video", "clip.avi", cwd=tmp_path, code=1)
-        one_complaint(done, f"vm-detect: {source} is an input and would be overwritten")
+        one_complaint(done, "vm-detect: clip.avi is an input and would be overwritten")
     assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("name", ["found.avi", "f" * 251 + ".avi"])
+def test_other_things_beside_a_video_stay_and_do_not_matter(name, folder, tmp_path):
+    path, link, source = tmp_path / name, tmp_path / "link.avi", tmp_path / "found.part.avi"
+    film(source, 2)
+    (tmp_path / "found.avi.part").mkdir()
+    path.touch(mode=0o640)
+    link.symlink_to(path)
+    before = source.read_bytes()
+    detect(folder, "--save-video", link)
+    assert cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT) == 2
+    assert link.is_symlink()
+    assert path.stat().st_mode & 0o777 == 0o640
+    assert source.read_bytes() == before
+    known = {path, link, source, folder, tmp_path / "found.avi.part"}
+    assert known == set(tmp_path.iterdir())
+
+
+def test_two_videos_of_one_name_at_once_are_each_whole(tmp_path):
+    path, picture = tmp_path / "both.avi", np.zeros((64, 64, 3), np.uint8)
+    with VideoFile(path, 10.0) as first:
+        for _ in range(3):
+            first.write(picture)
+        with VideoFile(path, 10.0) as second:
+            second.write(picture)
+        assert cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT) == 1
+    assert cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT) == 3
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_video_that_can_not_get_its_name_stays_under_another(tmp_path):
+    path = tmp_path / "film.avi"
+
+    def write_video():
+        with VideoFile(path, 10.0) as video:
+            video.write(np.zeros((64, 64, 3), np.uint8))
+            path.mkdir()
+
+    with pytest.raises(InputError, match=r"this is a folder; it is in .*\.part\.avi"):
+        write_video()
+    (left,) = set(tmp_path.iterdir()) - {path}
+    assert cv2.VideoCapture(str(left)).get(cv2.CAP_PROP_FRAME_COUNT) == 1
 
 
 def test_overlays_and_points_of_images_with_one_name_stay_apart(folder, lens, tmp_path):

@@ -152,7 +152,40 @@ def test_a_name_that_can_not_be_written_is_one_line(tmp_path, scene_folder, name
     one_complaint(run(scene_folder, "--save-mcap", tmp_path / name, code=1), reason)
 
 
-def test_what_a_killed_run_has_left_is_not_overwritten(tmp_path, scene_folder):
+def test_other_things_beside_the_file_stay_and_do_not_matter(tmp_path, scene_folder):
+    """Also of a name that is as long as names can be, and if the file is a link."""
+    path, link = tmp_path / ("m" * 250 + ".mcap"), tmp_path / "out.mcap"
     (tmp_path / "out.mcap.part").mkdir()
-    done = run(scene_folder, "--save-mcap", tmp_path / "out.mcap", code=1)
-    one_complaint(done, "out.mcap.part is left from a run that was killed; remove it")
+    (tmp_path / "out.mcap.part" / "own.txt").write_text("mine")
+    link.symlink_to(path)
+    run(scene_folder, "--save-mcap", link)
+    assert len(messages_of(path)["/vm_ros/detections_3d"]) == 5
+    assert link.is_symlink()
+    assert (tmp_path / "out.mcap.part" / "own.txt").read_text() == "mine"
+    assert sorted(tmp_path.iterdir()) == [scene_folder, path, link, tmp_path / "out.mcap.part"]
+
+
+def test_a_killed_run_does_not_block_the_next(tmp_path, scene_folder):
+    path = tmp_path / "out.mcap"
+    process = subprocess.Popen(
+        [COMMAND, scene_folder, "--save-mcap", path], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    )
+    try:
+        assert process.stdout.readline()
+    finally:
+        process.kill()
+        process.communicate()
+    left = {each.name for each in tmp_path.iterdir()} - {"frames", "out.mcap"}
+    run(scene_folder, "--save-mcap", path)
+    assert len(messages_of(path)["/vm_ros/detections_3d"]) == 5
+    assert all(name.startswith(".out.mcap.") and name.endswith(".part") for name in left)
+    assert {each.name for each in tmp_path.iterdir()} == {"frames", "out.mcap", *left}
+
+
+def test_of_two_runs_into_one_file_each_is_whole(tmp_path, scene_folder):
+    path = tmp_path / "out.mcap"
+    command = [COMMAND, scene_folder, "--save-mcap", path]
+    started = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) for _ in range(2)]
+    assert [(each.communicate(timeout=120)[1], each.returncode) for each in started] == [(b"", 0)] * 2
+    assert len(messages_of(path)["/vm_ros/detections_3d"]) == 5
+    assert sorted(tmp_path.iterdir()) == [scene_folder, path]

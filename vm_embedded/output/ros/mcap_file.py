@@ -22,7 +22,7 @@ from ...cameras.ros.stamps import stamp_of
 from ...cameras.ros.transforms import transform_message
 from ...detection.detections import Detections
 from ...errors import InputError
-from ...files import check_writable
+from ...files import check_writable, put_in_place, real_path, unused_name
 from ...geometry.lens import Lens
 from ...geometry.orientation import Orientation
 from .annotations import image_annotations
@@ -38,9 +38,9 @@ _ONE_DAY = 86400.0
 class McapFile:
     """An MCAP file that frames are written into; a context manager.
 
-    The file appears when it is closed; until then, its content is in the folder PATH.part. plane_frame: name of the
-    frame of the observation plane. inputs: files that it must not replace. Raises InputError if rosbags is missing, or
-    the file can't be written.
+    The file appears when it is closed; until then, its content is in a hidden folder beside it, under a name that
+    nothing has. plane_frame: name of the frame of the observation plane. inputs: files that it must not replace. Raises
+    InputError if rosbags is missing, or the file can't be written.
     """
 
     def __init__(self, path: Path, plane_frame: str, inputs: Sequence[Path] = ()) -> None:
@@ -48,14 +48,17 @@ class McapFile:
             raise InputError(f"an MCAP file must end in .mcap, not {path.name!r}")
         check_writable(path, inputs)
         self._path, self._plane_frame = path, plane_frame
-        self._part = path.with_name(path.name + ".part")
+        self._target = real_path(path)
+        self._part = unused_name(self._target)
         rosbags = import_rosbags()
-        if self._part.exists():
-            raise InputError(f"{self._part} is left from a run that was killed; remove it, or choose another name")
         self._store, self._types = typestore(), bag_types()
         mcap = rosbags.rosbag2.StoragePlugin.MCAP
-        self._writer = rosbags.rosbag2.Writer(self._part, version=9, storage_plugin=mcap)
+        self._writer = rosbags.rosbag2.Writer(self._part / "bag", version=9, storage_plugin=mcap)
         self._failure: OSError | None = None
+        try:
+            self._part.mkdir()
+        except OSError as error:
+            raise InputError(f"can't write {path}: {error.strerror or error}") from error
         try:
             self._writer.open()
         except OSError as error:
@@ -139,12 +142,12 @@ class McapFile:
             if self._failure is not None:
                 raise self._failure
             self._writer.close()
-            written = next(self._part.glob("*.mcap"))
+            written = next(self._part.glob("bag/*.mcap"))
         except OSError as failure:
             self._discard()
             raise InputError(f"can't write {self._path}: {failure.strerror or failure}") from failure
         try:
-            written.replace(self._path)
+            put_in_place(written, self._target)
         except OSError as failure:
             raise InputError(
                 f"can't write {self._path}: {failure.strerror or failure}; it is in {written}"
