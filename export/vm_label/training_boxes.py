@@ -14,6 +14,7 @@ from pathlib import Path
 
 from vm_embedded.cameras.image_files import lens_file_of
 from vm_embedded.errors import InputError
+from vm_embedded.files import atomic_folder, real_path
 from vm_embedded.output.box_files import CLASSES, yolo_line
 
 from .box_folder import BoxFolder
@@ -50,20 +51,9 @@ def write_training_boxes(folder: BoxFolder, answers: Mapping[str, str], target: 
     if not chosen:
         raise InputError(f"no image of {folder.path} has an answer for each of its crops; judge them on the page first")
     accepted = {image: [crop for crop in by_image[image] if answers[crop.id] == "yes"] for image in chosen}
-    target = target.absolute()  # "." has no name
-    part = target.with_name(target.name + ".part")
-    try:
-        shutil.rmtree(part, ignore_errors=True)
-        part.mkdir(parents=True)
+    with atomic_folder(target) as part:
         for image, crops in accepted.items():
             _write_image(folder, part, image, crops)
-        if target.exists():
-            target.rmdir()
-        part.rename(target)
-    except OSError as error:
-        raise InputError(f"can't write {target}: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
     count = Counter(fates.values())
     return Written(
         images=len(chosen),
@@ -90,9 +80,10 @@ def _fate(folder: BoxFolder, crops: list[Crop], image: str, answers: Mapping[str
 
 def _check_target(source: Path, target: Path) -> None:
     """Raise InputError unless a folder can be written: a new or empty one, outside of the folder of boxes."""
-    if source.resolve() in (target.resolve(), *target.resolve().parents):
-        raise InputError(f"can't write {target}: it lies in the folder of boxes, {source}")
     try:
+        real = real_path(target)
+        if real_path(source) in (real, *real.parents):
+            raise InputError(f"can't write {target}: it lies in the folder of boxes, {source}")
         if target.exists() and any(target.iterdir()):
             raise InputError(f"can't write {target}: the folder is not empty; give a new one")
     except OSError as error:

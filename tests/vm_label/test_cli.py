@@ -4,9 +4,13 @@ import http.client
 import json
 import shutil
 import signal
+import subprocess
+from functools import partial
 
 import pytest
 
+from tests.folders import contents
+from tests.programs import BIN, limit_files, run_program
 from vm_label.answers import AnswerFile
 from vm_label.box_folder import read_box_folder
 
@@ -109,6 +113,51 @@ def test_nothing_is_overwritten(tmp_path):
     (tmp_path / "empty").mkdir()
     run(folder, "--write", tmp_path / "empty")
     assert (tmp_path / "empty" / "image0000.txt").exists()
+
+
+@pytest.mark.parametrize("name", ["day1.part", ".day1.part", "day1.part.part"])
+def test_training_data_beside_its_source_leaves_the_source_as_it_is(name, tmp_path):
+    """Also if the source is called like an unfinished recording of the same day."""
+    source = make_folder(tmp_path / name, 2)
+    judge(source, ["yes", "no", "yes", "no"])
+    before = contents(source)
+    run(source, "--write", tmp_path / "day1")
+    assert contents(source) == before
+    assert len(read_box_folder(tmp_path / "day1").images) == 2
+    assert {each.name for each in tmp_path.iterdir()} == {name, "day1"}
+
+
+def test_an_unrelated_folder_beside_the_training_data_stays(tmp_path):
+    source = make_folder(tmp_path / "boxes", 1, near=False)
+    judge(source, ["yes"])
+    (tmp_path / "out.part").mkdir()
+    (tmp_path / "out.part" / "thesis.tex").write_text("years of work")
+    before = contents(tmp_path / "out.part")
+    run(source, "--write", tmp_path / "out")
+    assert contents(tmp_path / "out.part") == before
+
+
+def test_training_data_that_can_not_be_written_leaves_nothing(tmp_path):
+    source = make_folder(tmp_path / "boxes", 2)
+    judge(source, ["yes", "no", "yes", "no"])
+    before = contents(tmp_path)
+    done = run_program("vm-label", source, "--write", tmp_path / "out", code=1, preexec_fn=partial(limit_files, 1000))
+    assert str(tmp_path / "out") in done.stderr
+    assert contents(tmp_path) == before
+    assert not list(tmp_path.glob("*.part"))
+    (tmp_path / "loop").symlink_to("loop")
+    assert "can't write" in run(source, "--write", tmp_path / "loop", code=1).stderr
+
+
+def test_of_two_that_write_the_same_training_data_at_once_one_wins(tmp_path):
+    source = make_folder(tmp_path / "boxes", 30, near=False)
+    judge(source, ["yes"] * 30)
+    command = [BIN / "vm-label", source, "--write", tmp_path / "out"]
+    started = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) for _ in range(2)]
+    codes = [(each.communicate(timeout=120), each.returncode)[1] for each in started]
+    assert sorted(codes) == [0, 1]
+    assert len(read_box_folder(tmp_path / "out").images) == 30
+    assert {each.name for each in tmp_path.iterdir()} == {"boxes", "out"}
 
 
 @pytest.mark.parametrize(
