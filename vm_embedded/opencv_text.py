@@ -55,10 +55,7 @@ def open_capture(source: int | str | Path, backend: int = cv2.CAP_ANY, options: 
     if isinstance(source, int):
         return cv2.VideoCapture(source, backend, options)
     if isinstance(source, str):
-        try:
-            source.encode()
-        except UnicodeEncodeError as error:
-            raise InputError(f"the address of a camera must be UTF-8 text, not {source[:200]!r}") from error
+        check_address(source)
         return cv2.VideoCapture(source, backend, options)
     backends = [each for each in cv2.videoio_registry.getStreamBackends() if each != cv2.CAP_IMAGES]
     with opencv_path(source) as name:
@@ -67,6 +64,14 @@ def open_capture(source: int | str | Path, backend: int = cv2.CAP_ANY, options: 
             if capture.isOpened():
                 break
     return capture
+
+
+def check_address(source: str) -> None:
+    """Raise InputError for the address of a stream, or a pipeline, that is not UTF-8."""
+    try:
+        source.encode()
+    except UnicodeEncodeError as error:
+        raise InputError(f"the address of a camera must be UTF-8 text, not {source[:200]!r}") from error
 
 
 def open_writer(path: Path, codec: int, rate: float, size: tuple[int, int]) -> cv2.VideoWriter:

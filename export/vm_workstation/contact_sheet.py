@@ -11,6 +11,7 @@ import numpy as np
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.errors import InputError
 from vm_embedded.files import write_file
+from vm_embedded.opencv_text import draw_text, text_size
 
 Color = tuple[int, int, int]
 """8-bit color in the order that a function's description gives."""
@@ -47,13 +48,12 @@ def write_text(canvas: Image, text: str, at: tuple[int, int], color: Color) -> i
 
     Text that is too long for the canvas ends in two dots.
     """
-    font, size = cv2.FONT_HERSHEY_SIMPLEX, 0.4
-    room = canvas.shape[1] - at[0]
-    text = text.encode("ascii", "replace").decode()
-    while len(text) > 2 and cv2.getTextSize(text, font, size, 1)[0][0] > room:
+    size, room = 0.4, canvas.shape[1] - at[0]
+    text = text[: max(room, 2)]  # a letter has at least one pixel
+    while len(text) > 2 and text_size(text, size)[0] > room:
         text = text.removesuffix("..")[:-1] + ".."
-    cv2.putText(canvas, text, at, font, size, color, 1, cv2.LINE_AA)
-    return int(cv2.getTextSize(text, font, size, 1)[0][0])
+    draw_text(canvas, text, at, size, color)
+    return text_size(text, size)[0]
 
 
 def draw_legend(canvas: Image, colors: Mapping[str, Color], at: tuple[int, int]) -> None:

@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..files import exists, is_file, open_regular, read_bytes, read_text
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
+from ..opencv_text import open_capture
 from .camera import camera_number
 from .decoding import decode
 from .image_header import MAX_MEGAPIXELS
@@ -221,7 +222,7 @@ def _video(name: str, max_megapixels: float) -> Source:
     for path in files:
         open_regular(path).close()  # OpenCV does not say why it can't read a file
     number = camera_number(name)
-    capture = cv2.VideoCapture(name if number is None else number)
+    capture = open_capture(Path(name) if number is None else number)
     live = number is not None or Path(name).is_char_device()
     if not capture.isOpened():
         if live:

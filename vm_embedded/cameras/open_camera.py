@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..errors import InputError, unknown
 from ..files import exists, is_file
+from ..opencv_text import check_address
 from .camera import Camera, CameraSettings, without_password
 from .fault import FaultCamera, Faults, FaultScript
 from .files import FileCamera
@@ -62,6 +63,8 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
         if raw:
             raise InputError("the synthetic camera supports only --format bgr")
         return lambda: SyntheticCamera(settings)
+    if "://" in source or source.startswith("gstreamer:"):
+        check_address(source)
     if source.startswith(("http://", "https://")):
         parse_url(source)
         return lambda: _network_camera(settings, raw)

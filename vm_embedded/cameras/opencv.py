@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..files import exists
+from ..opencv_text import open_capture
 from .camera import EARLY, BrokenFrameError, CameraError, CameraSettings, Shot, camera_number, without_password
 from .decoding import decode_frame
 from .frame_clock import FrameClock
@@ -59,9 +60,9 @@ class OpenCvCamera:
         if self._device is not None:
             if not exists(self._device):
                 raise CameraError(f"there is no camera at {self._device}")
-            self._capture = cv2.VideoCapture(str(self._device.resolve()), cv2.CAP_V4L2)
+            self._capture = open_capture(self._device.resolve(), cv2.CAP_V4L2)
         elif source.startswith("gstreamer:"):
-            self._capture = cv2.VideoCapture(source.removeprefix("gstreamer:"), cv2.CAP_GSTREAMER)
+            self._capture = open_capture(source.removeprefix("gstreamer:"), cv2.CAP_GSTREAMER)
         else:
             limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, int(settings.open_ms)]
             limits += [cv2.CAP_PROP_READ_TIMEOUT_MSEC, int(settings.lost_ms)]
@@ -69,7 +70,7 @@ class OpenCvCamera:
             limits += [cv2.CAP_PROP_N_THREADS, 1]
             self._clock = FrameClock(time.monotonic())  # FFmpeg lets frames wait until it knows the stream
             with _ffmpeg_options():
-                self._capture = cv2.VideoCapture(source, cv2.CAP_FFMPEG, limits)
+                self._capture = open_capture(source, cv2.CAP_FFMPEG, limits)
         if not self._capture.isOpened():
             self._capture.release()
             raise CameraError(f"can't open camera {without_password(source)}")

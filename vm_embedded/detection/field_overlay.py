@@ -7,6 +7,7 @@ import numpy as np
 
 from ..arrays import Floats, Image
 from ..field.features import CenterCircle, FieldFeatures, Upright
+from ..opencv_text import draw_text, text_size
 from .labels import INK, Color, Labels
 from .prepared_view import PreparedView
 
@@ -94,9 +95,9 @@ def _draw_letter(canvas: Image, letter: str, pixel: Floats, scale: float) -> Non
     """Write a letter in magenta on a white disk, its middle at a pixel (2,)."""
     if not (np.abs(pixel) < FARTHEST).all():
         return
-    font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.5 * scale, max(1, round(1.5 * scale))
-    (width, height), _ = cv2.getTextSize(letter, font, size, thickness)
+    size, thickness = 0.5 * scale, max(1, round(1.5 * scale))
+    width, height, _ = text_size(letter, size, thickness)
     x, y = np.rint(pixel).astype(int).tolist()
     cv2.circle(canvas, (x, y), round(0.8 * height), (255, 255, 255), cv2.FILLED, cv2.LINE_AA)
     place = round(x - width / 2), round(y + height / 2)
-    cv2.putText(canvas, letter, place, font, size, _LINE, thickness, cv2.LINE_AA)
+    draw_text(canvas, letter, place, size, _LINE, thickness)

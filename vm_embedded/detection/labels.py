@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Floats, Image, Mask
+from ..opencv_text import draw_text, text_size
 
 Color = tuple[int, int, int]
 """Blue, green, red."""
@@ -39,8 +40,8 @@ class Labels:
 
         The text is left out if it would cover other labels wherever it goes.
         """
-        font, size, thickness = cv2.FONT_HERSHEY_SIMPLEX, 0.6 * share * self._scale, max(1, round(1.5 * self._scale))
-        (width, height), base = cv2.getTextSize(text, font, size, thickness)
+        size, thickness = 0.6 * share * self._scale, max(1, round(1.5 * self._scale))
+        width, height, base = text_size(text, size, thickness)
         pad = round(4 * self._scale)
         box = np.array([width + 2 * pad, height + base + pad])
         wanted = place + np.array(_SIDES) * (gap + 2 * pad + box / 2) - box / 2
@@ -54,7 +55,7 @@ class Labels:
         right, bottom = left + int(box[0]), top + int(box[1])
         self._labels.append((left, top, right, bottom))
         cv2.rectangle(self._canvas, (left, top), (right, bottom), INK, cv2.FILLED)
-        cv2.putText(self._canvas, text, (left + pad, bottom - base), font, size, color, thickness, cv2.LINE_AA)
+        draw_text(self._canvas, text, (left + pad, bottom - base), size, color, thickness)
 
 
 def _overlap(corners: Floats, size: Floats, boxes: list[tuple[float, ...]]) -> Mask:

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Number, Singles
+from vm_embedded.opencv_text import draw_text, text_size
 
 from .painting_sphere import PaintingSphere
 
@@ -35,10 +36,10 @@ def word(random: np.random.Generator) -> Singles:
     image = np.zeros((96, 96), np.uint8)
     text = "".join(random.choice(list("ABCDEFGHIKLMNOPRSTUVXYZ0123456789"), size=random.integers(1, 7)))
     font, thick = int(random.choice([0, 2, 3, 4])), int(random.integers(2, 7))
-    (wide, high), _ = cv2.getTextSize(text, font, 1.0, thick)
+    wide, high, _ = text_size(text, 1.0, thick, font)
     scale = min(84.0 / wide, 60.0 / high)
     corner = int(48 - 0.5 * wide * scale), int(48 + 0.5 * high * scale)
-    cv2.putText(image, text, corner, font, scale, 255, thick, cv2.LINE_AA)
+    draw_text(image, text, corner, scale, 255, thick, font)
     return image.astype(np.float32) / 255.0
 
 
