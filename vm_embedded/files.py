@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import re
 import secrets
@@ -146,13 +147,12 @@ def _check_regular(path: Path, mode: int) -> None:
 
 def read_pieces(stream: IO[bytes], largest: int) -> bytes:
     """The rest of a stream, in memory only as far as it exists. Raises OSError if it has more than `largest` bytes."""
-    pieces, count = [], 0
-    while count <= largest and (piece := stream.read(min(_PIECE, largest + 1 - count))):
-        pieces.append(piece)
-        count += len(piece)
-    if count > largest:
+    content = io.BytesIO()  # it grows in place, and is not copied at the end
+    while content.tell() <= largest and (piece := stream.read(min(_PIECE, largest + 1 - content.tell()))):
+        content.write(piece)
+    if content.tell() > largest:
         raise OSError(errno.EFBIG, f"it is too large; at most {largest} bytes are allowed")
-    return pieces[0] if len(pieces) == 1 else b"".join(pieces)
+    return content.getvalue()
 
 
 def read_regular(path: Path, largest: int = LARGEST) -> bytes:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from vm_embedded.detection.detector import Detector
 from vm_embedded.errors import InputError, ModelError, VisualMeshError
+from vm_embedded.files import read_bytes
 from vm_embedded.geometry.lens_files import LensFile, parse_lens_yaml, read_lens_file
 from vm_embedded.live.proof import find_canary, prove
 from vm_embedded.network.canary import CANARY_KEY, Canary
@@ -33,12 +34,7 @@ class CanaryPicture:
     @classmethod
     def read(cls, picture: Path, lens: Path) -> CanaryPicture:
         """Read the picture and its lens file. Raises InputError."""
-        try:
-            if picture.stat().st_size > _LARGEST:
-                raise InputError(f"{picture} is too large for a canary; at most {_LARGEST} bytes are allowed")
-            return cls(str(picture), picture.read_bytes(), read_lens_file(lens))
-        except OSError as error:
-            raise InputError(f"can't read {picture}: {error.strerror}") from error
+        return cls(str(picture), read_bytes(picture, "canary", _LARGEST), read_lens_file(lens))
 
     @classmethod
     def of(cls, canary: Canary) -> CanaryPicture:

@@ -19,9 +19,10 @@ import yaml
 from torch import nn
 
 from vm_embedded.errors import InputError, VisualMeshError, one_line, unknown
-from vm_embedded.files import atomic_write
+from vm_embedded.files import atomic_write, read_bytes
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.manifest import Manifest, ObjectClass
+from vm_embedded.text import name_fault, printable
 
 from .checkpoint import Checkpoint
 from .network import Dense, GraphConvolution, Network, SeparableConvolution
@@ -67,7 +68,12 @@ class Overrides:
 
 
 def named_class(name: str, kind: str | None = None) -> ObjectClass:
-    """A class by name; without a kind the name must be one of USUAL_KINDS. Raises InputError."""
+    """A class by name; without a kind the name must be one of USUAL_KINDS.
+
+    Raises InputError, also for a name that can't be printed or is too long.
+    """
+    if fault := name_fault(name):
+        raise InputError(f"the name of class {name!r} {fault}")
     if kind is None and name not in USUAL_KINDS:
         raise InputError(f"class {name!r} needs a kind: object, upright, area or background, as in {name}:area")
     return ObjectClass(name, kind or USUAL_KINDS[name])
@@ -76,18 +82,17 @@ def named_class(name: str, kind: str | None = None) -> ObjectClass:
 def read_reference(path: str | Path, overrides: Overrides) -> Checkpoint:
     """Read a network that the reference implementation exported. Raises InputError."""
     path = Path(path)
+    text = read_bytes(path)
     try:
-        text = path.read_bytes()
         data = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    except OSError as error:
-        raise InputError(f"can't read {path}: {error.strerror or error}") from error
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError) as error:
         raise InputError(f"{path} is not YAML: {one_line(error)}") from error
     lacking = [each for each in ("geometry", "mesh", "network") if not isinstance(data, Mapping) or each not in data]
     if lacking:
         raise InputError(f"{path} is not a network of the reference implementation: it lacks {', '.join(lacking)}")
     try:
-        return _checkpoint(data, overrides, {"made_from": path.name, "sha256": hashlib.sha256(text).hexdigest()})
+        provenance = {"made_from": printable(path.name), "sha256": hashlib.sha256(text).hexdigest()}
+        return _checkpoint(data, overrides, provenance)
     except KeyError as error:
         raise InputError(f"{path}: a part of the network lacks its {error.args[0]}; the file may be damaged") from error
     except (TypeError, AttributeError, ValueError, OverflowError) as error:

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import TracebackType
 
 from vm_embedded.errors import InputError
+from vm_embedded.files import exists, read_bytes
 
 from .crops import Crop
 
@@ -29,10 +30,7 @@ def read_answers(folder: Path) -> tuple[dict[str, str], list[str]]:
     A crop whose answer was taken back has none. Raises InputError if the file can't be read.
     """
     path = folder / ANSWERS_FILE
-    try:
-        content = path.read_bytes() if path.exists() else b""
-    except OSError as error:
-        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+    content = read_bytes(path) if exists(path) else b""
     answers: dict[str, str] = {}
     faults = []
     for number, line in enumerate(content.splitlines(), start=1):

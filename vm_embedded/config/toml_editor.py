@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files import check_writable, write_file
+from ..files import check_writable, exists, read_regular, write_file
 from .toml_reader import parse_toml
 
 
@@ -29,7 +29,7 @@ def write_entries(path: Path, section: str, entries: Mapping[str, Any]) -> None:
 def _edited_file(path: Path, section: str, entries: Mapping[str, Any]) -> str:
     """The new text of a file, checked to have the new entries and to keep all others."""
     try:
-        text = path.read_bytes().decode("utf-8-sig") if path.exists() else ""
+        text = read_regular(path).decode("utf-8-sig") if exists(path) else ""
         before = parse_toml(text)
     except UnicodeDecodeError as error:
         raise InputError(f"configuration {path} is not a text file") from error

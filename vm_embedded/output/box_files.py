@@ -20,7 +20,7 @@ from ..arrays import Floats, Image
 from ..cameras.image_files import Frame
 from ..detection.detections import Detections
 from ..errors import InputError
-from ..files import write_file
+from ..files import read_bytes, write_file
 from ..geometry.lens import Lens
 from ..geometry.lens_files import format_lens_file
 from ..geometry.orientation import Orientation
@@ -81,7 +81,7 @@ class BoxWriter:
         if not (self._folder / CLASSES).exists():  # not earlier: if no frame can be processed, the folder stays empty
             write_file(self._folder / CLASSES, "".join(f"{name}\n" for name in self._classes))
         path = self._folder / f"{name}{'.png' if frame.path is None else frame.path.suffix}"
-        write_file(path, encode_png(image) if frame.path is None else _content_of(frame.path))
+        write_file(path, encode_png(image) if frame.path is None else read_bytes(frame.path))
         lens_file = format_lens_file(lens, orientation)
         write_file(self._folder / f"lens{name.removeprefix('image')}.yaml", lens_file)
         labels = [yolo_line(self._classes.index(each.class_name), each.shares) for each in boxes if each.found]
@@ -101,14 +101,6 @@ class BoxWriter:
 def yolo_line(number: int, shares: Shares) -> str:
     """The line of a box in a label file in YOLO format. number: of its class in the table of names."""
     return f"{number} {' '.join(f'{each:.6f}' for each in shares)}\n"
-
-
-def _content_of(image: Path) -> bytes:
-    """The bytes of an image file. Raises InputError."""
-    try:
-        return image.read_bytes()
-    except OSError as error:
-        raise InputError(f"can't read {image}: {error.strerror or error}") from error
 
 
 def _candidate_boxes(detections: Detections, size: tuple[int, int]) -> list[CandidateBox]:

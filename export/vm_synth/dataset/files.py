@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.errors import InputError
+from vm_embedded.files import open_regular, read_regular
+from vm_workstation.class_names import class_name
 
 FORMAT = 1
 """Version of set.json and of scene*.json."""
@@ -55,7 +57,7 @@ def is_done(folder: Path, index: int) -> bool:
 def _is_whole(path: Path) -> bool:
     end = _ENDS[path.suffix]
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             file.seek(-len(end), os.SEEK_END)
             return file.read() == end
     except OSError:  # it is missing, or shorter than its end
@@ -79,7 +81,10 @@ def read_truth(folder: Path, index: int) -> dict[str, Any]:
     """The description of a picture's scene, from its scene*.json. Raises InputError."""
     path = file_of(folder, "scene", index)
     try:
-        return read_table(path)
+        truth = read_table(path)
+        if isinstance(truth.get("object"), dict):
+            class_name(str(truth["object"].get("name", "object")))
+        return truth
     except OSError as error:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
 
@@ -87,7 +92,7 @@ def read_truth(folder: Path, index: int) -> dict[str, Any]:
 def read_table(path: Path) -> dict[str, Any]:
     """The object in a JSON file. Raises InputError if the file has no such content, OSError if it can't be read."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(read_regular(path))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is damaged: {error}") from error
     if not isinstance(found, dict):

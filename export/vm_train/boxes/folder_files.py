@@ -9,9 +9,7 @@ from pathlib import Path
 
 from vm_embedded.cameras.image_files import IMAGE_SUFFIXES
 from vm_embedded.errors import InputError
-
-LARGEST = 2**30
-"""Largest size of an annotation file [bytes]."""
+from vm_embedded.files import read_regular
 
 
 @dataclass(frozen=True)
@@ -57,9 +55,7 @@ def find_files(folder: Path) -> FolderFiles:
 def read_bytes(path: Path) -> bytes:
     """The content of an annotation file. Raises InputError without the file's name if it is unreadable."""
     try:
-        if path.stat().st_size > LARGEST:
-            raise InputError(f"is too large; at most {LARGEST} bytes are allowed")
-        return path.read_bytes()
+        return read_regular(path)
     except OSError as error:
         raise InputError(f"can't be read: {error.strerror or error}") from error
 

@@ -11,6 +11,7 @@ import numpy as np
 from vm_embedded.arrays import Image
 from vm_embedded.cameras.decoding import decode
 from vm_embedded.errors import InputError
+from vm_embedded.files import read_regular
 from vm_embedded.geometry.lens import Size
 
 UPRIGHT = 1
@@ -63,7 +64,7 @@ def image_facts(path: Path) -> ImageFacts:
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_regular(path)
     except OSError as error:
         raise InputError(f"can't be read: {error.strerror or error}") from error
 

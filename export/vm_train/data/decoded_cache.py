@@ -18,7 +18,7 @@ from urllib.parse import quote
 import numpy as np
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import atomic_write, open_regular
 
 from .classes import Classes
 from .picture_files import PARTS, PictureFiles
@@ -62,7 +62,7 @@ class DecodedCache:
         """The picture, read-only, or None if the entry is absent, or its files or the classes have changed since."""
         try:
             source = fingerprint(files, classes)
-            with self._path(files).open("rb") as file:
+            with open_regular(self._path(files)) as file:
                 content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
             magic, found, width, height, text, _ = _HEADER.unpack_from(content)
             start, pixels = _HEADER.size + text, width * height

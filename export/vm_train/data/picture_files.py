@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import exists
+from vm_embedded.files import exists, open_regular, read_regular
 
 IMAGES = (".jpg", ".jpeg", ".png")
 
 PARTS = ("image", "mask", "lens")
+
+LARGEST_FILE = 2**28
+"""Most bytes of one of a picture's files. A mask of 50 Mpx has 200 MB before it is compressed."""
 
 
 class PictureFault(InputError):
@@ -74,7 +77,7 @@ class PictureFiles:
         """The bytes of one of PARTS. Raises PictureFault naming the file."""
         path = self.path(part)
         try:
-            return path.read_bytes() if self.shard is None else self._read_shard(self.shard, part)
+            return read_regular(path, LARGEST_FILE) if self.shard is None else self._read_shard(self.shard, part)
         except FileNotFoundError as error:
             raise PictureFault(f"{path.name}: is missing", "missing") from error
         except OSError as error:
@@ -84,7 +87,7 @@ class PictureFiles:
         place = self.place(part)
         if place is None:
             raise FileNotFoundError
-        with shard.open("rb", buffering=0) as file:
+        with open_regular(shard) as file:
             file.seek(place.offset)
             data = file.read(place.size)
         if len(data) != place.size:

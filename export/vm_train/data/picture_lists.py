@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from vm_embedded.errors import InputError
+from vm_embedded.files import read_text
 
 from .picture_files import IMAGES
 
@@ -17,10 +18,7 @@ def read_list(path: Path, numbers: Collection[str]) -> tuple[str, ...]:
     Raises InputError naming file and line for a picture that does not exist.
     """
     known = set(numbers)
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a path with a zero byte
-        raise InputError(f"can't read list {path}: {getattr(error, 'strerror', None) or error}") from error
+    lines = read_text(path, "list").splitlines()
     found: dict[str, None] = {}
     for line, text in enumerate(lines, start=1):
         name = text.partition("#")[0].strip()

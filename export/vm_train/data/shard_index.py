@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from vm_embedded.errors import InputError, one_line
+from vm_embedded.files import open_regular
 
 from .picture_files import IMAGES, PictureFiles, Place
+from .tar_members import DAMAGE, TarSource, check_readable, members
 
 PARTS_BY_SUFFIX = {**dict.fromkeys(IMAGES, "image"), ".mask.png": "mask", ".lens.yaml": "lens"}
 """Parts of a picture by suffix; files with other suffixes are ignored."""
@@ -24,7 +26,7 @@ def key_and_part(name: str) -> tuple[str, str | None]:
 def find_shards(where: Path) -> list[Path]:
     """Shards of a folder, or of a pattern such as DIR/pictures-*.tar, by name. Raises InputError if there are none."""
     found = where.glob("*.tar") if where.is_dir() else where.parent.glob(where.name)
-    shards = sorted(path for path in found if path.is_file())
+    shards = sorted(path for path in found if not path.is_dir())
     if not shards:
         raise InputError(f"there are no shards {where / '*.tar' if where.is_dir() else where}")
     return shards
@@ -67,17 +69,17 @@ def _entries(shard: Path) -> Iterator[_Entry]:
     entries: dict[str, _Entry] = {}
     after = "its start"
     try:
-        with tarfile.open(shard, "r:") as tar:
-            for member in tar:
-                _add_member(entries, member, shard)
-                after = member.name
-            end = tar.offset
-        # tarfile accepts a cut file as a complete archive.
-        with shard.open("rb") as file:
-            file.seek(end)
-            if file.read(512) != bytes(512):
-                raise InputError(f"{shard} is cut short or damaged after {after}, at byte {end}")
-    except (tarfile.TarError, OSError, EOFError) as error:
+        with open_regular(shard) as file:
+            source = TarSource(file)
+            with tarfile.open(fileobj=source, mode="r:") as tar:
+                for member in members(tar, source):
+                    _add_member(entries, member, shard)
+                    after = member.name
+            # tarfile accepts a cut file as a complete archive.
+            source.seek(tar.offset)
+            if source.read(512) != bytes(512):
+                raise InputError(f"{shard} is cut short or damaged after {after}, at byte {tar.offset}")
+    except DAMAGE as error:
         raise InputError(f"{shard} is cut short or damaged after {after}: {one_line(error)}") from error
     yield from (entry for entry in entries.values() if "image" in entry.parts)
 
@@ -87,6 +89,7 @@ def _add_member(entries: dict[str, _Entry], member: tarfile.TarInfo, shard: Path
     number, part = key_and_part(member.name)
     if not member.isfile() or part is None:
         return
+    check_readable(member)
     entry = entries.setdefault(number, _Entry(number))
     if part in entry.parts:
         raise InputError(f"{shard} has two files for the {part} of picture {number}")

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tarfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from http.client import HTTPException
 from itertools import groupby
@@ -19,12 +19,17 @@ from urllib.request import urlopen
 import numpy as np
 
 from vm_embedded.errors import InputError, one_line
+from vm_embedded.files import open_regular, read_pieces
 
-from .picture_files import PARTS, PictureFault, RawPicture
+from .picture_files import LARGEST_FILE, PARTS, PictureFault, RawPicture
 from .shard_index import key_and_part
+from .tar_members import DAMAGE, TarSource, check_readable, members
 
 _BUFFER = 256
 """Pictures to shuffle at a time: about 50 MB of JPEG and PNG files of 640 x 512 px."""
+
+_BUFFER_BYTES = 2**30
+"""Bytes of pictures to shuffle at a time: 256 of 12 Mpx have fewer."""
 
 _TIMEOUT = 60.0  # for the next bytes of a server [s]
 _TIMEOUT_AT_END = 5.0  # for a command to end after its last byte [s]
@@ -54,12 +59,20 @@ def _raise(fault: PictureFault) -> None:
 def _shuffled(pictures: Iterator[RawPicture], seed: tuple[int, ...], buffer: int) -> Iterator[RawPicture]:
     random = np.random.default_rng(seed)
     waiting: list[RawPicture] = []
+    size = 0
     for picture in pictures:
         waiting.append(picture)
-        if len(waiting) >= buffer:
-            yield _drawn(waiting, random)
+        size += _size(picture)
+        while len(waiting) >= buffer or size > _BUFFER_BYTES:
+            drawn = _drawn(waiting, random)
+            size -= _size(drawn)
+            yield drawn
     while waiting:
         yield _drawn(waiting, random)
+
+
+def _size(picture: RawPicture) -> int:
+    return len(picture.image) + len(picture.mask) + len(picture.lens)
 
 
 def _drawn(waiting: list[RawPicture], random: np.random.Generator) -> RawPicture:
@@ -69,65 +82,55 @@ def _drawn(waiting: list[RawPicture], random: np.random.Generator) -> RawPicture
 
 
 def _pictures(shard: str, report: Callable[[PictureFault], None]) -> Iterator[RawPicture]:
-    after, source = "its start", _Counted(io.BytesIO())
+    after, source = "its start", TarSource(io.BytesIO())
     try:
         with _opened(shard) as opened:
-            source = _Counted(opened)
+            source = TarSource(opened)
             for number, files in groupby(_files(source), lambda each: each[0]):
-                parts = [(part, content) for _, part, content in files]
                 try:
-                    picture = _picture(shard, number, parts)
+                    picture = _picture(shard, number, ((part, content) for _, part, content in files))
                 except PictureFault as fault:
                     report(fault)
                 else:
                     yield picture
                 after = f"picture {number}"
-    except (tarfile.TarError, OSError, EOFError, zlib.error, HTTPException) as error:
+    except (*DAMAGE, zlib.error, HTTPException) as error:
         place = f"after {after}, at byte {source.count}"
         raise InputError(f"{shard}: can't be read {place}: {one_line(error)}") from error
 
 
-def _picture(shard: str, number: str, parts: Sequence[tuple[str, bytes]]) -> RawPicture:
+def _picture(shard: str, number: str, parts: Iterable[tuple[str, bytes]]) -> RawPicture:
     """A picture from its named parts. Raises PictureFault unless there is exactly one of each."""
-    found = dict(parts)
+    found: dict[str, bytes] = {}
+    for part, content in parts:
+        if part in found:
+            raise PictureFault(f"{shard} has two files for one part of picture {number}")
+        found[part] = content
     missing = [part for part in PARTS if part not in found]
     if missing:
         lacks = f"lacks its {' and '.join(missing)}, or its files are not next to each other"
         raise PictureFault(f"{shard}: picture {number} {lacks}", "missing")
-    if len(parts) > len(found):
-        raise PictureFault(f"{shard} has two files for one part of picture {number}")
     try:
         return RawPicture(number, found["image"], found["mask"], found["lens"].decode("utf-8"))
     except UnicodeDecodeError as error:
         raise PictureFault(f"{shard}: the lens file of picture {number} is not UTF-8 text", "lens") from error
 
 
-def _files(source: _Counted) -> Iterator[tuple[str, str, bytes]]:
+def _files(source: TarSource) -> Iterator[tuple[str, str, bytes]]:
     """Number, part and content of the files of a tar archive."""
     with tarfile.open(fileobj=source, mode="r|") as tar:
-        for member in tar:
+        for member in members(tar, source):
             number, part = key_and_part(member.name)
-            content = tar.extractfile(member) if member.isfile() and part is not None else None
-            if content is not None and part is not None:
-                yield number, part, content.read()
+            if member.isfile() and part is not None:
+                check_readable(member)
+                content = tar.extractfile(member)
+                assert content is not None  # only a folder and the like has none
+                yield number, part, read_pieces(content, LARGEST_FILE)
     # tarfile accepts a cut stream as a complete archive; the last 512 bytes of a complete one are 0.
     while source.read(1 << 16):
         pass
     if source.last != bytes(512):
         raise tarfile.ReadError("it is cut short or damaged")
-
-
-class _Counted(io.RawIOBase):
-    """A stream that counts its bytes and keeps the last 512 of them."""
-
-    def __init__(self, source: IO[bytes]) -> None:
-        self._source, self.count, self.last = source, 0, b""
-
-    def read(self, size: int = -1) -> bytes:
-        data = self._source.read(size)
-        self.count += len(data)
-        self.last = (self.last + data)[-512:] if len(data) < 512 else data[-512:]
-        return data
 
 
 @contextmanager
@@ -138,7 +141,7 @@ def _opened(shard: str) -> Iterator[IO[bytes]]:
             assert process.stdout is not None
             try:
                 yield _unzipped(process.stdout)
-            except (tarfile.TarError, OSError, EOFError, zlib.error):  # a command that fails writes no valid archive
+            except (*DAMAGE, zlib.error):  # a command that fails writes no valid archive
                 _end(process)
                 raise
             else:
@@ -151,7 +154,7 @@ def _opened(shard: str) -> Iterator[IO[bytes]]:
     elif shard == "-":
         yield _unzipped(sys.stdin.buffer)
     else:
-        with Path(shard).open("rb") as file:
+        with open_regular(Path(shard)) as file:
             yield _unzipped(file)
 
 

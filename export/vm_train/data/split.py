@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from vm_embedded.errors import InputError, one_line
-from vm_embedded.files import write_file
+from vm_embedded.files import read_regular, write_file
 
 from .picture_lists import read_list
 
@@ -92,7 +92,7 @@ def write_split(path: Path, split: Split) -> None:
 def read_split(path: Path) -> Split:
     """Read pictures.json. Raises InputError naming the file and its fault."""
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
+        table = json.loads(read_regular(path))
     except OSError as error:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:

@@ -30,6 +30,7 @@ from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import InputError
 from vm_embedded.field.features import FieldFeatures
+from vm_embedded.files import read_bytes
 from vm_embedded.geometry.orientation import rotation_z
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.close_look import CloseLook
@@ -223,7 +224,7 @@ def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subj
     from vm_export.checkpoint import Checkpoint  # torch takes a second to load, and model files don't need it
 
     checkpoint = Checkpoint.load(path)
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    digest = hashlib.sha256(read_bytes(path)).hexdigest()
     manifest = replace(checkpoint.manifest, layout="plain")
     return ExactSubject(manifest, checkpoint.grid, digest, settings, TorchNetwork(checkpoint))
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Mask
 from vm_embedded.errors import InputError
+from vm_embedded.files import read_regular
 
 from ..data.pictures import Picture
 from ..scores.border_scores import distances_along
@@ -78,7 +79,7 @@ def read_field(path: Path) -> FieldScene | None:
     if not path.is_file():
         return None
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
+        table = json.loads(read_regular(path))
         standing = table.get("standing")
         found = None if standing is None else tuple(map(_standing, standing))
         model = table.get("field")

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write, write_file
+from vm_embedded.files import atomic_write, read_regular, write_file
 
 from ..data.picture_files import PARTS, PictureFault, PictureFiles
 
@@ -75,7 +75,7 @@ def _prepare(out: Path, pictures: Sequence[PictureFiles], per_shard: int) -> Non
         plan = {"format": _FORMAT, "pictures": len(pictures), "per_shard": per_shard, "files_sha256": digest}
         out.mkdir(parents=True, exist_ok=True)
         if path.exists():
-            if json.loads(path.read_text(encoding="utf-8")) != plan:
+            if json.loads(read_regular(path)) != plan:
                 raise InputError(f"{out} holds shards of other pictures, or of another --size: write to another folder")
         elif any(out.glob("*.tar")):
             raise InputError(f"{out} holds other tar files: write to another folder")

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.errors import InputError, VisualMeshError, unknown
-from vm_embedded.files import write_file
+from vm_embedded.files import read_regular, write_file
 
 from ..data.picture_files import IMAGES, PARTS
 from .picture_example import KEYS, SUFFIXES, ExamplePicture, WrongUnitError, picture_of
@@ -130,7 +130,7 @@ def _prepared(out: Path, plan: dict[str, Any]) -> str | None:
             if others:
                 raise InputError(f"{out} holds {min(others)}, which no import wrote: write to another folder")
             return _text(plan)
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(read_regular(path))
         same = all(found[key] == plan[key] for key in ("format", "renaming", "normalized"))
         same &= all(old == new for old, new in zip(found["files"], plan["files"], strict=False))
         longer = len(plan["files"]) > len(found["files"])

@@ -20,7 +20,7 @@ from urllib.parse import quote
 import numpy as np
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write
+from vm_embedded.files import atomic_write, read_regular
 
 from ..data.decoded_cache import KEPT_FREE, fingerprint
 from ..data.picture_files import PictureFiles
@@ -58,7 +58,7 @@ class GraphCache:
     def get(self, files: PictureFiles, view: int) -> LabeledGraph | None:
         """A view, or None if it is absent or older than its picture's files."""
         try:
-            content = self._path(files, view).read_bytes()
+            content = read_regular(self._path(files, view))
             magic, source, points, neighbors = _HEADER.unpack_from(content)
             if magic != _MAGIC or source != fingerprint(files, self._classes):
                 return None

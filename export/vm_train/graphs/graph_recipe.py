@@ -15,6 +15,7 @@ import numpy as np
 
 from vm_embedded.detection.color_normalization import normalized
 from vm_embedded.errors import GeometryError, InputError
+from vm_embedded.files import read_regular
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 
@@ -80,10 +81,10 @@ def ball_radius(files: PictureFiles) -> float:
     """Radius [m] of the balls in a picture of vm-synth, even if it shows none. Raises InputError."""
     path = files.image.with_name(f"scene{files.number}.json")
     try:
-        radius = float(json.loads(path.read_text(encoding="utf-8"))["ball_radius"])
+        radius = float(json.loads(read_regular(path))["ball_radius"])
     except OSError as error:
         raise InputError(f"can't read the ball's radius from {path.name}: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
         raise InputError(f"{path.name} has no number ball_radius, the ball's radius [m]") from error
     if not 0.0 < radius < math.inf:
         raise InputError(f"{path.name}: ball_radius must be a number above 0, the ball's radius [m], not {radius:g}")

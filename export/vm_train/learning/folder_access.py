@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.errors import InputError
+from vm_embedded.files import read_regular
 from vm_embedded.output.result_files import make_folder
 
 
@@ -28,7 +29,7 @@ def check_unused(folder: Path, names: Sequence[str]) -> None:
 def kind_of(folder: Path) -> str | None:
     """The kind of training in a folder, as its run.json says; None if it says none or can't be read."""
     try:
-        content = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        content = json.loads(read_regular(folder / "run.json"))
     except (OSError, ValueError, RecursionError):
         return None
     kind = content.get("kind") if isinstance(content, dict) else None
@@ -44,7 +45,7 @@ def description(folder: Path, number: int, what: str = "training") -> Iterator[d
     """
     path = folder / "run.json"
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(read_regular(path))
         if content["format"] != number:
             raise InputError(f"{path} was written by another release: begin the {what} again")
         yield content

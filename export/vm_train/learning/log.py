@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import write_file
+from vm_embedded.files import read_bytes, write_file
 
 
 class TrainingLog:
@@ -80,10 +80,7 @@ def _cut(path: Path, training_round: int, step: int, validated: int) -> None:
 
 def read_log(path: Path) -> list[tuple[str, dict[str, Any]]]:
     """Lines of a log with their records, up to the first damaged one. Raises InputError if it can't be read."""
-    try:
-        lines = path.read_bytes().splitlines(keepends=True)
-    except OSError as error:
-        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+    lines = read_bytes(path).splitlines(keepends=True)
     found: list[tuple[str, dict[str, Any]]] = []
     for line in lines:
         try:

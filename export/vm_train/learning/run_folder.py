@@ -23,8 +23,9 @@ from vm_embedded.arrays import Floats
 from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
-from vm_embedded.files import write_file
+from vm_embedded.files import read_bytes, write_file
 from vm_embedded.output.result_files import make_folder
+from vm_embedded.text import printable
 
 from ..data.split import read_split, write_split
 from ..graphs.loading import PictureGraphs
@@ -114,7 +115,7 @@ class TrainingRun:
         used = hashlib.sha256(json.dumps([training, data.split.validation]).encode()).hexdigest()
         return {
             "made_by": f"vm-train {__version__}",
-            "data": data.folder.name,
+            "data": printable(data.folder.name),
             "training_pictures": str(count) if data.source is None else f"{count} an epoch, streamed",
             "validation_pictures": str(len(data.split.validation)),
             "pictures_sha256": used,
@@ -150,7 +151,7 @@ def begin_run(
     run = TrainingRun(folder, data, configuration, counts, start)
     write_split(folder / "pictures.json", data.split)
     if start is not None:
-        write_file(folder / _start_name(start), start.path.read_bytes())
+        write_file(folder / _start_name(start), read_bytes(start.path))
     write_file(folder / "train.toml", to_commented_toml(configuration))
     write_file(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
     return run

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.errors import InputError
+from vm_embedded.files import read_bytes
 from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_embedded.network.model_file import read_model
 from vm_export.checkpoint import Checkpoint
@@ -36,7 +37,7 @@ class Start:
         """Read a checkpoint (.pt) or a model file (.onnx). Raises InputError or ModelError."""
         is_model = path.suffix.lower() == ".onnx"
         checkpoint = network_of(read_model(path)) if is_model else Checkpoint.load(path)
-        return cls(path, checkpoint, hashlib.sha256(path.read_bytes()).hexdigest())
+        return cls(path, checkpoint, hashlib.sha256(read_bytes(path)).hexdigest())
 
     @property
     def defaults(self) -> dict[str, dict[str, Any]]:

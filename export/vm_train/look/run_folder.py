@@ -19,7 +19,7 @@ from vm_embedded import __version__
 from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
-from vm_embedded.files import write_file
+from vm_embedded.files import read_bytes, write_file
 from vm_embedded.output.result_files import make_folder
 from vm_export.look_checkpoint import LookCheckpoint
 
@@ -142,7 +142,7 @@ def begin_look_run(
         check_glance(glance, object_class, upright_radius_of(configuration, object_class))
     make_folder(folder / "patches")
     mesh = folder / f"mesh{model.suffix.lower()}"
-    write_file(mesh, model.read_bytes())
+    write_file(mesh, read_bytes(model))
     run = LookRun(
         folder=folder,
         data=data.resolve(),
@@ -222,7 +222,4 @@ def _saved(look: LookCheckpoint | None, path: Path) -> str | None:
 
 
 def _sha256(path: Path) -> str:
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+    return hashlib.sha256(read_bytes(path)).hexdigest()
