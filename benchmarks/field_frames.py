@@ -28,10 +28,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats
+from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.detector import Detector
 from vm_embedded.errors import InputError
 from vm_embedded.field.features import Upright
@@ -210,7 +210,7 @@ def _frames(folder: Path) -> Iterator[tuple[Path, LensFile, Any]]:
     """The frames of a folder: path, lens and BGR image."""
     for path in sorted((folder / "images").glob("image*.jpg")):
         lens = read_lens_file(path.with_name(path.name.replace("image", "lens")).with_suffix(".yaml"))
-        yield path, lens, cv2.imread(str(path))
+        yield path, lens, read_image(path)
 
 
 def against_golden(folder: Path, detector: Detector) -> dict[str, dict[str, float | None]]:

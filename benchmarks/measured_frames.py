@@ -20,11 +20,14 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Image
+from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.network.bundled import DEFAULT, model_path
+from vm_embedded.opencv_text import draw_text
+from vm_workstation.contact_sheet import write_sheet
 
 CELL = 240  # [px]
 
@@ -59,7 +62,7 @@ def score(folder: Path, detector: Detector) -> Score:
     for path in sorted((folder / "images").glob("image*.jpg")):
         lens = read_lens_file(path.with_name(path.name.replace("image", "lens")).with_suffix(".yaml"))
         assert lens.orientation is not None
-        found = detector.detect(cv2.imread(str(path)), lens.orientation, lens.lens)
+        found = detector.detect(read_image(path), lens.orientation, lens.lens)
         balls = truth.get(path.name, [])
         left = [balls] if isinstance(balls, dict) else list(balls)
         for detection in found.objects:
@@ -104,8 +107,7 @@ def sheet(folder: Path, result: Score) -> Image:
 
 
 def _cell(path: Path, center: Any, radius: float, color: tuple[int, int, int], text: str) -> Image:
-    image = cv2.imread(str(path))
-    assert image is not None
+    image = read_image(path)
     half = max(6.0 * radius, 30.0)
     scale = CELL / (2.0 * half)
     matrix = np.array([[scale, 0.0, CELL / 2 - scale * center[0]], [0.0, scale, CELL / 2 - scale * center[1]]])
@@ -113,7 +115,7 @@ def _cell(path: Path, center: Any, radius: float, color: tuple[int, int, int], t
     cv2.circle(cell, (CELL // 2, CELL // 2), round(scale * radius) + 3, color, 1, cv2.LINE_AA)
     for shade, thickness in ((0, 3), (255, 1)):
         for line, at in ((text, 16), (path.stem, CELL - 8)):
-            cv2.putText(cell, line, (5, at), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (shade,) * 3, thickness, cv2.LINE_AA)
+            draw_text(cell, line, (5, at), 0.45, (shade,) * 3, thickness)
     return np.asarray(cell)
 
 
@@ -139,7 +141,7 @@ def main() -> None:
     if options.json:
         options.json.write_text(json.dumps(result.summary(options.near)) + "\n")
     if options.sheet:
-        cv2.imwrite(str(options.sheet), sheet(options.folder, result))
+        write_sheet(options.sheet, sheet(options.folder, result))
 
 
 if __name__ == "__main__":

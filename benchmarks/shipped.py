@@ -16,10 +16,13 @@ from typing import Any
 import cv2
 import numpy as np
 
+from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import GeometryError
+from vm_embedded.files import write_file
 from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
 from vm_embedded.network.model_file import read_model
+from vm_embedded.opencv_text import draw_text
 from vm_train.data.classes import Classes
 from vm_train.data.picture_files import PictureFiles
 from vm_train.data.pictures import find_pictures, read_picture
@@ -161,7 +164,7 @@ def wrong_sizes(model: Path, folder: Path) -> dict[str, dict[str, float]]:
 
 def _size(folder: Path) -> list[int]:
     """Width and height of a set's pictures [px]."""
-    height, width = cv2.imread(str(min(folder.glob("image*.jpg")))).shape[:2]
+    height, width = read_image(min(folder.glob("image*.jpg"))).shape[:2]
     return [width, height]
 
 
@@ -187,7 +190,7 @@ def sheet(result: Evaluation, count: int = 20) -> tuple[np.ndarray, list[str]]:
 
 def _numbered(cell: np.ndarray, number: int) -> np.ndarray:
     for shade, thickness in ((0, 4), (255, 2)):
-        cv2.putText(cell, str(number), (6, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.8, (shade,) * 3, thickness, cv2.LINE_AA)
+        draw_text(cell, str(number), (6, 24), 0.8, (shade,) * 3, thickness)
     return cell
 
 
@@ -213,7 +216,7 @@ def main() -> None:
             print(name, each, json.dumps(scores["ranked 0.5"]), flush=True)
             if name == DEFAULT and each == "field":
                 picture, found["worst"] = sheet(used)
-                cv2.imwrite(str(WORST), picture, [cv2.IMWRITE_JPEG_QUALITY, 80])
+                write_file(WORST, cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes())
     for folder in sorted((options.test / "grid").glob("*")) if options.network in (None, DEFAULT) else ():
         used = evaluation(model_path(DEFAULT), find_pictures(folder), Settings())
         found["grid"][folder.name] = numbers(used.objects["ball"], None)

@@ -18,6 +18,7 @@ import torch
 from torch import nn
 from torch.utils.data import DataLoader, Dataset
 
+from vm_embedded.cameras.image_files import read_image
 from vm_embedded.files import atomic_write
 
 from . import cpu_torchvision  # noqa: F401  # before torchvision
@@ -65,7 +66,7 @@ class BoxedPictures(Dataset[tuple[torch.Tensor, Target]]):
         from torchvision.tv_tensors import BoundingBoxes
 
         path = self._paths[number]
-        image = v2.functional.to_image(cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB))
+        image = v2.functional.to_image(cv2.cvtColor(read_image(path), cv2.COLOR_BGR2RGB))
         height, width = image.shape[1:]
         corners = torch.from_numpy(read_boxes(self._labels / f"{path.stem}.txt", width, height).astype(np.float32))
         boxes = BoundingBoxes(corners, format="XYXY", canvas_size=(height, width))

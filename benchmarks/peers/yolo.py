@@ -18,7 +18,7 @@ import onnx
 import torch
 from onnx import numpy_helper
 
-from vm_embedded.arrays import Image
+from vm_embedded.cameras.image_files import read_image
 
 from . import cpu_torchvision  # noqa: F401  # before ultralytics
 from .course import read_course
@@ -77,14 +77,8 @@ def new_network(pictures: Path) -> torch.nn.Module:
 def _batches(paths: list[Path]) -> Iterator[torch.Tensor]:
     """Pictures as inputs (n, 3, side, side) of the network."""
     for start in range(0, len(paths), BATCH):
-        squares = [boxed_in(_read(path), START_SIDE) for path in paths[start : start + BATCH]]
+        squares = [boxed_in(read_image(path), START_SIDE) for path in paths[start : start + BATCH]]
         yield torch.from_numpy(cv2.dnn.blobFromImages(squares, 1.0 / 255.0, swapRB=True))
-
-
-def _read(path: Path) -> Image:
-    image = cv2.imread(str(path))
-    assert image is not None
-    return image
 
 
 def train(data: Path, out: Path, side: int, epochs: int, begin: Path | None = None) -> None:

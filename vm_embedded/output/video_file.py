@@ -13,6 +13,7 @@ from ..arrays import Image
 from ..cameras.library_messages import library_messages
 from ..errors import InputError, unknown
 from ..files import check_writable, put_in_place, real_path, unused_name
+from ..opencv_text import open_capture, open_writer
 
 _CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".webm": "VP80"}
 """FFmpeg's code of the codec for each suffix; OpenCV's wheels have these."""
@@ -48,10 +49,10 @@ class VideoFile:
             self._size = size
             try:
                 self._part.touch(exist_ok=False)
+                with library_messages():  # one for each .webm: FFmpeg does not list the codec's code, but has it
+                    self._writer = open_writer(self._part, self._codec, self._rate, size)
             except OSError as error:
                 raise InputError(f"can't write the video {self._path}: {error.strerror or error}") from error
-            with library_messages():  # one for each .webm: FFmpeg does not list the codec's code, but has it
-                self._writer = cv2.VideoWriter(str(self._part), self._codec, self._rate, size)
         if not self._writer.isOpened():
             raise InputError(f"can't write the video {self._path}: OpenCV can't encode it or create the file")
         if size != self._size:
@@ -91,7 +92,7 @@ def _count_frames(path: Path, expected: int) -> int:
 
     The number that the file states is written last, so if it is the expected one, the frames need not be read.
     """
-    capture = cv2.VideoCapture(str(path))
+    capture = open_capture(path)
     count = round(capture.get(cv2.CAP_PROP_FRAME_COUNT))
     if count != expected:
         count = 0

@@ -18,6 +18,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Singles
 from vm_embedded.errors import InputError
+from vm_embedded.files import read_regular
 
 from .maps import MapRanges
 
@@ -57,7 +58,11 @@ class Environment:
     def read(cls, path: Path, ranges: MapRanges) -> Environment:
         """Read a map. Raises InputError that names the file and what is wrong with it."""
         try:
-            picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+            content = read_regular(path)
+        except OSError as error:
+            raise InputError(f"map {path.name}: can't be read: {error.strerror or error}") from error
+        try:
+            picture = cv2.imdecode(np.frombuffer(content or b"\0", dtype=np.uint8), cv2.IMREAD_UNCHANGED)
         except cv2.error:  # some builds of OpenCV raise an error if EXR is disabled
             picture = None
         if picture is None:

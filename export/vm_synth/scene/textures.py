@@ -10,6 +10,7 @@ import numpy as np
 
 from vm_embedded.arrays import Singles
 from vm_embedded.errors import InputError
+from vm_embedded.files import read_bytes
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp")
 
@@ -38,7 +39,8 @@ def texture_files(folder: Path) -> list[Path]:
 
 
 def _read(path: Path) -> Singles:
-    picture = cv2.imdecode(np.frombuffer(path.read_bytes() or b"\0", dtype=np.uint8), cv2.IMREAD_COLOR)
+    content = read_bytes(path, "texture")
+    picture = cv2.imdecode(np.frombuffer(content or b"\0", dtype=np.uint8), cv2.IMREAD_COLOR)
     if picture is None:
         raise InputError(f"texture {path} can't be read: it is damaged or not a picture")
     how = cv2.INTER_AREA if min(picture.shape[:2]) > _SIDE else cv2.INTER_LINEAR
