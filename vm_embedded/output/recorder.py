@@ -7,6 +7,8 @@ recording.jsonl with the messages. Running the detector on a recording gives the
 
 from __future__ import annotations
 
+import errno
+import os
 import threading
 import time
 from collections import deque
@@ -18,7 +20,7 @@ import cv2
 
 from ..cameras.camera import Shot
 from ..cameras.image_files import MESSAGES
-from ..config.entries import check_entries, number, text_line
+from ..config.entries import check_entries, file_name, number, text_line
 from ..errors import InputError
 from ..geometry.lens import Lens
 from ..geometry.lens_files import format_lens_file
@@ -38,7 +40,7 @@ _LAST_FRAME = 0.3
 class RecorderSettings:
     """Section [recorder]: where recordings go, their limits, and the class that triggers one."""
 
-    folder: str = text_line("", "folder for recordings; each gets a subfolder; empty: no recordings")
+    folder: str = file_name("", "folder for recordings; each gets a subfolder; empty: no recordings")
     seconds: float = number(5.0, "length of a recording", "s", (0.1, 600))
     memory_mib: float = number(256.0, "memory for recent frames; a full memory shortens recordings", "MiB", (1, 65536))
     disk_mib: float = number(1024.0, "disk space for all recordings; the oldest are deleted", "MiB", (1, 1e6))
@@ -123,6 +125,8 @@ class Recorder:
         folder = Path(self.settings.folder) / recording_name(time.time())
         part = folder.with_name(folder.name + PART)
         try:
+            if folder.exists():  # the clock was set back
+                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
             part.mkdir(parents=True)
         except OSError as error:
             raise InputError(f"can't create {part}: {error.strerror or error}") from error
@@ -183,20 +187,30 @@ class Recorder:
             yield nbytes
 
     def _delete_oldest(self, newest: Path | None = None) -> None:
-        delete_oldest_recordings(Path(self.settings.folder), 2**20 * self.settings.disk_mib, newest)
+        """Hold the limit of the disk space, and report what can't be deleted: the newest recording is complete."""
+        folder, limit = Path(self.settings.folder), 2**20 * self.settings.disk_mib
+        try:
+            for each in delete_oldest_recordings(folder, limit, newest):
+                self._report("not deleted", "warning", f"{each}: a part of it can't be deleted; remove it yourself")
+        except OSError as error:
+            self._report("not deleted", "warning", f"{folder}: {error.strerror or error}")
 
     def finish_left(self) -> None:
         """Finish the recordings of killed detectors, so that they count for the disk limit. Call it at the start."""
         if not self.settings.folder:
             return
+        folder = Path(self.settings.folder)
         try:
-            for path, written in finish_left_recordings(Path(self.settings.folder)):
-                result = f"only {written} frames" if written else "removed, because it has no frames"
-                self._report("recorded", "warning", f"{path}: {result}: the detector was killed")
-            if Path(self.settings.folder).is_dir():
-                self._delete_oldest()
+            for path, result in finish_left_recordings(folder):
+                if isinstance(result, OSError):
+                    self._report("recording failed", "error", f"{path}: {result.strerror or result}")
+                    continue
+                done = f"only {result} frames" if result else "removed, because it has no frames"
+                self._report("recorded", "warning", f"{path}: {done}: the detector was killed")
         except OSError as error:
-            self._report("recording failed", "error", f"{self.settings.folder}: {error.strerror or error}")
+            self._report("recording failed", "error", f"{folder}: {error.strerror or error}")
+        if folder.is_dir():
+            self._delete_oldest()
 
     def begin_anew(self, files: Mapping[str, bytes]) -> None:
         """Drop all moments, and use other files from now on: a recording has one vm.toml."""

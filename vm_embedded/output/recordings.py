@@ -6,19 +6,24 @@ lock when the process ends, however it ends. So an unlocked NAME.part has no wri
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import re
 import shutil
+import stat
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..cameras.image_files import MESSAGES
+from ..files import read_regular
 
 PART = ".part"
-_UNFINISHED = re.compile(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d\.\d{3}\.part")
+_NAME = re.compile(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d(\.\d{3})?")
+_FILE = re.compile(r"recording\.jsonl|vm\.toml|model\.onnx|image\d{7,}\.(jpg|png|bmp)|lens\d{7,}\.yaml")
+"""Names of recordings and of their files. Anything else is the user's, and stays."""
 
 
 def recording_name(now: float) -> str:
@@ -40,43 +45,85 @@ def locked(part: Path) -> Iterator[None]:
 def finish(part: Path, written: int) -> Path:
     """Give an unfinished recording of `written` frames its final name, or remove it if it has no frames.
 
-    Return the path with the final name. Raises OSError.
+    Return the path with the final name. Raises OSError, also if something has this name, or if there are no frames but
+    files that no recording has; all stays as it is then.
     """
-    path = part.with_name(part.name.removesuffix(PART))
+    path = part.with_suffix("")
     if written:
-        part.rename(path)
-    else:
-        shutil.rmtree(part)
+        part.rename(path)  # replaces nothing but an empty folder
+        return path
+    for each in part.iterdir():
+        if not _FILE.fullmatch(each.name) or not stat.S_ISREG(each.lstat().st_mode):
+            raise OSError(errno.ENOTEMPTY, f"it has no frames, but {each.name}")
+    for each in part.iterdir():
+        each.unlink()
+    part.rmdir()
     return path
 
 
-def finish_left_recordings(folder: Path) -> list[tuple[Path, int]]:
-    """Finish the recordings whose process was killed; return their paths and numbers of frames.
+def finish_left_recordings(folder: Path) -> Iterator[tuple[Path, int | OSError]]:
+    """Finish the recordings whose process was killed. Yield their paths and numbers of frames, or why one stays.
 
-    Other folders stay, and so do recordings that another process is writing.
+    Other folders stay, and so do recordings that another process is writing. Raises OSError if `folder` can't be read.
     """
-    finished = []
-    parts = sorted(folder.iterdir()) if folder.is_dir() else []
-    for part in parts:
-        if not _UNFINISHED.fullmatch(part.name):
+    for part in sorted(folder.iterdir()) if folder.is_dir() else []:
+        if part.suffix != PART or not _NAME.fullmatch(part.stem) or not _is_folder(part):
             continue
-        with suppress(OSError), locked(part):
-            messages = part / MESSAGES
-            written = messages.read_bytes().count(b"\n") if messages.is_file() else 0
-            finished.append((finish(part, written), written))
-    return finished
+        try:
+            with locked(part):
+                written = _count_messages(part)
+                finished: tuple[Path, int | OSError] = finish(part, written), written
+        except (BlockingIOError, FileNotFoundError):  # another detector writes it, or has finished it
+            continue
+        except OSError as error:
+            finished = part, error
+        yield finished
 
 
-def delete_oldest_recordings(folder: Path, limit: float, newest: Path | None = None) -> None:
+def _count_messages(part: Path) -> int:
+    """The number of complete messages of an unfinished recording; 0 before its first one. Raises OSError."""
+    with suppress(FileNotFoundError):
+        return read_regular(part / MESSAGES).count(b"\n")
+    return 0
+
+
+def _is_folder(path: Path) -> bool:
+    """Whether a path is a folder, and not a link to one. False if it has vanished."""
+    with suppress(OSError):
+        return stat.S_ISDIR(path.lstat().st_mode)
+    return False
+
+
+def delete_oldest_recordings(folder: Path, limit: float, newest: Path | None = None) -> list[Path]:
     """Delete the oldest recordings in a folder until the rest take at most `limit` [bytes]; keep the newest.
 
-    newest: the one that was just made, whatever the clock said then; None: the one with the latest name.
+    newest: the one that was just made, whatever the clock said then; None: the one with the latest name. Folders with
+    other names than those of recordings, and what links lead to, neither count nor are deleted. Return the recordings
+    that could not be deleted as a whole. Raises OSError if the folder can't be read.
     """
-    recordings = sorted(
-        each for each in folder.iterdir() if not each.name.endswith(PART) and (each / MESSAGES).is_file()
-    )
+    recordings = [
+        each
+        for each in sorted(folder.iterdir())
+        if _NAME.fullmatch(each.name) and _is_folder(each) and os.path.lexists(each / MESSAGES)
+    ]
     recordings.sort(key=lambda each: newest is not None and each.name == newest.name)
-    sizes = [sum(file.stat().st_size for file in each.iterdir()) for each in recordings]
-    while len(recordings) > 1 and sum(sizes) > limit:
-        shutil.rmtree(recordings.pop(0), ignore_errors=True)
-        sizes.pop(0)
+    excess, left = sum(map(_size, recordings)) - limit, []
+    for each in recordings[:-1]:
+        if excess <= 0:
+            break
+        before = _size(each)
+        shutil.rmtree(each, ignore_errors=True)
+        excess -= before - _size(each)
+        if os.path.lexists(each):
+            left.append(each)
+    return left
+
+
+def _size(folder: Path) -> int:
+    """Size of all that is in a folder [bytes]: of links themselves, and without what can't be looked at."""
+    size = 0
+    for inside, folders, files in os.walk(folder):
+        for name in (*folders, *files):
+            with suppress(OSError):  # it has vanished
+                size += (Path(inside) / name).lstat().st_size
+    return size
