@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError, InUseError, NetworkError
+from .locks import locked_folder
 
 _MAX_PATH_BYTES = 107
 """Longest path of a Unix socket on Linux [bytes]."""
@@ -34,6 +35,9 @@ MOST_CONNECTIONS = 64
 
 _NO_NETWORK = (errno.EADDRNOTAVAIL, errno.ENETDOWN, errno.ENETUNREACH, errno.EHOSTUNREACH)
 """Errors of an address while the network is not up."""
+
+_PATIENCE = 5.0
+"""Longest wait for other detectors that create sockets in the same folder [s]. One takes a second at most."""
 
 _UMASK = 0o117
 """Gives the socket's file mode 0660."""
@@ -105,43 +109,70 @@ def check_free(path: Path, option: str) -> bool:
     return True
 
 
-class UnixListener:
+class UnixListener(socket.socket):
     """A Unix stream socket that listens at a path; a relative one is in the runtime folder.
 
     option: of vm-detect that gives another path, for the error message. It replaces a socket file on which no process
-    listens anymore. Raises InputError if another process listens there, or if the socket can't be created.
+    listens anymore. Raises InUseError if another process listens there, and InputError if the socket can't be created.
+
+    The folder is locked from the check until the socket listens. So a file that the check finds without a listener was
+    left behind: it is not that of another detector that has begun to start. `close` removes the file first, as no other
+    detector replaces it while this one listens.
     """
 
     def __init__(self, path: str | Path, option: str) -> None:
         self.path = socket_path(path)
-        is_left = check_free(self.path, option)
-        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
+        self._file: tuple[int, int] | None = None
+        super().__init__(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC)
         try:
-            if is_left:
-                self.path.unlink(missing_ok=True)
-            mask = os.umask(_UMASK)
-            try:
-                self.socket.bind(str(self.path))
-            finally:
-                os.umask(mask)
-            self.socket.listen(_BACKLOG)
-            self.socket.setblocking(False)
-            self._inode = self.path.stat().st_ino
+            # Paths with the same folder must give the same lock.
+            with locked_folder(Path(os.path.realpath(self.path.parent)), _PATIENCE):
+                if check_free(self.path, option):
+                    self.path.unlink(missing_ok=True)
+                self._bind_and_listen()
+        except InputError:
+            self.close()
+            raise
         except OSError as error:
-            self.socket.close()
-            raise InputError(
-                f"can't listen at {self.path}: {error.strerror or error}; give a path in a folder that you can write "
-                f"to with {option}"
-            ) from error
+            self.close()
+            raise _cant_listen_at(self.path, option, error) from error
+
+    def _bind_and_listen(self) -> None:
+        mask = os.umask(_UMASK)
+        try:
+            self.bind(str(self.path))
+        finally:
+            os.umask(mask)
+        self._file = _identity(self.path)
+        self.listen(_BACKLOG)
+        self.setblocking(False)
 
     def close(self) -> None:
-        """Stop listening, and remove the file unless another process replaced it."""
-        self.socket.close()
-        try:
-            if self.path.stat().st_ino == self._inode:
+        """Remove the file unless another one has replaced it, and stop listening."""
+        with suppress(OSError):
+            # No other file has the number of this one while the socket is open.
+            if self._file is not None and _identity(self.path) == self._file:
                 self.path.unlink()
-        except OSError:
-            return
+        self._file = None
+        super().close()
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    """What tells a file from all others that exist. Raises OSError."""
+    found = path.lstat()
+    return found.st_dev, found.st_ino
+
+
+def _cant_listen_at(path: Path, option: str, error: OSError) -> InputError:
+    if isinstance(error, BlockingIOError):
+        return InUseError(
+            f"can't listen at {path}: another process holds the lock of {path.parent}; stop it, or give a path in "
+            f"another folder with {option}"
+        )
+    return InputError(
+        f"can't listen at {path}: {error.strerror or error}; give a path in a folder that you can read and write with "
+        f"{option}"
+    )
 
 
 Serve = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]

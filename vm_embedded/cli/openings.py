@@ -102,7 +102,7 @@ def _check_unix(name: str, option: str) -> str:
     """A Unix socket to create. option: of vm-detect that gives another path."""
     path = socket_path(name)
     check_free(path, option)
-    return _check_folder(path, "can't listen at")
+    return _check_folder(path, "can't listen at", os.R_OK)
 
 
 def _check_port(where: str, kind: socket.SocketKind) -> str:
@@ -127,15 +127,19 @@ def _check_recorder(settings: RecorderSettings) -> str:
         raise _FolderError(f"can't write to {existing}: {error.strerror or error}", folder) from error
 
 
-def _check_folder(path: Path, failure: str) -> str:
-    """What to say about a path at which something can be created. failure: start of the error. Raises InputError."""
+def _check_folder(path: Path, failure: str, access: int = 0) -> str:
+    """What to say about a path at which something can be created. failure: start of the error. Raises InputError.
+
+    access: to the folder, besides the right to create files in it.
+    """
     folder = path.parent
     if _is_made_by_systemd(folder):
         return f"{path}; systemd creates its folder"
     if not os.access(folder, os.F_OK):
         raise _FolderError(f"{failure} {path}: there is no folder {folder}; create it, or choose another one", folder)
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise _FolderError(f"{failure} {path}: this user may not write to {folder}; choose another folder", folder)
+    if not os.access(folder, os.W_OK | os.X_OK | access):
+        words = "read and write" if access else "write to"
+        raise _FolderError(f"{failure} {path}: this user may not {words} {folder}; choose another folder", folder)
     return str(path)
 
 

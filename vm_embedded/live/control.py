@@ -37,14 +37,12 @@ class ControlServer:
 
     def __init__(self, path: Path, commands: Mapping[str, Command]) -> None:
         self._path, self._commands = path, commands
-        self._file: UnixListener | None = None
         self._acceptor: Acceptor | None = None
         self._connections = Connections()
 
     async def open(self) -> None:
         """Listen. Raises InputError."""
-        self._file = UnixListener(self._path, "--status-socket")
-        self._acceptor = Acceptor(self._file.socket, self._reply, 1024)
+        self._acceptor = Acceptor(UnixListener(self._path, "--status-socket"), self._reply, 1024)
 
     async def _reply(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if not self._connections.admit(writer):
@@ -66,8 +64,6 @@ class ControlServer:
         """Stop listening."""
         if self._acceptor is not None:
             self._acceptor.close()
-        if self._file is not None:
-            self._file.close()
 
 
 def ask(path: Path, word: str) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import hmac
 import socket
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from ipaddress import ip_address
@@ -67,9 +67,9 @@ class HttpServer:
         token: str = "",
     ) -> None:
         self._where, self._option, self._pages = where, option, pages
+        self._is_local = where.startswith("unix:")
         self._streams, self._actions = streams or {}, actions or {}
         self._token = token
-        self._file: UnixListener | None = None
         self._acceptors: list[Acceptor] = []
         self._tasks: set[asyncio.Task[None]] = set()
         self._connections = Connections()
@@ -77,9 +77,9 @@ class HttpServer:
 
     async def open(self) -> None:
         """Listen. Raises InputError, and NetworkError for what may work later."""
-        if self._where.startswith("unix:"):
-            self._file = UnixListener(self._where.removeprefix("unix:"), self._option)
-            listening = [self._file.socket]
+        listening: Sequence[socket.socket]
+        if self._is_local:
+            listening = [UnixListener(self._where.removeprefix("unix:"), self._option)]
         else:
             listening = bound_sockets(self._where, socket.SOCK_STREAM)
             try:
@@ -122,7 +122,7 @@ class HttpServer:
         query = dict(parse_qsl(text))
         if method != "GET" and not (method == "POST" and path in self._actions):
             await write(_encode("405 Method Not Allowed", Response("text/plain", b"only GET is supported\n")))
-        elif self._file is None and not _has_numeric_host(head):
+        elif not self._is_local and not _has_numeric_host(head):
             await write(_encode("403 Forbidden", Response("text/plain", b"use the IP address, not a host name\n")))
         elif method == "POST":
             given = _header(head, "x-token") or ""
@@ -150,8 +150,6 @@ class HttpServer:
             for task in self._tasks:
                 task.cancel()
             await asyncio.wait(self._tasks, timeout=0.1)
-        if self._file is not None:
-            self._file.close()
 
 
 async def _answer(page: Page, query: Query) -> bytes:

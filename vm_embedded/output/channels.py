@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from ..config.entries import check_entries, entry, number, one_of, switch, text_line
+from ..config.entries import check_entries, entry, file_name, number, one_of, switch, text_line
 from ..errors import InputError
 from ..sockets import MOST_CONNECTIONS, Acceptor, UnixListener, checked_addresses, datagram_socket, parse_address
 from .binary_form import to_binary
@@ -34,14 +34,14 @@ class OutputSettings:
     """Section [output]: the channels, the format of their messages, and the backlog of slow readers."""
 
     stdout: bool = switch(True, "write lines to standard output")
-    file: str = text_line("", "file to append lines to")
+    file: str = file_name("", "file to append lines to")
     udp: str = entry(
         checked_addresses,
         "",
         "UDP receivers, one datagram per line: ADDRESS:PORT, separated by commas",
         example=_UDP_EXAMPLE,
     )
-    unix: str = text_line(
+    unix: str = file_name(
         "",
         "Unix socket to create; each reader gets all lines that it takes in time; a relative path is in "
         "$RUNTIME_DIRECTORY, $XDG_RUNTIME_DIR or the private folder /tmp/vm-detect-UID",
@@ -161,9 +161,9 @@ class UnixChannel:
     def __init__(self, path: str | Path, backlog: int) -> None:
         self.dropped = 0
         self.failure = ""
-        self._listener, self._backlog = UnixListener(path, "--output-unix"), backlog
+        self._backlog = backlog
         self._writers: set[asyncio.StreamWriter] = set()
-        self._acceptor = Acceptor(self._listener.socket, self._serve, limit=1)
+        self._acceptor = Acceptor(UnixListener(path, "--output-unix"), self._serve, limit=1)
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._writers) >= MOST_CONNECTIONS:
@@ -192,4 +192,3 @@ class UnixChannel:
         self._acceptor.close()
         for writer in list(self._writers):
             writer.close()
-        self._listener.close()

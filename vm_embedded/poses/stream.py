@@ -47,7 +47,6 @@ class PoseStream:
         self.arrived = asyncio.Event()
         self._report = report
         self._transports: list[asyncio.BaseTransport] = []
-        self._listener: UnixListener | None = None
         self._acceptor: Acceptor | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._connections = Connections()
@@ -57,8 +56,7 @@ class PoseStream:
         kind, _, rest = self.settings.source.partition(":")
         loop = asyncio.get_running_loop()
         if kind == "unix":
-            self._listener = UnixListener(rest, "--pose-source")
-            self._acceptor = Acceptor(self._listener.socket, self._serve, MAX_LINE_BYTES)
+            self._acceptor = Acceptor(UnixListener(rest, "--pose-source"), self._serve, MAX_LINE_BYTES)
         elif kind == "udp":
             host, port = parse_address(rest, "pose source", UDP_EXAMPLE)
             listening, _ = datagram_socket(host, port, "can't receive poses at", listen=True)
@@ -162,8 +160,6 @@ class PoseStream:
             os.set_blocking(sys.stdin.fileno(), True)  # programs that run later share the terminal
         if self._acceptor is not None:
             self._acceptor.close()
-        if self._listener is not None:
-            self._listener.close()
 
 
 def _is_waitable(descriptor: int) -> bool:
