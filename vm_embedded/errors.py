@@ -7,15 +7,22 @@ from difflib import get_close_matches
 
 from .text import printable
 
+_MOST_START, _MOST_END = 1500, 500
+"""Longest start and end of a message [characters]; what is between them is left out."""
+
 
 class VisualMeshError(Exception):
-    """Base of all errors that a user can fix; the message is one line of text.
+    """Base of all errors that a user can fix; the message is one line of text, of 2,000 characters and a few.
 
-    Messages quote values from files and from the network, so what could end the line or control a terminal is escaped.
+    Messages quote values from files and from the network, so what could end the line or control a terminal is escaped,
+    and the middle of a long message is left out.
     """
 
     def __str__(self) -> str:
-        return printable(super().__str__())
+        text = super().__str__()
+        if len(text) > _MOST_START + _MOST_END:
+            text = f"{text[:_MOST_START]} ... {text[-_MOST_END:]}"
+        return printable(text)
 
 
 class GeometryError(VisualMeshError):

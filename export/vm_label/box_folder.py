@@ -13,6 +13,7 @@ from vm_embedded.cameras.image_files import IMAGE_SUFFIXES
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.files import read_text
 from vm_embedded.output.box_files import CANDIDATES, SAME_PLACE, CandidateBox, Shares, edges, overlap
+from vm_workstation.class_names import class_name
 from vm_workstation.yolo_labels import LabeledBox, find_labels, parse_labels
 from vm_workstation.yolo_names import NameTables
 
@@ -143,8 +144,11 @@ def read_candidates(path: Path) -> tuple[dict[str, list[CandidateBox]], list[str
             confidence = float(fields["confidence"])
             if not all(0.0 <= each <= 1.0 for each in (x, y, width, height, confidence)) or not width * height:
                 raise ValueError("values out of range")
-            box = CandidateBox(str(fields["class"]), (x, y, width, height), confidence, bool(fields["found"]))
+            name = class_name(str(fields["class"]))
+            box = CandidateBox(name, (x, y, width, height), confidence, bool(fields["found"]))
             found[str(fields["image"])].append(box)
+        except InputError as error:
+            faults.append(f"{path}: line {number}: {error}; it is ignored")
         except (ValueError, KeyError, TypeError):
             faults.append(f"{path}: line {number} is not a box; it is ignored")
     return found, faults

@@ -9,6 +9,8 @@ from vm_embedded.config.yaml_reader import read_yaml
 from vm_embedded.errors import InputError
 from vm_embedded.files import read_text
 
+from .class_names import class_name
+
 _TABLES = ("classes.txt", "obj.names", "data.yaml", "data.yml", "dataset.yaml", "dataset.yml")
 
 _ENTRY = re.compile(r"^names[ \t]*:.*(?:\n(?:[ \t\-\]}#].*)?)*", re.MULTILINE)
@@ -52,10 +54,11 @@ def _read_tables(folder: Path) -> tuple[str, ...]:
 def _read(path: Path) -> tuple[str, ...]:
     text = read_text(path)
     try:
-        lines = text.rstrip().splitlines() if path.suffix in (".txt", ".names") else _yaml_names(text)
-        names = tuple(" ".join(line.split()) for line in lines)
-        if not names or not all(names):
+        # Not splitlines: for other programs, no other character ends a line.
+        lines = text.rstrip().split("\n") if path.suffix in (".txt", ".names") else _yaml_names(text)
+        if not all(line.strip() for line in lines):
             raise InputError("must give a name for each class number")
+        names = tuple(map(class_name, lines))
         if len(set(names)) < len(names):
             raise InputError(f"has a name twice: {', '.join(names)}")
     except InputError as error:

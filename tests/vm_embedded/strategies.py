@@ -9,6 +9,7 @@ from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from vm_embedded.mesh.mesh import Mesh
+from vm_embedded.text import MOST_NAME
 
 SIZE = (640, 480)
 RADIUS = 400.0
@@ -26,6 +27,12 @@ def attempt(kind, function, *arguments):
 def reals(low, high):
     return st.floats(low, high, allow_nan=False, allow_infinity=False)
 
+
+printable = st.characters(exclude_categories=("C", "Z")) | st.just(" ")
+"""Characters of names and of other lines of text."""
+
+class_names = st.text(printable, min_size=1, max_size=MOST_NAME).filter(lambda each: each == each.strip(" "))
+"""Names that a class may have."""
 
 seeds = st.integers(0, 2**32 - 1)
 """For numpy's generators, where an example needs many numbers."""

@@ -82,7 +82,7 @@ def _line_number(text: str, section: str, entry: str | None) -> int | None:
     """
     wanted = (section, entry) if entry else ("", section)
     current = ""
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(text.split("\n"), 1):
         header, assigned = _HEADER.fullmatch(line), _ENTRY.match(line)
         if header:
             current = header[1].strip("\"'")

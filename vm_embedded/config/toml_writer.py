@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import Field, fields
 from typing import Any
+
+from ..text import utf8
+
+_BARE = re.compile("[A-Za-z0-9_-]+")
 
 
 def to_commented_toml(configuration: Any, header: str = "") -> str:
@@ -39,6 +44,11 @@ def _limits(entry: Field[Any]) -> str:
     return f"; {low:g} to {high:g}" if high != float("inf") else f"; at least {low:g}"
 
 
+def toml_key(name: str) -> str:
+    """The name of an entry as TOML: in quotes if it has other characters than A-Z, a-z, 0-9, _ and -."""
+    return name if _BARE.fullmatch(name) else toml_value(name)
+
+
 def toml_value(value: Any) -> str:
     """A text, number, boolean, list or table as TOML, in one line."""
     if isinstance(value, Mapping):
@@ -49,5 +59,5 @@ def toml_value(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        return json.dumps(utf8(value), ensure_ascii=False).replace("\x7f", "\\u007f")
     return short if float(short := f"{value:g}") == value else repr(value)

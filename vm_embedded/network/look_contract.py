@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from ..errors import ModelError
+from ..text import name_fault, text_fault
 from .look_test import LookTest
 
 LOOK_KEY = "visual_mesh_look"
@@ -56,6 +57,9 @@ class LookContract:
     def __post_init__(self) -> None:
         if not isinstance(self.object_class, str):
             raise ModelError(f"object_class of the close look must be a name, not {self.object_class!r}")
+        if fault := name_fault(self.object_class):
+            raise ModelError(f"object_class of the close look {fault}")
+        check_provenance(self.provenance)
         for name, whole, low, high in (
             ("upright_radius", False, 0.0, 100.0),
             ("size", True, 8, 128),
@@ -135,6 +139,15 @@ class LookContract:
         if data["self_test"] is None:
             return contract
         return replace(contract, self_test=LookTest.from_dict(data["self_test"], contract.size))
+
+
+def check_provenance(provenance: Mapping[str, str]) -> None:
+    """Raises ModelError for a name or a text that can't be printed, or is too long."""
+    for name, text in provenance.items():
+        if fault := name_fault(name):
+            raise ModelError(f"name {name!r} in the provenance of a network {fault}")
+        if fault := text_fault(text):
+            raise ModelError(f"{name} in the provenance of a network {fault}")
 
 
 def _too_many(networks: int) -> str:

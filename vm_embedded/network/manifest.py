@@ -18,7 +18,8 @@ from ..mesh.dilation import distinct_dilations
 from ..mesh.mesh import MeshModel
 from ..mesh.models import MESH_MODELS
 from ..mesh.walls import wall_counts
-from .look_contract import LookContract
+from ..text import name_fault
+from .look_contract import LookContract, check_provenance
 from .self_test import SelfTest
 
 METADATA_KEY = "visual_mesh"
@@ -46,6 +47,9 @@ picture's points; see detection/color_normalization.py."""
 _LARGEST = 1e9
 """Limit of every radius, distance, number of rings and number of operations."""
 
+MOST_CLASSES = 127
+"""Most outputs of a network: the labels of a training are signed bytes."""
+
 MOST_DILATION = 64
 """Largest dilation of a convolution: a picture has about a hundred points from one side to the other."""
 
@@ -60,7 +64,10 @@ def _is_number(value: object, kind: type | UnionType = int | float) -> bool:
 
 @dataclass(frozen=True)
 class ObjectClass:
-    """One output of the network: its name and its kind, one of KINDS."""
+    """One output of the network: its name and its kind, one of KINDS.
+
+    Raises ModelError for another kind, and for a name that can't be printed or is too long (see text.py).
+    """
 
     name: str
     kind: str
@@ -68,6 +75,8 @@ class ObjectClass:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise ModelError(f"name of a class must be a string, not {self.name!r}")
+        if fault := name_fault(self.name):
+            raise ModelError(f"name of class {self.name!r} {fault}")
         if self.kind not in KINDS:
             raise ModelError(unknown(f"kind of class {self.name!r}", self.kind, KINDS))
 
@@ -83,7 +92,7 @@ class Manifest:
     mesh: one of MESH_MODELS.
     max_distance: of the mesh [m].
     edge: one of EDGES.
-    classes: in the order of the network's outputs.
+    classes: in the order of the network's outputs, at most MOST_CLASSES.
     object_height: of a cylinder [m], else 0.
     any_radius: the network was trained on objects of many radii, so the mesh is made for the real one's.
     self_test: an example with its answer, which each loading of the model file runs.
@@ -159,8 +168,12 @@ class Manifest:
         if abs(self.scale * 255.0 - 1.0) > 1e-6:
             raise ModelError(f"scale in the model's manifest must be 1/255, not {self.scale!r}")
         names = [each.name for each in self.classes]
-        if not names or len(set(names)) != len(names):
-            raise ModelError(f"classes in the model's manifest must be one or more, with different names, not {names}")
+        if not 1 <= len(names) <= MOST_CLASSES or len(set(names)) != len(names):
+            raise ModelError(
+                f"classes in the model's manifest must be 1 to {MOST_CLASSES}, with different names, not "
+                f"{len(names)}: {names}"
+            )
+        check_provenance(self.provenance)
 
     def _check_dilations(self) -> None:
         for each in self.layer_dilations:

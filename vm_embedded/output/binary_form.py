@@ -71,7 +71,8 @@ def to_binary(message: Message) -> bytes:
         _border_records(field.get("border")),
     ]
     records = [each[:_MOST] for each in records]
-    text = message.get("reason", "\n".join(each.replace("\n", " ") for each in codes)).encode()[:_MOST]
+    # Cut between characters: half of one would make the whole text unreadable.
+    text = message.get("reason", "\n".join(codes)).encode()[:_MOST].decode(errors="ignore").encode()
     body = b"".join([*(each.tobytes() for each in records), text])
     header = HEADER.pack(
         HEADER.size - 4 + len(body),

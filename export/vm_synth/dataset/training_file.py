@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from vm_embedded.config.toml_writer import toml_key
 from vm_embedded.files import write_file
 
 from ..scene.configuration import SceneConfiguration
@@ -31,7 +32,7 @@ def training_text(configuration: SceneConfiguration) -> str:
 # For vm-train, written by vm-synth: the classes in the masks of this folder, and the mesh for its objects.
 
 [classes]
-{own.name} = {{ kind = "object", colors = [{found}] }}
+{toml_key(own.name)} = {{ kind = "object", colors = [{found}] }}
 other = {{ kind = "background", colors = {others} }}
 
 [mesh]

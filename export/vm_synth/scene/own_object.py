@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vm_embedded.arrays import Singles
-from vm_embedded.config.entries import check_entries, number, one_of, share, text_line
+from vm_embedded.config.entries import check_entries, file_name, number, one_of, share, text_line
 from vm_embedded.errors import InputError
+from vm_embedded.text import MOST_NAME, name_fault
 from vm_workstation.ranges import range_of
 
 from ..bodies.solids import Solid
@@ -27,9 +28,9 @@ class ObjectRanges:
         "solid; all but the ball stand on a table or floor, and the detector takes them for cylinders",
     )
     name: str = text_line("object", "its class in train.toml")
-    file: str = text_line("", "for solid file: an .obj or .ply file; it is scaled to radius and height")
+    file: str = file_name("", "for solid file: an .obj or .ply file; it is scaled to radius and height")
     up: str = one_of(("y", "z"), "z", "axis of the file that points up")
-    textures: str = text_line("", 'folder of pictures to wrap around it; "": random colors')
+    textures: str = file_name("", 'folder of pictures to wrap around it; "": random colors')
     radius: tuple[float, float] = range_of(
         0.04, 0.04, "radius of the smallest upright cylinder around it", "m", (0.002, 5)
     )
@@ -50,8 +51,10 @@ class ObjectRanges:
         check_entries(self)
         if (self.solid == "file") != bool(self.file):
             raise InputError('file must name an .obj or .ply file if solid = "file", and be empty otherwise')
-        if not self.name.isidentifier():
-            raise InputError(f"name must be one word of letters, digits and _, as cup, not {self.name!r}")
+        if name_fault(self.name) or not self.name.isidentifier():
+            raise InputError(
+                f"name must be one word of at most {MOST_NAME} letters, digits and _, as cup, not {self.name!r}"
+            )
 
     @property
     def is_ball(self) -> bool:

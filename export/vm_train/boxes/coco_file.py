@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TypeGuard
 
 from vm_embedded.errors import InputError, one_line
+from vm_workstation.class_names import class_name
 
 from .folder_files import FolderFiles, read_bytes, read_text
 
@@ -64,7 +65,7 @@ def _names(categories: Sequence[Entry]) -> dict[Id, str]:
         key, name = entry.get("id"), entry.get("name")
         if not is_id(key) or not isinstance(name, str) or not name.strip():
             raise InputError(f"category {shown(dict(entry))} needs an id and a name")
-        name = " ".join(name.split())
+        name = class_name(name)
         if names.setdefault(key, name) != name:
             raise InputError(f"category {shown(key)} has two names, {names[key]!r} and {name!r}")
     return names

@@ -7,7 +7,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from vm_embedded.errors import InputError, one_line
+from vm_embedded.files import open_regular
 from vm_embedded.geometry.lens import Size
+from vm_workstation.class_names import class_name
 
 from .annotation import Annotation, Annotations, RawBox
 from .folder_files import FolderFiles, read_bytes
@@ -62,7 +64,7 @@ def _xml_files(files: FolderFiles, index: ImageIndex) -> list[Path]:
 
 def _has_annotation(path: Path) -> bool:
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             return b"<annotation" in file.read(_HEAD).replace(b"\0", b"")
     except OSError:
         return True
@@ -120,9 +122,10 @@ def _boxes(root: ElementTree.Element, label: str) -> tuple[list[RawBox], list[st
 
 
 def _box(element: ElementTree.Element, place: str) -> RawBox:
-    name = " ".join((element.findtext("name") or "").split())
-    if not name:
+    text = element.findtext("name") or ""
+    if not text.strip():
         raise InputError("class unknown: <name> is missing or empty")
+    name = class_name(text)
     if element.find("bndbox") is None:
         raise InputError(f"{name} lacks <bndbox> with {', '.join(_EDGES)}")
     values = []

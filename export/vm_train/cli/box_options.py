@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Sequence
 
 from vm_embedded.errors import InputError
+from vm_workstation.class_names import class_name
 
 from ..boxes.read import FORMATS
 
@@ -32,6 +33,7 @@ def parse_names(texts: Sequence[str]) -> dict[str, str]:
         old, equals, new = (part.strip() for part in text.rpartition("="))
         if not (old and equals and new):
             raise InputError(f"--names {text!r} must be OLD=NEW, for example 0=ball")
+        new = class_name(new)
         if names.setdefault(old, new) != new:
             raise InputError(f"--names renames {old!r} to both {names[old]!r} and {new!r}")
     return names

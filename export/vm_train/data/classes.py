@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Image
 from vm_embedded.errors import InputError
+from vm_embedded.network.manifest import MOST_CLASSES
 
 from .picture_files import PictureFault
 
@@ -29,7 +30,7 @@ _STRIP = 64  # rows to label at a time
 class Classes:
     """Classes in order, each with the RGB colors that masks have for it. Transparent pixels are unlabeled.
 
-    Raises InputError if two classes share a color, or there are fewer than two.
+    Raises InputError if two classes share a color, or there are fewer than two or more than MOST_CLASSES.
     """
 
     colors: Mapping[str, tuple[Color, ...]]
@@ -37,6 +38,8 @@ class Classes:
     def __post_init__(self) -> None:
         if len(self.colors) < 2:
             raise InputError(f"a network needs at least two classes, not only {list(self.colors)}")
+        if len(self.colors) > MOST_CLASSES:
+            raise InputError(f"a network can have at most {MOST_CLASSES} classes, not {len(self.colors)}")
         owner: dict[Color, str] = {}
         for name, colors in self.colors.items():
             for color in colors:

@@ -13,14 +13,18 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Mask
 from vm_embedded.errors import InputError
+from vm_embedded.files import read_regular
 from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.shape import Shape
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.manifest import Manifest
+from vm_workstation.class_names import class_name
 from vm_workstation.outlines import polygon_area, shape_outline
 
 from ..data.pictures import Picture
 from ..scores.overlaps import TrueObject, coverage
+
+_UNREADABLE = (InputError, OSError, AttributeError, KeyError, TypeError, ValueError, OverflowError, RecursionError)
 
 BALL = "ball"
 """The class of the object in a sceneX.json that does not name another one."""
@@ -67,16 +71,16 @@ def read_scene(path: Path) -> SceneTruth | None:
     if not path.is_file():
         return None
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
+        table = json.loads(read_regular(path))
         if "object" in table:
             found = tuple(_read_object(each, float(each["height"])) for each in table["objects"])
-            truth = SceneTruth(float(table["object"]["radius"]), found, str(table["object"]["name"]))
+            truth = SceneTruth(float(table["object"]["radius"]), found, class_name(str(table["object"]["name"])))
         else:
             in_mask = table.keys() == {"ball_radius"}
             ball = None if in_mask else table["ball"]
             found = () if ball is None else (_read_object(ball, 0.0),)
             truth = SceneTruth(float(table["ball_radius"]), found, in_mask=in_mask)
-    except (OSError, AttributeError, KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
+    except _UNREADABLE as error:
         raise InputError(f"{path.name}: is not a scene file of vm-synth: {error!r}") from error
     if not _is_valid(truth):
         raise InputError(

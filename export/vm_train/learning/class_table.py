@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.config.toml_reader import parse_toml
+from vm_embedded.config.toml_writer import toml_key
 from vm_embedded.errors import InputError
 from vm_embedded.files import read_text
 from vm_embedded.network.manifest import KINDS, ObjectClass
+from vm_embedded.text import name_fault
 from vm_synth.dataset.files import CLASS_COLORS
 
 from ..data.classes import Classes, Color
@@ -45,6 +47,8 @@ class ClassTable:
         if not isinstance(table, Mapping):
             raise InputError(f"classes must be a section [classes], not {table!r}")
         for name, entry in table.items():
+            if fault := name_fault(name):
+                raise InputError(f"the name of class {name!r} {fault}")
             if not isinstance(entry, Mapping) or set(entry) != {"kind", "colors"}:
                 raise InputError(f'{name} must be like {{ kind = "object", colors = [[255, 0, 0]] }}, not {entry!r}')
             if entry["kind"] not in KINDS:
@@ -70,7 +74,7 @@ class ClassTable:
         lines = ["[classes]", f"# for each class its kind ({', '.join(KINDS)}) and its RGB colors in masks"]
         for name, colors in self.colors.items():
             shown = ", ".join(str(list(each)) for each in colors)
-            lines.append(f'{name} = {{ kind = "{self.kinds[name]}", colors = [{shown}] }}')
+            lines.append(f'{toml_key(name)} = {{ kind = "{self.kinds[name]}", colors = [{shown}] }}')
         return "\n".join(lines)
 
     def mask_classes(self) -> Classes:

@@ -18,6 +18,7 @@ from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
 from vm_embedded.files import write_file
 from vm_embedded.network.look_contract import LookContract
+from vm_embedded.text import printable
 from vm_export.eight_bits import round_kernels
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_network import LookNetwork
@@ -168,7 +169,7 @@ class _Training:
         contract = replace(contract, provenance=self._provenance(score, result))
         examples = _examples(self._collected.validation, logits[:, 0])
         look = LookCheckpoint(network, contract, examples, glance)
-        source = f"{len(run.split.validation)} validation pictures of {run.data.name}"
+        source = f"{len(run.split.validation)} validation pictures of {printable(run.data.name)}"
         look.recalibrated(calibration.scale, calibration.offset, source).save(run.look_path)
         write_file(run.folder / "result.json", json.dumps(result.as_dict(), indent=1) + "\n")
         print(f"{run.look_path}: {result}")
@@ -194,7 +195,7 @@ class _Training:
         start = {"start_sha256": run.start_sha256} if run.start_sha256 else {}
         return {
             "made_by": f"vm-train {__version__}",
-            "data": run.data.name,
+            "data": printable(run.data.name),
             "training_pictures": str(found.pictures),
             "training_patches": str(len(found.training)),
             "validation_pictures": str(len(run.split.validation)),

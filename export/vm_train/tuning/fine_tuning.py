@@ -11,6 +11,7 @@ from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.files import write_file
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
+from vm_embedded.text import printable
 from vm_export.attach_look import attached
 from vm_export.look_checkpoint import LookCheckpoint
 
@@ -68,7 +69,7 @@ def _provenance(run: TuningRun, before: LookCheckpoint, own: PatchSet) -> Mappin
     """Where the network comes from, for its contract."""
     return dict(before.contract.provenance) | {
         "fine_tuned_by": f"vm-train {__version__}",
-        "fine_tuned_on": run.boxes.folder.name,
+        "fine_tuned_on": printable(run.boxes.folder.name),
         "fine_tuned_frames": str(len(run.split.training)),
         "fine_tuned_patches_sha256": own.sha256(),
         "fine_tuned_from_sha256": run.before.sha256,

@@ -25,7 +25,7 @@ from vm_embedded.network.look_test import LookTest
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 from vm_embedded.network.model_file import read_model
 
-from ..strategies import attempt, reals, seeds
+from ..strategies import attempt, class_names, printable, reals, seeds
 
 LOOK = small_look()
 PATCHES = random_patches(3)
@@ -260,7 +260,7 @@ def contracts(draw):
         passes=draw(st.integers(1, 4)),
         channels=tuple(draw(st.lists(st.integers(1, 99), max_size=4))),
         self_test=draw(st.sampled_from([None, test])),
-        provenance=draw(st.dictionaries(st.text(max_size=8), st.text(max_size=8), max_size=3)),
+        provenance=draw(st.dictionaries(class_names, st.text(printable, max_size=8), max_size=3)),
     )
 
 

@@ -25,7 +25,7 @@ from vm_embedded.network.manifest import (
 )
 from vm_embedded.network.self_test import SelfTest
 
-from ..strategies import attempt, reals, seeds
+from ..strategies import attempt, class_names, printable, reals, seeds
 
 
 @st.composite
@@ -41,7 +41,7 @@ def self_tests(draw):
 
 
 classes = st.lists(
-    st.builds(ObjectClass, st.text(min_size=1, max_size=8), st.sampled_from(KINDS)),
+    st.builds(ObjectClass, class_names, st.sampled_from(KINDS)),
     min_size=1,
     max_size=4,
     unique_by=lambda each: each.name,
@@ -77,7 +77,7 @@ manifests = st.builds(
     classes=classes,
     self_test=st.one_of(st.none(), self_tests()),
     operations=st.integers(0, 10**7),
-    provenance=st.dictionaries(st.text(max_size=8), st.text(max_size=8), max_size=3),
+    provenance=st.dictionaries(class_names, st.text(printable, max_size=8), max_size=3),
 )
 
 BALL = ball_manifest("ball", "line", "other", object_radius=0.075)
