@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NoReturn, ParamSpec
 
 from ..errors import VisualMeshError, unknown
+from .terminal import printable_output
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
@@ -43,6 +44,7 @@ class Parser(argparse.ArgumentParser):
         for kind, read in ((Path, _path), (int, _whole_number), (float, _number)):
             self.register("type", kind, read)
         self._negative_number_matcher = re.compile(r"-\.?\d")  # "-5deg", too, is a value and no option
+        self.color = False  # Python 3.14 would print control sequences, which terminal.py escapes
         self._given: Sequence[str] = ()
         self._commands = commands
         self.add_argument("--version", action="version", version=version(self.prog), help="show the version and exit")
@@ -163,12 +165,17 @@ def version(program: str) -> str:
 def program(main: Callable[P, int]) -> Callable[P, int]:
     """A main function that ends quietly after Ctrl-C, and if nothing reads its output any more, such as head in a pipe.
 
-    A full disk, and a path that the system refuses, are one line on standard error, and exit status 1.
+    A full disk, and a path that the system refuses, are one line on standard error, and exit status 1. What it prints
+    is printable: see terminal.py.
     """
 
     @wraps(main)
     def run(*arguments: P.args, **more: P.kwargs) -> int:
         _open_standard_error()
+        with printable_output():
+            return run_quietly(*arguments, **more)
+
+    def run_quietly(*arguments: P.args, **more: P.kwargs) -> int:
         try:
             try:
                 return main(*arguments, **more)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 import time
 
+from .terminal import control_terminal
+
 _BAR_INTERVAL, _LINE_INTERVAL = 0.1, 60.0
 """Least time between two updates [s]: of the bar at a terminal, of the lines elsewhere."""
 
@@ -49,7 +51,7 @@ class ProgressBar:
             self._visible, self._updated = True, time.monotonic()
             filled = 30 * done // self._total
             bar = f"[{'#' * filled}{'.' * (30 - filled)}] {self._text(self._total)}"
-            print(f"\r{bar}\x1b[K", end="", file=sys.stderr, flush=True)
+            control_terminal(f"\r{bar}\x1b[K")
         elif not self._terminal and self._program and since_update >= _LINE_INTERVAL:
             self._updated = time.monotonic()
             print(f"{self._program}: {self._text(self._total)}", file=sys.stderr, flush=True)
@@ -57,7 +59,7 @@ class ProgressBar:
     def clear(self) -> None:
         """Remove the bar from the terminal; the next step draws it again."""
         if self._visible:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+            control_terminal("\r\x1b[K")
             self._visible = False
 
     def _text(self, total: int) -> str:

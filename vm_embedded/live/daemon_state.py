@@ -7,6 +7,7 @@ import time
 
 from ..cameras.grabber import Grabber
 from ..output.channels import Channels
+from ..text import printable
 from .health import Health
 from .log import EventLog
 from .systemd import SystemdNotifier
@@ -35,7 +36,8 @@ class DaemonState:
         now, was = time.monotonic(), self.name
         is_lost = self._grabber.supervise(now)
         self._collect_troubles(now)
-        self.name, self.reason = self._health.state(now, is_lost, self._grabber.trouble)
+        self.name, reason = self._health.state(now, is_lost, self._grabber.trouble)
+        self.reason = printable(reason)
         is_bad = self.name not in _GOOD
         if self.name != was:
             self._log("state", "warning" if is_bad else "info", state=self.name, was=was, reason=self.reason)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, TextIO
 
 from ..files import takes_more
+from ..text import printable
 
 _MOST_LINES, _PERIOD = 50, 10.0
 """Most lines about one kind of event in a period [s]."""
@@ -50,9 +51,9 @@ class EventLog:
             line = f"{time.strftime('%H:%M:%S')} {level:7} {event}{': ' if details else ''}{details}"
         else:
             now = round(time.time(), 3)
-            line = json.dumps({"time": now, "level": level, "event": event, **fields}, default=str)
+            line = to_json({"time": now, "level": level, "event": event, **fields}, default=str)
         try:
-            self._stream.write(" ".join(line.split("\n")) + "\n")
+            self._stream.write(printable(line) + "\n")
             self._stream.flush()
         except (OSError, ValueError):  # a full disk, a closed terminal
             self._stream = open(os.devnull, "w")  # noqa: SIM115, PTH123

@@ -12,6 +12,7 @@ import numpy as np
 from vm_embedded.errors import InputError, install_extra
 from vm_embedded.files import atomic_write
 from vm_embedded.geometry.lens import Size
+from vm_workstation.plots import keep_dollar_signs
 
 from ..scene.configuration import CLASSES
 from .inspection import Facts
@@ -66,6 +67,7 @@ def plot(facts: Sequence[Facts], size: Size, title: str, path: Path) -> None:
     for each in axes:
         each.spines[["top", "right"]].set_visible(False)
         each.tick_params(labelsize=8)
+    keep_dollar_signs(figure)
     with atomic_write(path) as part:
         figure.savefig(part, dpi=110, format=path.suffix[1:].lower())
     pyplot.close(figure)
