@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import IO, BinaryIO
 
 from .errors import InputError
+from .text import utf8
 
 LARGEST = 2**30
 """Most bytes of a file that is read as a whole, unless its reader allows fewer."""
@@ -193,9 +194,9 @@ def _named(path: Path, noun: str) -> str:
 
 
 def write_file(path: Path, content: str | bytes) -> None:
-    """Write a file as a whole, text as UTF-8. Raises InputError; the file is as before then."""
+    """Write a file as a whole, text as UTF-8 (see `utf8`). Raises InputError; the file is as before then."""
     with atomic_write(path) as part:
-        part.write_bytes(content.encode() if isinstance(content, str) else content)
+        part.write_bytes(utf8(content).encode() if isinstance(content, str) else content)
 
 
 def check_writable(path: Path, inputs: Iterable[Path | None] = ()) -> None:

@@ -32,11 +32,11 @@ def utf8(text: str) -> str:
 
 
 def to_json(value: object, **options: Any) -> str:
-    """The value as JSON that every reader takes (RFC 8259): without NaN, and with text as from `utf8`.
+    """The value as JSON in ASCII, with its text as from `utf8`: many readers refuse half characters.
 
-    options: of json.dumps. Raises ValueError for NaN and infinity.
+    options: of json.dumps.
     """
-    return _ESCAPE.sub(_without_half, json.dumps(value, allow_nan=False, **options))
+    return _ESCAPE.sub(_without_half, json.dumps(value, **options))
 
 
 _ESCAPE = re.compile(r"\\(ud[89ab]..\\ud[c-f]..|ud[89a-f]..|.)")

@@ -6,7 +6,6 @@ The module is long because it holds the options and the steps of all four comman
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Sequence
@@ -18,6 +17,7 @@ from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError, VisualMeshError, unknown
 from vm_embedded.files import check_writable, write_file
+from vm_embedded.text import to_json
 from vm_workstation.contact_sheet import check_sheet_path, check_sheet_size, choose_indices, write_sheet
 from vm_workstation.option_types import add_set, at_least
 from vm_workstation.stopping import stoppable
@@ -319,7 +319,7 @@ def _check(options: argparse.Namespace) -> int:
         bar.clear()
     print(tables(found, options.shards))
     if options.json is not None:
-        write_file(options.json, json.dumps(as_json(found), indent=1) + "\n")
+        write_file(options.json, to_json(as_json(found), indent=1) + "\n")
     if options.plots is not None and found.facts:
         title = f"{options.out.resolve().name}: {len(found.facts)} of {found.count} pictures"
         plot(found.facts, found.size, title, options.plots)

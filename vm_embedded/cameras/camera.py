@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from ..arrays import Image
-from ..config.entries import check_entries, number, switch, text_line
+from ..config.entries import check_entries, file_name, number, switch, text_line
 from ..errors import VisualMeshError
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
@@ -67,7 +67,7 @@ class Camera(Protocol):
 class CameraSettings:
     """Section [camera]: the source, what to request from a device, and when the camera counts as lost."""
 
-    source: str = text_line(
+    source: str = file_name(
         "",
         "camera number, /dev/videoN or /dev/v4l/by-id/...; http, https or rtsp address; gstreamer:PIPELINE; video file "
         "or folder of images, played at their frame rate; synthetic; fault:SCRIPT; ros, for vm-ros only",

@@ -21,6 +21,7 @@ from ..files import exists, is_file, open_regular, read_bytes, read_text
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from ..opencv_text import open_capture
+from ..text import utf8
 from .camera import camera_number
 from .decoding import decode
 from .image_header import MAX_MEGAPIXELS
@@ -161,7 +162,7 @@ def _images(paths: list[Path], read: Callable[[Path], Image], times: Mapping[str
     """The frames of image files. times: of some of them, by the names of the files without suffix [s]."""
     paths, times = sorted(paths, key=_natural), times or {}
     frames = (
-        Frame(index, path.name, path.stem, partial(read, path), path, times.get(path.stem))
+        Frame(index, utf8(path.name), path.stem, partial(read, path), path, times.get(path.stem))
         for index, path in enumerate(paths)
     )
     return Source(frames, len(paths), files=tuple(paths))
@@ -250,7 +251,8 @@ def _frames(capture: cv2.VideoCapture, first: Image, path: Path, max_megapixels:
     index = 0
     while image is not None:
         stamp = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
-        yield Frame(index, path.name, path.stem, partial(_of_video, image, path.name, max_megapixels), None, stamp)
+        read = partial(_of_video, image, path.name, max_megapixels)
+        yield Frame(index, utf8(path.name), path.stem, read, None, stamp)
         image = _next_image(capture)
         index += 1
     capture.release()

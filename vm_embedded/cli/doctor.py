@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 
 from ..cameras.library_messages import silence_opencv
 from ..errors import VisualMeshError
+from ..text import to_json
 from .checks import run_checks
 from .finding import BAD, Finding
 from .options import add_live, add_model, add_pose, add_settings, read_options
@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         configuration = read_options(options)
         worst = EXIT_OK
         for each in run_checks(configuration):
-            print(json.dumps(asdict(each)) if options.json else _as_text(each), flush=True)
+            print(to_json(asdict(each)) if options.json else _as_text(each), flush=True)
             worst = EXIT_FAILED if each.state == BAD else worst
     except VisualMeshError as error:
         print(f"vm-doctor: {error}", file=sys.stderr)

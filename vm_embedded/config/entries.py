@@ -56,6 +56,11 @@ def text_line(default: str, help: str) -> Any:
     return entry(_checked_text_line, default, help)
 
 
+def file_name(default: str, help: str) -> Any:
+    """An entry that holds a path, or an address: any name that the file system allows."""
+    return entry(_checked_file_name, default, help)
+
+
 def check_entries(section: Any) -> None:
     """Check each entry of a section and store it as its check returns it. Raises EntryError."""
     for each in fields(section):
@@ -94,6 +99,12 @@ def _checked_name(entry: Field[Any], value: Any) -> str:
 def _checked_switch(entry: Field[Any], value: Any) -> bool:
     if not isinstance(value, bool):
         raise InputError(f"{entry.name} must be true or false, not {value!r}")
+    return value
+
+
+def _checked_file_name(entry: Field[Any], value: Any) -> str:
+    if not isinstance(value, str) or "\0" in value:
+        raise InputError(f"{entry.name} must be the name of a file, without zero bytes, not {value!r}")
     return value
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from ..cameras.camera import CameraSettings
 from ..cameras.ros.settings import RosSettings
-from ..config.entries import EntryError, check_entries, entry, number, switch, text_line
+from ..config.entries import EntryError, check_entries, entry, file_name, number, switch
 from ..config.sections import read_sections
 from ..config.toml_writer import to_commented_toml
 from ..config.units import angle, length
@@ -86,7 +86,7 @@ class TrackSection(TrackSettings):
 class StatusSettings:
     """Section [status]: the control socket, the status page and the metrics."""
 
-    socket: str = text_line(
+    socket: str = file_name(
         "",
         "Unix socket for vm-detect --status and --record; empty: vm-detect.sock in $RUNTIME_DIRECTORY or "
         "$XDG_RUNTIME_DIR, otherwise in the private folder /tmp/vm-detect-UID",

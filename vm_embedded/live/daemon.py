@@ -9,7 +9,6 @@ reload and record.
 from __future__ import annotations
 
 import asyncio
-import json
 import math
 import os
 import signal
@@ -29,6 +28,7 @@ from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
 from ..poses.stream import PoseStream
 from ..sockets import is_open_to_network
+from ..text import to_json
 from .answering import Answer, Answerer
 from .bridge import Bridge
 from .configuration import Configuration, recording_files
@@ -124,7 +124,7 @@ class Daemon:
         self._remarks = FrameRemarks()
         self._state = DaemonState(self._health, self._grabber, self._outputs, log, self._notifier)
         self.page = StatusPage(self.answerer, self._status, self._record, self._metrics, self._use_threshold)
-        commands = {"status": lambda: json.dumps(self._status(), allow_nan=False), "record": self._record}
+        commands = {"status": lambda: to_json(self._status(), allow_nan=False), "record": self._record}
         control = ControlServer(control_path(status.socket), commands | {"metrics": self._metrics})
         self._parts: list[Part] = [self._outputs, self._poses, control, *self.page.servers()]
 

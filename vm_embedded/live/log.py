@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import threading
@@ -11,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, TextIO
 
 from ..files import takes_more
-from ..text import printable
+from ..text import printable, to_json
 
 _MOST_LINES, _PERIOD = 50, 10.0
 """Most lines about one kind of event in a period [s]."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import math
 import secrets
 import time
@@ -15,6 +14,7 @@ from ..cameras.camera import without_password
 from ..errors import InputError
 from ..geometry.orientation import Orientation
 from ..output.messages import Message
+from ..text import to_json
 from .answering import Answer, Answerer
 from .control import REFUSED
 from .frame_views import FrameViews
@@ -84,7 +84,7 @@ class StatusPage:
             "threshold": {"name": name, "value": getattr(detector.settings, name)},
             "records": bool(configuration.recorder.folder),
         }
-        return Response("application/json", json.dumps(content, allow_nan=False).encode())
+        return Response("application/json", to_json(content, allow_nan=False).encode())
 
     async def _preview(self, query: Query) -> Response:
         """The latest frame with the threshold of a query; null before the first one. Raises VisualMeshError."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from vm_embedded.config.entries import check_entries, one_of, share, text_line
+from vm_embedded.config.entries import check_entries, file_name, one_of, share
 from vm_workstation.ranges import range_of
 
 from ..balls.draw_design import DesignRanges
@@ -35,7 +35,7 @@ class GroundRanges:
     kind: str = one_of(
         ("table", "floor"), "table", "ground below objects that are not the ball; the ball lies on a field"
     )
-    textures: str = text_line("", 'folder of pictures of tables or floors to put there; "": random textures')
+    textures: str = file_name("", 'folder of pictures of tables or floors to put there; "": random textures')
 
     photographed: float = share(
         0.5, "share of pictures that show the flat floor of their map, if it has one; the others show a field"
@@ -72,6 +72,8 @@ class TargetRanges:
     missing: float = share(0.1, "share of pictures without a ball")
     cut: float = share(0.15, "share of pictures whose border may cut the ball")
     hidden: float = share(0.2, "share of pictures with an object that may hide the ball")
+    on_line: float = share(0.0, "share of fields with a line below the ball or beside it")
+    touched: float = share(0.0, "share of pictures with a robot, person or shoe that touches the ball")
     off_plane: float = share(0.08, "share of pictures with another ball on a pedestal or in the air")
     off_plane_height: tuple[float, float] = range_of(0.1, 1.2, "height of that ball above the plane", "m", (0.01, 5.0))
     off_plane_label: str = one_of(CLASSES, "environment", "class of that ball")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import os
 import sys
@@ -18,6 +17,7 @@ import numpy as np
 from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.files import check_writable, write_file
+from vm_embedded.text import to_json
 from vm_workstation.option_types import at_least
 from vm_workstation.shortened import shortened
 from vm_workstation.text_tables import aligned, summary
@@ -80,7 +80,7 @@ def run_check(options: argparse.Namespace, classes: Classes, objects: Sequence[s
         bar.clear()
     print("\n".join(tables(found)))
     if options.json is not None:
-        write_file(options.json, json.dumps(as_json(found), indent=1) + "\n")
+        write_file(options.json, to_json(as_json(found), indent=1) + "\n")
     for line in complaints(found):
         print(f"vm-train: {line}", file=sys.stderr)
     return EXIT_FAULTS if found.faults or (options.strict and found.absent) else EXIT_OK

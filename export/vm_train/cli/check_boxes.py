@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -19,6 +18,7 @@ from vm_embedded.files import check_writable, write_file
 from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
+from vm_embedded.text import to_json
 from vm_workstation.contact_sheet import check_sheet_path, write_sheet
 from vm_workstation.option_types import at_least
 from vm_workstation.shortened import shortened
@@ -97,7 +97,7 @@ def run_check_boxes(options: argparse.Namespace) -> int:
     faults = [*found.faults, *name_faults(found, objects), *(describe(each, options.data) for each in unlabeled)]
     print("\n".join(summary_lines(found)))
     if options.json is not None:
-        write_file(options.json, json.dumps(_as_json(found, faults), indent=1) + "\n")
+        write_file(options.json, to_json(_as_json(found, faults), indent=1) + "\n")
     for line in shortened(faults, _NAMED, "; vm-train check --boxes --json FILE lists all"):
         print(f"vm-train: {line}", file=sys.stderr)
     if unlabeled:

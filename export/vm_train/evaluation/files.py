@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import cv2
 
 from vm_embedded.errors import InputError
 from vm_embedded.files import check_not_input, write_file
+from vm_embedded.text import to_json
 from vm_workstation.plots import save_figure
 
 from .evaluation import Evaluation
@@ -58,7 +58,7 @@ def write_evaluation(
         raise InputError(f"can't create folder {out}: {error.strerror or error}") from error
     scores = {"about": about, **as_json(evaluation, threshold)}
     texts = {f"{name}.csv": text for name, text in as_csv(evaluation, threshold).items()}
-    texts["scores.json"] = json.dumps(scores, indent=1, allow_nan=False) + "\n"
+    texts["scores.json"] = to_json(scores, indent=1, allow_nan=False) + "\n"
     figures = _figures(evaluation, threshold)
     if points_on_object is not None:
         figures["points_on_object"] = points_on_object

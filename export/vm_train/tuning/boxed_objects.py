@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections import Counter
 from collections.abc import Sequence
 
@@ -55,7 +56,7 @@ def split_by_recording(pictures: Sequence[BoxedPicture], validation: float, seed
     sizes = Counter(each.recording for each in pictures)
     chosen: set[str] = set()
     count, wanted = 0, validation * len(pictures)
-    for recording in sorted(sizes, key=lambda each: hashlib.sha256(f"{seed}:{each}".encode()).digest()):
+    for recording in sorted(sizes, key=lambda each: hashlib.sha256(os.fsencode(f"{seed}:{each}")).digest()):
         if count < wanted and count + sizes[recording] <= _SLACK * wanted:
             chosen.add(recording)
             count += sizes[recording]
