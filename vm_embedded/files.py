@@ -1,8 +1,9 @@
-"""Reading regular files, and writing files without losing the previous content or waiting for a pipe's reader."""
+"""Reading regular files, writing files without losing the previous content or waiting for a pipe's reader, and locks."""
 
 from __future__ import annotations
 
 import errno
+import fcntl
 import io
 import os
 import re
@@ -10,6 +11,7 @@ import secrets
 import select
 import shutil
 import stat
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -22,6 +24,7 @@ LARGEST = 2**30
 """Most bytes of a file that is read as a whole, unless its reader allows fewer."""
 
 _PIECE = 2**20  # bytes to read at a time
+_PAUSE = 0.005  # between two attempts to get a lock [s]
 _SHOWN = 24  # letters of a name in the name of its unfinished file, so that file systems allow this, too
 
 
@@ -231,3 +234,26 @@ def takes_more(descriptor: int) -> bool:
     poll = select.poll()
     poll.register(descriptor, select.POLLOUT)
     return bool(poll.poll(0))
+
+
+@contextmanager
+def locked_folder(folder: Path, patience: float = 0.0) -> Iterator[None]:
+    """Hold the lock of a folder. The system releases it when the process ends, however it ends. A link has no lock.
+
+    patience: how long to wait for another process that holds it [s]. Raises BlockingIOError if it holds it longer, and
+    OSError if the folder can't be opened for reading, or if its file system has no locks.
+    """
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    try:
+        deadline = time.monotonic() + patience
+        while True:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if time.monotonic() >= deadline:
+                    raise
+            time.sleep(_PAUSE)
+        yield
+    finally:
+        os.close(descriptor)

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from .errors import InputError, InUseError, NetworkError
-from .locks import locked_folder
+from .files import locked_folder
 
 _MAX_PATH_BYTES = 107
 """Longest path of a Unix socket on Linux [bytes]."""
