@@ -1,4 +1,4 @@
-"""Reading regular files, writing files without losing the previous content or waiting for a pipe's reader, and locks."""
+"""Locks of folders, reading regular files, and writing files without losing their content or waiting for a pipe."""
 
 from __future__ import annotations
 

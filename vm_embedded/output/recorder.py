@@ -22,12 +22,13 @@ from ..cameras.camera import Shot
 from ..cameras.image_files import MESSAGES
 from ..config.entries import check_entries, file_name, number, text_line
 from ..errors import InputError
+from ..files import locked_folder
 from ..geometry.lens import Lens
 from ..geometry.lens_files import format_lens_file
 from ..geometry.orientation import Orientation
 from .ended import ended
 from .messages import Message, to_json_line
-from .recordings import PART, delete_oldest_recordings, finish, finish_left_recordings, locked, recording_name
+from .recordings import PART, delete_oldest_recordings, finish, finish_left_recordings, recording_name
 from .result_files import encode_png
 
 CONFIGURATION = "vm.toml"
@@ -148,7 +149,7 @@ class Recorder:
         Each frame's message follows its files at once, so vm-detect reads even the folder of a process that was killed.
         """
         try:
-            with locked(part):
+            with locked_folder(part):
                 self._fill(part, folder, moments, files)
         except OSError as error:
             self._report("recording failed", "error", f"{folder}: {error.strerror or error}")

@@ -7,18 +7,17 @@ lock when the process ends, however it ends. So an unlocked NAME.part has no wri
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 import re
 import shutil
 import stat
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 
 from ..cameras.image_files import MESSAGES
-from ..files import read_regular
+from ..files import locked_folder, read_regular
 
 PART = ".part"
 _NAME = re.compile(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d(\.\d{3})?")
@@ -29,17 +28,6 @@ _FILE = re.compile(r"recording\.jsonl|vm\.toml|model\.onnx|image\d{7,}\.(jpg|png
 def recording_name(now: float) -> str:
     """Name of a recording that starts now, a time since 1970 [s]."""
     return f"{time.strftime('%Y-%m-%dT%H-%M-%S', time.localtime(now))}.{int(1e3 * now) % 1000:03d}"
-
-
-@contextmanager
-def locked(part: Path) -> Iterator[None]:
-    """Lock an unfinished recording. Raises OSError if another process has locked it, or if it is no folder."""
-    descriptor = os.open(part, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield
-    finally:
-        os.close(descriptor)
 
 
 def finish(part: Path, written: int) -> Path:
@@ -70,7 +58,7 @@ def finish_left_recordings(folder: Path) -> Iterator[tuple[Path, int | OSError]]
         if part.suffix != PART or not _NAME.fullmatch(part.stem) or not _is_folder(part):
             continue
         try:
-            with locked(part):
+            with locked_folder(part):
                 written = _count_messages(part)
                 finished: tuple[Path, int | OSError] = finish(part, written), written
         except (BlockingIOError, FileNotFoundError):  # another detector writes it, or has finished it

@@ -11,7 +11,7 @@ from tests.messages import read_message
 from tests.preloaded import run_preloaded
 from tests.programs import run_program
 from tests.vm_embedded.live.running import COMMAND, arguments, running
-from vm_embedded.output.recordings import locked
+from vm_embedded.files import locked_folder
 
 
 @pytest.mark.long
@@ -130,7 +130,7 @@ def test_the_next_detector_finishes_recordings_of_a_killed_one_and_nothing_else(
     (whole / "recording.jsonl").write_bytes(b"{}\n")
     (others[0] / "recording.jsonl").write_bytes(b"{}\n")
     (kept / "2026-01-04T00-00-00.000.part").symlink_to(tmp_path)
-    with locked(others[1]), running(tmp_path, *options) as found:  # as if another detector wrote it
+    with locked_folder(others[1]), running(tmp_path, *options) as found:  # as if another detector wrote it
         found.wait_for_state("ok")
         told = [each["folder"] for each in found.events if each["event"] == "recorded"]
         found.stop()

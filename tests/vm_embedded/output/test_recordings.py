@@ -12,7 +12,8 @@ import pytest
 from tests.folders import contents
 from tests.programs import heed_permissions
 from tests.vm_embedded.live.running import running
-from vm_embedded.output.recordings import delete_oldest_recordings, finish_left_recordings, locked
+from vm_embedded.files import locked_folder
+from vm_embedded.output.recordings import delete_oldest_recordings, finish_left_recordings
 
 NAMES = [f"2026-01-0{day}T00-00-00.000" for day in (1, 2, 3)]
 
@@ -143,7 +144,7 @@ def test_a_left_recording_never_replaces_another(tmp_path):
     for name in (NAMES[0], f"{NAMES[0]}.part", f"{NAMES[1]}.part"):
         make_recording(tmp_path / name)
     (tmp_path / NAMES[0] / "recording.jsonl").write_text("other")
-    with locked(tmp_path / f"{NAMES[1]}.part"):
+    with locked_folder(tmp_path / f"{NAMES[1]}.part"):
         ((path, error),) = finish_left_recordings(tmp_path)
     assert path == tmp_path / f"{NAMES[0]}.part"
     assert isinstance(error, OSError)
