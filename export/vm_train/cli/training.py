@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import shutil
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -33,6 +32,9 @@ if TYPE_CHECKING:
     from ..learning.rounds import TrainingOutcome
     from ..learning.run_folder import TrainingRun
     from ..learning.start import Start
+
+UNPACKED = "unpacked"
+"""Folder in that of a training, for the cache of decoded pictures that is removed at the end."""
 
 _FEW = 10.0
 """Selected points per picture; with fewer, vm-train warns."""
@@ -134,7 +136,7 @@ def _begin(
         training = f"{source.epoch} an epoch of {len(source.shards)} shards"
     parts = f"{training} for training, {len(split.validation)} for validation, {len(split.test)} for test"
     print(f"{options.data}: {len(good)} pictures: {parts}")
-    unpacked = None if options.no_unpacked else options.unpacked or options.output / "unpacked"
+    unpacked = None if options.no_unpacked else options.unpacked or options.output / UNPACKED
     data = TrainingData(options.data, split, unpacked, source)
     run = begin_run(options.output, data, configuration, start)
     if run.selected_points_per_picture < _FEW:
@@ -180,9 +182,11 @@ def _train(folder: Path, hardware: Hardware, moved_to: Path | None = None) -> in
 
 def _report(run: TrainingRun, outcome: TrainingOutcome) -> None:
     """Print the result of a training and the commands to use next; remove the cache that it made for itself."""
+    from ..graphs.graph_cache import remove_caches
+
     data, model = run.data, run.model_path
-    if data.unpacked is not None and data.unpacked.parent.resolve() == run.folder.resolve():
-        shutil.rmtree(data.unpacked, ignore_errors=True)
+    if data.unpacked is not None and data.unpacked.resolve() == run.folder.resolve() / UNPACKED:
+        remove_caches(data.unpacked)
     if outcome.pictures:
         speed = outcome.pictures / max(outcome.seconds, 1e-9)
         score = outcome.progress.best_ever

@@ -25,7 +25,8 @@ from .picture_files import PARTS, PictureFiles
 from .pictures import Picture, parse_lens, read_picture
 
 _HEADER = struct.Struct("<8s32sIIII")  # magic, fingerprint, width, height, bytes of the lens text, zero
-_MAGIC = b"vmtrain1"
+MAGIC = b"vmtrain1"
+_FULL = "full"
 
 _LONGEST = 200
 """Longest name of a picture that becomes the name of a file; file systems allow 255 bytes."""
@@ -41,6 +42,7 @@ def decoded_size(count: int, width: int, height: int) -> int:
 class DecodedCache:
     """A folder of decoded pictures of one data set. Outdated or damaged entries count as absent.
 
+    Files that it did not write stay as they are, also under the name of an entry: .raw is a suffix of cameras, too.
     Raises InputError if the folder can't be created.
     """
 
@@ -48,7 +50,8 @@ class DecodedCache:
         self.folder = folder
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._full_mark.unlink(missing_ok=True)
+            if is_own(self._full_mark, b""):
+                self._full_mark.unlink(missing_ok=True)
         except OSError as error:
             raise InputError(f"can't use folder {folder}: {error.strerror or error}") from error
         self._full = False
@@ -66,7 +69,7 @@ class DecodedCache:
                 content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
             magic, found, width, height, text, _ = _HEADER.unpack_from(content)
             start, pixels = _HEADER.size + text, width * height
-            if magic != _MAGIC or found != source or len(content) != start + 4 * pixels:
+            if magic != MAGIC or found != source or len(content) != start + 4 * pixels:
                 return None
             lens = parse_lens(content[_HEADER.size : start].decode("utf-8"), files.lens.name)
         except (OSError, ValueError, struct.error, InputError):
@@ -76,14 +79,17 @@ class DecodedCache:
         return Picture(image, labels, lens)
 
     def put(self, files: PictureFiles, classes: Classes, picture: Picture) -> None:
-        """Add a picture. Does nothing if the disk is full or the file can't be written."""
+        """Add a picture. Does nothing if the disk is full, or the file is another program's or can't be written."""
         height, width = picture.labels.shape
         try:
+            path = self._path(files)
+            if not is_own(path, MAGIC):
+                return
             if shutil.disk_usage(self.folder).free < decoded_size(1, width, height) + KEPT_FREE:
                 raise OSError
             text = files.read("lens")
-            header = _HEADER.pack(_MAGIC, fingerprint(files, classes), width, height, len(text), 0)
-            with atomic_write(self._path(files)) as part, part.open("wb") as file:
+            header = _HEADER.pack(MAGIC, fingerprint(files, classes), width, height, len(text), 0)
+            with atomic_write(path) as part, part.open("wb") as file:
                 for each in (header, text, picture.image.tobytes(), picture.labels.tobytes()):
                     file.write(each)
         except (OSError, InputError) as error:
@@ -96,13 +102,35 @@ class DecodedCache:
     @property
     def _full_mark(self) -> Path:
         """An empty file. It tells all processes that one of them found the disk full."""
-        return self.folder / "full"
+        return self.folder / _FULL
 
     def _path(self, files: PictureFiles) -> Path:
         name = quote(files.number, safe="")
         if len(name) > _LONGEST:
             name = hashlib.sha256(name.encode()).hexdigest()
         return self.folder / f"{name}.raw"
+
+
+def is_own(path: Path, magic: bytes) -> bool:
+    """Whether a cache may replace or remove a file: a regular one that is empty or begins with `magic`, or none."""
+    try:
+        with open_regular(path) as file:
+            start = file.read(len(magic) or 1)
+    except FileNotFoundError:
+        return not path.is_symlink()
+    except OSError:
+        return False
+    return start in (b"", magic) and not path.is_symlink()
+
+
+def remove_entries(folder: Path, magic: bytes) -> None:
+    """Remove the entries of a cache that begin with `magic`, and the folder unless it has other files."""
+    with suppress(OSError):  # what can't be removed stays
+        for path in folder.iterdir():
+            unfinished = path.name.startswith(".") and path.name.endswith(".part")
+            if (path.suffix == ".raw" or path.name == _FULL or unfinished) and is_own(path, magic):
+                path.unlink(missing_ok=True)
+        folder.rmdir()
 
 
 def read_through_cache(files: PictureFiles, classes: Classes, cache: DecodedCache | None) -> Picture:

@@ -22,7 +22,7 @@ import numpy as np
 from vm_embedded.errors import InputError
 from vm_embedded.files import atomic_write, read_regular
 
-from ..data.decoded_cache import KEPT_FREE, fingerprint
+from ..data.decoded_cache import KEPT_FREE, MAGIC, fingerprint, remove_entries
 from ..data.picture_files import PictureFiles
 from .graph_recipe import GraphRecipe
 from .labeled_graph import LabeledGraph
@@ -89,6 +89,14 @@ class GraphCache:
 
     def _path(self, files: PictureFiles, view: int) -> Path:
         return self._folder / f"{quote(files.number, safe='')}-{view}.raw"
+
+
+def remove_caches(folder: Path) -> None:
+    """Remove all views and decoded pictures in a folder, and the folder itself unless it has other files."""
+    for views in folder.glob("views-*"):
+        if not views.is_symlink():
+            remove_entries(views, _MAGIC)
+    remove_entries(folder, MAGIC)
 
 
 def rounded(graph: LabeledGraph) -> LabeledGraph:

@@ -57,12 +57,13 @@ def description(folder: Path, number: int, what: str = "training") -> Iterator[d
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep other processes from training in the same folder, which is created, and removed if it stays empty.
+    """Keep other processes from training in the same folder. It is created, and then removed if it stays empty.
 
     The lock is that of the folder: a file in it could be replaced. Raises InputError if another process holds it.
     """
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file: give a new folder")
+    is_new = not folder.exists()
     make_folder(folder)
     try:
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -78,7 +79,8 @@ def locked(folder: Path) -> Iterator[None]:
         try:
             yield
         finally:
-            with suppress(OSError):
-                folder.rmdir()
+            if is_new:
+                with suppress(OSError):
+                    folder.rmdir()
     finally:
         os.close(descriptor)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.folders import contents
 from tests.vm_train.commands import COMMAND, environment, run, run_and_stop, wait_for_steps
 from tests.vm_train.weights import same, weights_of
 from vm_export.checkpoint import Checkpoint
@@ -195,6 +196,14 @@ def test_two_trainings_do_not_begin_in_one_folder(data, configuration, tmp_path)
     assert not (tmp_path / "run").exists()
 
 
+def test_an_empty_folder_of_the_user_stays(data, configuration, tmp_path):
+    (tmp_path / "own").mkdir()
+    for folder in ("own", "new"):
+        run(data / "nothing", "-o", tmp_path / folder, "--config", configuration, code=1)
+    assert (tmp_path / "own").is_dir()
+    assert not (tmp_path / "new").exists()
+
+
 def test_files_of_others_are_not_written_over(data, configuration, tmp_path):
     (tmp_path / "train.toml").write_text("# mine\n" + configuration.read_text())
     done = run(data, "-o", tmp_path, "--config", tmp_path / "train.toml", code=1)
@@ -206,10 +215,13 @@ def test_files_of_others_are_not_written_over(data, configuration, tmp_path):
 def test_a_training_goes_on_where_its_folders_were_moved_to(whole, data, tmp_path):
     folder = copied(whole, tmp_path)
     (folder / "state.pt").unlink()
+    (folder / "unpacked").mkdir()
+    (folder / "unpacked" / "own.raw").write_bytes(b"camera")
     moved = Path(shutil.copytree(data, tmp_path / "moved"))
     run("resume", folder, "--data", moved, "--workers", 1, "--threads", 1)
     assert same_network(folder / "model.pt", whole[0] / "model.pt")
-    assert not (folder / "unpacked").exists()
+    assert not (whole[0] / "unpacked").exists()
+    assert contents(folder / "unpacked") == {"own.raw": b"camera"}
 
 
 @pytest.mark.long

@@ -9,10 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.folders import contents
 from vm_embedded.errors import InputError
 from vm_train.data import decoded_cache as module
 from vm_train.data.classes import Classes
-from vm_train.data.decoded_cache import DecodedCache, decoded_size, read_through_cache
+from vm_train.data.decoded_cache import MAGIC, DecodedCache, decoded_size, read_through_cache, remove_entries
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.formats.shards import write_shards
 
@@ -82,12 +83,44 @@ def test_a_damaged_file_is_made_again(left, files, kept):
     assert kept.get(files, CLASSES) is not None
 
 
-def test_what_a_killed_process_left_is_put_away(files, kept):
-    (kept.folder / "1.raw.part").write_bytes(b"half")
+def test_what_killed_processes_left_does_not_matter(files, kept):
+    for name in ("1.raw.part", ".1.raw.0123456789abcdef.part"):
+        (kept.folder / name).write_bytes(b"half")
+        read_through_cache(files, CLASSES, kept)
+        read_through_cache(files, CLASSES, kept)
+        assert kept.get(files, CLASSES) is not None
+        assert not kept.full
+
+
+def test_files_of_others_stay_as_they_are(files, kept):
+    """Also a camera's image under the name of an entry, and one that is called as the mark of a full disk."""
+    path = kept.folder / f"{files.number}.raw"
+    for name in (path.name, "full", "notes.txt"):
+        (kept.folder / name).write_bytes(b"II*\0 of another program")
+    before = contents(kept.folder)
+    again = DecodedCache(kept.folder)
+    same(read_through_cache(files, CLASSES, again), read_picture(files, CLASSES))
+    again.put(files, CLASSES, read_picture(files, CLASSES))
+    remove_entries(kept.folder, MAGIC)
+    assert contents(kept.folder) == before
+
+
+def test_an_entry_does_not_follow_a_link(files, kept, tmp_path):
+    (tmp_path / "else").touch()
+    (kept.folder / f"{files.number}.raw").symlink_to(tmp_path / "else")
     read_through_cache(files, CLASSES, kept)
+    remove_entries(kept.folder, MAGIC)
+    assert (tmp_path / "else").read_bytes() == b""
+    assert (kept.folder / f"{files.number}.raw").is_symlink()
+
+
+def test_the_entries_and_what_killed_processes_left_are_removed(files, kept):
     read_through_cache(files, CLASSES, kept)
-    assert kept.get(files, CLASSES) is not None
-    assert not kept.full
+    (kept.folder / ".1.raw.0123456789abcdef.part").write_bytes(MAGIC + b"half")
+    (kept.folder / "full").touch()
+    (kept.folder / "2.raw").touch()
+    remove_entries(kept.folder, MAGIC)
+    assert not kept.folder.exists()
 
 
 def test_pictures_of_a_shard_are_kept_too(files, kept, tmp_path):

@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.folders import contents
 from vm_train.data.pictures import find_pictures
 from vm_train.graphs.augmentation import Augmentation
-from vm_train.graphs.graph_cache import GraphCache
+from vm_train.graphs.graph_cache import GraphCache, remove_caches
 from vm_train.graphs.graph_recipe import GraphRecipe
 from vm_train.graphs.loading import PictureGraphs
 from vm_train.graphs.schedule import Item
@@ -98,3 +99,20 @@ def test_other_meshes_have_other_views(folder, tmp_path, mesh, other):
     made = [graphs_of(folder, tmp_path / "kept", count=1, **each)[Item(0, (1,))] for each in (mesh, other)]
     assert len(made[0]) != len(made[1])
     assert len(list((tmp_path / "kept").iterdir())) == 2
+
+
+def test_only_caches_are_removed(folder, tmp_path):
+    graphs = graphs_of(folder, tmp_path / "kept")
+    assert len(graphs[Item(0, (1, 0))])
+    assert files_in(tmp_path / "kept")
+    (tmp_path / "kept" / "views-of-mine").mkdir()
+    (tmp_path / "kept" / "views-of-mine" / "1.raw").write_bytes(b"camera")
+    (tmp_path / "kept" / "views-link").symlink_to(folder)
+    before = contents(folder)
+    remove_caches(tmp_path / "kept")
+    assert {each.name for each in (tmp_path / "kept").iterdir()} == {"views-of-mine", "views-link"}
+    assert contents(tmp_path / "kept") == {"views-of-mine/1.raw": b"camera"}
+    assert contents(folder) == before
+    graphs_of(folder, tmp_path / "other")[Item(0, (1, 0))]
+    remove_caches(tmp_path / "other")
+    assert not (tmp_path / "other").exists()
