@@ -149,13 +149,27 @@ def _check_regular(path: Path, mode: int) -> None:
         raise OSError(errno.EINVAL, "not a regular file", str(path))
 
 
+def is_open_pipe(path: Path) -> bool:
+    """Whether a path stands for a pipe of the shell, such as /dev/stdin after "|": unlike a named one, it has a writer.
+
+    Raises OSError.
+    """
+    return path.is_fifo() and not exists(real_path(path))
+
+
 def read_pieces(stream: IO[bytes], largest: int) -> bytes:
-    """The rest of a stream, in memory only as far as it exists. Raises OSError if it has more than `largest` bytes."""
-    content = io.BytesIO()  # it grows in place, and is not copied at the end
-    while content.tell() <= largest and (piece := stream.read(min(_PIECE, largest + 1 - content.tell()))):
-        content.write(piece)
-    if content.tell() > largest:
+    """The rest of a stream, as `read_up_to`. Raises OSError if it has more than `largest` bytes."""
+    content = read_up_to(stream, largest + 1)
+    if len(content) > largest:
         raise OSError(errno.EFBIG, f"it is too large; at most {largest} bytes are allowed")
+    return content
+
+
+def read_up_to(stream: IO[bytes], count: int) -> bytes:
+    """The next bytes of a stream, fewer than `count` at its end, in memory only as far as they exist."""
+    content = io.BytesIO()  # it grows in place, and is not copied at the end
+    while content.tell() < count and (piece := stream.read(min(_PIECE, count - content.tell()))):
+        content.write(piece)
     return content.getvalue()
 
 
@@ -243,17 +257,25 @@ def locked_folder(folder: Path, patience: float = 0.0) -> Iterator[None]:
     patience: how long to wait for another process that holds it [s]. Raises BlockingIOError if it holds it longer, and
     OSError if the folder can't be opened for reading, or if its file system has no locks.
     """
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    descriptor = _lock(folder, time.monotonic() + patience)
     try:
-        deadline = time.monotonic() + patience
-        while True:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                if time.monotonic() >= deadline:
-                    raise
-            time.sleep(_PAUSE)
         yield
     finally:
         os.close(descriptor)
+
+
+def _lock(folder: Path, deadline: float) -> int:
+    """A descriptor that holds the lock of a folder until it is closed."""
+    while True:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # The folder may have been removed since it was opened, and another one may have its name.
+            if os.path.samestat(os.fstat(descriptor), folder.lstat()):
+                return descriptor
+            os.close(descriptor)
+        except OSError as error:
+            os.close(descriptor)
+            if not isinstance(error, BlockingIOError) or time.monotonic() >= deadline:
+                raise
+        time.sleep(_PAUSE)

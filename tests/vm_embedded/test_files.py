@@ -6,6 +6,7 @@ import os
 import socket
 import stat
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from vm_embedded import InputError
 from vm_embedded.files import (
     atomic_write,
     check_writable,
+    locked_folder,
     open_regular,
     read_bytes,
     read_pieces,
@@ -224,3 +226,32 @@ def test_a_stream_is_read_to_its_end_or_to_the_limit(count):
 def test_lines_of_a_text_end_with_a_line_feed(tmp_path, written):
     (tmp_path / "file").write_bytes(written)
     assert read_text(tmp_path / "file") == "a\nb\n"
+
+
+def test_the_lock_of_a_folder_is_that_of_the_folder_that_has_the_name(tmp_path):
+    """Another folder may have got the name since the lock was waited for."""
+    folder, names = tmp_path / "folder", []
+    folder.mkdir()
+    (folder / "old").touch()
+
+    def wait_for_lock():
+        with locked_folder(folder, patience=60.0):
+            names.append([each.name for each in folder.iterdir()])
+            with pytest.raises(BlockingIOError), locked_folder(folder):
+                pass
+
+    waiting = threading.Thread(target=wait_for_lock)
+    with locked_folder(folder):
+        waiting.start()
+        time.sleep(0.05)
+        folder.rename(tmp_path / "gone")
+        folder.mkdir()
+        (folder / "new").touch()
+    waiting.join()
+    assert names == [["new"]]
+
+
+def test_a_link_to_a_folder_has_no_lock(tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path)
+    with pytest.raises(NotADirectoryError), locked_folder(tmp_path / "link"):
+        pass

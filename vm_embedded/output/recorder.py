@@ -7,12 +7,11 @@ recording.jsonl with the messages. Running the detector on a recording gives the
 
 from __future__ import annotations
 
-import errno
-import os
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,13 +21,12 @@ from ..cameras.camera import Shot
 from ..cameras.image_files import MESSAGES
 from ..config.entries import check_entries, file_name, number, text_line
 from ..errors import InputError
-from ..files import locked_folder
 from ..geometry.lens import Lens
 from ..geometry.lens_files import format_lens_file
 from ..geometry.orientation import Orientation
 from .ended import ended
 from .messages import Message, to_json_line
-from .recordings import PART, delete_oldest_recordings, finish, finish_left_recordings, recording_name
+from .recordings import begin_recording, delete_oldest_recordings, finish, finish_left_recordings
 from .result_files import encode_png
 
 CONFIGURATION = "vm.toml"
@@ -123,33 +121,34 @@ class Recorder:
             raise InputError("the previous recording is still being written; try again later")
         if not self._moments:
             raise InputError("no frame to record yet")
-        folder = Path(self.settings.folder) / recording_name(time.time())
-        part = folder.with_name(folder.name + PART)
         try:
-            if folder.exists():  # the clock was set back
-                raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
-            part.mkdir(parents=True)
+            part, lock = begin_recording(Path(self.settings.folder))
         except OSError as error:
-            raise InputError(f"can't create {part}: {error.strerror or error}") from error
-        moments = list(self._moments)
-        arguments = (folder, part, moments, self._files)
+            raise InputError(
+                f"can't create a recording in {self.settings.folder}: {error.strerror or error}"
+            ) from error
+        folder, moments = part.with_suffix(""), list(self._moments)
+        arguments = (folder, part, lock, moments, self._files)
         self._writer = threading.Thread(target=self._write, args=arguments, name="recorder", daemon=True)
         try:
             self._writer.start()
         except RuntimeError as error:  # the system gives no thread
             part.rmdir()
+            lock.close()
             raise InputError(f"can't write a recording: {error}") from error
         return f"recording {len(moments)} frame{'s' if len(moments) > 1 else ''} to {folder}"
 
-    def _write(self, folder: Path, part: Path, moments: Sequence[Moment], files: Mapping[str, bytes]) -> None:
-        """Write a recording into the folder `part`, which gets the name `folder` at the end.
+    def _write(
+        self, folder: Path, part: Path, lock: ExitStack, moments: Sequence[Moment], files: Mapping[str, bytes]
+    ) -> None:
+        """Write a recording into the folder `part`, which is locked, and gets the name `folder` at the end.
 
         If it can't be completed, keep the frames that were written.
 
         Each frame's message follows its files at once, so vm-detect reads even the folder of a process that was killed.
         """
         try:
-            with locked_folder(part):
+            with lock:
                 self._fill(part, folder, moments, files)
         except OSError as error:
             self._report("recording failed", "error", f"{folder}: {error.strerror or error}")

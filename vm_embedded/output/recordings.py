@@ -13,7 +13,7 @@ import shutil
 import stat
 import time
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from ..cameras.image_files import MESSAGES
@@ -28,6 +28,23 @@ _FILE = re.compile(r"recording\.jsonl|vm\.toml|model\.onnx|image\d{7,}\.(jpg|png
 def recording_name(now: float) -> str:
     """Name of a recording that starts now, a time since 1970 [s]."""
     return f"{time.strftime('%Y-%m-%dT%H-%M-%S', time.localtime(now))}.{int(1e3 * now) % 1000:03d}"
+
+
+def begin_recording(folder: Path) -> tuple[Path, ExitStack]:
+    """Create the folder NAME.part of a recording that starts now, and hold its lock until the stack is closed.
+
+    Raises OSError, also if there is a recording of this name: the clock was set back.
+    """
+    while True:
+        part, lock = folder / f"{recording_name(time.time())}{PART}", ExitStack()
+        if os.path.lexists(part.with_suffix("")):
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+        part.mkdir(parents=True)
+        try:
+            lock.enter_context(locked_folder(part))
+            return part, lock
+        except (BlockingIOError, FileNotFoundError):
+            time.sleep(2e-3)  # a detector that starts found it before it was locked, and removes it; take a later name
 
 
 def finish(part: Path, written: int) -> Path:

@@ -13,7 +13,12 @@ from tests.folders import contents
 from tests.programs import heed_permissions
 from tests.vm_embedded.live.running import running
 from vm_embedded.files import locked_folder
-from vm_embedded.output.recordings import delete_oldest_recordings, finish_left_recordings
+from vm_embedded.output.recordings import (
+    begin_recording,
+    delete_oldest_recordings,
+    finish,
+    finish_left_recordings,
+)
 
 NAMES = [f"2026-01-0{day}T00-00-00.000" for day in (1, 2, 3)]
 
@@ -169,3 +174,30 @@ def test_a_detector_deletes_old_recordings_with_dangling_links_and_reports_the_n
     assert [(each["event"], each["level"]) for each in told] == [("recorded", "info")] * 2
     assert len(names(kept)) == 2
     assert NAMES[2] not in names(kept)
+
+
+def test_a_detector_that_starts_takes_no_recording_for_a_left_one(tmp_path):
+    """It looks for left recordings while another one begins some in the same folder."""
+    done = threading.Event()
+
+    def start_often():
+        while not done.is_set():
+            for _ in finish_left_recordings(tmp_path):
+                pass
+
+    starting = [threading.Thread(target=start_often) for _ in range(2)]
+    for each in starting:
+        each.start()
+    try:
+        for _ in range(500):
+            part, lock = begin_recording(tmp_path)
+            with lock:
+                (part / "recording.jsonl").write_bytes(b"{}\n")
+                path = finish(part, 1)
+            assert (path / "recording.jsonl").read_bytes() == b"{}\n"
+            shutil.rmtree(path)
+    finally:
+        done.set()
+        for each in starting:
+            each.join()
+    assert not names(tmp_path)
