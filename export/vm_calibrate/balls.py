@@ -99,7 +99,7 @@ def ball_files(path: Path) -> list[Path]:
 def _read_json(path: Path, radius: float | None, label: str | None) -> list[SeenBall]:
     try:
         table = json.loads(read_text(path))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is not JSON: {error}") from error
     if not isinstance(table, dict) or not all(isinstance(each, list) for each in table.values()):
         raise InputError(f'{path} must map names of pictures to lists of balls, as in {{"a.jpg": [{{"cx": 1, ...}}]}}')

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import errno
 import io
 import pickle
 import warnings
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 import torch
 
 from vm_embedded.errors import InputError, one_line
-from vm_embedded.files import write_file
+from vm_embedded.files import read_bytes, write_file
 
 
 def save_values(path: str | Path, content: Mapping[str, Any]) -> None:
@@ -29,19 +29,30 @@ def load_values(path: str | Path, what: str) -> Any:
     torch's own message advises to load the file without this protection, so it is not passed on. Neither are its
     warnings about parts of a damaged file.
     """
+    content = read_bytes(Path(path))
     try:
+        _check_packed(content)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return torch.load(path, map_location="cpu", weights_only=True)
-    except OSError as error:
-        if error.errno == errno.EINVAL:  # torch looks for a part where a file that was cut short has none
-            raise InputError(f"{path} is not {what}: it is damaged or cut short") from error
-        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+            return torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
+    except zipfile.BadZipFile as error:
+        raise InputError(f"{path} is not {what}: it is damaged or cut short") from error
     except pickle.UnpicklingError as error:
         reason = "it is damaged, or contains more than plain values and tensors; use only files that you trust"
         raise InputError(f"{path} is not {what}: {reason}") from error
     except Exception as error:  # a damaged file makes torch raise errors of many types
         raise InputError(f"{path} is not {what}: {_first_sentence(error)}") from error
+
+
+def _check_packed(content: bytes) -> None:
+    """Raise BadZipFile unless this is an archive as torch writes it, with parts as large as they claim: a compressed
+    part of kilobytes would be unpacked to gigabytes."""
+    with zipfile.ZipFile(io.BytesIO(content)) as packed:
+        parts = packed.infolist()
+    if any(each.compress_type != zipfile.ZIP_STORED for each in parts) or sum(e.file_size for e in parts) > len(
+        content
+    ):
+        raise zipfile.BadZipFile
 
 
 def _first_sentence(error: Exception) -> str:

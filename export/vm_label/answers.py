@@ -39,7 +39,7 @@ def read_answers(folder: Path) -> tuple[dict[str, str], list[str]]:
             crop, answer = fields["crop"], fields["answer"]
             if not isinstance(crop, str) or answer not in (*ANSWERS, None):
                 raise ValueError("not an answer")
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, RecursionError):
             if line.strip():
                 faults.append(f"{path}: line {number} is not an answer; it is ignored")
             continue

@@ -11,8 +11,9 @@ from pathlib import Path, PurePosixPath
 
 from vm_embedded.cameras.image_files import IMAGE_SUFFIXES
 from vm_embedded.errors import InputError, unknown
-from vm_embedded.files import read_text
+from vm_embedded.files import exists, read_text
 from vm_embedded.output.box_files import CANDIDATES, SAME_PLACE, CandidateBox, Shares, edges, overlap
+from vm_workstation.box_grid import BoxGrid
 from vm_workstation.class_names import class_name
 from vm_workstation.yolo_labels import LabeledBox, find_labels, parse_labels
 from vm_workstation.yolo_names import NameTables
@@ -88,17 +89,23 @@ class _Reader:
         name = image.relative_to(self._top).as_posix()
         candidates = self._candidates_of(image)
         confidences = {(each.class_name, each.shares): each.confidence for each in candidates}
-        crops = []
+        crops: dict[Crop, None] = {}
         for box in self._labels(image):
             shares = clipped(box.shares)
             known = confidences.get((box.class_name, shares)) if box.confidence is None else box.confidence
-            crops.append(Crop(name, box.class_name, shares, known))
+            crops[Crop(name, box.class_name, shares, known)] = None
+        places = BoxGrid(SAME_PLACE)
+        for crop in crops:
+            places.add(crop.class_name, edges(crop.shares))
         for each in candidates:
-            places = [edges(crop.shares) for crop in crops if crop.class_name == each.class_name]
-            if not each.found and all(overlap(edges(each.shares), place) <= SAME_PLACE for place in places):
-                crops.append(Crop(name, each.class_name, each.shares, each.confidence))
+            place = edges(each.shares)
+            if not each.found and all(
+                overlap(place, at) <= SAME_PLACE for _, at in places.near(each.class_name, place)
+            ):
+                crops[Crop(name, each.class_name, each.shares, each.confidence)] = None
+                places.add(each.class_name, place)
         self.classes |= dict.fromkeys(crop.class_name for crop in crops)
-        self.crops += crops
+        self.crops += crops  # each once
 
     def _labels(self, image: Path) -> list[LabeledBox]:
         """The boxes in the label file of an image; each fault is reported."""
@@ -117,7 +124,7 @@ class _Reader:
     def _candidates_of(self, image: Path) -> list[CandidateBox]:
         if image.parent not in self._candidates:
             path = image.parent / CANDIDATES
-            self._candidates[image.parent], faults = read_candidates(path) if path.is_file() else ({}, [])
+            self._candidates[image.parent], faults = read_candidates(path) if exists(path) else ({}, [])
             self.problems += faults
         return self._candidates[image.parent].get(image.name, [])
 
@@ -149,7 +156,7 @@ def read_candidates(path: Path) -> tuple[dict[str, list[CandidateBox]], list[str
             found[str(fields["image"])].append(box)
         except InputError as error:
             faults.append(f"{path}: line {number}: {error}; it is ignored")
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
             faults.append(f"{path}: line {number} is not a box; it is ignored")
     return found, faults
 

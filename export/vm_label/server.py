@@ -101,7 +101,7 @@ class _Handler(BaseHTTPRequestHandler):
             fields = json.loads(body)
             ours, crop, answer = fields["session"] == session.id, fields["crop"], fields["answer"]
             good = isinstance(crop, str) and (answer is None or answer in ANSWERS)
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, RecursionError):
             good = False
         if not good:
             self._refuse(HTTPStatus.BAD_REQUEST, "an answer has a session, a crop and an answer")

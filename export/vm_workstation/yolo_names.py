@@ -7,7 +7,7 @@ from pathlib import Path
 
 from vm_embedded.config.yaml_reader import read_yaml
 from vm_embedded.errors import InputError
-from vm_embedded.files import read_text
+from vm_embedded.files import exists, read_text
 
 from .class_names import class_name
 
@@ -39,7 +39,7 @@ class NameTables:
 
 def tables_in(folder: Path) -> list[Path]:
     """The tables of names directly in a folder."""
-    return [path for path in (folder / name for name in _TABLES) if path.is_file()]
+    return [path for path in (folder / name for name in _TABLES) if exists(path)]
 
 
 def _read_tables(folder: Path) -> tuple[str, ...]:

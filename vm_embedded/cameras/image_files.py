@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Image
 from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
-from ..files import exists, is_file, open_regular, read_bytes, read_text
+from ..files import exists, is_file, is_open_pipe, open_regular, read_bytes, read_text
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from ..opencv_text import open_capture
@@ -214,17 +214,17 @@ def lens_beside(path: Path | None) -> Path | None:
 def lens_file_of(image: Path) -> Path | None:
     """The lens file of a frame of any tool: NAME.yaml, lensNAME.yaml, or for imageNAME lensNAME.yaml; None without."""
     beside = (image.with_suffix(".yaml"), image.with_name(f"lens{image.stem}.yaml"), lens_beside(image))
-    return next((each for each in beside if each is not None and is_file(each)), None)
+    return next((each for each in beside if each is not None and exists(each)), None)
 
 
 def _video(name: str, max_megapixels: float) -> Source:
     """The frames of a video file; or of a camera, by number or device path. Raises OSError for an unreadable file."""
     files = (Path(name),) if is_file(Path(name)) else ()
-    for path in files:
-        open_regular(path).close()  # OpenCV does not say why it can't read a file
     number = camera_number(name)
-    capture = open_capture(Path(name) if number is None else number)
     live = number is not None or Path(name).is_char_device()
+    if not live and not is_open_pipe(Path(name)):
+        open_regular(Path(name)).close()  # OpenCV does not say why it can't read a file, and waits for a pipe's writer
+    capture = open_capture(Path(name) if number is None else number)
     if not capture.isOpened():
         if live:
             raise InputError(f"can't open camera {name}")

@@ -204,7 +204,7 @@ def _ask(socket: str, command: str) -> int:
         raise InputError(reply.removeprefix(REFUSED))
     try:
         good = command != "status" or json.loads(reply)["state"] == "ok"
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(f"unexpected reply; is this vm-detect? {reply[:60]!r}") from error
     print(reply)
     return EXIT_OK if good else EXIT_FAILED

@@ -8,6 +8,7 @@ from collections.abc import Collection
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Size
 from vm_embedded.output.box_files import overlap
+from vm_workstation.box_grid import BoxGrid
 
 from .annotation import RawBox
 from .box import Box
@@ -44,6 +45,7 @@ def checked_boxes(boxes: list[RawBox], size: Size, round_names: Collection[str])
     """
     good: list[Box] = []
     places: list[str] = []
+    grid = BoxGrid(_EQUAL)
     faults = []
     for raw in boxes:
         try:
@@ -51,15 +53,16 @@ def checked_boxes(boxes: list[RawBox], size: Size, round_names: Collection[str])
         except InputError as error:
             faults.append(f"{raw.place}: {error}; box not used")
             continue
-        same = next((at for at, other in enumerate(good) if _same(box, other)), None)
-        if same is not None:
-            faults.append(f"{raw.place}: the same box of {box.name} as {_short(places[same])}; box not used")
+        same = [at for at, other in grid.near(box.name, box.edges) if overlap(box.edges, other) >= _EQUAL]
+        if same:
+            faults.append(f"{raw.place}: the same box of {box.name} as {_short(places[min(same)])}; box not used")
             continue
         if box.name in round_names and not is_cut(box, size) and not is_round(box):
             faults.append(
                 f"{raw.place}: {box.name} of {_by(box.width, box.height)} px, but width and height of a {box.name} "
                 f"in full view differ by a factor of {_ROUNDEST:g} at most; is it partly hidden? box kept"
             )
+        grid.add(box.name, box.edges)
         good.append(box)
         places.append(raw.place)
     return good, faults
@@ -85,10 +88,6 @@ def _inside(raw: RawBox, size: Size) -> Box:
         min(right, float(size[0])) - 0.5,
         min(bottom, float(size[1])) - 0.5,
     )
-
-
-def _same(one: Box, other: Box) -> bool:
-    return one.name == other.name and overlap(one.edges, other.edges) >= _EQUAL
 
 
 def _by(width: float, height: float) -> str:

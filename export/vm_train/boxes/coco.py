@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter, defaultdict
 from collections.abc import Mapping
+from itertools import islice
 from pathlib import Path
 
 from vm_embedded.errors import InputError
@@ -14,6 +15,9 @@ from .annotation import Annotation, Annotations, RawBox
 from .coco_file import CocoFile, Entry, Id, coco_files, is_id, number, parse_coco, shown
 from .folder_files import FolderFiles
 from .image_index import ImageIndex, image_folders, once_each
+
+_MOST_SHOWN = 100
+"""Most categories in a message, so that many wrong ones do not take long."""
 
 
 def is_coco(files: FolderFiles) -> bool:
@@ -76,6 +80,7 @@ class _Reader:
         """Image file and stated size [px] by id."""
         found: dict[Id, tuple[Path, Size | None]] = {}
         keys: dict[Path, Id] = {}
+        unclear: set[str] = set()
         uses = Counter(json.dumps(entry.get("id")) for entry in self._content.images)
         for entry in self._content.images:
             key = entry.get("id")
@@ -88,7 +93,9 @@ class _Reader:
                 path = self._index.named(name, self._near)
             except InputError as error:
                 self.faults.append(f"{place}: {error}; not used")
-                self.spoiled.update(self._index.of_name(name))
+                if name not in unclear:  # it may stand for thousands of images, in thousands of entries
+                    unclear.add(name)
+                    self.spoiled.update(self._index.of_name(name))
                 continue
             image = self._index.labels([path])
             try:
@@ -117,7 +124,7 @@ def _size(entry: Entry) -> Size | None:
 def _box(entry: Entry, place: str, categories: Mapping[Id, str]) -> RawBox:
     key, bbox = entry.get("category_id"), entry.get("bbox")
     if not is_id(key) or key not in categories:
-        known = ", ".join(f"{each} {name}" for each, name in categories.items())
+        known = ", ".join(f"{each} {name}" for each, name in islice(categories.items(), _MOST_SHOWN))
         raise InputError(f"category {shown(key)} is unknown; categories has {known}"[:400])
     if entry.get("iscrowd"):
         raise InputError(f"marks a crowd of {categories[key]}, not a single one")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from itertools import islice
 from pathlib import Path, PurePath, PureWindowsPath
 
 from vm_embedded.errors import InputError
@@ -12,6 +13,7 @@ from .annotation import Annotation, Annotations
 from .folder_files import FolderFiles
 
 _IMAGE_FOLDERS = ("JPEGImages", "images")
+_MOST_LABELS = 4
 _ANNOTATION_FOLDERS = ("annotations", "labels")
 
 
@@ -23,15 +25,17 @@ class ImageIndex:
         self._images = set(files.images)
         self._by_name: dict[str, list[Path]] = defaultdict(list)
         self._by_stem: dict[str, list[Path]] = defaultdict(list)
+        self._by_place: dict[tuple[Path, str], list[Path]] = defaultdict(list)
         for path in files.images:
             self._by_name[path.name].append(path)
             self._by_stem[path.stem].append(path)
+            self._by_place[path.parent, path.stem].append(path)
 
     def of_stem(self, annotation: Path) -> list[Path]:
         """The images with the stem of an annotation file: those beside it or in its folder of images, or else all."""
-        found = self._by_stem.get(annotation.stem, [])
-        near = image_folders(annotation)
-        return [path for path in found if path.parent in near] or found
+        stem = annotation.stem
+        near = [path for folder in image_folders(annotation) for path in self._by_place.get((folder, stem), [])]
+        return near or self._by_stem.get(stem, [])
 
     def named(self, name: str, near: Sequence[Path]) -> Path:
         """The image of a name, with or without folders, in one of the folders `near` or anywhere.
@@ -55,8 +59,9 @@ class ImageIndex:
         return self._by_name.get(parts[-1], []) if parts else []
 
     def labels(self, paths: Iterable[Path]) -> str:
-        """Paths below the folder, joined, for messages."""
-        return " and ".join(self._files.label(path) for path in paths)
+        """Paths below the folder, joined, for messages; at most _MOST_LABELS of them."""
+        shown = [self._files.label(path) for path in islice(paths, _MOST_LABELS + 1)]
+        return " and ".join(shown if len(shown) <= _MOST_LABELS else [*shown[:_MOST_LABELS], "others"])
 
 
 def image_folders(annotation: Path) -> list[Path]:

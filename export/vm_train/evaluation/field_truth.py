@@ -14,7 +14,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Mask
 from vm_embedded.errors import InputError
-from vm_embedded.files import read_regular
+from vm_embedded.files import exists, read_regular
 
 from ..data.pictures import Picture
 from ..scores.border_scores import distances_along
@@ -76,7 +76,7 @@ class FieldScene:
 def read_field(path: Path) -> FieldScene | None:
     """What a sceneX.json tells about the field; None if the file is missing. Raises InputError naming file and
     fault."""
-    if not path.is_file():
+    if not exists(path):
         return None
     try:
         table = json.loads(read_regular(path))

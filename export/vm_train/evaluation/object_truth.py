@@ -13,7 +13,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Mask
 from vm_embedded.errors import InputError
-from vm_embedded.files import read_regular
+from vm_embedded.files import exists, read_regular
 from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.shape import Shape
 from vm_embedded.geometry.sphere import Sphere
@@ -68,7 +68,7 @@ class SceneTruth:
 
 def read_scene(path: Path) -> SceneTruth | None:
     """The truth in a sceneX.json; None if the file is missing. Raises InputError naming file and fault."""
-    if not path.is_file():
+    if not exists(path):
         return None
     try:
         table = json.loads(read_regular(path))

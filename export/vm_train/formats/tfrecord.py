@@ -7,19 +7,20 @@ A record is the length of its payload (uint64), the length's checksum (uint32), 
 from __future__ import annotations
 
 import gzip
-import io
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO, BinaryIO
 
 from vm_embedded.errors import InputError, one_line
+from vm_embedded.files import open_regular, read_up_to
 
+from ..data.picture_files import LARGEST_FILE
 from .crc32c import masked_crc32c
 from .tfexample import Example, parse_example
 
-_LARGEST = 2**31 - 1  # bytes of a protobuf message
-_PIECE = 2**24  # bytes to read at a time, so a wrong length never allocates more memory than the file has bytes
+_LARGEST = 2 * LARGEST_FILE  # bytes of a record, with an image and a mask
 _HEADER = 12  # bytes
 
 
@@ -67,12 +68,12 @@ def read_records(path: Path) -> Iterator[Record]:
     """
     number = 0
     try:
-        with path.open("rb") as file:
-            stream: io.BufferedIOBase = gzip.GzipFile(fileobj=file) if _is_gzip(file) else file
-            while header := _read(stream, _HEADER):
+        with open_regular(path) as file:
+            stream: IO[bytes] = gzip.GzipFile(fileobj=file) if _is_gzip(file) else file
+            while header := read_up_to(stream, _HEADER):
                 length = _length(path, number, header)
-                payload = _read(stream, length)
-                end = _read(stream, 4)
+                payload = read_up_to(stream, length)
+                end = read_up_to(stream, 4)
                 if len(end) < 4:
                     raise _truncated(path, number)
                 yield Record(path, number, payload, int.from_bytes(end, "little"), file.tell())
@@ -81,11 +82,11 @@ def read_records(path: Path) -> Iterator[Record]:
         raise _truncated(path, number) from error
     except (zlib.error, gzip.BadGzipFile) as error:
         raise InputError(f"{path}: record {number}: the gzip file is damaged: {one_line(error)}") from error
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte
-        raise InputError(f"can't read {path}: {getattr(error, 'strerror', None) or error}") from error
+    except OSError as error:
+        raise InputError(f"can't read {path}: {error.strerror or error}") from error
 
 
-def _is_gzip(file: io.BufferedReader) -> bool:
+def _is_gzip(file: BinaryIO) -> bool:
     head = file.read(_HEADER)
     file.seek(0)
     # A plain record of 559,903 bytes starts like a gzip file, so a length with a correct checksum takes precedence.
@@ -106,20 +107,9 @@ def _length(path: Path, number: int, header: bytes) -> int:
         raise InputError(f"{path}: record {number} is damaged: the checksum of its length is wrong")
     length = int.from_bytes(header[:8], "little")
     if length > _LARGEST:
-        raise InputError(f"{path}: record {number} has {length} bytes, more than an Example can have")
+        raise InputError(f"{path}: record {number} has {length} bytes, more than the allowed {_LARGEST}")
     return length
 
 
 def _truncated(path: Path, number: int) -> InputError:
     return InputError(f"{path} is cut short in record {number}")
-
-
-def _read(stream: io.BufferedIOBase, count: int) -> bytes:
-    """The next `count` bytes, or fewer at the end of the file."""
-    if count <= _PIECE:
-        return stream.read(count)
-    pieces = []
-    while count and (piece := stream.read(min(count, _PIECE))):
-        pieces.append(piece)
-        count -= len(piece)
-    return b"".join(pieces)

@@ -85,7 +85,7 @@ def read_log(path: Path) -> list[tuple[str, dict[str, Any]]]:
     for line in lines:
         try:
             found.append((line.decode("utf-8"), json.loads(line)))
-        except ValueError:
+        except (ValueError, RecursionError):
             break
         if not line.endswith(b"\n"):
             found.pop()

@@ -9,7 +9,6 @@ that of the mean loss over the selected points of all parts.
 from __future__ import annotations
 
 import math
-import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +21,7 @@ from torch import distributed, nn
 from vm_embedded.arrays import Floats, Singles
 from vm_embedded.errors import InputError, one_line
 from vm_export.network import Network
-from vm_export.torch_files import save_values
+from vm_export.torch_files import load_values, save_values
 
 from ..graphs.labeled_graph import LabeledGraph, join_graphs
 from ..graphs.schedule import Item
@@ -171,11 +170,9 @@ class Trainer:
 def read_state(path: Path) -> dict[str, Any]:
     """Read the file of `Trainer.save` without executing anything in it. Raises InputError."""
     try:
-        state = torch.load(path, map_location="cpu", weights_only=True)
-    except (OSError, RuntimeError, KeyError, ValueError, EOFError, pickle.UnpicklingError) as error:
-        raise InputError(
-            f"can't resume from {path}, it is damaged: {one_line(error)}; begin again in a new folder"
-        ) from error
+        state = load_values(path, "the state of a training")
+    except InputError as error:
+        raise InputError(f"can't resume: {error}; begin again in a new folder") from error
     if not isinstance(state, dict) or not isinstance(state.get("more"), dict):
         raise InputError(f"can't resume from {path}: it is not the state of a training; begin again in a new folder")
     return state

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from vm_embedded.arrays import Image, Singles
 from vm_embedded.errors import InputError, one_line
 from vm_embedded.files import atomic_write
 
+from ..data.array_files import read_arrays
 from .labels import OBJECT
 
 
@@ -122,9 +122,11 @@ class PatchChunk:
     def load(cls, path: Path) -> PatchChunk:
         """Read a chunk. Raises InputError naming the file."""
         try:
-            with np.load(path, allow_pickle=False) as file:
-                objects, proposed = file["truths"].tolist()
-                arrays = (file[name] for name in ("patches", "labels", "targets", "pictures"))
-                return cls(PatchSet(*arrays), objects, proposed, tuple(map(str, file["faults"])))
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            file = read_arrays(path)
+            objects, proposed = file["truths"].tolist()
+            arrays = (file[name] for name in ("patches", "labels", "targets", "pictures"))
+            return cls(PatchSet(*arrays), objects, proposed, tuple(map(str, file["faults"])))
+        except InputError as error:
+            raise InputError(f"{error}; remove it and resume the training") from error
+        except (ValueError, KeyError, TypeError) as error:
             raise InputError(f"can't read {path}: {one_line(error)}; remove it and resume the training") from error

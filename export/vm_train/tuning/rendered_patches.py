@@ -6,7 +6,6 @@ patches each, compressed as WebP. `make networks` writes it.
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,9 +13,11 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Image
+from vm_embedded.cameras.decoding import decode
 from vm_embedded.errors import InputError, one_line
 from vm_embedded.files import atomic_write
 
+from ..data.array_files import read_arrays
 from ..look.patch_set import PatchSet
 
 RENDERED = Path(__file__).with_name("rendered_patches.npz")
@@ -40,13 +41,13 @@ def read_rendered(path: Path, size: int) -> PatchSet:
 
     All have the position -1 as their picture. Raises InputError if the file is missing or damaged.
     """
+    file = read_arrays(path)
     try:
-        with np.load(path, allow_pickle=False) as file:
-            made, labels = int(file["size"]), file["labels"]
-            sheets = [cv2.imdecode(file[f"sheet{number}"], cv2.IMREAD_COLOR) for number in range(_count(len(labels)))]
-            targets = file["targets"].astype(np.float32)
-        patches = np.concatenate([_cut(np.asarray(sheet, dtype=np.uint8), made) for sheet in sheets])[: len(labels)]
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, cv2.error) as error:
+        made, labels = int(file["size"]), file["labels"]
+        sheets = [decode(file[f"sheet{number}"].tobytes()) for number in range(_count(len(labels)))]
+        targets = file["targets"].astype(np.float32)
+        patches = np.concatenate([_cut(sheet, made) for sheet in sheets])[: len(labels)]
+    except (InputError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"can't read {path}: {one_line(error)}") from error
     if size != made:
         method = cv2.INTER_AREA if size < made else cv2.INTER_LINEAR
