@@ -8,6 +8,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from functools import wraps
 from importlib import metadata
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import Any, NoReturn, ParamSpec
 
 from ..errors import VisualMeshError, unknown
-from .terminal import printable_output
+from .terminal import lost_output, open_streams, printable_output
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 
@@ -28,6 +29,9 @@ _vm_complete() {{
 }}
 complete -o default -F _vm_complete {programs}
 """
+
+_LOST = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
+"""Errors that concern standard output, unless they name a file: it takes no more text."""
 
 P = ParamSpec("P")
 
@@ -68,6 +72,13 @@ class Parser(argparse.ArgumentParser):
         """Print what is wrong as one line, and exit with status 2."""
         message = self._unknown_option() or self._unknown_command(message) or message
         self.exit(2, f"{self.prog}: {' '.join(message.split())}; {self.prog} --help lists the options\n")
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """As argparse does, but an error of writing the help or the version is not ignored."""
+        if file is not None and file is sys.stdout:
+            file.write(message)
+        else:
+            super()._print_message(message, file)
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """As argparse does; the message names the nearest allowed value, too."""
@@ -165,33 +176,41 @@ def version(program: str) -> str:
 def program(main: Callable[P, int]) -> Callable[P, int]:
     """A main function that ends quietly after Ctrl-C, and if nothing reads its output any more, such as head in a pipe.
 
-    A full disk, and a path that the system refuses, are one line on standard error, and exit status 1. What it prints
-    is printable: see terminal.py.
+    Output that is lost, because the disk is full or standard output is closed, and a path that the system refuses, are
+    one line on standard error, and exit status 1. What it prints is printable: see terminal.py.
     """
 
     @wraps(main)
     def run(*arguments: P.args, **more: P.kwargs) -> int:
-        _open_standard_error()
-        with printable_output():
-            return run_quietly(*arguments, **more)
+        open_streams()
+        try:
+            with printable_output():
+                status = run_quietly(*arguments, **more)
+        except SystemExit as end:  # of --help and the like
+            if end.code or not lost_output():
+                raise
+            status = EXIT_OK
+        if status == EXIT_OK and lost_output():
+            print("can't write standard output: it is closed", file=sys.stderr)
+            return EXIT_FAILED
+        return status
 
     def run_quietly(*arguments: P.args, **more: P.kwargs) -> int:
         try:
             try:
                 return main(*arguments, **more)
             finally:
-                if sys.stdout is not None:
-                    sys.stdout.flush()  # here, because at exit the interpreter would print a traceback
+                sys.stdout.flush()  # here, because at exit the interpreter would print a traceback
         except KeyboardInterrupt:
             return EXIT_INTERRUPTED
         except BrokenPipeError:
             discard_output()
             return EXIT_OK
         except OSError as error:
-            if error.errno == errno.ENOSPC:
-                discard_output()
-            elif error.filename is None:
+            if error.filename is None and error.errno not in _LOST:
                 raise
+            if error.filename is None or error.errno == errno.ENOSPC:
+                discard_output()
             print(system_error(error), file=sys.stderr)
             return EXIT_FAILED
 
@@ -224,15 +243,5 @@ def system_error(error: OSError) -> str:
 
 def discard_output() -> None:
     """Send standard output to nowhere once it can't be written; else the interpreter complains when it flushes."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _open_standard_error() -> None:
-    """Send standard error to nowhere if it is closed.
-
-    Otherwise, errors would be printed on standard output, and libraries would print into the file that is opened next.
-    """
-    if sys.stderr is None:
-        sys.stderr = open(os.devnull, "w")  # noqa: SIM115, PTH123
-        os.dup2(sys.stderr.fileno(), 2)
-        os.set_inheritable(2, True)
+    with suppress(OSError):  # it was closed before
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,4 +1,4 @@
-"""Standard output and standard error of a program, which write printable text only.
+"""Standard output and standard error of a program, which write printable text only, and know of text that is lost.
 
 Programs print names and paths that others chose, such as those of a folder of images. In them, a control character
 could change what the terminal shows or does, and a half character would end the program with an error.
@@ -6,12 +6,56 @@ could change what the terminal shows or does, and a half character would end the
 
 from __future__ import annotations
 
+import io
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO, cast
 
 from ..text import printable_lines
+
+
+class ClosedOutput(io.TextIOBase):
+    """Takes the place of a standard output that was closed before the program began. lost: whether it was needed."""
+
+    lost = False
+
+    def write(self, text: str) -> int:
+        """Remember that there was text."""
+        self.lost = self.lost or bool(text)
+        return len(text)
+
+
+def open_streams() -> None:
+    """Open standard output and standard error for text that goes nowhere, if they are closed.
+
+    Otherwise, errors would be printed on standard output, and libraries would print into the file that is opened next.
+    """
+    if sys.stderr is None:
+        _occupy(2)
+        sys.stderr = open(2, "w", closefd=False)  # noqa: SIM115
+    if sys.stdout is None:
+        _occupy(1)
+        sys.stdout = ClosedOutput()
+
+
+def _occupy(descriptor: int) -> None:
+    """Give a descriptor to the null device, unless something else has it already."""
+    try:
+        os.fstat(descriptor)
+    except OSError:
+        opened = os.open(os.devnull, os.O_WRONLY)
+        if opened == descriptor:
+            os.set_inheritable(opened, True)
+        else:
+            os.dup2(opened, descriptor)
+            os.close(opened)
+
+
+def lost_output() -> bool:
+    """Whether something was printed on a standard output that is closed."""
+    return isinstance(sys.stdout, ClosedOutput) and sys.stdout.lost
 
 
 @contextmanager
@@ -33,7 +77,7 @@ def control_terminal(sequence: str) -> None:
 
 
 def _printable_stream(stream: TextIO) -> TextIO:
-    if stream is None or isinstance(stream, _PrintableStream):  # None: it was closed before the program began
+    if isinstance(stream, _PrintableStream):
         return stream
     if hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")  # for terminals that do not take all of Unicode

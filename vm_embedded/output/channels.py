@@ -83,9 +83,11 @@ class Channels:
         settings, backlog = self.settings, 1024 * self.settings.backlog_kib
         try:
             if settings.stdout:
-                if sys.stdout is None:
-                    raise InputError("standard output is closed; use --no-output-stdout")
-                self._line_channels.append(DescriptorChannel(os.dup(sys.stdout.fileno()), backlog))
+                try:
+                    descriptor = os.dup(sys.stdout.fileno())
+                except OSError as error:
+                    raise InputError("standard output is closed; use --no-output-stdout") from error
+                self._line_channels.append(DescriptorChannel(descriptor, backlog))
             if settings.file:
                 self._line_channels.append(FileChannel(settings.file, backlog))
             for each in filter(None, settings.udp.split(",")):
