@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import check_not_input, write_file
+from vm_embedded.files import check_not_input, exists, read_regular, write_file
 from vm_embedded.text import to_json
 from vm_workstation.plots import save_figure
 
@@ -30,17 +31,34 @@ _PLOTS = (
     *("points_curves", "points_over_distance", "confusion", "points_on_object"),
     *("objects_curves", "objects_over_distance", "distance_error", "reliability", "proposals"),
 )
-_TEXTS = ("scores.json", "report.html")
+_SCORES, _REPORT = "scores.json", "report.html"
 _QUALITY = 85  # of the small JPEG pictures
 
 
 def check_evaluation_folder(out: Path, inputs: Iterable[Path | None]) -> None:
-    """Raise InputError unless the files of an evaluation can be written to a folder without replacing an input."""
+    """Raise InputError unless an evaluation may be written to a folder.
+
+    It may be a new one, and may hold an earlier evaluation, which is replaced. A file with one of these names that no
+    evaluation wrote stays, and so does an input.
+    """
     if out.exists() and not out.is_dir():
         raise InputError(f"can't write to {out}: it is not a folder")
     given = list(inputs)
-    for name in (*(f"{each}.csv" for each in _TABLES), *_TEXTS, *(f"plots/{each}.svg" for each in _PLOTS)):
+    names = (_SCORES, _REPORT, *(f"{each}.csv" for each in _TABLES), *(f"plots/{each}.svg" for each in _PLOTS))
+    for name in names:
         check_not_input(out / name, given)
+    present = [name for name in names if exists(out / name)]
+    if present and not _is_evaluation(out):
+        raise InputError(f"{out} holds {present[0]}, which no evaluation wrote: give another folder")
+
+
+def _is_evaluation(out: Path) -> bool:
+    """Whether a folder has the scores.json of an evaluation, which is the first file that it writes."""
+    try:
+        content = json.loads(read_regular(out / _SCORES))
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(content, dict) and isinstance(content.get("about"), dict)
 
 
 def write_evaluation(
@@ -57,15 +75,15 @@ def write_evaluation(
     except OSError as error:
         raise InputError(f"can't create folder {out}: {error.strerror or error}") from error
     scores = {"about": about, **as_json(evaluation, threshold)}
+    write_file(out / _SCORES, to_json(scores, indent=1, allow_nan=False) + "\n")
     texts = {f"{name}.csv": text for name, text in as_csv(evaluation, threshold).items()}
-    texts["scores.json"] = to_json(scores, indent=1, allow_nan=False) + "\n"
     figures = _figures(evaluation, threshold)
     if points_on_object is not None:
         figures["points_on_object"] = points_on_object
     for name, each in figures.items():
         save_figure(each, out / "plots" / f"{name}.svg")
     images = {name: (out / "plots" / f"{name}.svg").read_bytes() for name in figures}
-    texts["report.html"] = page(scores, images, _strips(evaluation))
+    texts[_REPORT] = page(scores, images, _strips(evaluation))
     for file_name, text in texts.items():
         write_file(out / file_name, text)
     for stale in {f"{name}.csv" for name in _TABLES}.difference(texts):

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import cv2
 import pytest
 
+from tests.folders import contents
 from tests.programs import BIN, heed_interrupts, run_program
 from tests.vm_export.looks import look_checkpoint
 from vm_export.change_model import change_looks
@@ -167,6 +168,7 @@ def test_a_hexagonal_checkpoint_has_points_only_and_leaves_no_old_objects(capsys
     (out / "plots").mkdir(parents=True)
     for stale in (out / "objects.csv", out / "plots" / "distance_error.svg", out / "mine.txt"):
         stale.write_text("")
+    (out / "scores.json").write_text('{"about": {}}')
     numbers = numbers_in(tmp_path, "0001", "0004")
     assert main([str(path), str(data), "-o", str(out), "--list", str(numbers), "--workers", "1"]) == 0
     said = capsys.readouterr()
@@ -264,6 +266,15 @@ def test_a_setting_out_of_range_is_wrong_usage():
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("name", ["objects.csv", "field.csv", "report.html", "plots/confusion.svg", "scores.json"])
+def test_files_of_others_stay(capsys, data, tmp_path, name):
+    path = tmp_path / "out" / name
+    path.parent.mkdir(parents=True)
+    path.write_text("[1, 2]")
+    assert f"holds {name}, which no evaluation wrote" in complaint(capsys, MODEL, data, "-o", tmp_path / "out")
+    assert contents(tmp_path) == {f"out/{name}": b"[1, 2]"}
+
+
 def test_the_figure_alone_needs_no_model(tmp_path):
     done = run("points", "-o", tmp_path / "figure.svg", "--intersections", "3", "--equal-at", "4")
     assert "visual" in done.stdout
