@@ -56,7 +56,7 @@ def _read(path: Path) -> tuple[str, ...]:
     try:
         # Not splitlines: for other programs, no other character ends a line.
         lines = text.rstrip().split("\n") if path.suffix in (".txt", ".names") else _yaml_names(text)
-        if not all(line.strip() for line in lines):
+        if not lines or not all(line.strip() for line in lines):
             raise InputError("must give a name for each class number")
         names = tuple(map(class_name, lines))
         if len(set(names)) < len(names):

@@ -12,7 +12,7 @@ import atheris
 
 FOUND = 77
 
-with atheris.instrument_imports(include=["vm_embedded", "vm_export", "vm_train"]):
+with atheris.instrument_imports(include=["vm_embedded", "vm_export", "vm_train", "vm_label", "vm_workstation"]):
     target = importlib.import_module(sys.argv[1])
 
 from .inputs import Watch, peak_memory  # noqa: E402

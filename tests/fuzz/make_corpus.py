@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 import torch
 
+from tests.named_models import GOOD
 from tests.vm_embedded.live.running import DEMO
 from tests.vm_export.checkpoints import checkpoint, manifest
 from tests.vm_export.looks import look_checkpoint
@@ -79,6 +80,7 @@ def main() -> None:
     _write("model", _models())
     manifest = {"release": "1.0-abc", "machine": "x86_64", "glibc": "2.28", "python": "cp311", "disk_mib": 16}
     sums = "".join(f"{number:064x}  {name}\n" for number, name in enumerate(("README.md", "etc/vm.toml")))
+    _write("names", {f"name{number}": each for number, each in enumerate(_names())})
     _write("bundle", {"manifest": json.dumps(manifest, indent=1).encode() + b"\n", "sums": sums.encode()})
 
 
@@ -103,6 +105,21 @@ def _requests() -> list[bytes]:
     return [b"GET " + each + host + b"\r\n" for each in gets] + [
         b"POST " + each + host + more + b"\r\n" for each in posts for more in (token, b"")
     ]
+
+
+def _names() -> list[bytes]:
+    escaped = (
+        "\\ud800",
+        "\\ud83c\\udfc0",
+        "ball\\ncar",
+        "a\\u2028b",
+        "\\u001b[2J",
+        "\\u0000",
+        "\\u0085",
+        " a",
+        "\ufeffa",
+    )
+    return [each.encode() for each in (*GOOD, *escaped, "", "x" * 101, "a\nb", "$x$")] + [b"\xff", b"\x9b2J"]
 
 
 def _lenses() -> dict[str, bytes]:
