@@ -70,6 +70,9 @@ lock() { # SECONDS: wait for other commands of this program for so long, then fa
         exec 9>>"$PREFIX/.lock"
     fi
     flock -w "$1" 9 || fail "another install.sh or vm-deploy is running"
+    case $(readlink /proc/self/fd/9) in # the next command would lock another file of this name
+    *" (deleted)") fail "uninstall.sh has just removed $PREFIX: run this command again" ;;
+    esac
 }
 
 uptime_seconds() { cut -d . -f 1 /proc/uptime; } # a clock that nobody can set

@@ -26,6 +26,19 @@ def test_shellcheck_has_nothing_to_say():
     assert ran.returncode == 0, ran.stdout
 
 
+def test_a_lock_that_was_removed_while_it_was_waited_for_is_none(tmp_path):
+    """Otherwise, the next command locks a new file of the same name, and two are at work."""
+    body = f"PREFIX={tmp_path}; . {ROBOT / 'releases.sh'}; %s lock 0; flock -n {tmp_path}/.lock true || echo alone"
+    after_uninstall = 'flock() { rm -f "$PREFIX/.lock"; command flock "$@"; };'
+    held, removed = (
+        subprocess.run(["/bin/sh", "-c", body % each], capture_output=True, text=True, check=False)
+        for each in ("", after_uninstall)
+    )
+    assert (held.returncode, held.stdout) == (0, "alone\n")
+    assert (removed.returncode, removed.stdout) == (1, "")
+    assert str(tmp_path) in removed.stderr
+
+
 @pytest.fixture
 def units(tmp_path):
     """The units, for a release that is there."""
