@@ -39,7 +39,7 @@ from .scene.rooms import HELD_OUT_ROOMS, ROOMS, room_name
 
 _EXAMPLE = "camera.picture_width=1280"
 
-_EXAMPLES = ("cups", "cones", "soccer", "polyhaven")
+_EXAMPLES = ("cups", "cones", "soccer", "varied", "polyhaven")
 """Configurations in the folder of this module."""
 
 _EPILOG = """\

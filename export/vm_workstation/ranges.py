@@ -56,6 +56,12 @@ def _checked_whole_numbers(entry: Field[Any], value: Any) -> tuple[int, ...]:
     return tuple(numbers)
 
 
+def drawn(random: np.random.Generator, share: float) -> bool:
+    """Whether something happens that happens with this share. For a share of 0 no number is drawn, so all that follows
+    is the same as without the question."""
+    return share > 0.0 and random.random() < share
+
+
 def uniform(random: np.random.Generator, span: Range) -> float:
     """A number from a uniform distribution over the range."""
     return float(random.uniform(*span))

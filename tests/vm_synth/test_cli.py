@@ -29,7 +29,7 @@ def test_config_prints_a_configuration_that_vm_synth_reads(tmp_path, capsys):
     assert "no maps" in line
 
 
-@pytest.mark.parametrize("name", ["polyhaven.toml", "soccer"])
+@pytest.mark.parametrize("name", ["polyhaven.toml", "soccer", "varied"])
 def test_configurations_of_the_package_have_names_in_any_folder(name, tmp_path, monkeypatch, capsys):
     (tmp_path / "maps").mkdir()
     monkeypatch.chdir(tmp_path)

@@ -9,6 +9,7 @@ import numpy as np
 from vm_embedded.config.entries import check_entries, share
 from vm_workstation.ranges import log_uniform, range_of, some_of, uniform
 
+from .boxy_robot import boxy_robot
 from .carrier import CARRIERS, camera_carrier, carriers_for
 from .clutter import CLUTTER, FURNITURE
 from .distractors import DISTRACTORS
@@ -16,7 +17,13 @@ from .people import legs, person, shoes
 from .robots import fallen, humanoid, nao, wheeled_robot
 from .solids import Body, DrawBody
 
-ROBOTS: dict[str, DrawBody] = {"humanoid": humanoid, "nao": nao, "fallen": fallen, "wheeled": wheeled_robot}
+ROBOTS: dict[str, DrawBody] = {
+    "humanoid": humanoid,
+    "nao": nao,
+    "fallen": fallen,
+    "wheeled": wheeled_robot,
+    "boxy": boxy_robot,
+}
 """Robots by name; their size is the height."""
 
 PEOPLE: dict[str, DrawBody] = {"legs": legs, "person": person}
@@ -36,7 +43,11 @@ class BodyRanges:
     furniture_size: tuple[float, float] = range_of(0.6, 2.5, "longest side of large objects", "m", (0.1, 20.0))
     furniture_kinds: tuple[str, ...] = some_of(tuple(FURNITURE), "kinds of large objects")
     robot_height: tuple[float, float] = range_of(0.4, 1.6, "height of robots", "m", (0.1, 3.0))
-    robot_kinds: tuple[str, ...] = some_of(tuple(ROBOTS), "kinds of robots; a nao is always 0.58 m tall")
+    robot_kinds: tuple[str, ...] = some_of(
+        tuple(ROBOTS),
+        "kinds of robots; a nao is always 0.58 m tall, and boxy ones are large boxes on wheels",
+        ("humanoid", "nao", "fallen", "wheeled"),
+    )
     person_height: tuple[float, float] = range_of(1.5, 1.95, "height of people", "m", (0.5, 2.5))
     legs_share: float = share(0.7, "share of people with only their legs in the scene")
     distractor_radius: tuple[float, float] = range_of(
@@ -53,8 +64,14 @@ class BodyRanges:
 def draw_clutter(random: np.random.Generator, ranges: BodyRanges) -> list[Body]:
     """Draw a small object."""
     kind = _one(random, ranges.clutter_kinds)
-    size = uniform(random, ranges.shoe_length) if kind == "shoes" else log_uniform(random, ranges.clutter_size)
-    return KINDS[kind](random, size)
+    if kind == "shoes":
+        return draw_shoes(random, ranges)
+    return CLUTTER[kind](random, log_uniform(random, ranges.clutter_size))
+
+
+def draw_shoes(random: np.random.Generator, ranges: BodyRanges) -> list[Body]:
+    """Draw a shoe or a pair."""
+    return shoes(random, uniform(random, ranges.shoe_length))
 
 
 def draw_furniture(random: np.random.Generator, ranges: BodyRanges) -> list[Body]:

@@ -59,6 +59,30 @@ def cylinder(radius: float, height: float, segments: int = 16, top: float | None
     return lathe([(0.0, -half), (radius, -half), (upper, half), (0.0, half)], segments)
 
 
+def prism(corners: int, lower: float, upper: float, height: float) -> Solid:
+    """A closed upright prism or stump with flat sides, on z = 0; one side faces +x.
+
+    lower, upper: distances of the lower and the upper corners from the axis [m].
+    """
+    around = (np.arange(corners) + 0.5) * (2.0 * np.pi / corners)
+    circle = np.stack([np.cos(around), np.sin(around)], axis=1)
+    bottom, top = (
+        np.column_stack([radius * circle, np.full(corners, z)]) for radius, z in ((lower, 0.0), (upper, height))
+    )
+    quads = np.stack([np.roll(bottom, 1, axis=0), bottom, top, np.roll(top, 1, axis=0)], axis=1)
+    outward = np.cross(quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0])
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    ends = np.repeat([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]], corners, axis=0)
+    fan = np.stack([np.zeros(corners - 2), np.arange(1, corners - 1), np.arange(2, corners)], axis=1)
+    sides = np.array([[0, 1, 2], [0, 2, 3]])
+    triangles = [4 * corners + fan[:, ::-1], 5 * corners + fan, *(4 * side + sides for side in range(corners))]
+    return _solid(
+        np.concatenate([quads.reshape(-1, 3), bottom, top]),
+        np.concatenate([np.repeat(outward, 4, axis=0), ends]),
+        np.concatenate(triangles).astype(np.int32),
+    )
+
+
 def sphere(radius: float, segments: int = 16) -> Solid:
     """A sphere. Stretch it for an ellipsoid."""
     return lathe(arc(radius, -np.pi / 2.0, np.pi / 2.0, max(segments // 2, 4)), segments)

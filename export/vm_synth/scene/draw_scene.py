@@ -9,18 +9,21 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import RadialLens
-from vm_workstation.ranges import uniform
+from vm_workstation.ranges import drawn, uniform
 
 from ..bodies.solids import join_bodies
 from .camera import draw_lens, draw_orientation
 from .configuration import SceneConfiguration
 from .draw_table_scene import draw_table_scene
 from .environment import Environment
-from .field import Field, draw_field
+from .field import Field, draw_field, with_line_at
 from .own_object import NO_ASSETS, Assets
 from .placement import ATTEMPTS, NEAREST, Placement, draw_ball_at, in_picture, intersects_ball
 from .scene import Scene
 from .sensor import draw_sensor
+
+_BELOW = np.zeros(2)
+"""The point of the plane below the camera [m]."""
 
 
 def draw_scene(
@@ -35,7 +38,7 @@ def draw_scene(
     radius = uniform(random, ranges.ball.radius)
     missing = random.random() < ranges.ball.missing
     orientation, spot = _draw_camera_and_spot(random, ranges, lens, radius, floor)
-    field = None if photographed else _draw_field_around(random, ranges, np.zeros(2) if spot is None else spot, radius)
+    field = None if photographed else _draw_field_around(random, ranges, _BELOW if spot is None else spot, radius)
 
     ball = None if missing or spot is None else draw_ball_at(random, ranges, np.array([*spot, radius]), radius)
     placement = Placement(random, ranges, lens, orientation, field, floor)
@@ -43,6 +46,8 @@ def draw_scene(
         placement.keep_clear(ball.center[:2], radius)
         if random.random() < ranges.ball.hidden:
             placement.add_between(ball.center[:2], radius)
+        if drawn(random, ranges.ball.touched):
+            placement.add_touching(ball)
     other, label = placement.draw_other_ball(radius)
     if field is not None and random.random() < ranges.field.goals:
         placement.add_goals(field)
@@ -109,8 +114,11 @@ def _angular_radius(radius: float, distance: float, rise: float) -> float:
 
 def _draw_field_around(random: np.random.Generator, ranges: SceneConfiguration, spot: Floats, radius: float) -> Field:
     """Draw a field below the camera, with the spot (2,) [m] of the ball on its carpet if possible."""
+    at_line = drawn(random, ranges.ball.on_line)
     for _ in range(ATTEMPTS):
         field = draw_field(random, ranges.field)
-        if field.on_carpet(spot, 2.0 * radius):
+        if at_line:
+            field = with_line_at(random, field, spot, 0.5 * field.line_width + radius)
+        if field.on_carpet(spot, 2.0 * radius) and (field.on_carpet(_BELOW) or not at_line):
             break
     return field

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -80,6 +80,32 @@ class Field:
         """Whether a point (2,) [m] of the world is on the carpet, at least a margin [m] from its edge."""
         x, y = np.abs((spot - np.array(self.middle)) @ self.rotation) + margin
         return bool(x < self.length / 2.0 + self.border and y < self.width / 2.0 + self.border)
+
+
+def line_segments(length: float, width: float) -> Floats:
+    """The ends (n, 2, 2) [m] of the straight lines of a field, in its frame, with x along its length: outline, halfway
+    line, goal and penalty areas. Lengths are in meters, of the middles of the lines."""
+    x, y = length / 2.0, width / 2.0
+    segments = [((-x, -y), (x, -y)), ((x, -y), (x, y)), ((x, y), (-x, y)), ((-x, y), (-x, -y)), ((0.0, -y), (0.0, y))]
+    for depth, breadth in ((length / 9.0, width / 2.0), (length / 4.5, width / 1.2)):
+        for goal in (-x, x):
+            front, side = math.copysign(x - depth, goal), breadth / 2.0
+            segments += [((goal, -side), (front, -side)), ((front, -side), (front, side))]
+            segments.append(((front, side), (goal, side)))
+    return np.array(segments)
+
+
+def with_line_at(random: np.random.Generator, field: Field, spot: Floats, reach: float) -> Field:
+    """The field, moved so that the middle of one of its straight lines is at most `reach` [m] from a spot (2,) [m] of
+    the world."""
+    ends = line_segments(field.length, field.width)
+    along = ends[:, 1] - ends[:, 0]
+    lengths = np.hypot(*along.T)
+    chosen = int(random.choice(len(ends), p=lengths / lengths.sum()))
+    right = np.array([-along[chosen, 1], along[chosen, 0]]) / lengths[chosen]
+    place = ends[chosen, 0] + random.random() * along[chosen] + random.uniform(-reach, reach) * right
+    x, y = (spot - field.rotation @ place).tolist()
+    return replace(field, middle=(x, y))
 
 
 def draw_field(random: np.random.Generator, ranges: FieldRanges) -> Field:

@@ -14,7 +14,15 @@ from vm_embedded.geometry.radial_lenses import RadialLens
 from vm_workstation.ranges import log_uniform, uniform
 
 from ..balls.draw_design import draw_design
-from ..bodies.catalog import draw_carrier, draw_clutter, draw_distractor, draw_furniture, draw_person, draw_robot
+from ..bodies.catalog import (
+    draw_carrier,
+    draw_clutter,
+    draw_distractor,
+    draw_furniture,
+    draw_person,
+    draw_robot,
+    draw_shoes,
+)
 from ..bodies.clutter import pedestal
 from ..bodies.goals import goal
 from ..bodies.solids import Body
@@ -25,6 +33,12 @@ from .surface import Surface
 
 ATTEMPTS = 60
 NEAREST = 0.12  # [m], smallest distance on the plane between camera and objects
+
+_ASIDE = math.radians(110.0)
+"""Largest angle at the ball between the direction away from the camera and what touches the ball."""
+
+_TOUCH, _HALVINGS = 0.04, 4
+"""Step in which something approaches the ball [m], and how often the last step is halved."""
 
 
 def in_picture(lens: RadialLens, size: Size, rays: Floats, margin: float) -> Mask:
@@ -128,6 +142,33 @@ class Placement:
         along = random.uniform(0.5 * (near + far), far)
         aside = random.uniform(-1.0, 1.0) * (half + 0.8 * radius * along / distance)
         self._put(bodies, along * ahead + aside * np.array([-ahead[1], ahead[0]]), half)
+
+    def add_touching(self, ball: PlacedBall) -> None:
+        """Place a robot, a person or shoes so that they touch the ball, mostly from behind or from the side."""
+        random = self._random
+        draw = (draw_robot, draw_person, draw_shoes)[int(random.choice(3, p=[0.5, 0.3, 0.2]))]
+        turn = random.uniform(-math.pi, math.pi)
+        bodies = [each.moved(turn, (0.0, 0.0, 0.0)) for each in draw(random, self._ranges.bodies)]
+        half = _reach(bodies)
+        spot = ball.center[:2]
+        aside = math.atan2(spot[1], spot[0]) + random.uniform(-_ASIDE, _ASIDE)
+        away = np.array([math.cos(aside), math.sin(aside)])
+
+        def at(distance: float) -> list[Body]:
+            return [each.shifted((*(spot + distance * away), 0.0)) for each in bodies]
+
+        far = half + ball.radius
+        steps = np.arange(far, -0.5 * _TOUCH, -_TOUCH).tolist()
+        hit = next((each for each in steps if any(intersects_ball(one, ball) for one in at(each))), None)
+        if hit is None:  # the ball fits between the legs
+            return
+        low, high = hit, min(hit + _TOUCH, far)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if any(intersects_ball(one, ball) for one in at(middle)) else (low, middle)
+        if np.linalg.norm(spot + high * away) > NEAREST + half:
+            self.bodies += at(high)
+            self.keep_clear(spot + high * away, half)
 
     def draw_other_ball(self, radius: float) -> tuple[PlacedBall | None, str]:
         """Draw a ball of the same size above the plane, one of the wrong size on it, or None, and its class."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vm_embedded.config.entries import check_entries, share
-from vm_workstation.ranges import Range, log_uniform, range_of, some_of, uniform
+from vm_workstation.ranges import Range, drawn, log_uniform, range_of, some_of, uniform
 
 TONES = ("srgb", "gamma", "filmic")
 MOSAICS = ("RGGB", "BGGR", "GRBG", "GBRG")
@@ -26,6 +26,10 @@ class SensorRanges:
 
     exposure: tuple[float, float] = range_of(
         -2.6, 0.9, "exposure error; values near the middle are more likely", "EV", (-8.0, 8.0)
+    )
+    bright_share: float = share(0.0, "share of pictures that are overexposed")
+    bright: tuple[float, float] = range_of(
+        0.9, 2.4, "exposure error of these pictures; values near the middle are more likely", "EV", (-8.0, 8.0)
     )
     balance: tuple[float, float] = range_of(
         0.4, 1.0, "share of the light's color that white balance removes", "", (0.0, 1.0)
@@ -115,8 +119,9 @@ def draw_sensor(random: np.random.Generator, ranges: SensorRanges) -> Sensor:
     defocused, moved = random.random() < ranges.defocus_share, random.random() < ranges.motion_share
     mosaic, again = random.random() < ranges.mosaic_share, random.random() < ranges.again_share
     gains = ranges.cast if cast else ranges.gains
+    exposure = ranges.bright if drawn(random, ranges.bright_share) else ranges.exposure
     return Sensor(
-        exposure=_near_middle(random, ranges.exposure),
+        exposure=_near_middle(random, exposure),
         balance=uniform(random, ranges.balance),
         red=log_uniform(random, gains),
         blue=log_uniform(random, gains),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.arrays import Floats
+from vm_synth.scene.field import line_segments
 
 from ..scores.line_shapes import Lines
 
@@ -53,14 +54,8 @@ class FieldModel:
 
     def lines(self) -> Lines:
         """The middle lines: outline, halfway line, center circle, goal and penalty areas. Marks are not lines."""
-        x, y = self.length / 2.0, self.width / 2.0
-        segments = [((-x, -y), (x, -y)), ((x, -y), (x, y)), ((x, y), (-x, y)), ((-x, y), (-x, -y)), ((0, -y), (0, y))]
-        for depth, breadth in ((self.length / 9.0, self.width / 2.0), (self.length / 4.5, self.width / 1.2)):
-            for goal in (-x, x):
-                front, side = math.copysign(x - depth, goal), breadth / 2.0
-                segments += [((goal, -side), (front, -side)), ((front, -side), (front, side))]
-                segments.append(((front, side), (goal, side)))
-        return Lines(self.placed(np.array(segments)), [(np.array(self.middle), self.length / 12.0)])
+        segments = line_segments(self.length, self.width)
+        return Lines(self.placed(segments), [(np.array(self.middle), self.length / 12.0)])
 
     def carpet(self) -> Floats | None:
         """Corners (5, 2) [m] of the carpet, the first one twice; None without an edge."""

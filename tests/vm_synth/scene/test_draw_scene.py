@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from vm_synth.scene.camera import CameraRanges
-from vm_synth.scene.field import FieldRanges
+from vm_synth.scene.field import FieldRanges, line_segments
+from vm_workstation.ranges import drawn
 
-from .drawn import DEFAULT, FLOOR, balls, bare, scenes, under
+from .drawn import DEFAULT, FLOOR, balls, bare, bodies, scenes, under
 
 
 def seen_ray(scene):
@@ -162,3 +163,50 @@ def test_narrow_ranges_give_what_they_say():
 def test_the_camera_is_over_the_origin():
     for scene in scenes(5, bare()):
         np.testing.assert_array_equal(scene.camera, (0.0, 0.0, scene.orientation.height))
+
+
+def test_a_ball_lies_at_a_line_in_as_many_fields_as_configured():
+    for on_line, expected in ((1.0, 1.0), (0.5, 0.5)):
+        near = []
+        for scene in scenes(60, bare(on_line=on_line)):
+            spot = (scene.ball.center[:2] - np.array(scene.field.middle)) @ scene.field.rotation
+            aside = distances_to_lines(scene.field, spot)
+            near.append(aside.min() <= 0.5 * scene.field.line_width + scene.ball.radius + 1e-9)
+            assert scene.field.on_carpet(spot @ scene.field.rotation.T + np.array(scene.field.middle))
+        # With one in two, others lie there by chance.
+        assert expected - 0.15 < np.mean(near) <= min(1.0, expected + 0.3)
+
+
+def distances_to_lines(field, spot):
+    """Distances (n,) [m] of a spot (2,) of the field from its straight lines."""
+    start, end = line_segments(field.length, field.width).transpose(1, 0, 2)
+    along = end - start
+    share = np.clip(((spot - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    return np.linalg.norm(start + share[:, None] * along - spot, axis=1)
+
+
+def test_something_touches_the_ball_without_passing_through_it():
+    touched = 0
+    for scene in scenes(30, bare(touched=1.0, distance=(0.8, 3.0))):
+        gaps = [surface_distance(corners, scene.ball.center) - scene.ball.radius for _, _, corners in bodies(scene)]
+        if gaps:
+            touched += 1
+            assert -0.03 * scene.ball.radius < min(gaps) < 0.01
+    assert touched > 20  # of others, the ball is between the legs, or the camera too near
+
+
+def surface_distance(corners, point):
+    """Distance [m] of a point (3,) from densely sampled triangles (m, 3, 3)."""
+    weights = np.array([(i, j, 24 - i - j) for i in range(25) for j in range(25 - i)]) / 24.0
+    near = corners[np.linalg.norm(corners - point, axis=2).min(axis=1) < 0.5]
+    return float(np.linalg.norm(weights @ near - point, axis=2).min())
+
+
+def test_shares_of_zero_draw_nothing():
+    """Sets that were rendered before an entry existed can be rendered again."""
+    random = np.random.default_rng(1)
+    before = random.bit_generator.state
+    assert not drawn(random, 0.0)
+    assert random.bit_generator.state == before
+    assert drawn(random, 1.0)
+    assert random.bit_generator.state != before

@@ -29,6 +29,13 @@ def test_shares_switch_effects_off_and_leave_the_other_draws():
         assert plain == replace(sensor, defocus=0.0, motion=0.0, mosaic="", earlier_quality=0)
 
 
+def test_as_many_pictures_as_configured_are_overexposed():
+    ranges = SensorRanges(exposure=(-2.0, 0.0), bright_share=0.3, bright=(1.0, 2.0))
+    exposures = np.array([draw_sensor(np.random.default_rng(seed), ranges).exposure for seed in range(400)])
+    assert np.mean(exposures >= 1.0) == pytest.approx(0.3, abs=0.07)
+    assert ((exposures <= 0.0) | ((exposures >= 1.0) & (exposures <= 2.0))).all()
+
+
 @pytest.mark.parametrize(
     "entries",
     [
