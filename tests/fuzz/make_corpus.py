@@ -5,9 +5,11 @@ Inputs whose names begin with `found` were findings once; they stay as they are.
 
 from __future__ import annotations
 
+import gzip
 import io
 import json
 import re
+import tarfile
 import tempfile
 import zipfile
 from collections.abc import Mapping
@@ -21,6 +23,7 @@ from tests.named_models import GOOD
 from tests.vm_embedded.live.running import DEMO
 from tests.vm_export.checkpoints import checkpoint, manifest
 from tests.vm_export.looks import look_checkpoint
+from tests.vm_train.boxes.written import coco_table, voc_text
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.live.configuration import Configuration
@@ -29,6 +32,7 @@ from vm_export.export import export
 from vm_export.network_shape import NetworkShape
 from vm_train.learning.configuration import TrainConfiguration
 
+from .boxes import joined
 from .run import CORPORA
 
 _OPENCV = """%YAML:1.0
@@ -81,6 +85,8 @@ def main() -> None:
     manifest = {"release": "1.0-abc", "machine": "x86_64", "glibc": "2.28", "python": "cp311", "disk_mib": 16}
     sums = "".join(f"{number:064x}  {name}\n" for number, name in enumerate(("README.md", "etc/vm.toml")))
     _write("names", {f"name{number}": each for number, each in enumerate(_names())})
+    _write("shards", _shards())
+    _write("boxes", {name: joined(files) for name, files in _box_folders().items()})
     _write("bundle", {"manifest": json.dumps(manifest, indent=1).encode() + b"\n", "sums": sums.encode()})
 
 
@@ -132,6 +138,65 @@ def _whole_configurations() -> dict[str, bytes]:
     """All entries of both configurations, without their comments."""
     texts = {"all_vm": to_commented_toml(Configuration()), "all_train": to_commented_toml(TrainConfiguration())}
     return {name: re.sub(r"(?m)^#.*\n", "", text).encode() for name, text in texts.items()}
+
+
+def _shards() -> dict[str, bytes]:
+    """Archives of one picture, with each kind of header that names or sizes may have."""
+    random = np.random.default_rng(1)
+    image, mask = (random.integers(0, 256, (6, 8, channels), dtype=np.uint8) for channels in (3, 4))
+    lens = (DEMO / "lens0000000.yaml").read_bytes()
+    parts = {".jpg": image, ".mask.png": mask}
+    files = {suffix: cv2.imencode(suffix[-4:], each)[1].tobytes() for suffix, each in parts.items()} | {
+        ".lens.yaml": lens
+    }
+    sparse = {"GNU.sparse.major": "1", "GNU.sparse.minor": "0", "GNU.sparse.realsize": "200000000000"}
+    made = {
+        "ustar": _tar(files, tarfile.USTAR_FORMAT, "0"),
+        "pax": _tar(files, tarfile.PAX_FORMAT, "p" * 120, {"mtime": "1.5"}),
+        "gnu": _tar(files, tarfile.GNU_FORMAT, "g" * 120),
+        "sparse": _tar({".jpg": b"1\n0\n512\n".ljust(512, b"\0") + bytes(512)}, tarfile.PAX_FORMAT, "0", sparse),
+        "sparse_map": _tar(
+            {".jpg": bytes(8)}, tarfile.PAX_FORMAT, "0", {"GNU.sparse.map": "0,8", "GNU.sparse.size": "8"}
+        ),
+    }
+    return made | {"zipped": gzip.compress(made["ustar"], mtime=0)}
+
+
+def _tar(files: Mapping[str, bytes], kind: int, number: str, headers: Mapping[str, str] | None = None) -> bytes:
+    """An archive of files by suffix, with the end that it must have and no more."""
+    packed = io.BytesIO()
+    with tarfile.open(fileobj=packed, mode="w", format=kind) as tar:
+        for suffix, content in files.items():
+            entry = tarfile.TarInfo(f"a/{number}{suffix}")
+            entry.size, entry.pax_headers = len(content), dict(headers or {})
+            tar.addfile(entry, io.BytesIO(content))
+        end = tar.offset
+    return packed.getvalue()[: end + 1024]
+
+
+def _box_folders() -> dict[str, dict[str, bytes]]:
+    size = (16, 12)
+    boxes = [("ball", 2.0, 3.0, 6.0, 7.0), ("goal", 1.0, 1.0, 4.0, 9.0)]
+    labels = b"0 0.25 0.4 0.25 0.3\n1 0.2 0.4 0.2 0.6 0.9\n"
+    candidate = {"image": "a.jpg", "class": "ball", "box": [0.7, 0.7, 0.2, 0.2], "confidence": 0.2, "found": False}
+    answer = {"crop": "a.jpg ball", "answer": "yes", "image": "a.jpg", "class": "ball", "box": [0.7, 0.7, 0.2, 0.2]}
+    coco = coco_table({"a": boxes}, size)
+    turned = cv2.imencode(".jpg", np.zeros((12, 16, 3), np.uint8))[1].tobytes()
+    exif = b"Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0"
+    turned = turned[:2] + b"\xff\xe1" + (len(exif) + 2).to_bytes(2, "big") + exif + turned[2:]
+    return {
+        "yolo": {"classes.txt": b"ball\ngoal\n", "a.txt": labels},
+        "yolo_yaml": {"data.yaml": b"nc: 2\nnames: [ball, goal]\n", "a.txt": labels},
+        "voc": {"a.xml": voc_text("a.jpg", boxes, size).encode()},
+        "coco": {"all.json": json.dumps(coco).encode()},
+        "turned": {"a.jpg": turned, "a.xml": voc_text("a.jpg", boxes, size).encode()},
+        "label": {
+            "a.txt": labels,
+            "candidates.jsonl": json.dumps(candidate).encode() + b"\n",
+            "answers.jsonl": json.dumps(answer).encode() + b"\n",
+            "lensa.yaml": _TOML_LENS.encode(),
+        },
+    }
 
 
 def _pictures() -> dict[str, bytes]:

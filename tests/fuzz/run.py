@@ -21,7 +21,21 @@ from .shared_input import MOST_BYTES, SharedInput
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 CORPORA = Path(__file__).with_name("corpus")
-TARGETS = ("model", "lens", "toml", "poses", "picture", "mjpeg", "control", "web", "checkpoint", "bundle", "names")
+TARGETS = (
+    "model",
+    "lens",
+    "toml",
+    "poses",
+    "picture",
+    "mjpeg",
+    "control",
+    "web",
+    "checkpoint",
+    "bundle",
+    "names",
+    "shards",
+    "boxes",
+)
 
 _LONGEST_WORK, _LONGEST = 2.0, 20.0
 """Processor time of an input that counts as a hang, and time that does on a busy machine or if it sleeps [s]."""

@@ -10,7 +10,7 @@ import pytest
 from .inputs import Watch
 from .run import CHECKOUT, CORPORA, TARGETS, fuzz
 
-RUNS = {"model": 3000, "mjpeg": 1000, "checkpoint": 1500, "bundle": 12, "names": 200}
+RUNS = {"model": 3000, "mjpeg": 1000, "checkpoint": 1500, "bundle": 12, "names": 200, "shards": 4000, "boxes": 500}
 """Inputs of the slower targets, so that each takes about ten seconds."""
 
 
