@@ -33,7 +33,7 @@ from vm_embedded import __version__  # noqa: E402
 from vm_embedded.cameras.camera import CameraSettings  # noqa: E402
 from vm_embedded.config.toml_writer import to_commented_toml  # noqa: E402
 from vm_embedded.errors import InputError, VisualMeshError  # noqa: E402
-from vm_embedded.files import write_file  # noqa: E402
+from vm_embedded.files import atomic_folder, write_file  # noqa: E402
 from vm_embedded.live.configuration import Configuration, read_configuration  # noqa: E402
 from vm_embedded.network.bundled import DEFAULT, model_path  # noqa: E402
 from vm_embedded.network.model_file import read_model  # noqa: E402
@@ -122,19 +122,19 @@ def wheelhouse(target: Target, folder: Path) -> list[Path]:
     made = folder / target.name
     stamp, lock = made / "lock", hashlib.sha256(LOCK.read_bytes()).hexdigest()
     if not stamp.exists() or stamp.read_text() != lock:
-        shutil.rmtree(made, ignore_errors=True)
-        part = made.with_name(f".{target.name}.part")
-        shutil.rmtree(part, ignore_errors=True)
-        part.mkdir(parents=True)
+        if made.exists() and not stamp.exists():
+            raise InputError(f"{made} holds other files than this program's downloads: give another folder to --wheels")
         platforms = [word for each in target.platforms() for word in ("--platform", each)]
-        _pip(
-            f"a package of {LOCK.relative_to(TOP)} has no wheel for {target.name}, or can't be downloaded",
-            *["download", "--no-deps", "--require-hashes", "--only-binary=:all:", "--dest", part, *platforms],
-            *["--python-version", target.python[2] + "." + target.python[3:], "--implementation", "cp"],
-            *["--abi", target.python, "--abi", "abi3", "--abi", "none", "--requirement", LOCK],
-        )
-        (part / "lock").write_text(lock)
-        part.rename(made)
+        with atomic_folder(made) as part:
+            _pip(
+                f"a package of {LOCK.relative_to(TOP)} has no wheel for {target.name}, or can't be downloaded",
+                *["download", "--no-deps", "--require-hashes", "--only-binary=:all:", "--dest", part, *platforms],
+                *["--python-version", target.python[2] + "." + target.python[3:], "--implementation", "cp"],
+                *["--abi", target.python, "--abi", "abi3", "--abi", "none", "--requirement", LOCK],
+            )
+            (part / "lock").write_text(lock)
+            if stamp.exists():  # of an earlier list
+                shutil.rmtree(made)
     return sorted(made.glob("*.whl"))
 
 

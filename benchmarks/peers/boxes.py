@@ -109,7 +109,8 @@ def write_boxes(data: Path, out: Path) -> None:
                 continue
             picture, _, balls = read_truths(pictures[number], classes)
             link = out / "images" / part / f"{number}{pictures[number].image.suffix}"
-            link.unlink(missing_ok=True)
+            if link.is_symlink():
+                link.unlink()
             link.symlink_to(pictures[number].image.resolve())
             label.write_text("".join(line + "\n" for line in _lines(picture, balls)))
     (out / "data.yaml").write_text(

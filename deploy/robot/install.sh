@@ -112,8 +112,16 @@ check_folder() {
     folder=$PREFIX
     while [ ! -d "$folder" ]; do folder=$(dirname "$folder"); done
     [ -w "$folder" ] || fail "can't write $folder: run as root or choose another --prefix"
-    [ ! -e "$PREFIX/releases" ] || [ -e "$PREFIX/supervisor" ] ||
-        fail "$PREFIX/releases belongs to another program: choose another --prefix"
+    if [ -f "$PREFIX/supervisor" ]; then
+        uses_systemd || : # fails if another program wrote this file
+    else
+        for each in $OURS; do
+            if [ "$each" = left ] && [ -d "$PREFIX/left/bundle/etc" ]; then continue; fi # from uninstall.sh
+            if [ -e "$PREFIX/$each" ] || [ -L "$PREFIX/$each" ]; then
+                fail "$PREFIX/$each belongs to another program: choose another --prefix"
+            fi
+        done
+    fi
     free=$(df -Pk "$folder" | awk 'NR == 2 { print int($4 / 1024) }')
     needed=$(field disk_mib "$manifest")
     if same_packages; then needed=$OWN_MIB; fi
@@ -211,7 +219,12 @@ fi
 
 mkdir -p "$PREFIX" || fail "can't write $PREFIX"
 # Root's service and its rollback work only with files of root.
-if [ "$SUPERVISOR" = systemd ] && [ "$(stat -c %u "$PREFIX")" != 0 ]; then chown -R 0:0 "$PREFIX"; fi
+if [ "$SUPERVISOR" = systemd ] && [ "$(stat -c %u "$PREFIX")" != 0 ]; then
+    chown 0:0 "$PREFIX"
+    for each in $OURS; do
+        if [ -e "$PREFIX/$each" ]; then chown -R 0:0 "$PREFIX/$each"; fi
+    done
+fi
 lock 0
 [ -e "$PREFIX/supervisor" ] || write_file supervisor "$SUPERVISOR"
 mkdir -p "$PREFIX/releases"

@@ -11,8 +11,10 @@
 #   PREFIX/.bundle              a bundle that vm-deploy install has unpacked
 #   PREFIX/supervisor           systemd or none; marks the folder as ours
 #   PREFIX/run                  sockets of the detector, without systemd
+#   PREFIX/left                 what uninstall.sh keeps for the next install.sh
 # shellcheck shell=sh
 
+OURS="releases current previous trial model-signed supervisor run left vm-deploy" # in PREFIX; the rest is the user's
 UNITS=/etc/systemd/system
 RULES=/etc/udev/rules.d
 COMMAND=/usr/local/bin/vm-deploy

@@ -45,7 +45,7 @@ PREFIX=${PREFIX%/}
 
 lock 0
 if uses_systemd; then remove_service; fi
-if [ -d "$PREFIX/current/etc" ]; then
+if [ -e "$PREFIX/supervisor" ] && [ -d "$PREFIX/current/etc" ]; then
     rm -rf "$PREFIX/.left.new"
     mkdir -p "$PREFIX/.left.new/bundle"
     cp -rp "$PREFIX/current/etc" "$PREFIX/.left.new/etc"
@@ -53,8 +53,12 @@ if [ -d "$PREFIX/current/etc" ]; then
     rm -rf "$PREFIX/left"
     mv "$PREFIX/.left.new" "$PREFIX/left"
 fi
-rm -rf "$PREFIX/current" "$PREFIX/previous" "$PREFIX/trial" "$PREFIX/model-signed" "$PREFIX/.bundle" "$PREFIX/run" "$PREFIX/vm-deploy"
-if [ -e "$PREFIX/supervisor" ]; then rm -rf "$PREFIX/releases" "$PREFIX/supervisor"; fi
+if [ -e "$PREFIX/supervisor" ]; then # it goes last, because it says that the rest is ours
+    for each in $OURS .bundle; do
+        case $each in left | supervisor) ;; *) rm -rf "${PREFIX:?}/$each" ;; esac
+    done
+    rm -f "$PREFIX/supervisor"
+fi
 if [ -n "$PURGE" ]; then
     rm -rf "$PREFIX/left" "$PREFIX/.lock"
     rmdir "$PREFIX" 2>/dev/null || :
