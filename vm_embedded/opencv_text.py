@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -24,9 +25,15 @@ def opencv_path(path: Path) -> Iterator[str]:
 
     It is absolute, because FFmpeg takes "a:b.mp4" for a protocol. A name that is not UTF-8, or that has a %, for which
     a sequence of images may be read, is replaced by a descriptor: of its folder, or if the last part is such a name, of
-    the file itself, then without a suffix. Raises OSError for such a name if that does not exist.
+    the file itself, then without a suffix. Raises OSError for such a name if that does not exist, and for one that no
+    file can have.
     """
     name = os.path.abspath(path)  # noqa: PTH100 (Path.absolute raises an error in a folder that was removed)
+    try:
+        if b"\0" in os.fsencode(name):  # OpenCV would open the file of the name before it
+            raise ValueError("the name has a zero byte")
+    except ValueError as error:
+        raise OSError(errno.EINVAL, str(error), str(path)) from error
     if _is_plain(name):
         yield name
         return
@@ -67,7 +74,9 @@ def open_capture(source: int | str | Path, backend: int = cv2.CAP_ANY, options: 
 
 
 def check_address(source: str) -> None:
-    """Raise InputError for the address of a stream, or a pipeline, that is not UTF-8."""
+    """Raise InputError for the address of a stream, or a pipeline, that is not UTF-8 or has a zero byte."""
+    if "\0" in source:
+        raise InputError(f"the address of a camera can't have a zero byte, as in {source[:200]!r}")
     try:
         source.encode()
     except UnicodeEncodeError as error:

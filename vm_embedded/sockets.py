@@ -253,6 +253,8 @@ def checked_address(entry: Field[Any], value: object) -> str:
     """
     if not isinstance(value, str):
         raise InputError(f"{entry.name} must be a string, not {value!r}")
+    if "\0" in value:
+        raise InputError(f"{entry.name} can't have a zero byte, as in {value!r}")
     if value and not (value.startswith("unix:") and len(value) > len("unix:")):
         parse_address(value, entry.name, entry.metadata["example"])
     return value
@@ -276,7 +278,7 @@ def parse_address(text: str, name: str, example: str) -> tuple[str, int]:
     host = host.removeprefix("[").removesuffix("]")
     # Python refuses to read thousands of digits as a number.
     is_port = port.isascii() and port.isdigit() and len(port) < 6 and 0 < int(port) < 65536
-    if not (colon and host and "," not in host and is_port):
+    if not (colon and host and not {",", "\0"} & set(host) and is_port):
         raise InputError(f"{name} must be ADDRESS:PORT, as in {example}, with a port of at most 65535, not {text!r}")
     return host, int(port)
 

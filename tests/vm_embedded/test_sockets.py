@@ -17,6 +17,9 @@ import pytest
 from tests.programs import heed_permissions
 from vm_embedded import sockets
 from vm_embedded.errors import InputError, InUseError
+from vm_embedded.live.configuration import StatusSettings
+from vm_embedded.output.channels import OutputSettings
+from vm_embedded.poses.settings import PoseSettings
 from vm_embedded.sockets import Acceptor, UnixListener
 
 SPAWN = multiprocessing.get_context("spawn")
@@ -222,6 +225,23 @@ def test_a_link_to_a_folder_has_the_lock_of_the_folder(tmp_path):
         UnixListener(tmp_path / "folder" / "socket", "--option")
     listener.close()
     assert not list((tmp_path / "folder").iterdir())
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        lambda: StatusSettings(page="unix:/tmp/zero\0byte"),
+        lambda: StatusSettings(page="127.0.0.1\0:80"),
+        lambda: PoseSettings(source="unix:/tmp/zero\0byte"),
+        lambda: PoseSettings(source="udp:zero\0byte:80"),
+        lambda: OutputSettings(udp="127.0.0.1:80,zero\0byte:80"),
+    ],
+)
+def test_an_address_with_a_zero_byte_is_refused_with_its_entry(settings):
+    with pytest.raises(InputError) as caught:
+        settings()
+    assert any(name in str(caught.value) for name in ("page", "source", "udp"))
+    assert r"\x00" in str(caught.value)
 
 
 def test_connections_of_a_flood_are_accepted_with_pauses(tmp_path, monkeypatch):

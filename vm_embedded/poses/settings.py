@@ -31,7 +31,7 @@ def _checked_source(field: Field[Any], value: object) -> str:
             raise InputError(
                 f"{field.name} must be udp:ADDRESS:PORT, as in udp:{UDP_EXAMPLE}, not {value!r}"
             ) from error
-    elif not (value in ("fixed", "stdin", "tf") or (kind in ("unix", "topic") and rest)):
+    elif not (value in ("fixed", "stdin", "tf") or (kind in ("unix", "topic") and rest and "\0" not in rest)):
         raise InputError(
             f"{field.name} must be fixed, stdin, unix:PATH, udp:ADDRESS:PORT, or with ROS tf or topic:/NAME, "
             f"not {value!r}"
