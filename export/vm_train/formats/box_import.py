@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ import cv2
 
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_write, write_file
+from vm_embedded.files import read_bytes, write_file
 from vm_embedded.geometry.lens_files import read_lens_file
 
 from ..boxes.box import BoxedPicture
@@ -38,27 +37,39 @@ def import_boxes(
     """Write imageX, maskX.png and lensX.yaml of each frame that has a lens file with a pose.
 
     folder: that the frames are in. write_radius: also write sceneX.json with the objects' radius, for networks that are
-    trained on objects of many radii. Raises InputError if `out` is not empty or can't be written.
+    trained on objects of many radii. Raises InputError if `out` is not empty or can't be written. After an error or an
+    interrupt, nothing is left in `out`.
     """
     _prepare(out)
     numbers: list[str | None] = []
     misfits: list[str] = []
+    written: list[Path] = []
     labeled = 0
-    for picture in pictures:
-        lens = None if picture.lens is None else read_lens_file(picture.lens)
-        if picture.lens is None or lens is None or lens.orientation is None:
-            numbers.append(None)
-            continue
-        number = _number(picture.image.relative_to(folder), numbers)
-        mask, count, wrong = mask_of(picture, lens, rule)
-        write_file(out / f"mask{number}.png", cv2.imencode(".png", mask)[1].tobytes())
-        _copy(picture.lens, out / f"lens{number}.yaml")
-        if write_radius:
-            write_file(out / f"scene{number}.json", json.dumps({"ball_radius": rule.shape.radius}) + "\n")
-        _write_image(picture.image, out / f"image{number}")
-        numbers.append(number)
-        labeled += count
-        misfits += [f"{picture.image.relative_to(folder)}: {each}" for each in wrong]
+    try:
+        for picture in pictures:
+            lens = None if picture.lens is None else read_lens_file(picture.lens)
+            if picture.lens is None or lens is None or lens.orientation is None:
+                numbers.append(None)
+                continue
+            number = _number(picture.image.relative_to(folder), numbers)
+            mask, count, wrong = mask_of(picture, lens, rule)
+            contents = {
+                f"mask{number}.png": cv2.imencode(".png", mask)[1].tobytes(),
+                f"lens{number}.yaml": read_bytes(picture.lens),
+                f"image{number}{_suffix(picture.image)}": _image(picture.image),
+            }
+            if write_radius:
+                contents[f"scene{number}.json"] = (json.dumps({"ball_radius": rule.shape.radius}) + "\n").encode()
+            for name, content in contents.items():
+                written.append(out / name)
+                write_file(out / name, content)
+            numbers.append(number)
+            labeled += count
+            misfits += [f"{picture.image.relative_to(folder)}: {each}" for each in wrong]
+    except BaseException:  # also after Ctrl-C: so that the same command works again
+        for each in written:
+            each.unlink(missing_ok=True)
+        raise
     return ImportedBoxes(tuple(numbers), labeled, tuple(misfits))
 
 
@@ -81,14 +92,14 @@ def _number(path: Path, used: Sequence[str | None]) -> str:
     return number
 
 
-def _write_image(image: Path, to: Path) -> None:
-    """Copy an image without any change; convert it to PNG if vm-train does not read its format. Raises InputError."""
+def _suffix(image: Path) -> str:
+    """The suffix of an image's copy: .png for a format that vm-train does not read."""
+    suffix = image.suffix.lower()
+    return suffix if suffix in IMAGES else ".png"
+
+
+def _image(image: Path) -> bytes:
+    """An image without any change, or as PNG if vm-train does not read its format. Raises InputError."""
     if image.suffix.lower() in IMAGES:
-        _copy(image, to.with_name(to.name + image.suffix.lower()))
-        return
-    write_file(to.with_name(f"{to.name}.png"), cv2.imencode(".png", read_image(image))[1].tobytes())
-
-
-def _copy(path: Path, to: Path) -> None:
-    with atomic_write(to) as part:
-        shutil.copyfile(path, part)
+        return read_bytes(image)
+    return cv2.imencode(".png", read_image(image))[1].tobytes()

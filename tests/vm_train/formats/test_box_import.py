@@ -3,6 +3,7 @@
 import json
 import shutil
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -12,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.manifests import ball_manifest
+from tests.programs import limit_files, run_program
 from tests.vm_train.commands import run, run_module
 from tests.vm_train.drawn import CLASSES, RADIUS
 from tests.vm_train.formats.boxed import draw_frames, yolo_line
@@ -233,6 +235,18 @@ def test_with_more_classes_only_objects_are_labeled(frames, tmp_path):
 def test_a_number_has_no_sign_of_a_comment():
     assert _number(Path("clip #1/frame.0.jpg"), []) == "clip _1_frame_0"
     assert _number(Path("clip #1/frame.0.jpg"), ["clip _1_frame_0"]) == "clip _1_frame_0_"
+
+
+def test_an_import_that_ends_early_leaves_nothing_and_works_again(frames, configuration, tmp_path):
+    folder, out = frames[0], tmp_path / "out"
+    options = ("--names", "0=ball", "--config", configuration)
+    limit = partial(limit_files, max(each.stat().st_size for each in folder.iterdir()) - 1)
+    command = ("vm-train", "import-boxes", folder, out, *options)
+    done = run_program(*command, code=1, preexec_fn=limit)
+    assert "File too large" in done.stderr
+    assert not list(out.iterdir())
+    import_frames(folder, out, *options)
+    assert len(find_pictures(out)) == 40
 
 
 def test_what_is_missing_is_named(frames, configuration, tmp_path):

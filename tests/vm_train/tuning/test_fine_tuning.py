@@ -13,8 +13,10 @@ from vm_embedded.network.bundled import model_path
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
 from vm_export.look_weights import look_of
+from vm_train.boxes.read import read_boxes
 from vm_train.cli.train import main
 from vm_train.learning.log import read_log
+from vm_train.tuning.boxed_objects import split_by_recording
 
 from ..drawn import draw_set
 
@@ -188,6 +190,20 @@ def test_mistakes_are_told_in_one_line(complaint, frames, tmp_path):
     assert "leave out --glance" in complaint(*ball, *boxes, "--glance", "x.pt")
     assert "go with --boxes" in complaint(frames, *ball, "--names", "0=ball")
     assert "patience" in complaint(*ball, *boxes, "--names", "0=ball", "--set", "training.patiense=3")
+    assert not (tmp_path / "run").exists()
+
+
+def test_boxes_that_are_only_in_the_validation_leave_nothing(complaint, frames, tmp_path):
+    folder = tmp_path / "boxes"
+    shutil.copytree(frames, folder)
+    for each in folder.glob("*.txt"):
+        if each.name[0] != "b":
+            each.write_text("")
+    pictures = read_boxes(folder, None, {"0": "ball"}).pictures
+    splits = {seed: split_by_recording(pictures, 0.3, seed).validation for seed in range(99)}
+    seed = next(seed for seed, taken in splits.items() if pictures[int(taken[0])].image.name[0] == "b")
+    options = ("--names", "0=ball", "--set", f"data.split_seed={seed}", "--set", "data.validation=0.3")
+    assert "part for training, has no box" in complaint("--from", "ball-small", "--boxes", folder, *options)
     assert not (tmp_path / "run").exists()
 
 
