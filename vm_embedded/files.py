@@ -123,6 +123,37 @@ def real_path(path: Path) -> Path:
         raise OSError(errno.EINVAL, str(error), str(path)) from error
 
 
+@contextmanager
+def library_path(path: Path) -> Iterator[str]:
+    """A name by which a library that takes UTF-8 only, such as OpenCV, opens exactly the file `path`, in this block.
+
+    It is absolute, because FFmpeg takes "a:b.mp4" for a protocol. A name that is not UTF-8, or that has a %, for which
+    OpenCV may read a sequence of images, is replaced by a descriptor: of its folder, or if the last part is such a
+    name, of the file itself, then without a suffix. Raises OSError for such a name if that does not exist, and for one
+    that no file can have.
+    """
+    name = os.path.abspath(path)  # noqa: PTH100 (Path.absolute raises an error in a folder that was removed)
+    try:
+        if b"\0" in os.fsencode(name):  # libraries would open the file of the name before it
+            raise ValueError("the name has a zero byte")
+    except ValueError as error:
+        raise OSError(errno.EINVAL, str(error), str(path)) from error
+    if _is_plain(name):
+        yield name
+        return
+    folder, last = os.path.split(name)
+    opened = os.open(folder if _is_plain(last) else name, os.O_PATH)
+    try:
+        yield f"/proc/self/fd/{opened}/{last}" if _is_plain(last) else f"/proc/self/fd/{opened}"
+    finally:
+        os.close(opened)
+
+
+def _is_plain(name: str) -> bool:
+    """Whether libraries and the system mean the same file by a name."""
+    return "%" not in name and os.fsencode(name) == utf8(name).encode()
+
+
 def open_regular(path: Path) -> BinaryIO:
     """Open a regular file for reading.
 
@@ -147,14 +178,6 @@ def _check_regular(path: Path, mode: int) -> None:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if not stat.S_ISREG(mode):
         raise OSError(errno.EINVAL, "not a regular file", str(path))
-
-
-def is_open_pipe(path: Path) -> bool:
-    """Whether a path stands for a pipe of the shell, such as /dev/stdin after "|": unlike a named one, it has a writer.
-
-    Raises OSError.
-    """
-    return path.is_fifo() and not exists(real_path(path))
 
 
 def read_pieces(stream: IO[bytes], largest: int) -> bytes:

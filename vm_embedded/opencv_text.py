@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import errno
-import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 
 from .arrays import Image
 from .errors import InputError
+from .files import library_path
 
 _LONGEST = 200
 """Most characters that are drawn; a picture has no room for more."""
@@ -19,45 +17,11 @@ _LONGEST = 200
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
-@contextmanager
-def opencv_path(path: Path) -> Iterator[str]:
-    """A name by which OpenCV opens exactly the file `path`, in this block; after it, OpenCV has it open.
-
-    It is absolute, because FFmpeg takes "a:b.mp4" for a protocol. A name that is not UTF-8, or that has a %, for which
-    a sequence of images may be read, is replaced by a descriptor: of its folder, or if the last part is such a name, of
-    the file itself, then without a suffix. Raises OSError for such a name if that does not exist, and for one that no
-    file can have.
-    """
-    name = os.path.abspath(path)  # noqa: PTH100 (Path.absolute raises an error in a folder that was removed)
-    try:
-        if b"\0" in os.fsencode(name):  # OpenCV would open the file of the name before it
-            raise ValueError("the name has a zero byte")
-    except ValueError as error:
-        raise OSError(errno.EINVAL, str(error), str(path)) from error
-    if _is_plain(name):
-        yield name
-        return
-    folder, last = os.path.split(name)
-    opened = os.open(folder if _is_plain(last) else name, os.O_PATH)
-    try:
-        yield f"/proc/self/fd/{opened}/{last}" if _is_plain(last) else f"/proc/self/fd/{opened}"
-    finally:
-        os.close(opened)
-
-
-def _is_plain(name: str) -> bool:
-    """Whether OpenCV and the system mean the same file by a name."""
-    try:
-        return "%" not in name and os.fsencode(name) == name.encode()
-    except UnicodeEncodeError:
-        return False
-
-
 def open_capture(source: int | str | Path, backend: int = cv2.CAP_ANY, options: Sequence[int] = ()) -> cv2.VideoCapture:
     """A video file or device by its path, a stream by its address or pipeline (str), or a camera by its number.
 
     backend, options: as for cv2.VideoCapture, which may not be open afterwards. A path is never a sequence of images.
-    Raises InputError for an address that is not UTF-8, and OSError as `opencv_path` does.
+    Raises InputError for an address that is not UTF-8, and OSError as `library_path` does.
     """
     if isinstance(source, int):
         return cv2.VideoCapture(source, backend, options)
@@ -65,7 +29,7 @@ def open_capture(source: int | str | Path, backend: int = cv2.CAP_ANY, options: 
         check_address(source)
         return cv2.VideoCapture(source, backend, options)
     backends = [each for each in cv2.videoio_registry.getStreamBackends() if each != cv2.CAP_IMAGES]
-    with opencv_path(source) as name:
+    with library_path(source) as name:
         for each in backends if backend == cv2.CAP_ANY else [backend]:
             capture = cv2.VideoCapture(name, each, options)
             if capture.isOpened():
@@ -87,9 +51,9 @@ def open_writer(path: Path, codec: int, rate: float, size: tuple[int, int]) -> c
     """A video file to write, as for cv2.VideoWriter, which may not be open afterwards.
 
     The last part of `path` must be UTF-8 without a %, such as a name of `files.unused_name`: without its suffix, OpenCV
-    does not know the format. Raises OSError as `opencv_path` does.
+    does not know the format. Raises OSError as `library_path` does.
     """
-    with opencv_path(path) as name:
+    with library_path(path) as name:
         return cv2.VideoWriter(name, codec, rate, size)
 
 

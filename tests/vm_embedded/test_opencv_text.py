@@ -5,13 +5,14 @@ from pathlib import Path
 import pytest
 
 from vm_embedded.errors import InputError
-from vm_embedded.opencv_text import open_capture, opencv_path
+from vm_embedded.files import library_path
+from vm_embedded.opencv_text import open_capture
 
 
 @pytest.mark.parametrize("ending", ["\0x", "\ud800"])
 def test_a_name_that_no_file_can_have_is_an_error_and_not_another_file(tmp_path, ending):
     (tmp_path / "a.avi").touch()
-    for use in (lambda path: opencv_path(path).__enter__(), open_capture):
+    for use in (lambda path: library_path(path).__enter__(), open_capture):
         with pytest.raises(OSError, match=r"zero byte|surrogates"):
             use(Path(f"{tmp_path}/a.avi{ending}"))
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import Field, fields
 from typing import Any
 
+from ..errors import InputError
 from ..text import utf8
 
 _BARE = re.compile("[A-Za-z0-9_-]+")
@@ -50,7 +51,7 @@ def toml_key(name: str) -> str:
 
 
 def toml_value(value: Any) -> str:
-    """A text, number, boolean, list or table as TOML, in one line."""
+    """A text, number, boolean, list or table as TOML, in one line. Raises InputError for text that is not UTF-8."""
     if isinstance(value, Mapping):
         pairs = ", ".join(f"{toml_value(name)} = {toml_value(each)}" for name, each in value.items())
         return f"{{ {pairs} }}" if pairs else "{}"
@@ -59,5 +60,7 @@ def toml_value(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
-        return json.dumps(utf8(value), ensure_ascii=False).replace("\x7f", "\\u007f")
+        if utf8(value) != value:
+            raise InputError(f"TOML can't hold {value!r}, because it is not UTF-8: rename the file")
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return short if float(short := f"{value:g}") == value else repr(value)

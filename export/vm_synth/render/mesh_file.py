@@ -9,6 +9,7 @@ import numpy as np
 
 from vm_embedded.arrays import Indices, Singles
 from vm_embedded.errors import InputError, one_line
+from vm_embedded.files import library_path
 
 from ..bodies.solids import Solid, rotation
 from .mitsuba import load_mitsuba
@@ -29,7 +30,8 @@ def read_mesh(path: Path, up: str) -> Solid:
         raise InputError(f"there is no mesh {path}")
     mi = load_mitsuba()
     try:
-        loaded: Any = mi.load_dict({"type": path.suffix[1:].lower(), "filename": str(path.resolve())})
+        with library_path(path.resolve()) as name:
+            loaded: Any = mi.load_dict({"type": path.suffix[1:].lower(), "filename": name})
         values = mi.traverse(loaded)
         vertices = _rows(values["vertex_positions"], np.float32)
         triangles = _rows(values["faces"], np.int32)

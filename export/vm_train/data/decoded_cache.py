@@ -105,7 +105,7 @@ class DecodedCache:
         return self.folder / _FULL
 
     def _path(self, files: PictureFiles) -> Path:
-        name = quote(files.number, safe="")
+        name = quote(files.number, safe="", errors="surrogateescape")
         if len(name) > _LONGEST:
             name = hashlib.sha256(name.encode()).hexdigest()
         return self.folder / f"{name}.raw"

@@ -53,7 +53,7 @@ class GraphCache:
 
     def random(self, files: PictureFiles, view: int) -> np.random.Generator:
         """The random numbers of a picture's view, the same in every training."""
-        return np.random.default_rng([view, zlib.crc32(files.number.encode())])
+        return np.random.default_rng([view, zlib.crc32(files.number.encode("utf-8", "surrogateescape"))])
 
     def get(self, files: PictureFiles, view: int) -> LabeledGraph | None:
         """A view, or None if it is absent or older than its picture's files."""

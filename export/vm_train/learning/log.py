@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import read_bytes, write_file
+from vm_embedded.files import library_path, read_bytes, write_file
 
 
 class TrainingLog:
@@ -27,10 +28,11 @@ class TrainingLog:
         self._path = folder / "log.jsonl"
         if self._path.exists():
             _cut(self._path, training_round, step, validated)
-        self._round = training_round
+        self._round, self._open = training_round, ExitStack()
         try:
             self._file = self._path.open("a", encoding="utf-8")
-            self._board = SummaryWriter(str(folder / "tensorboard" / f"round{training_round}"), purge_step=step + 1)
+            name = self._open.enter_context(library_path(folder))  # until the end: it is opened again and again
+            self._board = SummaryWriter(f"{name}/tensorboard/round{training_round}", purge_step=step + 1)
         except OSError as error:
             raise InputError(f"can't write {self._path}: {error.strerror or error}") from error
 
@@ -53,6 +55,7 @@ class TrainingLog:
         if self._writes:
             self._file.close()
             self._board.close()
+            self._open.close()
 
 
 def _scalars(record: dict[str, Any], above: str = "") -> list[tuple[str, float]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections import Counter
 from collections.abc import Sequence
 
@@ -56,7 +55,8 @@ def split_by_recording(pictures: Sequence[BoxedPicture], validation: float, seed
     sizes = Counter(each.recording for each in pictures)
     chosen: set[str] = set()
     count, wanted = 0, validation * len(pictures)
-    for recording in sorted(sizes, key=lambda each: hashlib.sha256(os.fsencode(f"{seed}:{each}")).digest()):
+    order = {each: hashlib.sha256(f"{seed}:{each}".encode("utf-8", "surrogateescape")).digest() for each in sizes}
+    for recording in sorted(sizes, key=order.__getitem__):
         if count < wanted and count + sizes[recording] <= _SLACK * wanted:
             chosen.add(recording)
             count += sizes[recording]
