@@ -7,6 +7,8 @@ import sys
 import threading
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from vm_embedded.live.log import EventLog
 
@@ -23,6 +25,17 @@ def test_text_leaves_out_empty_fields_and_json_keeps_them():
     EventLog(file)("state", **fields)
     assert terminal.getvalue().endswith(" state: state ok, was starting, frames 0\n")
     assert fields.items() <= json.loads(file.getvalue()).items()
+
+
+@given(st.text(), st.text())
+def test_an_event_is_one_line_of_printable_text(event, text):
+    terminal, file = Terminal(), io.StringIO()
+    EventLog(terminal)(event, reason=text)
+    EventLog(file)(event, reason=text)
+    for written in (terminal.getvalue(), file.getvalue()):
+        assert written[-1:] == "\n"
+        assert written[:-1].isprintable()
+    assert json.loads(file.getvalue())["reason"] == text
 
 
 @pytest.fixture
