@@ -107,7 +107,13 @@ def _watched(target: str, folder: Path, corpus: Path, flags: list[str]) -> tuple
     shared_file, log = folder / "input", folder / "log"
     shared_file.unlink(missing_ok=True)
     shared = SharedInput(shared_file)
-    options = [f"-timeout={10**6}", "-rss_limit_mb=0", "-detect_leaks=0", "-print_final_stats=0"]
+    options = [
+        f"-timeout={10**6}",
+        "-rss_limit_mb=0",
+        f"-report_slow_units={10**6}",
+        "-detect_leaks=0",
+        "-print_final_stats=0",
+    ]
     dictionary = CORPORA / f"{target}.dict"
     options += [f"-dict={dictionary}"] if dictionary.exists() else []
     command = [sys.executable, "-m", "tests.fuzz.child", f"tests.fuzz.{target}", str(shared_file), str(corpus)]

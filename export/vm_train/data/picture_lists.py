@@ -18,7 +18,7 @@ def read_list(path: Path, numbers: Collection[str]) -> tuple[str, ...]:
     Raises InputError naming file and line for a picture that does not exist.
     """
     known = set(numbers)
-    lines = read_text(path, "list").splitlines()
+    lines = read_text(path, "list").split("\n")
     found: dict[str, None] = {}
     for line, text in enumerate(lines, start=1):
         name = text.partition("#")[0].strip()
