@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Image
 from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
-from ..files import exists, is_file, is_open_pipe, open_regular, read_bytes, read_text
+from ..files import exists, is_file, open_regular, read_bytes, read_text
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from ..opencv_text import open_capture
@@ -222,7 +222,7 @@ def _video(name: str, max_megapixels: float) -> Source:
     files = (Path(name),) if is_file(Path(name)) else ()
     number = camera_number(name)
     live = number is not None or Path(name).is_char_device()
-    if not live and not is_open_pipe(Path(name)):
+    if not live:
         open_regular(Path(name)).close()  # OpenCV does not say why it can't read a file, and waits for a pipe's writer
     capture = open_capture(Path(name) if number is None else number)
     if not capture.isOpened():

@@ -50,7 +50,7 @@ def description(folder: Path, number: int, what: str = "training") -> Iterator[d
             raise InputError(f"{path} was written by another release: begin the {what} again")
         yield content
     except OSError as error:
-        raise InputError(f"{folder} holds no training: {error.strerror or error}") from error
+        raise InputError(f"{folder} holds no training: can't read run.json: {error.strerror or error}") from error
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path} is damaged: {error}") from error
 
