@@ -11,7 +11,7 @@ import cv2
 
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.errors import InputError
-from vm_embedded.files import read_bytes, write_file
+from vm_embedded.files import atomic_folder, read_bytes
 from vm_embedded.geometry.lens_files import read_lens_file
 
 from ..boxes.box import BoxedPicture
@@ -37,15 +37,14 @@ def import_boxes(
     """Write imageX, maskX.png and lensX.yaml of each frame that has a lens file with a pose.
 
     folder: that the frames are in. write_radius: also write sceneX.json with the objects' radius, for networks that are
-    trained on objects of many radii. Raises InputError if `out` is not empty or can't be written. After an error or an
-    interrupt, nothing is left in `out`.
+    trained on objects of many radii. Raises InputError if `out` is not empty or can't be written; after an error
+    or an interrupt, it is as before.
     """
-    _prepare(out)
+    _check_new(out)
     numbers: list[str | None] = []
     misfits: list[str] = []
-    written: list[Path] = []
     labeled = 0
-    try:
+    with atomic_folder(out) as part:
         for picture in pictures:
             lens = None if picture.lens is None else read_lens_file(picture.lens)
             if picture.lens is None or lens is None or lens.orientation is None:
@@ -61,23 +60,17 @@ def import_boxes(
             if write_radius:
                 contents[f"scene{number}.json"] = (json.dumps({"ball_radius": rule.shape.radius}) + "\n").encode()
             for name, content in contents.items():
-                written.append(out / name)
-                write_file(out / name, content)
+                (part / name).write_bytes(content)
             numbers.append(number)
             labeled += count
             misfits += [f"{picture.image.relative_to(folder)}: {each}" for each in wrong]
-    except BaseException:  # also after Ctrl-C: so that the same command works again
-        for each in written:
-            each.unlink(missing_ok=True)
-        raise
     return ImportedBoxes(tuple(numbers), labeled, tuple(misfits))
 
 
-def _prepare(out: Path) -> None:
-    """Make the folder. Raises InputError if it holds anything."""
+def _check_new(out: Path) -> None:
+    """Raise InputError before long work if a folder can't be written, or holds anything."""
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        if any(out.iterdir()):
+        if out.exists() and any(out.iterdir()):
             raise InputError(f"{out} is not empty: give a new folder")
     except OSError as error:
         raise InputError(f"can't write to folder {out}: {error.strerror or error}") from error

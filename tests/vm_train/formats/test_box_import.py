@@ -33,7 +33,7 @@ from vm_train.cli.import_boxes import import_boxes_parser, run_import_boxes
 from vm_train.data.classes import Classes
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.object_truth import read_scene, true_objects
-from vm_train.formats.box_import import _number
+from vm_train.formats.box_import import _number, import_boxes
 from vm_train.formats.box_masks import MaskRule, mask_of
 from vm_workstation.outlines import sphere_outline
 
@@ -244,9 +244,24 @@ def test_an_import_that_ends_early_leaves_nothing_and_works_again(frames, config
     command = ("vm-train", "import-boxes", folder, out, *options)
     done = run_program(*command, code=1, preexec_fn=limit)
     assert "File too large" in done.stderr
-    assert not list(out.iterdir())
+    assert [each.name for each in tmp_path.iterdir()] == ["train.toml"]
     import_frames(folder, out, *options)
     assert len(find_pictures(out)) == 40
+
+
+def test_of_two_imports_into_one_folder_at_once_one_is_whole_and_the_other_an_error(frames, tmp_path):
+    """The second one runs while the first one reads its first frame."""
+    out, pictures = tmp_path / "out", read_boxes(frames[0], names={"0": "ball"}).pictures
+
+    class Meanwhile(tuple):
+        def __iter__(self):
+            import_boxes(pictures[:3], frames[0], out, RULE, write_radius=False)
+            return super().__iter__()
+
+    with pytest.raises(InputError):
+        import_boxes(Meanwhile(pictures[3:6]), frames[0], out, RULE, write_radius=False)
+    assert len(find_pictures(out)) == 3
+    assert [each.name for each in tmp_path.iterdir()] == ["out"]
 
 
 def test_what_is_missing_is_named(frames, configuration, tmp_path):
