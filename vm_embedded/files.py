@@ -98,10 +98,12 @@ def atomic_folder(path: Path) -> Iterator[Path]:
     """A new folder beside `path`, which gets the name `path` when the block ends without an error.
 
     An empty folder is replaced, and gives its mode to the new one; anything else of that name stays. Missing parent
-    folders are created. Raises InputError if the folder can't be written.
+    folders are created. Raises InputError if the folder can't be written, and for the current folder.
     """
     try:
         target = real_path(path)
+        if target.is_dir() and target.samefile("."):  # a shell would stay in the replaced one, which looks empty
+            raise OSError(errno.EBUSY, "this is the current folder: give the name of a new one")
         part = unused_name(target)
         part.mkdir(parents=True)
         try:

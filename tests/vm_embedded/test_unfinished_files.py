@@ -82,6 +82,13 @@ def test_an_empty_folder_is_replaced_and_keeps_its_mode_and_its_link(tmp_path):
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
 
 
+def test_the_current_folder_is_refused_because_a_shell_would_stay_in_the_replaced_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=r"can't write \.: .*current folder"), atomic_folder(Path()):
+        pytest.fail("the work began")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("fill", [lambda path: (path / "own").touch(), lambda path: (path.rmdir(), path.touch())])
 def test_what_has_the_name_of_a_folder_stays(tmp_path, fill):
     path = tmp_path / "folder"
