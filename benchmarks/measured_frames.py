@@ -111,12 +111,12 @@ def _cell(path: Path, center: Any, radius: float, color: tuple[int, int, int], t
     half = max(6.0 * radius, 30.0)
     scale = CELL / (2.0 * half)
     matrix = np.array([[scale, 0.0, CELL / 2 - scale * center[0]], [0.0, scale, CELL / 2 - scale * center[1]]])
-    cell = cv2.warpAffine(image, matrix, (CELL, CELL), flags=cv2.INTER_CUBIC)
+    cell = np.asarray(cv2.warpAffine(image, matrix, (CELL, CELL), flags=cv2.INTER_CUBIC), dtype=np.uint8)
     cv2.circle(cell, (CELL // 2, CELL // 2), round(scale * radius) + 3, color, 1, cv2.LINE_AA)
     for shade, thickness in ((0, 3), (255, 1)):
         for line, at in ((text, 16), (path.stem, CELL - 8)):
             draw_text(cell, line, (5, at), 0.45, (shade,) * 3, thickness)
-    return np.asarray(cell)
+    return cell
 
 
 def main() -> None:

@@ -17,6 +17,7 @@ from typing import Any
 
 from vm_embedded.errors import InputError
 from vm_embedded.live.http_server import is_numeric_host
+from vm_embedded.text import to_json
 
 from .answers import ANSWERS
 from .session import Session
@@ -116,7 +117,7 @@ class _Handler(BaseHTTPRequestHandler):
                 self._send_json({"crop": crop, "answer": answer})
 
     def _send_json(self, content: Any) -> None:
-        self._send(HTTPStatus.OK, "application/json", json.dumps(content, allow_nan=False).encode())
+        self._send(HTTPStatus.OK, "application/json", to_json(content, allow_nan=False).encode())
 
     def _refuse(self, status: HTTPStatus, reason: str) -> None:
         self._send(status, "text/plain; charset=utf-8", reason.encode(errors="replace") + b"\n")

@@ -1,0 +1,196 @@
+"""Programs as a user types them, on files whose names are not UTF-8, or mean something else to a library."""
+
+import json
+import os
+import shutil
+import subprocess
+
+import cv2
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+
+from tests.drawn_scenes import FOLDER, IMAGES, MODEL
+from tests.programs import BIN
+
+LENS = FOLDER / f"lens{IMAGES[0].stem.removeprefix('image')}.yaml"
+
+
+def run(program, *arguments, code=0, cwd, **more):
+    """Run a program with arguments in bytes, text or paths, and return what it printed as text."""
+    command = [os.fsencode(each) for each in (BIN / program, *arguments)]
+    done = subprocess.run(command, cwd=os.fsencode(cwd), capture_output=True, timeout=300, check=False, **more)
+    assert done.returncode == code, (done.returncode, done.stderr)
+    assert b"Traceback" not in done.stderr
+    return done.stdout.decode()
+
+
+def detect(*arguments, **more):
+    return run("vm-detect", "--model", MODEL, *arguments, **more)
+
+
+def lines(text):
+    """The lines of JSON; no text in them may be half a character."""
+    found = [json.loads(line) for line in text.splitlines()]
+    json.dumps(found, ensure_ascii=False).encode()
+    return found
+
+
+def film(path, folder, count=4):
+    """Write a film of the first drawn frame, in a folder whose name OpenCV takes, and move it to its path."""
+    plain = folder / "plain.avi"
+    writer = cv2.VideoWriter(str(plain), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (640, 512))
+    image = cv2.imread(str(IMAGES[0]))
+    for index in range(count):
+        image[:64, :64] = np.random.default_rng(index).integers(0, 256, (64, 64, 3))
+        writer.write(image)
+    writer.release()
+    plain.rename(path)
+
+
+def named(folder, name):
+    """The path of a name in bytes."""
+    return folder / os.fsdecode(name)
+
+
+@pytest.fixture
+def frames(tmp_path):
+    """A folder t?r with a drawn frame and its lens, whose names have a byte that is not UTF-8."""
+    folder = named(tmp_path, b"t\xfcr")
+    folder.mkdir()
+    shutil.copy(IMAGES[0], named(folder, b"image_b\xe4ll.jpg"))
+    shutil.copy(LENS, named(folder, b"lens_b\xe4ll.yaml"))
+    return folder
+
+
+def test_an_image_of_any_name_gives_a_line_with_its_name_escaped(tmp_path, frames):
+    for name, shown in ((b"b\xe4ll.jpg", "b\\udce4ll.jpg"), ("at 9.41\u202fAM.jpg".encode(), "at 9.41\u202fAM.jpg")):
+        shutil.copy(IMAGES[0], named(tmp_path, name))
+        shutil.copy(LENS, named(tmp_path, b"l\xe4ns.yaml"))
+        (line,) = lines(detect(name, "--lens", b"l\xe4ns.yaml", cwd=tmp_path))
+        assert line["source"] == shown
+        assert line["detections"]
+
+
+def test_every_file_that_is_saved_has_the_name_that_was_given(tmp_path, frames):
+    saved = {
+        "--save-overlay": b"o\xe4",
+        "--save-points": b"p\xe4",
+        "--save-boxes": b"b\xe4",
+        "--save-mcap": b"m\xe4.mcap",
+    }
+    saved["--save-video"] = b"v\xe4.mp4"
+    detect(b"t\xfcr", *(each for pair in saved.items() for each in pair), cwd=tmp_path)
+    assert {os.fsencode(each.name) for each in tmp_path.iterdir()} == {b"t\xfcr", *saved.values()}
+    for name in (
+        b"o\xe4/image_b\xe4ll.jpg",
+        b"p\xe4/image_b\xe4ll.npz",
+        b"b\xe4/image_b\xe4ll.jpg",
+        b"b\xe4/image_b\xe4ll.txt",
+    ):
+        assert named(tmp_path, name).stat().st_size, name
+    (line,) = lines(detect(b"v\xe4.mp4", "--lens", LENS, cwd=tmp_path))
+    assert line["source"] == "v\\udce4.mp4"
+    with AnyReader([named(tmp_path, b"m\xe4.mcap")]) as reader:
+        states = [each for each in reader.messages() if each[0].topic == "/diagnostics"]
+        state = reader.deserialize(states[0][2], states[0][0].msgtype).status[0]
+    assert state.hardware_id == "image_b\\udce4ll.jpg"
+
+
+def test_a_film_is_read_as_a_whole_from_a_folder_of_any_name(tmp_path, frames):
+    film(named(frames, b"-f\xef%d:lm.avi"), tmp_path)
+    command = ("--lens", LENS, "--save-video=-o.webm", "--", b"-f\xef%d:lm.avi")
+    assert len(lines(detect(*command, cwd=frames))) == 4
+    assert (frames / "-o.webm").stat().st_size
+
+
+def test_a_file_is_never_taken_for_a_sequence_of_images(tmp_path):
+    for name in ("s%d.jp2", "s1.jp2", "s2.jp2", "s3.jp2"):
+        cv2.imwrite(str(tmp_path / name), cv2.imread(str(IMAGES[0])))
+    assert len(lines(detect("s%d.jp2", "--lens", LENS, cwd=tmp_path))) == 1
+
+
+def test_a_terminal_of_ascii_gets_escapes(tmp_path):
+    shutil.copy(IMAGES[0], tmp_path / "Bälle.jpg")
+    for more in ({"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}, {"PYTHONIOENCODING": "ascii"}):
+        for name in ("Bälle.jpg".encode(), b"none\xe4.jpg"):
+            found = name.startswith(b"B")
+            printed = detect(name, "--lens", LENS, cwd=tmp_path, code=0 if found else 1, env=os.environ | more)
+            assert len(lines(printed)) == found
+
+
+@pytest.mark.parametrize(
+    "address",
+    [b"rtsp://127.0.0.1:1/b\xe4ll", b"http://127.0.0.1:1/b\xe4ll", b"http://u\xe4@127.0.0.1:1/", b"gstreamer:b\xe4ll"],
+)
+def test_an_address_that_is_not_utf_8_is_an_error_of_the_configuration(tmp_path, address):
+    detect("--camera", address, "--lens", LENS, cwd=tmp_path, code=78)
+
+
+def test_a_daemon_plays_files_of_any_name_and_writes_to_files_of_any_name(tmp_path):
+    film(named(tmp_path, b"f\xeflm.avi"), tmp_path, 8)
+    options = (
+        "--no-output-stdout",
+        "--output-file",
+        b"l\xefnes",
+        "--output-unix",
+        b"s\xf6cket",
+        "--recorder-folder",
+        b"r\xebc",
+    )
+    detect("--live", b"f\xeflm.avi", "--lens", LENS, "--height", "0.8", *options, cwd=tmp_path)
+    assert any(each.get("type") == "frame" for each in lines(named(tmp_path, b"l\xefnes").read_text()))
+
+
+def test_a_configuration_is_not_printed_with_another_name(tmp_path):
+    shutil.copy(LENS, named(tmp_path, b"l\xe4ns.yaml"))
+    assert detect("--print-config", "--lens", b"l\xe4ns.yaml", cwd=tmp_path, code=1) == ""
+
+
+def test_vm_doctor_shows_a_name_escaped(tmp_path, frames):
+    found = lines(run("vm-doctor", "--model", MODEL, "--camera", b"t\xfcr", "--json", cwd=tmp_path))
+    assert any("t\\udcfcr" in each["seen"] for each in found)
+
+
+def test_vm_calibrate_reads_a_film_of_any_name(tmp_path):
+    film(named(tmp_path, b"f\xeflm.avi"), tmp_path)
+    printed = run("vm-calibrate", "lens", b"f\xeflm.avi", "--board", "9x6", "-o", b"l\xe4ns.yaml", cwd=tmp_path, code=1)
+    assert printed == ""  # the film shows no board
+
+
+@pytest.fixture
+def boxes(tmp_path):
+    """A folder with a folder b? of boxes of the drawn frames, whose names are not UTF-8."""
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    for index, image in enumerate(IMAGES):
+        lens = image.with_name(f"lens{image.stem.removeprefix('image')}.yaml")
+        shutil.copy(image, named(folder, b"image_b\xe4%d.jpg" % index))
+        shutil.copy(lens, named(folder, b"lens_b\xe4%d.yaml" % index))
+    detect(folder, "--save-boxes", b"b\xe4", cwd=tmp_path)
+    return tmp_path
+
+
+@pytest.mark.long
+def test_boxes_of_any_name_become_pictures_shards_and_a_report(boxes):
+    checked = ("--json", b"j\xe4.json", "--sheet", b"s\xe4.png")
+    run("vm-train", "check", b"b\xe4", "--boxes", "--no-look", *checked, cwd=boxes)
+    (summary,) = lines(named(boxes, b"j\xe4.json").read_text().replace("\n", ""))
+    assert any("b\\udce4" in each for each in summary["recordings"])
+    run("vm-train", "import-boxes", b"b\xe4", b"d\xe4", cwd=boxes)
+    run("vm-train", "shards", b"d\xe4", b"s\xe4", cwd=boxes)
+    run("vm-train", "check", b"s\xe4", cwd=boxes)
+    run("vm-evaluate", MODEL, b"d\xe4", "-o", b"e\xe4", cwd=boxes)
+    (scores,) = lines(named(boxes, b"e\xe4/scores.json").read_text().replace("\n", ""))
+    assert scores["objects"]
+
+
+@pytest.mark.long
+def test_a_training_in_a_folder_of_any_name_ends_and_its_network_is_exported(boxes):
+    run("vm-train", "import-boxes", b"b\xe4", b"d\xe4", cwd=boxes)
+    split = ("--set", "data.validation=0.7", "--set", "data.test=0.0")
+    run("vm-train", b"d\xe4", "-o", b"r\xfcn", "--set", "training.epochs=1", *split, "--threads", "1", cwd=boxes)
+    assert list(named(boxes, b"r\xfcn/tensorboard/round1").iterdir())
+    run("vm-train", "resume", b"r\xfcn", cwd=boxes)
+    run("vm-export", b"r\xfcn/model.pt", "-o", b"m\xfc.onnx", cwd=boxes)
+    lines(run("vm-detect", "--model", b"m\xfc.onnx", IMAGES[0], "--lens", LENS, cwd=boxes))
