@@ -1,6 +1,8 @@
 """Names and texts that others wrote, and the messages that quote them."""
 
 import json
+import os
+import re
 import unicodedata
 
 import pytest
@@ -8,7 +10,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
-from vm_embedded.text import MOST_NAME, MOST_REMARK, name_fault, printable, printable_lines, text_fault
+from vm_embedded.files import write_file
+from vm_embedded.text import MOST_NAME, MOST_REMARK, name_fault, printable, printable_lines, text_fault, to_json, utf8
 
 from .strategies import class_names
 from .strategies import printable as characters
@@ -99,3 +102,30 @@ def test_a_message_is_a_line_of_limited_length_that_keeps_its_ends(text):
     assert said.endswith(" end")
     assert len(said) < 10 * 2100  # an escape has at most ten characters
     json.dumps(said, ensure_ascii=False).encode()
+
+
+some_text = st.text(st.characters()) | st.text(st.sampled_from('aé\\\ud83d\udc80\ud800\U0001f3c0"\n'))
+"""Text with half characters, too."""
+
+
+@given(some_text)
+@example("\\udce4 \udce4 \\\udce4")
+@example("\ud83d\udc80 \udc80\ud83d")
+def test_json_holds_the_same_text_without_half_characters(text):
+    def whole(pair):
+        return pair[0].encode("utf-16", "surrogatepass").decode("utf-16")
+
+    shown = to_json({text: [text]})
+    assert shown.isascii()
+    expected = utf8(re.sub("[\ud800-\udbff][\udc00-\udfff]", whole, text))
+    assert json.loads(shown) == {expected: [expected]}
+
+
+@given(st.binary(min_size=1, max_size=30))
+def test_bytes_of_a_name_that_are_not_utf_8_are_escaped_and_nothing_else_is(tmp_path_factory, name):
+    text = os.fsdecode(name)
+    expected = "".join(f"\\u{ord(each):04x}" if "\udc80" <= each <= "\udcff" else each for each in text)
+    assert utf8(text) == expected
+    path = tmp_path_factory.mktemp("text") / "file"
+    write_file(path, text)
+    assert path.read_bytes() == expected.encode()

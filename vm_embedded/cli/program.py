@@ -209,8 +209,7 @@ def program(main: Callable[P, int]) -> Callable[P, int]:
         except OSError as error:
             if error.filename is None and error.errno not in _LOST:
                 raise
-            if error.filename is None or error.errno == errno.ENOSPC:
-                discard_output()
+            _discard_lost(error)
             print(system_error(error), file=sys.stderr)
             return EXIT_FAILED
 
@@ -226,6 +225,7 @@ def run_or_complain(prog: str, run: Callable[[], int]) -> int:
     except BrokenPipeError:
         raise
     except OSError as error:  # for example a full disk behind standard output
+        _discard_lost(error)
         complain(prog, system_error(error))
     return EXIT_FAILED
 
@@ -239,6 +239,12 @@ def system_error(error: OSError) -> str:
     """The message for an error of the system that nothing else explains; without a path, it is of standard output."""
     doing = "use" if error.filename is not None and error.errno != errno.ENOSPC else "write"
     return f"can't {doing} {error.filename or 'standard output'}: {error.strerror or error}"
+
+
+def _discard_lost(error: OSError) -> None:
+    """Forget text that could not be written, so that the error is not raised and reported again."""
+    if error.errno == errno.ENOSPC or (error.filename is None and error.errno in _LOST):
+        discard_output()
 
 
 def discard_output() -> None:

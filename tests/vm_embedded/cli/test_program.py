@@ -1,5 +1,6 @@
 """What all programs share, as a user meets it: --version, mistyped options, and a reader that leaves."""
 
+import json
 import os
 import re
 import shlex
@@ -16,6 +17,7 @@ from vm_embedded.config.toml_reader import parse_toml
 
 TOP = Path(__file__).parents[3]
 BIN = Path(sys.executable).parent
+DEMO = TOP / "tests" / "fixtures" / "demo"
 PROGRAMS = sorted(parse_toml((TOP / "pyproject.toml").read_text())["project"]["scripts"])
 
 
@@ -176,6 +178,45 @@ def test_a_full_disk_is_one_line():
     assert done.stderr == "can't write standard output: No space left on device\n"
 
 
+IMAGE = f"vm-detect {DEMO / 'image0000002.jpg'}"
+CLOSED, READ_ONLY, FULL = ">&-", "</dev/null >&0", ">/dev/full"
+
+
+@pytest.mark.parametrize(
+    ("command", "stream", "unbuffered"),
+    [
+        *((IMAGE, stream, "") for stream in (CLOSED, READ_ONLY, FULL)),
+        *(("vm-train config", CLOSED, ""), ("vm-detect --version", FULL, "1"), ("vm-detect --version", READ_ONLY, "")),
+        *(
+            pytest.param(command, stream, "1", marks=pytest.mark.long)
+            for command in (
+                *(IMAGE, "vm-detect --completion", "vm-detect --print-config", "vm-mesh quality", "vm-doctor"),
+                *(f"{program} --help" for program in PROGRAMS),
+            )
+            for stream in (CLOSED, FULL)
+        ),
+    ],
+)
+def test_output_that_is_lost_is_a_failure_of_one_line(command, stream, unbuffered):
+    shell = ["sh", "-c", f"{BIN / command} {stream}"]
+    environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
+    done = subprocess.run(shell, stderr=subprocess.PIPE, text=True, timeout=120, check=False, env=environment)
+    assert (done.returncode, len(done.stderr.splitlines())) == (1, 1), done.stderr
+    assert "can't write standard output: " in done.stderr
+
+
+def test_without_standard_output_and_error_lost_output_is_still_a_failure():
+    done = subprocess.run(["sh", "-c", f"{BIN / 'vm-train'} config >&- 2>&- <&-"], timeout=120, check=False)
+    assert done.returncode == 1
+
+
+def test_a_daemon_that_writes_elsewhere_needs_no_standard_output(tmp_path):
+    shell = f"{BIN / 'vm-detect'} --live {DEMO} --no-output-stdout --output-file {tmp_path / 'lines'} >&-"
+    done = subprocess.run(["sh", "-c", shell], stderr=subprocess.PIPE, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert any(json.loads(line)["type"] == "frame" for line in (tmp_path / "lines").read_text().splitlines())
+
+
 @pytest.mark.parametrize("command", ["vm-detect none.jpg", "vm-bench --image none.jpg", "vm-train check none"])
 def test_errors_are_not_printed_on_standard_output(command):
     shell = ["sh", "-c", f"{BIN / command} 2>&-"]
@@ -188,6 +229,16 @@ def test_without_standard_error_no_other_file_takes_its_place():
     shell = ["sh", "-c", f"{sys.executable} -c {shlex.quote(code)} 2>&-"]
     done = subprocess.run(shell, stdout=subprocess.PIPE, timeout=120, check=False)
     assert int(done.stdout) > 2
+
+
+def test_without_standard_output_no_other_file_takes_its_place():
+    code = (
+        "import os, sys; from vm_embedded.cli.program import program; "
+        "print(program(lambda: os.open('/', os.O_RDONLY))(), file=sys.stderr)"
+    )
+    shell = ["sh", "-c", f"{sys.executable} -c {shlex.quote(code)} >&-"]
+    done = subprocess.run(shell, stderr=subprocess.PIPE, timeout=120, check=False)
+    assert int(done.stderr) > 2
 
 
 @pytest.mark.parametrize("command", ["vm-bench --image", "vm-train check --boxes", "vm-label"])

@@ -29,7 +29,9 @@ def ply(solid):
     return "\n".join([*head, *rows, *(f"3 {a} {b} {c}" for a, b, c in solid.triangles)]) + "\n"
 
 
-@pytest.mark.parametrize(("name", "text"), [("crate.obj", obj), ("crate.ply", ply), ("CRATE.OBJ", obj)])
+@pytest.mark.parametrize(
+    ("name", "text"), [("crate.obj", obj), ("crate.ply", ply), ("CRATE.OBJ", obj), ("cr\udce4te.ply", ply)]
+)
 def test_a_mesh_is_read_as_it_is(tmp_path, name, text):
     path = tmp_path / name
     path.write_text(text(SOLID))

@@ -1,6 +1,7 @@
 """Environment maps: where a direction is in them, how much light falls from them, and which files are refused."""
 
 import math
+import os
 import re
 
 import cv2
@@ -284,6 +285,13 @@ def test_a_damaged_map_is_refused_by_name(folder, kind, says):
     with pytest.raises(InputError, match=rf"map {re.escape(path.name)}: .*{says}") as caught:
         Environment.read(path, MapRanges())
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", [b"m\xe4p.hdr", b"m%03dp.hdr"])
+def test_a_map_of_any_name_is_read(folder, name):
+    path = folder / os.fsdecode(name)
+    written(folder, noisy()).rename(path)
+    assert Environment.read(path, MapRanges()).name == path.stem
 
 
 def test_an_unreadable_exr_says_what_may_be_missing(folder):
