@@ -17,21 +17,21 @@ _LONGEST = 200
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
-def open_capture(source: int | str | Path, backend: int = cv2.CAP_ANY, options: Sequence[int] = ()) -> cv2.VideoCapture:
+def open_capture(source: int | str | Path, backend: int = cv2.CAP_ANY, *options: Sequence[int]) -> cv2.VideoCapture:
     """A video file or device by its path, a stream by its address or pipeline (str), or a camera by its number.
 
     backend, options: as for cv2.VideoCapture, which may not be open afterwards. A path is never a sequence of images.
     Raises InputError for an address that is not UTF-8, and OSError as `library_path` does.
     """
     if isinstance(source, int):
-        return cv2.VideoCapture(source, backend, options)
+        return cv2.VideoCapture(source, backend, *options)
     if isinstance(source, str):
         check_address(source)
-        return cv2.VideoCapture(source, backend, options)
+        return cv2.VideoCapture(source, backend, *options)
     backends = [each for each in cv2.videoio_registry.getStreamBackends() if each != cv2.CAP_IMAGES]
     with library_path(source) as name:
         for each in backends if backend == cv2.CAP_ANY else [backend]:
-            capture = cv2.VideoCapture(name, each, options)
+            capture = cv2.VideoCapture(name, each, *options)
             if capture.isOpened():
                 break
     return capture
