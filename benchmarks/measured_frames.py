@@ -20,13 +20,13 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Image
+from vm_embedded.borders.opencv_text import draw_text
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.network.bundled import DEFAULT, model_path
-from vm_embedded.opencv_text import draw_text
 from vm_workstation.contact_sheet import write_sheet
 
 CELL = 240  # [px]

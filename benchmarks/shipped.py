@@ -16,13 +16,13 @@ from typing import Any
 import cv2
 import numpy as np
 
+from vm_embedded.borders.opencv_text import draw_text
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import GeometryError
 from vm_embedded.files import write_file
 from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
 from vm_embedded.network.model_file import read_model
-from vm_embedded.opencv_text import draw_text
 from vm_train.data.classes import Classes
 from vm_train.data.picture_files import PictureFiles
 from vm_train.data.pictures import find_pictures, read_picture

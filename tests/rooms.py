@@ -16,7 +16,7 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 ROOMS = {
     "vm_programs": "",
     "vm_embedded": "cli > live > output > cameras > detection > field > network > mesh > poses > geometry"
-    " > config > sockets+files+opencv_text+errors+text+arrays",
+    " > config > borders+files+errors+arrays",
     "vm_workstation": "",
     "vm_export": "",
     "vm_synth": "__main__ > cli > dataset > render > scene > balls, bodies",

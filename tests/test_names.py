@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from tests.looks import look_contract
 from tests.manifests import ball_manifest
+from tests.vm_embedded.borders.test_text import BAD_NAMES, GOOD_NAMES
 from tests.vm_embedded.strategies import attempt, class_names
-from tests.vm_embedded.test_text import BAD_NAMES, GOOD_NAMES
 from tests.vm_train.boxes.written import write_coco, write_image, write_voc
+from vm_embedded.borders.text import MOST_REMARK, name_fault
 from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_reader import parse_toml
 from vm_embedded.errors import InputError, ModelError
@@ -20,7 +21,6 @@ from vm_embedded.network.manifest import MOST_CLASSES, Manifest
 from vm_embedded.output.binary_form import HEADER, to_binary
 from vm_embedded.output.box_files import CANDIDATES, CLASSES
 from vm_embedded.output.messages import state_message
-from vm_embedded.text import MOST_REMARK, name_fault
 from vm_export.reference import named_class
 from vm_label.box_folder import read_box_folder
 from vm_label.training_boxes import write_training_boxes

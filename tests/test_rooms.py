@@ -165,7 +165,7 @@ def test_top_level_is_as_agreed():
 
 def test_the_runtime_is_a_short_list():
     entries = {path.name for path in (CHECKOUT / "vm_embedded").iterdir()} - {"__pycache__"}
-    assert 10 < len(entries) <= 20, sorted(entries)
+    assert 10 < len(entries) <= 18, sorted(entries)
 
 
 @pytest.fixture

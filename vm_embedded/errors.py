@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-from .text import printable
+from .borders.text import printable
 
 _MOST_START, _MOST_END = 1500, 500
 """Longest start and end of a message [characters]; what is between them is left out."""

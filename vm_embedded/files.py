@@ -17,8 +17,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, BinaryIO
 
+from .borders.text import utf8
 from .errors import InputError
-from .text import utf8
 
 LARGEST = 2**30
 """Most bytes of a file that is read as a whole, unless its reader allows fewer."""

@@ -18,11 +18,11 @@ import torch
 import yaml
 from torch import nn
 
+from vm_embedded.borders.text import name_fault, printable
 from vm_embedded.errors import InputError, VisualMeshError, one_line, unknown
 from vm_embedded.files import atomic_write, read_bytes
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.manifest import Manifest, ObjectClass
-from vm_embedded.text import name_fault, printable
 
 from .checkpoint import Checkpoint
 from .network import Dense, GraphConvolution, Network, SeparableConvolution

@@ -15,9 +15,9 @@ from pathlib import Path
 from socketserver import TCPServer
 from typing import Any
 
+from vm_embedded.borders.text import to_json
 from vm_embedded.errors import InputError
 from vm_embedded.live.http_server import is_numeric_host
-from vm_embedded.text import to_json
 
 from .answers import ANSWERS
 from .session import Session

@@ -11,13 +11,13 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from vm_embedded.borders.text import to_json
 from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError, VisualMeshError, unknown
 from vm_embedded.files import check_writable, write_file
-from vm_embedded.text import to_json
 from vm_workstation.contact_sheet import check_sheet_path, check_sheet_size, choose_indices, write_sheet
 from vm_workstation.option_types import add_set, at_least
 from vm_workstation.stopping import stoppable

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from vm_embedded.borders.text import name_fault
 from vm_embedded.errors import InputError
-from vm_embedded.text import name_fault
 
 
 def class_name(text: str) -> str:

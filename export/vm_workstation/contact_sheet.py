@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Image
+from vm_embedded.borders.opencv_text import draw_text, text_size
 from vm_embedded.errors import InputError
 from vm_embedded.files import write_file
-from vm_embedded.opencv_text import draw_text, text_size
 
 Color = tuple[int, int, int]
 """8-bit color in the order that a function's description gives."""

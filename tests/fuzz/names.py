@@ -17,6 +17,7 @@ import numpy as np
 
 from tests.manifests import ball_manifest
 from tests.vm_embedded.output.features import demo_frame
+from vm_embedded.borders.text import name_fault
 from vm_embedded.cameras.camera import Shot
 from vm_embedded.cli.terminal import printable_output
 from vm_embedded.config.toml_reader import parse_toml
@@ -24,7 +25,6 @@ from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.output.binary_form import HEADER, to_binary
 from vm_embedded.output.messages import live_message, to_json_line, to_ros
-from vm_embedded.text import name_fault
 from vm_export.reference import named_class
 from vm_label.box_folder import read_box_folder
 from vm_train.boxes.read import read_boxes

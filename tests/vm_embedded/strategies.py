@@ -5,11 +5,11 @@ import math
 import numpy as np
 from hypothesis import strategies as st
 
+from vm_embedded.borders.text import MOST_NAME
 from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from vm_embedded.mesh.mesh import Mesh
-from vm_embedded.text import MOST_NAME
 
 SIZE = (640, 480)
 RADIUS = 400.0

@@ -15,13 +15,13 @@ import cv2
 import numpy as np
 
 from ..arrays import Image
+from ..borders.opencv_text import open_capture
+from ..borders.text import utf8
 from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
 from ..files import exists, is_file, open_regular, read_bytes, read_text
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
-from ..opencv_text import open_capture
-from ..text import utf8
 from .camera import camera_number
 from .decoding import decode
 from .image_header import MAX_MEGAPIXELS

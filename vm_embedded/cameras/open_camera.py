@@ -7,9 +7,9 @@ from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
+from ..borders.opencv_text import check_address
 from ..errors import InputError, unknown
 from ..files import exists, is_file
-from ..opencv_text import check_address
 from .camera import Camera, CameraSettings, without_password
 from .fault import FaultCamera, Faults, FaultScript
 from .files import FileCamera

@@ -14,9 +14,9 @@ os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")
 import cv2
 import numpy as np
 
+from ..borders.opencv_text import open_capture
 from ..errors import InputError
 from ..files import exists
-from ..opencv_text import open_capture
 from .camera import EARLY, BrokenFrameError, CameraError, CameraSettings, Shot, camera_number, without_password
 from .decoding import decode_frame
 from .frame_clock import FrameClock

@@ -7,9 +7,9 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 
+from ..borders.text import to_json
 from ..cameras.library_messages import silence_opencv
 from ..errors import VisualMeshError
-from ..text import to_json
 from .checks import run_checks
 from .finding import BAD, Finding
 from .options import add_live, add_model, add_pose, add_settings, read_options

@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
+from ..borders.sockets import check_free, check_port, is_listening, socket_path
 from ..errors import InputError, InUseError, NetworkError
 from ..live.configuration import Configuration
 from ..live.control import control_path
 from ..output.recorder import RecorderSettings
-from ..sockets import check_free, check_port, is_listening, socket_path
 from .finding import BAD, GOOD, WARNING, Finding
 
 _OF_SERVICE = ("/run/vm-detect", "/var/lib/vm-detect")

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO, cast
 
-from ..text import printable_lines
+from ..borders.text import printable_lines
 
 
 class ClosedOutput(io.TextIOBase):

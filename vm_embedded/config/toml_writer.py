@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import Field, fields
 from typing import Any
 
+from ..borders.text import utf8
 from ..errors import InputError
-from ..text import utf8
 
 _BARE = re.compile("[A-Za-z0-9_-]+")
 

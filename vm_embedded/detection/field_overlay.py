@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 
 from ..arrays import Floats, Image
+from ..borders.opencv_text import draw_text, text_size
 from ..field.features import CenterCircle, FieldFeatures, Upright
-from ..opencv_text import draw_text, text_size
 from .labels import INK, Color, Labels
 from .prepared_view import PreparedView
 

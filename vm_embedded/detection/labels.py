@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Floats, Image, Mask
-from ..opencv_text import draw_text, text_size
+from ..borders.opencv_text import draw_text, text_size
 
 Color = tuple[int, int, int]
 """Blue, green, red."""

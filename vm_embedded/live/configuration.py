@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from ..borders.sockets import checked_address
 from ..cameras.camera import CameraSettings
 from ..cameras.ros.settings import RosSettings
 from ..config.entries import EntryError, check_entries, entry, file_name, number, switch
@@ -29,7 +30,6 @@ from ..network.model_file import ModelFile
 from ..output.channels import OutputSettings
 from ..output.recorder import CONFIGURATION, RecorderSettings
 from ..poses.settings import PoseSettings
-from ..sockets import checked_address
 from .deploy_settings import DeploySettings
 from .top_level_entries import (
     checked_fov,

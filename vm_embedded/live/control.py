@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
+from ..borders.sockets import Acceptor, Connections, UnixListener, socket_path
 from ..errors import InputError
-from ..sockets import Acceptor, Connections, UnixListener, socket_path
 
 NAME = "vm-detect.sock"
 

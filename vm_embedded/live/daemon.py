@@ -18,6 +18,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Protocol
 
+from ..borders.sockets import is_open_to_network
+from ..borders.text import to_json
 from ..cameras.camera import without_password
 from ..cameras.grabber import Grabber
 from ..cameras.open_camera import Opener
@@ -27,8 +29,6 @@ from ..output.channels import Channels
 from ..output.messages import Message, live_message, state_message
 from ..output.recorder import Moment, Recorder
 from ..poses.stream import PoseStream
-from ..sockets import is_open_to_network
-from ..text import to_json
 from .answering import Answer, Answerer
 from .bridge import Bridge
 from .configuration import Configuration, recording_files

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 import time
 
+from ..borders.text import printable
 from ..cameras.grabber import Grabber
 from ..output.channels import Channels
-from ..text import printable
 from .health import Health
 from .log import EventLog
 from .systemd import SystemdNotifier

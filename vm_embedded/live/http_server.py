@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from ipaddress import ip_address
 from urllib.parse import parse_qsl
 
+from ..borders.sockets import Acceptor, Connections, UnixListener, bound_sockets, cant_listen
 from ..errors import VisualMeshError
-from ..sockets import Acceptor, Connections, UnixListener, bound_sockets, cant_listen
 
 _TIMEOUT = 5.0
 """How long a browser may take to send its request, and to receive each part of the response [s]."""

@@ -9,8 +9,8 @@ import time
 from dataclasses import dataclass
 from typing import Any, TextIO
 
+from ..borders.text import printable, to_json
 from ..files import takes_more
-from ..text import printable, to_json
 
 _MOST_LINES, _PERIOD = 50, 10.0
 """Most lines about one kind of event in a period [s]."""

@@ -10,11 +10,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from ..borders.text import to_json
 from ..cameras.camera import without_password
 from ..errors import InputError
 from ..geometry.orientation import Orientation
 from ..output.messages import Message
-from ..text import to_json
 from .answering import Answer, Answerer
 from .control import REFUSED
 from .frame_views import FrameViews

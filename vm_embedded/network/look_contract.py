@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
+from ..borders.text import name_fault, text_fault
 from ..errors import ModelError
-from ..text import name_fault, text_fault
 from .look_test import LookTest
 
 LOOK_KEY = "visual_mesh_look"

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from types import UnionType
 
+from ..borders.text import name_fault
 from ..errors import GeometryError, InputError, ModelError, unknown
 from ..geometry.make_shape import SHAPES, make_shape
 from ..geometry.shape import Shape
@@ -18,7 +19,6 @@ from ..mesh.dilation import distinct_dilations
 from ..mesh.mesh import MeshModel
 from ..mesh.models import MESH_MODELS
 from ..mesh.walls import wall_counts
-from ..text import name_fault
 from .look_contract import LookContract, check_provenance
 from .self_test import SelfTest
 

@@ -12,9 +12,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from ..borders.sockets import (
+    MOST_CONNECTIONS,
+    Acceptor,
+    UnixListener,
+    checked_addresses,
+    datagram_socket,
+    parse_address,
+)
 from ..config.entries import check_entries, entry, file_name, number, one_of, switch, text_line
 from ..errors import InputError
-from ..sockets import MOST_CONNECTIONS, Acceptor, UnixListener, checked_addresses, datagram_socket, parse_address
 from .binary_form import to_binary
 from .file_channel import DescriptorChannel, FileChannel
 from .messages import Message, to_json_line, to_ros

@@ -10,10 +10,10 @@ from types import TracebackType
 import cv2
 
 from ..arrays import Image
+from ..borders.opencv_text import open_capture, open_writer
 from ..cameras.library_messages import library_messages
 from ..errors import InputError, unknown
 from ..files import check_writable, put_in_place, real_path, unused_name
-from ..opencv_text import open_capture, open_writer
 
 _CODECS = {".mp4": "mp4v", ".avi": "MJPG", ".webm": "VP80"}
 """FFmpeg's code of the codec for each suffix; OpenCV's wheels have these."""

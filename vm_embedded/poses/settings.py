@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import Field, dataclass
 from typing import Any
 
+from ..borders.sockets import parse_address
 from ..config.entries import check_entries, entry, number, one_of, switch
 from ..errors import InputError
-from ..sockets import parse_address
 
 CLOCKS = ("monotonic", "wall", "arrival")
 FRAMES = ("camera", "optical")

@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
+from ..borders.sockets import Acceptor, Connections, UnixListener, datagram_socket, parse_address
 from ..errors import InputError, VisualMeshError
 from ..geometry.orientation import Orientation
-from ..sockets import Acceptor, Connections, UnixListener, datagram_socket, parse_address
 from .buffer import PoseBuffer
 from .parsing import MAX_LINE_BYTES, parse_pose_line
 from .settings import UDP_EXAMPLE, PoseSettings

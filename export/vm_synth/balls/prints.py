@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Number, Singles
-from vm_embedded.opencv_text import draw_text, text_size
+from vm_embedded.borders.opencv_text import draw_text, text_size
 
 from .painting_sphere import PaintingSphere
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vm_embedded.arrays import Singles
+from vm_embedded.borders.text import MOST_NAME, name_fault
 from vm_embedded.config.entries import check_entries, file_name, number, one_of, share, text_line
 from vm_embedded.errors import InputError
-from vm_embedded.text import MOST_NAME, name_fault
 from vm_workstation.ranges import range_of
 
 from ..bodies.solids import Solid

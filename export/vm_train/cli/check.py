@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from vm_embedded.borders.text import to_json
 from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.files import check_writable, write_file
-from vm_embedded.text import to_json
 from vm_workstation.option_types import at_least
 from vm_workstation.shortened import shortened
 from vm_workstation.text_tables import aligned, summary

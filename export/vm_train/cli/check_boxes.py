@@ -10,6 +10,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from vm_embedded.borders.text import to_json
 from vm_embedded.cli.program import EXIT_OK
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.detection.settings import Settings
@@ -18,7 +19,6 @@ from vm_embedded.files import check_writable, write_file
 from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
-from vm_embedded.text import to_json
 from vm_workstation.contact_sheet import check_sheet_path, write_sheet
 from vm_workstation.option_types import at_least
 from vm_workstation.shortened import shortened

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import cv2
 
+from vm_embedded.borders.text import to_json
 from vm_embedded.errors import InputError
 from vm_embedded.files import check_not_input, exists, read_regular, write_file
-from vm_embedded.text import to_json
 from vm_workstation.plots import save_figure
 
 from .evaluation import Evaluation

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from vm_embedded.borders.text import name_fault
 from vm_embedded.config.toml_reader import parse_toml
 from vm_embedded.config.toml_writer import toml_key
 from vm_embedded.errors import InputError
 from vm_embedded.files import read_text
 from vm_embedded.network.manifest import KINDS, ObjectClass
-from vm_embedded.text import name_fault
 from vm_synth.dataset.files import CLASS_COLORS
 
 from ..data.classes import Classes, Color

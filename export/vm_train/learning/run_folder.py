@@ -20,12 +20,12 @@ import numpy.typing as npt
 
 from vm_embedded import __version__
 from vm_embedded.arrays import Floats
+from vm_embedded.borders.text import printable
 from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_embedded.files import read_bytes, write_file
 from vm_embedded.output.result_files import make_folder
-from vm_embedded.text import printable
 
 from ..data.split import read_split, write_split
 from ..graphs.loading import PictureGraphs

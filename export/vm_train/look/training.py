@@ -14,11 +14,11 @@ import torch
 
 from vm_embedded import __version__
 from vm_embedded.arrays import Image, Singles
+from vm_embedded.borders.text import printable
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
 from vm_embedded.files import write_file
 from vm_embedded.network.look_contract import LookContract
-from vm_embedded.text import printable
 from vm_export.eight_bits import round_kernels
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_network import LookNetwork

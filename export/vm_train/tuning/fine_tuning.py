@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from vm_embedded import __version__
+from vm_embedded.borders.text import printable
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.files import write_file
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
-from vm_embedded.text import printable
 from vm_export.attach_look import attached
 from vm_export.look_checkpoint import LookCheckpoint
 

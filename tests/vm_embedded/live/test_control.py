@@ -12,9 +12,9 @@ import pytest
 from tests.messages import read_message
 from tests.preloaded import run_preloaded
 from tests.vm_embedded.live.running import COMMAND, arguments, running
+from vm_embedded.borders.sockets import MOST_CONNECTIONS, private_folder
 from vm_embedded.errors import InputError
 from vm_embedded.live.control import ControlServer, ask, control_path
-from vm_embedded.sockets import MOST_CONNECTIONS, private_folder
 
 
 def test_a_socket_that_was_left_behind_is_replaced_and_one_in_use_is_not(tmp_path):

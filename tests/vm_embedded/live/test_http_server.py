@@ -9,9 +9,9 @@ import time
 import pytest
 
 from tests.vm_embedded.live.running import running
+from vm_embedded.borders.sockets import datagram_socket, is_open_to_network
 from vm_embedded.errors import InputError, NetworkError
 from vm_embedded.live.http_server import HttpServer, Response
-from vm_embedded.sockets import datagram_socket, is_open_to_network
 
 
 def test_a_busy_port_and_an_unknown_host_are_named_once():

@@ -16,7 +16,7 @@ from tests.fixtures.make_drawn import FOLDER
 from tests.named_models import GOOD, random_name, with_names
 from tests.vm_embedded.live.running import running
 from tests.vm_embedded.live.test_status_page import free_address
-from vm_embedded.text import name_fault, text_fault
+from vm_embedded.borders.text import name_fault, text_fault
 
 PARTS, MODELS = 2, 125
 """Models with four names each."""

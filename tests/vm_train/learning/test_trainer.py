@@ -132,7 +132,7 @@ def test_a_batch_without_points_changes_no_weights():
 @pytest.mark.parametrize("content", [b"no state", b""])
 def test_a_damaged_state_is_refused(content, tmp_path):
     (tmp_path / "state.pt").write_bytes(content)
-    with pytest.raises(InputError, match="can't resume: .*state.pt"):
+    with pytest.raises(InputError, match=r"can't resume: .*state\.pt"):
         read_state(tmp_path / "state.pt")
 
 

@@ -1,0 +1,1 @@
+"""The borders to the system and its libraries: sockets, text that others wrote, and OpenCV."""
