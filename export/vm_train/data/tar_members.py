@@ -13,6 +13,8 @@ from .picture_files import LARGEST_FILE
 _LARGEST_HEADERS = 2**16
 """Most bytes of the headers of one member: long names take a few hundred."""
 
+_MOST_ENDS = 8  # reads that give nothing
+
 DAMAGE = (tarfile.TarError, OSError, EOFError, ValueError, OverflowError, RecursionError)
 """What tarfile raises for a damaged archive."""
 
@@ -21,18 +23,21 @@ class TarSource(io.RawIOBase):
     """The bytes of an archive, for tarfile. It counts them and keeps the last 512 of them.
 
     Until `members` gives the first member, and between two members, only so many bytes can be read as headers may have:
-    tarfile itself reads as much as a header claims.
+    tarfile itself reads as much as a header claims. It also goes on reading after the end, until a size is reached.
     """
 
     def __init__(self, source: IO[bytes]) -> None:
-        self._source, self.count, self.last = source, 0, b""
+        self._source, self.count, self.last, self._ends = source, 0, b"", 0
         self.limit: int | None = _LARGEST_HEADERS
 
     def read(self, size: int = -1) -> bytes:
-        """The next bytes. Raises OSError beyond the limit."""
+        """The next bytes. Raises OSError beyond the limit, and EOFError if there were none again and again."""
         if self.limit is not None and not 0 <= size <= self.limit - self.count:
             raise OSError(errno.EFBIG, f"the headers of a member have more than {_LARGEST_HEADERS} bytes")
         data = self._source.read(size)
+        self._ends = 0 if data else self._ends + 1
+        if self._ends > _MOST_ENDS:
+            raise EOFError("it is cut short")
         self.count += len(data)
         self.last = (self.last + data)[-512:] if len(data) < 512 else data[-512:]
         return data
@@ -51,7 +56,7 @@ def members(tar: tarfile.TarFile, source: TarSource) -> Iterator[tarfile.TarInfo
     """The members of an archive. source: its fileobj. Raises one of DAMAGE."""
     place = -1
     while (member := tar.next()) is not None:
-        if tar.offset <= place:
+        if member.size < 0 or tar.offset <= place:
             raise tarfile.ReadError(f"the size of {member.name} leads back to an earlier member")
         place, source.limit = tar.offset, None
         tar.members.clear()  # they are no longer needed, and an archive may have millions
