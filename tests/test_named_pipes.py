@@ -101,7 +101,7 @@ def test_a_named_pipe_in_place_of_a_file_is_named_and_not_waited_for(row, folder
         program, *arguments = command.split()
         done = run_preloaded([BIN / program, *arguments], LEARNING, cwd=folder, timeout=60)
         assert path.name in done.stderr
-        assert "not a regular file" in done.stderr or "is a named pipe" in done.stderr
+        assert "not a regular file" in done.stderr
         assert "Traceback" not in done.stderr
     finally:
         path.unlink()

@@ -6,7 +6,6 @@ yes or no.
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter, defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from pathlib import Path
 
 from vm_embedded.cameras.image_files import lens_file_of
 from vm_embedded.errors import InputError
-from vm_embedded.files import atomic_folder, real_path
+from vm_embedded.files import atomic_folder, read_bytes, real_path
 from vm_embedded.output.box_files import CLASSES, yolo_line
 
 from .box_folder import BoxFolder
@@ -91,13 +90,14 @@ def _check_target(source: Path, target: Path) -> None:
 
 
 def _write_image(folder: BoxFolder, target: Path, image: str, crops: list[Crop]) -> None:
-    """Write an image with its boxes, its lens file if it has one, and the classes beside it. Raises OSError."""
+    """Write an image with its boxes, its lens file if it has one, and the classes beside it. Raises InputError or
+    OSError."""
     source, copy = folder.path / image, target / image
     copy.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(source, copy)
+    copy.write_bytes(read_bytes(source))
     lens = lens_file_of(source)
     if lens is not None:
-        shutil.copyfile(lens, copy.with_name(lens.name))
+        copy.with_name(lens.name).write_bytes(read_bytes(lens))
     numbers = {name: number for number, name in enumerate(folder.classes)}
     lines = [yolo_line(numbers[crop.class_name], crop.shares) for crop in crops]
     copy.with_suffix(".txt").write_text("".join(lines), encoding="utf-8")

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import write_file
+from vm_embedded.files import read_bytes, write_file
 
 from ..scene.configuration import SceneConfiguration
 from .files import FORMAT, SET, files_in, read_table
@@ -71,8 +71,8 @@ def read_plan(folder: Path) -> dict[str, Any]:
 
 
 def digest(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    """SHA-256 of a file, hexadecimal. Raises InputError."""
+    return hashlib.sha256(read_bytes(path)).hexdigest()
 
 
 def shard_of(indices: Sequence[int], number: int, count: int) -> list[int]:

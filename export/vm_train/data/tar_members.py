@@ -59,7 +59,7 @@ def members(tar: tarfile.TarFile, source: TarSource) -> Iterator[tarfile.TarInfo
         if member.size < 0 or tar.offset <= place:
             raise tarfile.ReadError(f"the size of {member.name} leads back to an earlier member")
         place, source.limit = tar.offset, None
-        tar.members.clear()  # they are no longer needed, and an archive may have millions
+        tar.members.clear()  # type: ignore[attr-defined]  # they are no longer needed, and an archive may have millions
         yield member
         source.limit = place + _LARGEST_HEADERS
     source.limit = None

@@ -69,7 +69,7 @@ def read_records(path: Path) -> Iterator[Record]:
     number = 0
     try:
         with open_regular(path) as file:
-            stream: IO[bytes] = gzip.GzipFile(fileobj=file) if _is_gzip(file) else file
+            stream: IO[bytes] = gzip.GzipFile(fileobj=file) if _is_gzip(file) else file  # type: ignore[assignment]
             while header := read_up_to(stream, _HEADER):
                 length = _length(path, number, header)
                 payload = read_up_to(stream, length)
