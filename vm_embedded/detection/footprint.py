@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats, frozen
+from ..arrays import Floats, Indices, frozen
 from ..geometry.lens import Lens
 from ..geometry.shape import Shape
+from ..mesh.mesh import PointGraph
 from ..network.manifest import Manifest
 
 BLOCK = 64
@@ -64,18 +65,30 @@ class Levels:
         return self.order.nbytes + self.places.nbytes
 
 
-def levels_for(manifest: Manifest, rays: Floats, height: float, lens: Lens) -> Levels:
-    """The levels of points with rays (n, 3). A network that samples single pixels takes all from the whole picture.
+def levels_for(manifest: Manifest, graph: PointGraph, height: float, lens: Lens) -> Levels:
+    """The levels of a graph's points. A network that samples single pixels takes all from the whole picture.
 
     height: of the camera that the mesh is made for [m]. lens: fitted to the image.
     """
     if manifest.sampling == "bilinear":
-        return uniform_levels(len(rays), 1.0)
-    return footprint_levels(rays, manifest.mesh_shape, height, manifest.intersections, lens.scale)
+        return uniform_levels(len(graph), 1.0)
+    shape, strips = manifest.mesh_shape, graph.strips
+    widths = footprint_widths(graph.rays, shape, height, manifest.intersections, lens.scale)
+    if strips is not None:
+        widths = _strip_widths(widths, strips)
+    return Levels.of(level_of(widths))
 
 
-def footprint_levels(rays: Floats, shape: Shape, height: float, intersections: float, scale: float) -> Levels:
-    """The levels of a mesh's points with rays (n, 3).
+def _strip_widths(widths: Floats, strips: Indices) -> Floats:
+    """For each point (n,) the mean width of the points in its strip (n,); those above the horizon have none."""
+    below = np.flatnonzero(widths > 0.0)
+    sums = np.bincount(strips[below] + 1, widths[below], minlength=int(strips.max(initial=-1)) + 2)
+    counts = np.bincount(strips[below] + 1, minlength=len(sums))
+    return np.asarray((sums / np.maximum(counts, 1))[strips + 1])
+
+
+def footprint_widths(rays: Floats, shape: Shape, height: float, intersections: float, scale: float) -> Floats:
+    """How wide (n,) [px] the areas are that a mesh's points with rays (n, 3) stand for; 0 above the horizon.
 
     The mesh is made for a shape seen from a height [m], with `intersections` rings k across an object. At an
     inclination phi the object's angular radius is r cos(phi) / (h - c), with c the height of its center. So rings are
@@ -83,14 +96,14 @@ def footprint_levels(rays: Floats, shape: Shape, height: float, intersections: f
     axis [px/rad].
     """
     widest = 2.0 * shape.radius * scale / (intersections * (height - shape.center_height))
-    return Levels.of(_level_of(widest * np.maximum(np.nan_to_num(-rays[:, 2]), 0.0)))
+    return np.asarray(widest * np.maximum(np.nan_to_num(-rays[:, 2]), 0.0))
 
 
 def uniform_levels(count: int, width: float) -> Levels:
     """The levels of `count` points that are all `width` apart [px]."""
-    return Levels.of(_level_of(np.full(count, width)))
+    return Levels.of(level_of(np.full(count, width)))
 
 
-def _level_of(width: Floats) -> npt.NDArray[np.integer]:
+def level_of(width: Floats) -> npt.NDArray[np.integer]:
     """The smallest picture whose pixels are at most `width` (n,) [px] wide."""
     return np.clip(np.floor(np.log2(np.maximum(width, 1.0))), 0, _MOST_HALVINGS).astype(np.int8)

@@ -33,13 +33,15 @@ class Layout(ABC):
     its points are the slots. All links lead to original points, never to copies.
 
     slots: (m,) point of each slot; n in gaps. places: (n,) slot of each point. original: (m,) True for the slots in
-    `places`, False for gaps and copies. rays: (m, 3) of the slots' points, NaN in gaps.
+    `places`, False for gaps and copies. rays: (m, 3) of the slots' points, NaN in gaps. strips: (m,) strip of each
+    slot, -1 in gaps; None for a mesh without strips.
     """
 
     slots: Indices
     places: Indices
     original: Mask
     rays: Floats
+    strips: Indices | None = None
 
     def __len__(self) -> int:
         return len(self.slots)
