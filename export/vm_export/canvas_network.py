@@ -60,6 +60,11 @@ class CanvasShape:
         return (self.depth, *(each for _, each in COARSER))
 
     @property
+    def summary(self) -> str:
+        """The shape in a few words."""
+        return f"depth {self.depth}, width {self.width}"
+
+    @property
     def operations(self) -> int:
         """Multiplications and additions for each cell, without activations."""
         widths, depths = self.widths, self.depths
