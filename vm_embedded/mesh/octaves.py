@@ -75,6 +75,7 @@ def _octave(phi: Floats, first: int, last: int, columns: float) -> _Strip:
     above = _ABOVE + (-(len(below) + last + 1 - first + _ABOVE) - GAP) % BLOCK
     step = phi[last] - phi[last - 1]
     rows = np.concatenate([below, phi[first : last + 1], phi[last] + step * np.arange(1, above + 1)])
+    rows = rows[rows < np.pi]  # beyond the zenith, a row would show again what another one shows, upside down
     column = np.arange(-half - _BESIDE, half + _BESIDE)
     row = np.arange(len(rows))
     cells = np.stack(np.meshgrid(column + half + _BESIDE, row), axis=-1).reshape(-1, 2)
