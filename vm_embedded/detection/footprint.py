@@ -14,10 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats, Indices, frozen
+from ..arrays import Floats, frozen
 from ..geometry.lens import Lens
 from ..geometry.shape import Shape
 from ..mesh.mesh import PointGraph
+from ..mesh.octaves import strip_rays
 from ..network.manifest import Manifest
 
 BLOCK = 64
@@ -72,19 +73,13 @@ def levels_for(manifest: Manifest, graph: PointGraph, height: float, lens: Lens)
     """
     if manifest.sampling == "bilinear":
         return uniform_levels(len(graph), 1.0)
-    shape, strips = manifest.mesh_shape, graph.strips
-    widths = footprint_widths(graph.rays, shape, height, manifest.intersections, lens.scale)
-    if strips is not None:
-        widths = _strip_widths(widths, strips)
-    return Levels.of(level_of(widths))
-
-
-def _strip_widths(widths: Floats, strips: Indices) -> Floats:
-    """For each point (n,) the mean width of the points in its strip (n,); those above the horizon have none."""
-    below = np.flatnonzero(widths > 0.0)
-    sums = np.bincount(strips[below] + 1, widths[below], minlength=int(strips.max(initial=-1)) + 2)
-    counts = np.bincount(strips[below] + 1, minlength=len(sums))
-    return np.asarray((sums / np.maximum(counts, 1))[strips + 1])
+    shape, k = manifest.mesh_shape, manifest.intersections
+    if graph.strips is None:
+        return Levels.of(level_of(footprint_widths(graph.rays, shape, height, k, lens.scale)))
+    # One width for each strip, whatever part of the strip is in the graph.
+    middle = strip_rays(shape, height, k, manifest.max_distance)
+    widths = np.append(footprint_widths(middle, shape, height, k, lens.scale), 0.0)  # the last is that of gaps, -1
+    return Levels.of(level_of(widths)[graph.strips])
 
 
 def footprint_widths(rays: Floats, shape: Shape, height: float, intersections: float, scale: float) -> Floats:

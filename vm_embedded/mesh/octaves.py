@@ -47,16 +47,32 @@ class Octaves(MeshModel):
     groups = row_groups(steps)
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
-        phi = inclinations(shape, height, intersections, max_distance)
-        columns = 2.0 * np.pi * intersections / shape.theta(np.arange(len(phi)) / intersections, height)
-        check_size(3.0 * float(columns.sum()))
-        strips, last = [], len(phi) - 1
-        while last > 0 and columns[last] > math.sqrt(2.0) * _NEAREST * intersections:
-            first = int(np.searchsorted(columns, max(0.5 * columns[last], _NEAREST * intersections), side="right"))
-            strips.append(_octave(phi, first, last, math.sqrt(columns[first] * columns[last])))
-            last = first - 1
-        strips.append(_foot(phi, last))
-        return _joined(strips, self.steps)
+        phi, columns, strips = _rings_of_strips(shape, height, intersections, max_distance)
+        made = [_octave(phi, first, last, math.sqrt(columns[first] * columns[last])) for first, last in strips[:-1]]
+        return _joined([*made, _foot(phi, strips[-1][1])], self.steps)
+
+
+def strip_rays(shape: Shape, height: float, intersections: float, max_distance: float) -> Floats:
+    """A ray (strips, 3) to the middle of each strip of this mesh, where points are as far apart as in its mean."""
+    phi, _, strips = _rings_of_strips(shape, height, intersections, max_distance)
+    cosines = np.array([np.cos(phi[first : last + 1]).mean() for first, last in strips])
+    return rays_from_polar(np.arccos(cosines), np.zeros(len(cosines)))
+
+
+def _rings_of_strips(
+    shape: Shape, height: float, intersections: float, max_distance: float
+) -> tuple[Floats, Floats, list[tuple[int, int]]]:
+    """The inclinations (rings,) of the rings and their columns around the camera (rings,); for each strip, the foot
+    last, its first and last ring. Raises GeometryError for too many points."""
+    phi = inclinations(shape, height, intersections, max_distance)
+    columns = 2.0 * np.pi * intersections / shape.theta(np.arange(len(phi)) / intersections, height)
+    check_size(3.0 * float(columns.sum()))
+    strips, last = [], len(phi) - 1
+    while last > 0 and columns[last] > math.sqrt(2.0) * _NEAREST * intersections:
+        first = int(np.searchsorted(columns, max(0.5 * columns[last], _NEAREST * intersections), side="right"))
+        strips.append((first, last))
+        last = first - 1
+    return phi, columns, [*strips, (0, last)]
 
 
 @dataclass(frozen=True, eq=False)
