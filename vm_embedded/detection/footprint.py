@@ -34,12 +34,13 @@ class Levels:
 
     order (p,): the points, those of the first picture first. The share of each picture is filled up to whole blocks:
     its last point is repeated. places (n,): where each point is in `order`. ends: for each picture, the number of
-    blocks up to the end of its share.
+    blocks up to the end of its share. halvings (n,): how often the picture of each point is halved.
     """
 
     order: npt.NDArray[np.intp]
     places: npt.NDArray[np.intp]
     ends: tuple[int, ...]
+    halvings: npt.NDArray[np.int8]
 
     @classmethod
     def of(cls, level: npt.NDArray[np.integer]) -> Levels:
@@ -50,7 +51,7 @@ class Levels:
         order = np.concatenate(filled)
         places = np.empty(len(level), dtype=np.intp)
         places[order] = np.arange(len(order))
-        return cls(frozen(order), frozen(places), tuple(blocks.tolist()))
+        return cls(frozen(order), frozen(places), tuple(blocks.tolist()), frozen(level.astype(np.int8)))
 
     def shares(self) -> Iterator[tuple[int, slice]]:
         """The pictures that color points: how often each was halved, and its blocks."""
@@ -63,7 +64,7 @@ class Levels:
     @property
     def nbytes(self) -> int:
         """Memory that it holds [bytes]."""
-        return self.order.nbytes + self.places.nbytes
+        return self.order.nbytes + self.places.nbytes + self.halvings.nbytes
 
 
 def levels_for(manifest: Manifest, graph: PointGraph, height: float, lens: Lens) -> Levels:

@@ -69,7 +69,7 @@ class CanvasLayout(WholeLayout):
         return {"points": points.reshape(1, 3, *self.shape), "shown": on_screen.reshape(1, 1, *self.shape)}
 
     def probabilities(self, output: Singles) -> Singles:
-        return output.reshape(len(output[0]), -1).T
+        return output.reshape(-1, len(self)).T
 
 
 def place_on_canvas(cells: Indices, core: Mask) -> tuple[tuple[Piece, ...], tuple[int, int], Indices]:

@@ -53,7 +53,8 @@ class Layout(ABC):
     @property
     def nbytes(self) -> int:
         """Size in memory [bytes]."""
-        return self.slots.nbytes + self.places.nbytes + self.original.nbytes + self.rays.nbytes
+        strips = 0 if self.strips is None else self.strips.nbytes
+        return self.slots.nbytes + self.places.nbytes + self.original.nbytes + self.rays.nbytes + strips
 
     @abstractmethod
     def answers(self, network: Run, colors: Singles, on_screen: Mask) -> Singles:
