@@ -90,12 +90,17 @@ def place_on_canvas(cells: Indices, core: Mask) -> tuple[tuple[Piece, ...], tupl
 
 
 def _boxes(cells: Indices, core: Mask) -> Iterator[tuple[Chosen, tuple[int, int], tuple[int, int]]]:
-    """The points of each strip with core points, and the lowest and highest column and row of their cells (n, 2)."""
+    """The points of each strip with core points, and the lowest and highest column and row of a box for their cells.
+
+    Left and top of a box are whole blocks away from those of the whole strip, so that a network halves the same cells
+    together whatever part of the strip is in view.
+    """
     strip = cells[:, 1] // STRIDE
     for number in np.flatnonzero(np.bincount(strip[core])).tolist():
         members = np.flatnonzero(strip == number)
         low, high = cells[members].min(axis=0).tolist(), cells[members].max(axis=0).tolist()
-        yield members, (low[0], low[1]), (high[0], high[1])
+        first, top = low[0] - low[0] % BLOCK, high[1] + (BLOCK - GAP - 1 - high[1]) % BLOCK
+        yield members, (first, low[1]), (high[0], top)
 
 
 def pack(sizes: Sequence[tuple[int, int]]) -> tuple[list[tuple[int, int]], tuple[int, int]]:

@@ -147,7 +147,8 @@ def levels_in(levels):
 
 
 def shown_of(layout, levels, turn, lens):
-    """Of each strip with answers on screen: cells, pixels, levels, and whether they are answered, of what is shown."""
+    """Of each strip with answers on screen, for what is shown: cells, their places in blocks, pixels, levels, and
+    whether they are answered."""
     shown, level, found = project(layout, turn, lens, SIZE), levels_in(levels), {}
     for piece in layout.pieces:
         box = np.arange(len(layout)).reshape(layout.shape)[piece.region]
@@ -156,16 +157,18 @@ def shown_of(layout, levels, turn, lens):
             row, column = np.nonzero(seen)
             inside = box[row, column]
             cells = np.stack([column - column.min(), row - row.min()], axis=1)
+            within = np.stack([column, row], axis=1) % BLOCK
             answered = layout.original[inside]
-            found[int(layout.strips[inside[0]])] = (cells, shown.pixels[inside], level[inside], answered)
+            found[int(layout.strips[inside[0]])] = (cells, within, shown.pixels[inside], level[inside], answered)
     return found
 
 
 @given(reals(-0.5, 0.5), reals(-0.5, 0.5), reals(0.2, 1.0), reals(0.02, 0.4), reals(150.0, 900.0))
 def test_a_bucket_shows_each_strip_as_the_whole_mesh_does(roll, pitch, tilt, step, focal_length):
-    """The same cells on screen beside each other, from the same places of the same copy of the picture.
+    """The same cells on screen, halved together, from the same places of the same copy of the picture.
 
-    Only where a strip lies on the canvas depends on the bucket, and so which cells are halved together.
+    Only where a strip lies on the canvas depends on the bucket. The network sees across gaps, and gaps are not the
+    edge of the canvas to it, so answers are nearly the same, not to the last digit as in other layouts.
     """
     lens = Equisolid(focal_length=focal_length, fov=2.2)
     middle = round(tilt / step) * step, 0.0
@@ -179,4 +182,4 @@ def test_a_bucket_shows_each_strip_as_the_whole_mesh_does(roll, pitch, tilt, ste
     for strip in theirs:
         for one, other in zip(ours[strip], theirs[strip], strict=True):
             np.testing.assert_array_equal(one, other)
-        assert len(np.unique(ours[strip][2])) == 1
+        assert len(np.unique(ours[strip][3])) == 1
