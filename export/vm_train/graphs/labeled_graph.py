@@ -24,15 +24,18 @@ from ..data.classes import Labels
 from ..data.pictures import Picture
 from .seen_points import seen_points
 
+CONTEXT = np.int8(-2)
+"""Label of a point in the margin of its mesh, which is no part of the answer."""
+
 
 @dataclass(frozen=True)
 class LabeledGraph:
     """n points of one picture, or of several joined.
 
     points (n + 1, 3): colors, RGB from 0 to 1; row n is the off-screen point. neighbors (n + 1, D N): rows of points,
-    as with_dilations gives them. labels (n,): positions of classes, -1 for unlabeled. distances (n,): along the plane,
-    from the camera to an object at the point [m]. pixels (n, 2): places of the points in their pictures, (x, y) [px].
-    cells (n, 2): columns and rows of points on strips (mesh octaves), which have no neighbors; else None.
+    as with_dilations gives them. labels (n,): positions of classes, -1 for unlabeled, or CONTEXT. distances (n,): along
+    the plane, from the camera to an object at the point [m]. pixels (n, 2): places of the points in their pictures,
+    (x, y) [px]. cells (n, 2): columns and rows of points on strips (mesh octaves), which have no neighbors; else None.
     """
 
     points: Singles
@@ -52,9 +55,8 @@ class LabeledGraph:
 
     @property
     def counted(self) -> Mask | None:
-        """The points (n,) whose colors count for the mean of the picture: those on strips that are no margin, which
-        have no label; None for all."""
-        return None if self.cells is None else self.labels >= 0
+        """The points (n,) whose colors count for the mean of the picture, all but those of context; None for all."""
+        return None if self.cells is None else self.labels != CONTEXT
 
     def part(self, kept: npt.NDArray[np.intp]) -> LabeledGraph:
         """The graph of the points `kept`, in that order. Links to other points lead to the off-screen point."""
@@ -71,15 +73,16 @@ class LabeledGraph:
 def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> LabeledGraph:
     """The graph of a picture for a network with this manifest. Raises GeometryError or InputError as seen_points."""
     shown = seen_points(picture.lens, picture.size, manifest, grid)
+    strips, margin = shown.graph.strips, shown.graph.margin
+    if strips is not None and margin is not None:  # as in a canvas, which leaves out strips of context only
+        shown = shown.only(np.isin(strips, strips[~margin])).visible
     x, y = np.rint(shown.pixels).astype(np.intp).T
     labels = picture.labels[y, x]
-    strips = shown.graph.strips
-    if strips is None:
+    if shown.graph.margin is None:
         neighbors, cells = with_dilations(shown.graph.neighbors, manifest.model.groups, manifest.dilations), None
     else:
-        assert shown.graph.margin is not None
         neighbors, cells = np.zeros((len(shown) + 1, 0), dtype=np.int32), shown.graph.cells
-        labels = np.where(shown.graph.margin, np.int8(-1), labels)
+        labels = np.where(shown.graph.margin, CONTEXT, labels)
     points = np.full((len(shown) + 1, 3), OFF_SCREEN, dtype=np.float32)
     distances = plane_distances(shown.graph.rays, picture.orientation.height)
     graph = LabeledGraph(points, neighbors, labels, distances, shown.pixels, cells)

@@ -132,8 +132,6 @@ class TrainConfiguration:
         for name in ("activation", "kind", "dilations"):
             if getattr(network, name) != getattr(usual, name):
                 raise InputError(f"{name} of [network] has no effect for mesh octaves; remove the entry")
-        if self.mesh.grid != "visual":
-            raise InputError("grid of [mesh] must be visual for mesh octaves")
         CanvasShape(network.depth, network.width, len(self.classes.colors))
 
     @property
