@@ -13,8 +13,8 @@ from ..mesh.mesh import STRIDE, Mesh
 from ..mesh.octaves import BLOCK, GAP
 from .layout import Feeds, WholeLayout, rays_in
 
-SMALLEST = BLOCK
-"""Rows and columns of the smallest canvas: networks halve it three times."""
+SMALLEST = 2 * BLOCK
+"""Rows and columns of the smallest canvas: networks halve it three times, and training needs several cells then."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def pack(sizes: Sequence[tuple[int, int]]) -> tuple[list[tuple[int, int]], tuple
     room; of several widths of the canvas, the one with the smallest area is taken. All places are multiples of BLOCK,
     and at least GAP cells are between two boxes.
     """
-    widest = max((columns for _, columns in sizes), default=SMALLEST)
+    widest = max([SMALLEST, *(columns for _, columns in sizes)])
     widths = range(_blocks(widest), 2 * _blocks(widest) + BLOCK, BLOCK)
     return min((_on_shelves(sizes, width) for width in widths), key=lambda found: found[1][0] * found[1][1])
 
@@ -129,7 +129,7 @@ def _on_shelves(sizes: Sequence[tuple[int, int]], width: int) -> tuple[list[tupl
             end += _blocks(rows + GAP)
         places[number] = shelf[0], shelf[2]
         shelf[2] += _blocks(columns + GAP)
-    bottom = max((row + rows for (row, _), (rows, _) in zip(places, sizes, strict=True)), default=SMALLEST)
+    bottom = max([SMALLEST, *(row + rows for (row, _), (rows, _) in zip(places, sizes, strict=True))])
     return places, (_blocks(bottom), width)
 
 

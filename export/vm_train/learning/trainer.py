@@ -110,7 +110,7 @@ class Trainer:
         return StepResult(self.done, mean, int(sum_over_processes(torch.tensor(part.points))), rate)
 
     def _batch_loss(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> _BatchLoss:
-        if not graphs:  # a small batch may leave this process nothing
+        if not any(map(len, graphs)):  # a small batch may leave this process nothing, and a camera may see nothing
             if self._graders:  # the other processes wait for its part of the sum in _chance_factors
                 sum_over_processes(torch.zeros((2, self.network.shape.classes), dtype=torch.float64))
             return _BatchLoss(torch.zeros(()), 0.0, 0)

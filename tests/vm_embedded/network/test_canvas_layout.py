@@ -15,7 +15,7 @@ from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import build_mesh, mesh_model
 from vm_embedded.mesh.octaves import BLOCK, GAP
-from vm_embedded.network.canvas_layout import CanvasLayout, pack
+from vm_embedded.network.canvas_layout import SMALLEST, CanvasLayout, pack
 from vm_embedded.network.choose_layout import choose_layout
 
 from ..strategies import SIZE, reals, seeds
@@ -56,7 +56,8 @@ def test_a_canvas_is_not_much_larger_than_its_boxes(sizes):
 
 
 def test_without_boxes_a_canvas_can_still_be_halved_three_times():
-    assert pack([]) == ([], (BLOCK, BLOCK))
+    assert pack([]) == ([], (SMALLEST, SMALLEST))
+    assert SMALLEST % BLOCK == 0
 
 
 @st.composite
