@@ -33,8 +33,8 @@ def canvas_model(network: CanvasNetwork, manifest: Manifest) -> bytes:
     stem = writer.convolve("stem", canvas, *_folded(network.stem, network.stem_norm))
     x = graph.node("Relu", [stem], "stem.out")
     finer = []
-    for level, blocks in enumerate(network.down):
-        for number, block in enumerate(blocks):  # type: ignore[arg-type]
+    for level, blocks in enumerate(network.blocks):
+        for number, block in enumerate(blocks):
             x = writer.separable(f"down{level}.{number}", x, block)
         if level < len(network.halve):
             finer.append(x)
@@ -43,6 +43,7 @@ def canvas_model(network: CanvasNetwork, manifest: Manifest) -> bytes:
     nearest = {"mode": "nearest", "coordinate_transformation_mode": "asymmetric", "nearest_mode": "floor"}
     for level in reversed(range(len(finer))):
         lift = network.lift[level]
+        assert isinstance(lift, nn.Conv2d)
         lifted = writer.convolve(f"lift{level}", x, _array(lift.weight), _array(lift.bias))
         larger = graph.node("Resize", [lifted, "", scales], f"lift{level}.larger", **nearest)
         both = graph.node("Add", [finer[level], larger], f"lift{level}.both")
@@ -88,8 +89,8 @@ def read_canvas(constants: Mapping[str, Singles]) -> CanvasNetwork:
 
     load("stem", network.stem, network.stem_norm)
     load("head", network.head)
-    for level, blocks in enumerate(network.down):
-        for number, block in enumerate(blocks):  # type: ignore[arg-type]
+    for level, blocks in enumerate(network.blocks):
+        for number, block in enumerate(blocks):
             load_block(f"down{level}.{number}", block)
     for level, (halve, lift, up) in enumerate(zip(network.halve, network.lift, network.up, strict=True)):
         load_block(f"halve{level}", halve)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -125,14 +125,19 @@ class CanvasNetwork(nn.Module):
         self.up = nn.ModuleList(Separable(fine, fine) for fine, _ in steps)
         self.head = nn.Conv2d(widths[0], shape.classes, 1)
 
+    @property
+    def blocks(self) -> list[list[Separable]]:
+        """The separable convolutions on the way down at each resolution, the finest first."""
+        return cast("list[list[Separable]]", self.down)
+
     def canvas_logits(self, points: torch.Tensor, shown: torch.Tensor) -> torch.Tensor:
         """Outputs (1, C, H, W) before the softmax, from colors (1, 3, H, W), 0 where nothing is, and the cells (1, 1,
         H, W) that are shown."""
         canvas = torch.cat([points, shown.to(points.dtype)], dim=1).contiguous(memory_format=torch.channels_last)
         x = torch.relu(self.stem_norm(self.stem(canvas)))
         finer = []
-        for level, blocks in enumerate(self.down):
-            for block in blocks:  # type: ignore[union-attr]
+        for level, blocks in enumerate(self.blocks):
+            for block in blocks:
                 x = block(x)
             if level < len(self.halve):
                 finer.append(x)

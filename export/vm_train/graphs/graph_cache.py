@@ -81,10 +81,10 @@ class GraphCache:
             if shutil.disk_usage(self._folder).free < KEPT_FREE:
                 return
             header = _HEADER.pack(_MAGIC, fingerprint(files, self._classes), len(graph), graph.neighbors.shape[1])
-            parts = [graph.neighbors, graph.points.astype(np.float16), graph.pixels, graph.distances, graph.labels]
-            parts += [] if graph.cells is None else [graph.cells]
+            parts = (graph.neighbors, graph.points.astype(np.float16), graph.pixels, graph.distances, graph.labels)
+            cells = () if graph.cells is None else (graph.cells,)
             with atomic_write(self._path(files, view)) as part, part.open("wb") as file:
-                for each in (header, *(array.tobytes() for array in parts)):
+                for each in (header, *(array.tobytes() for array in (*parts, *cells))):
                     file.write(each)
         except (OSError, InputError):
             return  # the next training example makes it again
