@@ -6,8 +6,8 @@ get the same number of columns, and the octave is a small picture: a strip. In i
 of the octave, or up to the square root of two wider or narrower; the rings are those of the paper.
 
 Around the rings of its octave, a strip has rows that only give context: the next rings inwards, and outwards rows at
-equal angles, which go on above the horizon. So a network sees what stands on the plane. What lies nearer than the last
-octave is on one more strip, the foot: a square lattice of the plane around the point below the camera.
+equal angles, in the outermost strip to above the horizon. So a network sees what stands on the plane. What lies nearer
+than the last octave is on one more strip, the foot: a square lattice of the plane around the point below the camera.
 """
 
 from __future__ import annotations
@@ -31,6 +31,9 @@ BLOCK, GAP = 8, 2
 _ABOVE, _BELOW, _BESIDE = 8, 4, 8
 """Rows of context above and below the rings of an octave, at least, and columns of context where a strip ends behind
 the camera."""
+
+_RISE = 1.5
+"""How far the outermost strip reaches upwards, at least, in units of the angle from its last ring to the horizon."""
 
 _NEAREST = 6.0
 """Columns around the camera in the nearest ring of the octaves, in units of k: about two objects from the nadir."""
@@ -90,6 +93,8 @@ def _octave(phi: Floats, first: int, last: int, columns: float) -> _Strip:
     below = phi[max(first - _BELOW, 1) : first]
     above = _ABOVE + (-(len(below) + last + 1 - first + _ABOVE) - GAP) % BLOCK
     step = phi[last] - phi[last - 1]
+    if last == len(phi) - 1:
+        step = max(step, _RISE * (0.5 * np.pi - phi[last]) / above)
     rows = np.concatenate([below, phi[first : last + 1], phi[last] + step * np.arange(1, above + 1)])
     rows = rows[rows < np.pi]  # beyond the zenith, a row would show again what another one shows, upside down
     column = np.arange(-half - _BESIDE, half + _BESIDE)
