@@ -37,7 +37,7 @@ LIMITS = np.linspace(0.05, 0.95, 19)
 def add(exact: PointScores, below: PointScores, picture: Picture, manifest: Manifest) -> None:
     """Add the points of a picture: with the exact shares of the classes, and with the class of the pixel below each."""
     shown = seen_points(picture.lens, picture.size, manifest)
-    levels = levels_of(picture, shown.graph.rays, manifest, VISUAL)
+    levels = levels_of(picture, shown.graph, manifest, VISUAL)
     distances = plane_distances(shown.graph.rays, picture.orientation.height)
     x, y = np.rint(shown.pixels).astype(np.intp).T
     labels = picture.labels[y, x]

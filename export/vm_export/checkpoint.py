@@ -11,10 +11,10 @@ from typing import Any
 from vm_embedded.errors import InputError, ModelError, one_line
 from vm_embedded.network.manifest import Manifest
 
+from .canvas_network import CanvasShape
 from .grid import VISUAL, Grid
 from .look_checkpoint import LOOK_FORMAT
-from .network import Network
-from .network_shape import NetworkShape
+from .mesh_networks import MeshNetwork, new_network, read_shape
 from .torch_files import load_values, save_values
 
 _FORMAT = "vm-embedded checkpoint 3"
@@ -24,16 +24,20 @@ _FORMAT = "vm-embedded checkpoint 3"
 class Checkpoint:
     """A trained network and the manifest of its model file, which has no self-test yet. Raises ModelError."""
 
-    network: Network
+    network: MeshNetwork
     manifest: Manifest
     grid: Grid = VISUAL
 
     def __post_init__(self) -> None:
         shape, manifest = self.network.shape, self.manifest
+        if isinstance(shape, CanvasShape) != (manifest.mesh == "octaves"):
+            raise ModelError(f"mesh {manifest.mesh} is for another kind of network")
         if shape.classes != len(manifest.classes):
             raise ModelError(
                 f"the network has {shape.classes} outputs, but the manifest names {len(manifest.classes)} classes"
             )
+        if isinstance(shape, CanvasShape):
+            return
         if shape.neighbors != manifest.neighbors:
             raise ModelError(
                 f"the network is for {shape.neighbors} neighbors, but mesh {manifest.mesh} has {manifest.neighbors}"
@@ -73,7 +77,7 @@ class Checkpoint:
     @classmethod
     def _from_dict(cls, content: Mapping[str, Any]) -> Checkpoint:
         """Inverse of what `save` writes. Raises InputError or ModelError."""
-        network = Network(NetworkShape.from_dict(content["network"]))
+        network = new_network(read_shape(content["network"]))
         try:
             network.load_state_dict(content["state"])
         except (RuntimeError, KeyError, TypeError, AttributeError) as error:

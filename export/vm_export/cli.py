@@ -173,7 +173,7 @@ def _export_checkpoint(options: argparse.Namespace, output: Path, canary: Canary
         return
     looks = _read_looks(options, checkpoint.manifest)
     layout = options.layout or fastest_layout(checkpoint)
-    files = {_portable(output): "plain"} if options.layout is None and layout != "plain" else {}
+    files = {_portable(output): "plain"} if options.layout is None and layout == "runs" else {}
     files[output] = layout
     for path, layout in files.items():
         _print_written(path, f"layout {layout}", looks, export(checkpoint, path, layout, looks, canary))
@@ -250,7 +250,7 @@ def _description(checkpoint: Checkpoint) -> str:
     manifest = checkpoint.manifest
     classes = ", ".join(f"{each.name} ({each.kind})" for each in manifest.classes)
     return (
-        f"{len(checkpoint.network.shape.layers)} layers, {manifest.mesh}, {manifest.shape}\n"
+        f"{checkpoint.network.shape.summary}, {manifest.mesh}, {manifest.shape}\n"
         f"  radius {manifest.radius:g} m, {manifest.intersections:g} intersections, to {manifest.max_distance:g} m\n"
         f"  object radius {manifest.object_radius:g} m, edge {manifest.edge}, classes: {classes}"
     )

@@ -25,9 +25,12 @@ from vm_embedded.network.session import Session
 
 from .attach_canary import CanaryPicture, with_canary
 from .attach_look import attached
+from .canvas_graph import canvas_model
+from .canvas_network import CanvasNetwork
 from .checkpoint import Checkpoint
 from .lattice_graph import lattice_model
 from .look_checkpoint import LookCheckpoint
+from .mesh_networks import MeshNetwork
 from .network import Network
 from .plain_graph import plain_model
 from .runs_graph import runs_model
@@ -44,21 +47,25 @@ _CHECKED_POINTS = (1, 2, 7, 64, 1000, 5000)
 
 
 def fastest_layout(checkpoint: Checkpoint) -> str:
-    """The fastest layout for a network of this shape: runs or plain.
+    """The fastest layout for a network of this shape: runs or plain, and canvas for a network on strips.
 
     The layout `runs` saves look-ups and costs multiplications. A convolution multiplies three slots for each group: for
     ring6, 9 places for 7 weights. A separable convolution becomes a full one. So the layout `runs` gains less for wider
     layers.
     """
+    if isinstance(checkpoint.network, CanvasNetwork):
+        return "canvas"
     narrow = all(layer.width <= _WIDEST[layer.kind] for layer in checkpoint.network.shape.layers)
     return "runs" if narrow and checkpoint.manifest.edge == "hard" else "plain"
 
 
-def onnx_model(network: Network, manifest: Manifest) -> bytes:
+def onnx_model(network: MeshNetwork, manifest: Manifest) -> bytes:
     """The bytes of an ONNX model in the manifest's layout, of standard operators only.
 
     Raises ModelError for `lattice` with a mesh that has none.
     """
+    if isinstance(network, CanvasNetwork):
+        return canvas_model(network, manifest)
     models = {"plain": plain_model, "runs": runs_model, "lattice": lattice_model}
     return models[manifest.layout](network, manifest)
 
@@ -123,20 +130,20 @@ def check_difference(path: str | Path, what: str, difference: float) -> None:
         )
 
 
-def largest_difference(content: bytes, network: Network, manifest: Manifest) -> float:
+def largest_difference(content: bytes, network: MeshNetwork, manifest: Manifest) -> float:
     """The largest difference of a probability between ONNX Runtime and torch, for graphs of different sizes.
 
     NaN if a probability is NaN.
     """
     session = Session(ModelFile(Path("the new model"), content, replace(manifest, self_test=None), ""))
-    steps = manifest.model.steps if manifest.layout == "lattice" else None
+    steps = manifest.model.steps if manifest.layout in ("lattice", "canvas") else None
     groups = manifest.model.groups
     tests = (random_example(network, points, seed, groups, steps) for seed, points in enumerate(_CHECKED_POINTS))
     return float(np.max([np.abs(session.answer(test) - test.probabilities[:-1]).max() for test in tests]))
 
 
 def random_example(
-    network: Network,
+    network: MeshNetwork,
     points: int,
     seed: int,
     groups: Groups = (),
@@ -144,21 +151,27 @@ def random_example(
 ) -> SelfTest:
     """A random graph of `points` points with random colors, rounded as SelfTest.as_dict rounds, and torch's answer.
 
-    groups: `MeshModel.groups`, for a network with dilations. steps: with them, for the layout `lattice`, the graph is a
-    random part of a lattice with these `MeshModel.steps`.
+    groups: `MeshModel.groups`, for a network with dilations. steps: with them, for the layouts `lattice` and `canvas`,
+    the graph is a random part of a lattice with these `MeshModel.steps`.
     """
     random = np.random.default_rng(seed)
     colors: Singles = np.full((points + 1, 3), OFF_SCREEN, dtype=np.float32)
     colors[:-1] = np.round(random.random((points, 3)), 4)
-    neighbors: Indices = random.integers(0, points + 1, (points + 1, network.shape.neighbors)).astype(np.int32)
-    neighbors[-1] = points
     cells: Indices | None = None
     if steps is not None:
         side = math.ceil(math.sqrt(1.5 * points))
         chosen = np.sort(random.choice(side * side, points, replace=False))
         cells = np.stack([chosen % side, chosen // side], axis=1).astype(np.int32)
         neighbors = lattice_neighbors(cells, steps)
-    around = with_dilations(neighbors, groups, network.shape.dilations)
+    else:
+        assert isinstance(network, Network)
+        neighbors = random.integers(0, points + 1, (points + 1, network.shape.neighbors)).astype(np.int32)
+        neighbors[-1] = points
+    if isinstance(network, CanvasNetwork):
+        assert cells is not None
+        around = cells
+    else:
+        around = with_dilations(neighbors, groups, network.shape.dilations)
     with torch.inference_mode():
-        answer = network(torch.from_numpy(colors), torch.from_numpy(around)).numpy()
+        answer = network.probabilities(torch.from_numpy(colors), torch.from_numpy(around)).numpy()
     return SelfTest(colors, neighbors, answer, cells)

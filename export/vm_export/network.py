@@ -91,10 +91,12 @@ class Network(nn.Module):
             x = activation(layer(x, around[spec.dilation]))
         return self.layers[-1](x, around[self.shape.layers[-1].dilation])  # type: ignore[no-any-return]
 
-    def forward(self, points: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
+    def probabilities(self, points: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
         """Probabilities (n + 1, C) from points (n + 1, 3) and neighbors (n + 1, D N), with_dilations."""
         logits = self.logits(points, neighbors)
         return logits.softmax(dim=1) if self.shape.layers[-1].activation == "softmax" else logits.sigmoid()
+
+    forward = probabilities
 
 
 def _make(layer: Layer, inputs: int, neighbors: int) -> GraphLayer:

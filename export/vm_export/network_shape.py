@@ -95,6 +95,11 @@ class NetworkShape:
         return distinct_dilations(self.layer_dilations)
 
     @property
+    def summary(self) -> str:
+        """The shape in two words."""
+        return f"{len(self.layers)} layers"
+
+    @property
     def operations(self) -> int:
         """Multiplications and additions for each point, without activations."""
         total, inputs = 0, 3

@@ -16,9 +16,11 @@ from vm_embedded.mesh.mesh import Groups
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import ModelFile
 
+from .canvas_graph import read_canvas
 from .checkpoint import Checkpoint
 from .column_layers import ACTIVATION_PARTS, Activation
 from .export import LARGEST_DIFFERENCE, largest_difference
+from .mesh_networks import MeshNetwork
 from .network import Network
 from .network_shape import Layer, NetworkShape
 from .runs_graph import kernel_places
@@ -68,14 +70,19 @@ def network_of(model: ModelFile) -> Checkpoint:
     manifest, foreign = model.manifest, f"{model.path}: its mesh network has other layers than vm-export writes"
     try:
         graph = _Graph(model.content)
-        layers = _plain(graph) if manifest.layout == "plain" else _columns(graph, manifest)
-        network = _network(_dilated(layers, manifest.layer_dilations), manifest.neighbors)
+        network: MeshNetwork
+        if manifest.layout == "canvas":
+            network = read_canvas(graph.constants)
+        else:
+            layers = _plain(graph) if manifest.layout == "plain" else _columns(graph, manifest)
+            network = _network(_dilated(layers, manifest.layer_dilations), manifest.neighbors)
         difference = largest_difference(model.content, network, manifest)
     except (KeyError, IndexError, ValueError, RuntimeError, InputError) as error:
         raise ModelError(f"{foreign}: {error}") from error
     if not difference <= LARGEST_DIFFERENCE:
         raise ModelError(f"{foreign}: its answers differ from those of the layers by {difference:.2g}")
-    bare = replace(manifest, layout="plain", operations=0, self_test=None, look=None, upright_looks=())
+    layout = "canvas" if manifest.layout == "canvas" else "plain"
+    bare = replace(manifest, layout=layout, operations=0, self_test=None, look=None, upright_looks=())
     return Checkpoint(network, bare)
 
 

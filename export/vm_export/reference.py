@@ -210,6 +210,7 @@ def write_reference(checkpoint: Checkpoint, path: str | Path) -> None:
     if manifest.layer_dilations:
         steps = ", ".join(map(str, manifest.layer_dilations))
         raise InputError(f"the format of the reference has no dilations; this network has {steps}")
+    assert isinstance(network, Network)  # other meshes are refused above
     neighbors = network.shape.neighbors
     groups: list[list[dict[str, Any]]] = []
     for spec, layer in zip(network.shape.layers, network.layers, strict=True):

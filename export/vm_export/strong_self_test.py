@@ -16,7 +16,8 @@ from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.self_test import SelfTest
 
-from .network import Network
+from .canvas_network import CanvasNetwork
+from .mesh_networks import MeshNetwork
 
 _HOPS, _MOST_HOPS = 3, 6
 """Links from the middle of a patch to its edge, without and with dilations: ring6 gets patches of about 37 points, and
@@ -30,7 +31,7 @@ _RANGES = {"absolute": (0.0, 1.0), "relative": (-3.0, 3.0)}
 """Colors that points of each kind of POINT_COLORS can have; relative ones are rarely farther from 0."""
 
 
-def strong_self_test(network: Network, manifest: Manifest) -> SelfTest:
+def strong_self_test(network: MeshNetwork, manifest: Manifest) -> SelfTest:
     """An example for a network and its answer: a few separate patches of the manifest's mesh.
 
     For each class, one patch has colors with which the network is as sure of this class as it can be, and one patch has
@@ -40,10 +41,13 @@ def strong_self_test(network: Network, manifest: Manifest) -> SelfTest:
     patch = _patch(manifest)
     neighbors, cells = _repeated(patch, len(wanted))
     around = with_dilations(neighbors, manifest.model.groups, manifest.dilations)
+    if manifest.layout == "canvas":
+        assert cells is not None
+        around = cells
     colors = _fitted_colors(network, around, np.repeat(wanted, len(patch), axis=0), _RANGES[manifest.colors])
     with torch.inference_mode():
-        answer = network(torch.from_numpy(colors), torch.from_numpy(around)).numpy()
-    return SelfTest(colors, neighbors, answer, cells if manifest.layout == "lattice" else None)
+        answer = network.probabilities(torch.from_numpy(colors), torch.from_numpy(around)).numpy()
+    return SelfTest(colors, neighbors, answer, cells if manifest.layout in ("lattice", "canvas") else None)
 
 
 def _wanted(classes: int) -> Singles:
@@ -79,13 +83,14 @@ def _repeated(patch: Mesh, count: int) -> tuple[Indices, Indices | None]:
     return neighbors, np.concatenate([own + copy * apart for copy in range(count)]).astype(np.int32)
 
 
-def _fitted_colors(network: Network, neighbors: Indices, wanted: Singles, limits: tuple[float, float]) -> Singles:
+def _fitted_colors(network: MeshNetwork, around: Indices, wanted: Singles, limits: tuple[float, float]) -> Singles:
     """Colors (n + 1, 3), rounded as SelfTest.as_dict rounds, whose answers are close to `wanted` (n, C).
 
-    neighbors: (n + 1, D N), with_dilations. limits: smallest and largest color.
+    around: neighbors (n + 1, D N), with_dilations, or for a network on a canvas cells (n, 2). limits: smallest and
+    largest color.
     """
     low, high = limits
-    links, target = torch.from_numpy(neighbors), torch.from_numpy(wanted)
+    links, target = torch.from_numpy(around), torch.from_numpy(wanted)
     off_screen = torch.full((1, 3), float(OFF_SCREEN))
     random = np.random.default_rng(0).normal(0.0, 0.3, (len(wanted), 3))
     free = torch.from_numpy(random.astype(np.float32)).requires_grad_()
@@ -93,7 +98,7 @@ def _fitted_colors(network: Network, neighbors: Indices, wanted: Singles, limits
     def colors() -> torch.Tensor:
         return torch.cat([low + (high - low) * (1.0 + torch.tanh(free)) / 2.0, off_screen])
 
-    softmax = network.shape.layers[-1].activation == "softmax"
+    softmax = isinstance(network, CanvasNetwork) or network.shape.layers[-1].activation == "softmax"
     functional = torch.nn.functional
     loss = functional.cross_entropy if softmax else functional.binary_cross_entropy_with_logits
     for step in range(_STEPS):

@@ -4,6 +4,7 @@ import torch
 
 from tests.manifests import ball_manifest
 from vm_embedded.mesh.models import MESH_MODELS
+from vm_export.canvas_network import CanvasNetwork, CanvasShape
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape
@@ -14,7 +15,24 @@ def manifest(classes=("ball", "environment"), mesh="ring6", **changes):
 
 
 def checkpoint(seed=0, shape=None, mesh="ring6"):
+    if mesh == "octaves":
+        return canvas_checkpoint(seed, shape or CanvasShape(1, 8, 2))
     torch.manual_seed(seed)
     shape = shape or NetworkShape.uniform(3, 4, 2, neighbors=MESH_MODELS[mesh].neighbors)
     facts = manifest([f"class{i}" for i in range(shape.classes)], mesh, layer_dilations=shape.layer_dilations)
     return Checkpoint(Network(shape).eval(), facts)
+
+
+def canvas_checkpoint(seed, shape):
+    """As after a training: every batch normalization has an effect of its own."""
+    torch.manual_seed(seed)
+    network = CanvasNetwork(shape)
+    with torch.no_grad():
+        for each in network.modules():
+            if isinstance(each, torch.nn.BatchNorm2d):
+                each.running_mean.normal_(std=0.2)
+                each.running_var.uniform_(0.3, 2.0)
+                each.weight.uniform_(0.5, 1.5)
+                each.bias.normal_(std=0.2)
+    facts = manifest([f"class{i}" for i in range(shape.classes)], "octaves", layout="canvas")
+    return Checkpoint(network.eval(), facts)

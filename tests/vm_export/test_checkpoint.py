@@ -8,8 +8,9 @@ from vm_embedded.errors import InputError, ModelError
 from vm_export.checkpoint import Checkpoint
 
 
-def test_checkpoints_are_plain_values_and_read_back(tmp_path):
-    made = checkpoint(7)
+@pytest.mark.parametrize("mesh", ["ring6", "octaves"])
+def test_checkpoints_are_plain_values_and_read_back(mesh, tmp_path):
+    made = checkpoint(7, mesh=mesh)
     made.save(tmp_path / "model.pt")
     torch.load(tmp_path / "model.pt", weights_only=True)
     read = Checkpoint.load(tmp_path / "model.pt")
@@ -40,5 +41,9 @@ def test_foreign_and_mismatched_checkpoints_are_refused(tmp_path):
         Checkpoint.load(tmp_path / "model.pt")
     with pytest.raises(ModelError, match="outputs"):
         Checkpoint(checkpoint().network, manifest(("ball", "line", "field")))
+    rings, canvas = checkpoint(), checkpoint(mesh="octaves")
+    for one, other in ((rings, canvas), (canvas, rings)):
+        with pytest.raises(ModelError, match=f"mesh {other.manifest.mesh} is for another kind of network"):
+            Checkpoint(one.network, other.manifest)
     with pytest.raises(ModelError, match=r"the dilations \(\), but the manifest \(1, 2, 1\)"):
         Checkpoint(checkpoint().network, manifest(layer_dilations=(1, 2, 1)))

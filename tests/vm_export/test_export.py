@@ -10,6 +10,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.manifests import MESHES
 from tests.vm_export.checkpoints import checkpoint, manifest
 from vm_embedded.errors import ModelError
 from vm_embedded.geometry.sphere import Sphere
@@ -18,12 +19,10 @@ from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.manifest import LAYOUTS
 from vm_embedded.network.model_file import read_model
 from vm_export import export
+from vm_export.canvas_network import CanvasShape
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
 from vm_export.network_shape import ACTIVATIONS, HEADS, Layer, NetworkShape
-
-MESHES = {"plain": "ring6", "runs": "ring6", "lattice": "xmgrid6"}
-"""A mesh for each layout."""
 
 in_all_layouts = pytest.mark.parametrize("layout", LAYOUTS)
 
@@ -50,13 +49,22 @@ def network_shapes(draw, most=1):
     return NetworkShape(tuple(dilated), draw(st.sampled_from([4, 6, 8])))
 
 
+canvas_shapes = st.builds(CanvasShape, st.integers(1, 3), st.sampled_from([8, 16, 24]), st.integers(1, 6))
+
+
+def any_checkpoint(draw, layout, seed):
+    """A checkpoint of any network that there is for this layout."""
+    if layout == "canvas":
+        return checkpoint(seed, draw(canvas_shapes), "octaves")
+    shape = draw(network_shapes(1 if layout == "lattice" else 3))
+    return checkpoint(seed, shape, f"{'xygrid' if layout == 'lattice' else 'ring'}{shape.neighbors}")
+
+
 @in_all_layouts
 @given(data=st.data(), seed=st.integers(0, 1000))
 @settings(max_examples=25)
 def test_every_network_gives_the_same_answers_in_onnx_runtime(layout, data, seed):
-    shape = data.draw(network_shapes(1 if layout == "lattice" else 3))
-    mesh = f"{'xygrid' if layout == 'lattice' else 'ring'}{shape.neighbors}"
-    made = checkpoint(seed, shape, mesh)
+    made = any_checkpoint(data.draw, layout, seed)
     facts = replace(made.manifest, layout=layout)
     content = export.onnx_model(made.network, facts)
     assert export.largest_difference(content, made.network, facts) < 1e-4
@@ -86,7 +94,7 @@ def test_far_below_zero_no_layer_makes_numbers_that_slow_a_processor_down(layout
         assert not (sizes < np.finfo(np.float32).tiny).any(), name
 
 
-DOMAINS = {"plain": {""}, "runs": {"", "ai.onnx.ml"}, "lattice": {""}}
+DOMAINS = {"plain": {""}, "runs": {"", "ai.onnx.ml"}, "lattice": {""}, "canvas": {""}}
 """Where each layout's operators come from: the standard, and its part for machine learning on tables."""
 
 
@@ -139,11 +147,12 @@ def test_the_same_checkpoint_gives_the_same_bytes(layout, tmp_path):
 
 @in_all_layouts
 def test_a_graph_that_differs_from_torch_is_not_written(layout, tmp_path, monkeypatch):
-    other = export.onnx_model(checkpoint(5).network, manifest(("class0", "class1"), MESHES[layout], layout=layout))
+    mesh = MESHES[layout]
+    other = export.onnx_model(checkpoint(5, mesh=mesh).network, manifest(("class0", "class1"), mesh, layout=layout))
     monkeypatch.setattr(export, "onnx_model", lambda network, manifest: other)
     (tmp_path / "model.onnx").write_text("the file of before")
     with pytest.raises(ModelError, match="differ by"):
-        export.export(checkpoint(4, mesh=MESHES[layout]), tmp_path / "model.onnx", layout)
+        export.export(checkpoint(4, mesh=mesh), tmp_path / "model.onnx", layout)
     assert (tmp_path / "model.onnx").read_text() == "the file of before"
 
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.vm_export.checkpoints import checkpoint
-from tests.vm_export.test_export import in_all_layouts, network_shapes
+from tests.vm_export.test_export import any_checkpoint, in_all_layouts
 from vm_embedded.errors import ModelError
 from vm_embedded.mesh.dilation import with_dilations
 from vm_embedded.network.bundled import SHIPPED, model_path
@@ -26,19 +26,19 @@ from vm_export.network_weights import network_of
 @given(data=st.data(), seed=st.integers(0, 1000))
 @settings(max_examples=20)
 def test_every_network_comes_back_from_its_model_file(layout, data, seed):
-    shape = data.draw(network_shapes(1 if layout == "lattice" else 3))
-    made = checkpoint(seed, shape, f"{'xygrid' if layout == 'lattice' else 'ring'}{shape.neighbors}")
+    made = any_checkpoint(data.draw, layout, seed)
     facts = replace(made.manifest, layout=layout)
     model = ModelFile(Path("model.onnx"), export.onnx_model(made.network, facts), facts, "")
     read = network_of(model)
-    groups = facts.model.groups
-    test = export.random_example(made.network, 200, seed, groups)
-    around = with_dilations(test.neighbors, groups, read.network.shape.dilations)
+    groups, on_canvas = facts.model.groups, layout == "canvas"
+    test = export.random_example(made.network, 200, seed, groups, facts.model.steps if on_canvas else None)
+    around = test.cells if on_canvas else with_dilations(test.neighbors, groups, read.network.shape.dilations)
     with torch.inference_mode():
-        answer = read.network(torch.from_numpy(test.points), torch.from_numpy(around)).numpy()
+        answer = read.network.probabilities(torch.from_numpy(test.points), torch.from_numpy(around)).numpy()
     np.testing.assert_allclose(answer, test.probabilities, atol=2e-5)
-    if layout == "plain":
-        assert read.network.shape == shape
+    if layout in ("plain", "canvas"):
+        assert read.network.shape == made.network.shape
+    assert read.manifest.layout == ("canvas" if on_canvas else "plain")
     again = ModelFile(Path("again.onnx"), export.onnx_model(read.network, facts), facts, "")
     assert export.largest_difference(again.content, made.network, facts) < 1e-4
 

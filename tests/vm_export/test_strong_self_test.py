@@ -27,7 +27,8 @@ def test_the_network_is_sure_of_each_class_and_unsure_between_classes():
 
 
 @pytest.mark.parametrize(
-    ("layout", "mesh"), [("plain", "ring4"), ("runs", "ring8"), ("lattice", "xygrid6"), ("plain", "cap6")]
+    ("layout", "mesh"),
+    [("plain", "ring4"), ("runs", "ring8"), ("lattice", "xygrid6"), ("plain", "cap6"), ("canvas", "octaves")],
 )
 def test_a_model_file_with_another_weight_is_refused(layout, mesh, tmp_path):
     right = checkpoint(1, mesh=mesh)
@@ -36,7 +37,7 @@ def test_a_model_file_with_another_weight_is_refused(layout, mesh, tmp_path):
     Session(read)
     wrong = checkpoint(1, mesh=mesh).network
     with torch.no_grad():
-        wrong.layers[0].linear.weight[0, 0] += 0.1
+        (wrong.stem if layout == "canvas" else wrong.layers[0].linear).weight[0, 0] += 0.1
     content = export.onnx_model(wrong, read.manifest)
     with pytest.raises(ModelError, match="self-test failed"):
         Session(replace(read, content=content))

@@ -170,7 +170,7 @@ class MeshCache:
     def _in_order(self, mesh: Mesh, height: float, lens: Lens) -> PreparedPoints:
         """The points of a part of a mesh in the network's order, with the levels of their colors."""
         layout = self._arrange(mesh)
-        return PreparedPoints(layout, levels_for(self.manifest, layout.rays, height, lens))
+        return PreparedPoints(layout, levels_for(self.manifest, layout, height, lens))
 
     def _look_up(self, key: Hashable, make: Callable[[], _Kept], counted: bool = True) -> _Kept:
         kept: _Kept | None = self._kept.get(key)

@@ -17,6 +17,8 @@ import numpy.typing as npt
 from ..arrays import Floats, frozen
 from ..geometry.lens import Lens
 from ..geometry.shape import Shape
+from ..mesh.mesh import PointGraph
+from ..mesh.octaves import strip_rays
 from ..network.manifest import Manifest
 
 BLOCK = 64
@@ -32,12 +34,13 @@ class Levels:
 
     order (p,): the points, those of the first picture first. The share of each picture is filled up to whole blocks:
     its last point is repeated. places (n,): where each point is in `order`. ends: for each picture, the number of
-    blocks up to the end of its share.
+    blocks up to the end of its share. halvings (n,): how often the picture of each point is halved.
     """
 
     order: npt.NDArray[np.intp]
     places: npt.NDArray[np.intp]
     ends: tuple[int, ...]
+    halvings: npt.NDArray[np.int8]
 
     @classmethod
     def of(cls, level: npt.NDArray[np.integer]) -> Levels:
@@ -48,7 +51,7 @@ class Levels:
         order = np.concatenate(filled)
         places = np.empty(len(level), dtype=np.intp)
         places[order] = np.arange(len(order))
-        return cls(frozen(order), frozen(places), tuple(blocks.tolist()))
+        return cls(frozen(order), frozen(places), tuple(blocks.tolist()), frozen(level.astype(np.int8)))
 
     def shares(self) -> Iterator[tuple[int, slice]]:
         """The pictures that color points: how often each was halved, and its blocks."""
@@ -61,21 +64,27 @@ class Levels:
     @property
     def nbytes(self) -> int:
         """Memory that it holds [bytes]."""
-        return self.order.nbytes + self.places.nbytes
+        return self.order.nbytes + self.places.nbytes + self.halvings.nbytes
 
 
-def levels_for(manifest: Manifest, rays: Floats, height: float, lens: Lens) -> Levels:
-    """The levels of points with rays (n, 3). A network that samples single pixels takes all from the whole picture.
+def levels_for(manifest: Manifest, graph: PointGraph, height: float, lens: Lens) -> Levels:
+    """The levels of a graph's points. A network that samples single pixels takes all from the whole picture.
 
     height: of the camera that the mesh is made for [m]. lens: fitted to the image.
     """
     if manifest.sampling == "bilinear":
-        return uniform_levels(len(rays), 1.0)
-    return footprint_levels(rays, manifest.mesh_shape, height, manifest.intersections, lens.scale)
+        return uniform_levels(len(graph), 1.0)
+    shape, k = manifest.mesh_shape, manifest.intersections
+    if graph.strips is None:
+        return Levels.of(level_of(footprint_widths(graph.rays, shape, height, k, lens.scale)))
+    # One width for each strip, whatever part of the strip is in the graph.
+    middle = strip_rays(shape, height, k, manifest.max_distance)
+    widths = np.append(footprint_widths(middle, shape, height, k, lens.scale), 0.0)  # the last is that of gaps, -1
+    return Levels.of(level_of(widths)[graph.strips])
 
 
-def footprint_levels(rays: Floats, shape: Shape, height: float, intersections: float, scale: float) -> Levels:
-    """The levels of a mesh's points with rays (n, 3).
+def footprint_widths(rays: Floats, shape: Shape, height: float, intersections: float, scale: float) -> Floats:
+    """How wide (n,) [px] the areas are that a mesh's points with rays (n, 3) stand for; 0 above the horizon.
 
     The mesh is made for a shape seen from a height [m], with `intersections` rings k across an object. At an
     inclination phi the object's angular radius is r cos(phi) / (h - c), with c the height of its center. So rings are
@@ -83,14 +92,14 @@ def footprint_levels(rays: Floats, shape: Shape, height: float, intersections: f
     axis [px/rad].
     """
     widest = 2.0 * shape.radius * scale / (intersections * (height - shape.center_height))
-    return Levels.of(_level_of(widest * np.maximum(np.nan_to_num(-rays[:, 2]), 0.0)))
+    return np.asarray(widest * np.maximum(np.nan_to_num(-rays[:, 2]), 0.0))
 
 
 def uniform_levels(count: int, width: float) -> Levels:
     """The levels of `count` points that are all `width` apart [px]."""
-    return Levels.of(_level_of(np.full(count, width)))
+    return Levels.of(level_of(np.full(count, width)))
 
 
-def _level_of(width: Floats) -> npt.NDArray[np.integer]:
+def level_of(width: Floats) -> npt.NDArray[np.integer]:
     """The smallest picture whose pixels are at most `width` (n,) [px] wide."""
     return np.clip(np.floor(np.log2(np.maximum(width, 1.0))), 0, _MOST_HALVINGS).astype(np.int8)

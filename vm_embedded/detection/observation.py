@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from ..arrays import Floats, Indices, Mask, Singles
+from ..network.canvas_layout import CanvasLayout
 from ..network.layout import Layout
 from ..network.manifest import Manifest
 from .color_normalization import normalized
@@ -19,6 +20,7 @@ from .pyramid import Pyramid
 from .sampling import sample
 from .settings import Settings
 from .stopwatch import Stopwatch
+from .strip_sampling import sample_strips
 
 
 class Network(Protocol):
@@ -100,7 +102,11 @@ def classify(
     layout = view.layout
     # The network needs the colors of copies, too. They must not count twice in the mean color, nor in an object.
     shown = projected.only(layout.original)
-    colors = normalized(sample(pyramid, projected.pixels, view.levels), manifest.colors, shown.on_screen)
+    if isinstance(layout, CanvasLayout):
+        sampled = sample_strips(pyramid, projected.pixels, view.levels, layout)
+    else:
+        sampled = sample(pyramid, projected.pixels, view.levels)
+    colors = normalized(sampled, manifest.colors, shown.on_screen)
     watch.lap("sample")
     probabilities = network.run(layout, colors, projected.on_screen)
     watch.lap("infer")

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats, Indices, frozen
+from ..arrays import Floats, Indices, Mask, frozen
 from ..errors import GeometryError
 from ..geometry.shape import Shape
 
@@ -29,12 +29,21 @@ MOST_POINTS = 8_000_000
 """Largest number of points in a mesh: more than the pixels of a camera, and more than OpenCV samples at once."""
 
 
+STRIDE = 1024
+"""Rows from one strip of a mesh to the next: the cells of strip s are in the rows from STRIDE s."""
+
+
 class PointGraph(Protocol):
     """n points with their rays and links: a mesh, or a mesh laid out for a network (network.layout.Layout)."""
 
     @property
     def rays(self) -> Floats:
         """Unit vectors (n, 3) from the camera, in the mesh frame."""
+
+    @property
+    def strips(self) -> Indices | None:
+        """The strip (n,) of each point, -1 for none, in which all points stand for areas of the same size; None for a
+        mesh without strips."""
 
     def __len__(self) -> int: ...
 
@@ -51,14 +60,21 @@ class Mesh:
     neighbors: (n + 1, N) indices of points. Index n is the off-screen point, which takes the place of every missing
         neighbor. It is linked to itself.
     cells: (n, 2) column and row of each point, in a lattice where all neighbors are fixed steps away; else None.
+    margin: (n,) points that only give context to the network and are no part of its answer; None if there are none.
     """
 
     rays: Floats
     neighbors: Indices
     cells: Indices | None = None
+    margin: Mask | None = None
 
     def __len__(self) -> int:
         return len(self.rays)
+
+    @property
+    def strips(self) -> Indices | None:
+        """The strip (n,) of each point; None for a mesh without strips."""
+        return None if self.margin is None or self.cells is None else self.cells[:, 1] // np.int32(STRIDE)
 
     def links(self, members: npt.NDArray[np.integer]) -> Indices:
         """Neighbors (m, N) of the points `members` (m,)."""
@@ -67,7 +83,8 @@ class Mesh:
     @property
     def nbytes(self) -> int:
         """Size in memory [bytes]."""
-        return self.rays.nbytes + self.neighbors.nbytes + (0 if self.cells is None else self.cells.nbytes)
+        parts = (self.rays, self.neighbors, self.cells, self.margin)
+        return sum(each.nbytes for each in parts if each is not None)
 
     def part(self, kept: npt.NDArray[np.intp]) -> Mesh:
         """The mesh of the points `kept` (m,), in that order. Links to other points lead to the off-screen point."""
@@ -78,7 +95,8 @@ class Mesh:
         np.take(self.rays.T, kept, axis=1, out=rays.T)
         neighbors = np.take(position, np.take(self.neighbors, rows, axis=0))
         cells = None if self.cells is None else frozen(np.take(self.cells, kept, axis=0))
-        return Mesh(frozen(rays), frozen(neighbors), cells)
+        margin = None if self.margin is None else frozen(self.margin[kept])
+        return Mesh(frozen(rays), frozen(neighbors), cells, margin)
 
 
 class MeshModel(ABC):

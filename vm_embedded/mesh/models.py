@@ -7,6 +7,7 @@ from ..geometry.shape import Shape
 from .cap import Cap
 from .grids import KINDS, Grid
 from .mesh import Mesh, MeshModel
+from .octaves import Octaves
 from .rings import Rings
 from .walls import Walls
 
@@ -15,8 +16,10 @@ MESH_MODELS: dict[str, MeshModel] = {
     **{f"{kind}grid{each}": Grid(kind, each) for kind in KINDS for each in (4, 6, 8)},
     "cap6": Cap(),
     "wall6": Walls(),
+    "octaves": Octaves(),
 }
-"""The reference's twelve models, cap6 (as dense below the camera as elsewhere) and wall6 (for tall cylinders)."""
+"""The reference's twelve models, cap6 (as dense below the camera as elsewhere), wall6 (for tall cylinders) and octaves
+(strips for ordinary convolutions)."""
 
 
 def mesh_model(name: str) -> MeshModel:

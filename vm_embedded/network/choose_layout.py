@@ -1,8 +1,9 @@
-"""The choice between the three layouts."""
+"""The choice between the layouts."""
 
 from __future__ import annotations
 
 from ..mesh.mesh import Mesh
+from .canvas_layout import CanvasLayout
 from .lattice_layout import LatticeLayout
 from .layout import WholeLayout
 from .manifest import Manifest
@@ -14,7 +15,8 @@ def choose_layout(mesh: Mesh, manifest: Manifest) -> WholeLayout:
     """The mesh in the layout that the manifest's network takes."""
     if manifest.layout == "runs":
         return RunsLayout(mesh, manifest.model.groups, manifest.dilations)
-    if manifest.layout == "lattice":
-        assert manifest.model.steps is not None  # Manifest accepts this layout only for lattices.
-        return LatticeLayout(mesh, manifest.model.steps)
+    if manifest.layout in ("lattice", "canvas"):
+        assert manifest.model.steps is not None  # Manifest accepts these layouts only for lattices.
+        kind = LatticeLayout if manifest.layout == "lattice" else CanvasLayout
+        return kind(mesh, manifest.model.steps)
     return PlainLayout(mesh, manifest.edge, manifest.model.groups, manifest.dilations)

@@ -33,13 +33,15 @@ class Layout(ABC):
     its points are the slots. All links lead to original points, never to copies.
 
     slots: (m,) point of each slot; n in gaps. places: (n,) slot of each point. original: (m,) True for the slots in
-    `places`, False for gaps and copies. rays: (m, 3) of the slots' points, NaN in gaps.
+    `places`, False for gaps and copies. rays: (m, 3) of the slots' points, NaN in gaps. strips: (m,) strip of each
+    slot, -1 in gaps; None for a mesh without strips.
     """
 
     slots: Indices
     places: Indices
     original: Mask
     rays: Floats
+    strips: Indices | None = None
 
     def __len__(self) -> int:
         return len(self.slots)
@@ -51,7 +53,8 @@ class Layout(ABC):
     @property
     def nbytes(self) -> int:
         """Size in memory [bytes]."""
-        return self.slots.nbytes + self.places.nbytes + self.original.nbytes + self.rays.nbytes
+        strips = 0 if self.strips is None else self.strips.nbytes
+        return self.slots.nbytes + self.places.nbytes + self.original.nbytes + self.rays.nbytes + strips
 
     @abstractmethod
     def answers(self, network: Run, colors: Singles, on_screen: Mask) -> Singles:

@@ -32,9 +32,9 @@ with bearings. background: everything else."""
 EDGES = ("hard", "same")
 """Replacement of a missing neighbor. hard: the off-screen point, whose input is -1. same: the point itself."""
 
-LAYOUTS = ("plain", "runs", "lattice")
+LAYOUTS = ("plain", "runs", "lattice", "canvas")
 """Order of the points in the network's input; see layout.py. plain: point by point. runs: slots, ring by ring. lattice:
-a picture."""
+a picture. canvas: the strips of mesh octaves on a picture."""
 
 POINT_SAMPLINGS = ("bilinear", "footprint")
 """Color of a point. bilinear: at its pixel, from the four around it. footprint: the mean of the area that it stands
@@ -96,7 +96,7 @@ class Manifest:
     object_height: of a cylinder [m], else 0.
     any_radius: the network was trained on objects of many radii, so the mesh is made for the real one's.
     self_test: an example with its answer, which each loading of the model file runs.
-    layout: one of LAYOUTS; runs and lattice need edge hard.
+    layout: one of LAYOUTS; all but plain need edge hard, and canvas mesh octaves.
     operations: multiplications and additions for each point.
     channels: their order in a point's input, which is the point's color times `scale`.
     scale: see `channels`.
@@ -153,6 +153,10 @@ class Manifest:
             raise ModelError(
                 f"layout lattice needs a grid, whose neighbors are fixed steps away; mesh {self.mesh} is not a grid"
             )
+        if (self.layout == "canvas") != (self.mesh == "octaves"):
+            raise ModelError(
+                f"mesh octaves and layout canvas need each other; the mesh is {self.mesh}, the layout {self.layout}"
+            )
         for name in ("radius", "object_radius", "intersections", "max_distance", "scale"):
             value = getattr(self, name)
             if not _is_number(value) or not 0 < value <= _LARGEST:
@@ -181,7 +185,7 @@ class Manifest:
                 raise ModelError(
                     f"layer_dilations in the model's manifest must be whole numbers up to {MOST_DILATION}, not {each!r}"
                 )
-        if self.dilations != (1,) and (self.edge != "hard" or self.layout == "lattice"):
+        if self.dilations != (1,) and (self.edge != "hard" or self.layout in ("lattice", "canvas")):
             raise ModelError(
                 f"dilations other than 1 need edge hard and layout plain or runs, not {self.edge} and {self.layout}"
             )

@@ -11,6 +11,9 @@ import numpy as np
 from ..arrays import Indices, Singles
 from ..errors import ModelError
 
+_FARTHEST = 4096
+"""Largest column and row of a point on a lattice."""
+
 
 @dataclass(frozen=True, eq=False)
 class SelfTest:
@@ -57,7 +60,7 @@ class SelfTest:
             raise ModelError("self-test in the model file has neighbors outside of its points")
         if test.cells is not None:
             most = abs(test.cells).max(initial=0)
-            if len(test.cells) != rows - 1 or most > 1000 or len(np.unique(test.cells, axis=0)) != rows - 1:
+            if len(test.cells) != rows - 1 or most > _FARTHEST or len(np.unique(test.cells, axis=0)) != rows - 1:
                 raise ModelError(
                     "self-test in the model file has cells that are too far out, repeated, or not one for each point"
                 )

@@ -30,8 +30,8 @@ class Session:
     """A loaded mesh network.
 
     threads: never more than this process may use. With several, a large network runs on sectors of the mesh at the same
-    time (split_layout.py), each in one thread of ONNX Runtime; in the layout lattice, ONNX Runtime splits each operator
-    instead. spinning: see OnnxModel; it only matters in the layout lattice. Loading runs the model's
+    time (split_layout.py), each in one thread of ONNX Runtime; in the layouts lattice and canvas, ONNX Runtime splits
+    each operator instead. spinning: see OnnxModel; it only matters in these layouts. Loading runs the model's
     self-test. Raises ModelError if the file does not load, has other inputs and outputs than its manifest says, or
     fails its self-test.
     """
@@ -40,7 +40,7 @@ class Session:
         self.model = model
         self.threads = usable_threads(threads)
         self._process = os.getpid()
-        is_split = self.threads > 1 and model.manifest.layout != "lattice"
+        is_split = self.threads > 1 and model.manifest.layout not in ("lattice", "canvas")
         self._others = ThreadPoolExecutor(self.threads - 1, "network") if is_split else None
         interface = _interface(model.manifest)
         inside = 1 if is_split else self.threads
@@ -96,17 +96,21 @@ class Session:
                 f"{self.model.path}: self-test has {test.neighbors.shape[1]} neighbors for each point, "
                 f"its mesh {manifest.mesh} has {manifest.neighbors}"
             )
-        if manifest.layout == "lattice" and test.cells is None:
+        if manifest.layout in ("lattice", "canvas") and test.cells is None:
             raise ModelError(f"{self.model.path}: self-test lacks the cells of its points in the lattice")
         self.onnx.check_answer(self.answer(test), test.probabilities[:-1])
 
 
 def _interface(manifest: Manifest) -> Interface:
     """The inputs and outputs of a mesh network, which depend on its layout."""
-    interface: Interface = {
-        "points": ("tensor(float)", [3]),
-        "probabilities": ("tensor(float)", [len(manifest.classes)]),
-    }
+    classes = len(manifest.classes)
+    if manifest.layout == "canvas":
+        return {
+            "points": ("tensor(float)", [1, 3]),
+            "shown": ("tensor(bool)", [1, 1]),
+            "probabilities": ("tensor(float)", [1, classes]),
+        }
+    interface: Interface = {"points": ("tensor(float)", [3]), "probabilities": ("tensor(float)", [classes])}
     if manifest.layout == "plain":
         interface["neighbors"] = ("tensor(int32)", [manifest.neighbor_columns])
     elif manifest.layout == "runs":

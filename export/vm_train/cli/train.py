@@ -143,7 +143,7 @@ def _rate(options: argparse.Namespace) -> int:
 
     import torch
 
-    from vm_export.network import Network
+    from vm_export.mesh_networks import new_network
 
     from ..data.split import Split
     from ..learning.hardware import set_up_hardware
@@ -159,7 +159,7 @@ def _rate(options: argparse.Namespace) -> int:
         data = TrainingData(options.data, Split(tuple(each.number for each in good), (), ()))
         run = begin_run(Path(folder) / "run", data, configuration)
         torch.manual_seed(configuration.training.seed)
-        found = find_rate(run, hardware, Network(configuration.network_shape), options.steps)
+        found = find_rate(run, hardware, new_network(configuration.network_shape), options.steps)
     for position in range(0, len(found.rates), max(len(found.rates) // 12, 1)):
         print(f"rate {found.rates[position]:.1e}  loss {found.losses[position]:.4f}")
     print(f"proposed: training.rate = {found.proposed:.2g}")

@@ -192,7 +192,7 @@ def _view(picture: Picture, layout: Layout, manifest: Manifest, grid: Grid) -> P
     orientation = picture.orientation
     return PreparedView(
         layout=layout,
-        levels=levels_of(picture, layout.rays, manifest, grid),
+        levels=levels_of(picture, layout, manifest, grid),
         shape=manifest.object_shape,
         rings=manifest.rings_across(orientation.height, orientation.height),
         height=orientation.height,
@@ -225,7 +225,8 @@ def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subj
 
     checkpoint = Checkpoint.load(path)
     digest = hashlib.sha256(read_bytes(path)).hexdigest()
-    manifest = replace(checkpoint.manifest, layout="plain")
+    on_canvas = checkpoint.manifest.layout == "canvas"
+    manifest = checkpoint.manifest if on_canvas else replace(checkpoint.manifest, layout="plain")
     return ExactSubject(manifest, checkpoint.grid, digest, settings, TorchNetwork(checkpoint))
 
 
@@ -239,12 +240,12 @@ class TorchNetwork:
         self._network = checkpoint.network
 
     def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
-        """Probabilities (m, C) of the slots of a plain layout, from their colors (3, m)."""
+        """Probabilities (m, C) of the slots of a plain layout or a canvas, from their colors (3, m)."""
         import torch
 
         def network(feeds: Feeds) -> Singles:
             with torch.inference_mode():
-                output = self._network(torch.from_numpy(feeds["points"]), torch.from_numpy(feeds["neighbors"]))
+                output = self._network(**{name: torch.from_numpy(each) for name, each in feeds.items()})
             return np.asarray(output.numpy(), dtype=np.float32)
 
         return layout.answers(network, colors, on_screen)

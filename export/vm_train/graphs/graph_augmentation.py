@@ -51,8 +51,11 @@ def random_window(
 def mirror_image(graph: LabeledGraph, model: MeshModel) -> LabeledGraph:
     """The graph that a network would get of the picture's mirror image, for a mesh of this model.
 
-    Left and right neighbors change places; `pixels` keeps the places in the picture itself.
+    Left and right neighbors, or the columns of strips, change places; `pixels` keeps the places in the picture itself.
     """
+    if graph.cells is not None:
+        columns, rows = graph.cells.T
+        return replace(graph, cells=np.stack([columns.max(initial=0) - columns, rows], axis=1))
     columns = mirrored_columns(model)
     first = np.arange(0, graph.neighbors.shape[1], model.neighbors)[:, None]  # of each dilation
     return replace(graph, neighbors=np.ascontiguousarray(graph.neighbors[:, (first + columns).ravel()]))

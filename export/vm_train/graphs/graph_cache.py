@@ -1,9 +1,9 @@
 """Views of pictures on disk, because a small network learns from a graph in less time than it takes to make one.
 
 graph_recipe says what a view is. Windows, mirror images and tones are drawn anew for each example. A file holds a
-header, then neighbors, colors, pixels, distances and labels as raw arrays. Colors are float16: half the bytes to read,
-with an error of at most 0.00025, far below a level of an 8-bit picture (0.0039). Trainings share the views that they
-would make in the same way.
+header, then neighbors, colors, pixels, distances, labels and, without neighbors, cells as raw arrays. Colors are
+float16: half the bytes to read, with an error of at most 0.00025, far below a level of an 8-bit picture (0.0039).
+Trainings share the views that they would make in the same way.
 """
 
 from __future__ import annotations
@@ -69,6 +69,7 @@ class GraphCache:
                 pixels=read.array(np.float32, (points, 2)),
                 distances=read.array(np.float32, (points,)),
                 labels=read.array(np.int8, (points,)),
+                cells=None if neighbors else read.array(np.int32, (points, 2)),
             )
         except (OSError, ValueError, struct.error):
             return None
@@ -81,8 +82,9 @@ class GraphCache:
                 return
             header = _HEADER.pack(_MAGIC, fingerprint(files, self._classes), len(graph), graph.neighbors.shape[1])
             parts = (graph.neighbors, graph.points.astype(np.float16), graph.pixels, graph.distances, graph.labels)
+            cells = () if graph.cells is None else (graph.cells,)
             with atomic_write(self._path(files, view)) as part, part.open("wb") as file:
-                for each in (header, *(array.tobytes() for array in parts)):
+                for each in (header, *(array.tobytes() for array in (*parts, *cells))):
                     file.write(each)
         except (OSError, InputError):
             return  # the next training example makes it again
@@ -107,6 +109,7 @@ def rounded(graph: LabeledGraph) -> LabeledGraph:
         pixels=graph.pixels.astype(np.float32),
         distances=graph.distances.astype(np.float32),
         labels=graph.labels,
+        cells=graph.cells,
     )
 
 

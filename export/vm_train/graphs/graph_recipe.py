@@ -64,7 +64,7 @@ class GraphRecipe:
         """A random window of a view in a random tone, perhaps mirrored."""
         objects = [at for at, each in enumerate(self.manifest.classes) if each.kind == "object"]
         colors = perturb_colors(view.points[:-1], self.augmentation, random)
-        colors = normalized(colors.T, self.manifest.colors).T
+        colors = normalized(colors.T, self.manifest.colors, view.counted).T
         off_screen = view.points[-1:]  # the last row; its color is fixed
         colored = replace(view, points=np.concatenate([colors, off_screen]))
         seen = random_window(colored, self.window, objects, random)
@@ -74,7 +74,7 @@ class GraphRecipe:
         try:
             return graph_of(picture, manifest, self.grid)
         except GeometryError:  # the camera is too low to see any point of the mesh
-            return empty_graph(manifest.neighbor_columns)
+            return empty_graph(manifest)
 
 
 def ball_radius(files: PictureFiles) -> float:

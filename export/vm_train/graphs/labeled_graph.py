@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from vm_embedded.arrays import Floats, Indices, Singles
+from vm_embedded.arrays import Floats, Indices, Mask, Singles
 from vm_embedded.detection.color_normalization import normalized
 from vm_embedded.detection.footprint import Levels, levels_for, uniform_levels
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.sampling import sample
 from vm_embedded.mesh.dilation import with_dilations
+from vm_embedded.mesh.mesh import STRIDE, PointGraph
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import VISUAL, Grid
@@ -23,14 +24,18 @@ from ..data.classes import Labels
 from ..data.pictures import Picture
 from .seen_points import seen_points
 
+CONTEXT = np.int8(-2)
+"""Label of a point in the margin of its mesh, which is no part of the answer."""
+
 
 @dataclass(frozen=True)
 class LabeledGraph:
     """n points of one picture, or of several joined.
 
     points (n + 1, 3): colors, RGB from 0 to 1; row n is the off-screen point. neighbors (n + 1, D N): rows of points,
-    as with_dilations gives them. labels (n,): positions of classes, -1 for unlabeled. distances (n,): along the plane,
-    from the camera to an object at the point [m]. pixels (n, 2): places of the points in their pictures, (x, y) [px].
+    as with_dilations gives them. labels (n,): positions of classes, -1 for unlabeled, or CONTEXT. distances (n,): along
+    the plane, from the camera to an object at the point [m]. pixels (n, 2): places of the points in their pictures,
+    (x, y) [px]. cells (n, 2): columns and rows of points on strips (mesh octaves), which have no neighbors; else None.
     """
 
     points: Singles
@@ -38,9 +43,20 @@ class LabeledGraph:
     labels: Labels
     distances: Floats
     pixels: Floats
+    cells: Indices | None = None
 
     def __len__(self) -> int:
         return len(self.labels)
+
+    @property
+    def around(self) -> Indices:
+        """What a network needs to know besides the colors: cells, or else neighbors."""
+        return self.neighbors if self.cells is None else self.cells
+
+    @property
+    def counted(self) -> Mask | None:
+        """The points (n,) whose colors count for the mean of the picture, all but those of context; None for all."""
+        return None if self.cells is None else self.labels != CONTEXT
 
     def part(self, kept: npt.NDArray[np.intp]) -> LabeledGraph:
         """The graph of the points `kept`, in that order. Links to other points lead to the off-screen point."""
@@ -48,28 +64,41 @@ class LabeledGraph:
         position[kept] = np.arange(len(kept), dtype=np.int32)
         rows = np.append(kept, len(self))
         neighbors = position[self.neighbors[rows]]
-        return LabeledGraph(self.points[rows], neighbors, self.labels[kept], self.distances[kept], self.pixels[kept])
+        cells = None if self.cells is None else self.cells[kept]
+        return LabeledGraph(
+            self.points[rows], neighbors, self.labels[kept], self.distances[kept], self.pixels[kept], cells
+        )
 
 
 def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> LabeledGraph:
     """The graph of a picture for a network with this manifest. Raises GeometryError or InputError as seen_points."""
     shown = seen_points(picture.lens, picture.size, manifest, grid)
-    points = np.full((len(shown) + 1, 3), OFF_SCREEN, dtype=np.float32)
-    levels = levels_of(picture, shown.graph.rays, manifest, grid)
-    points[:-1] = normalized(sample(Pyramid(picture.image, "bgr"), shown.pixels, levels), manifest.colors).T
+    strips, margin = shown.graph.strips, shown.graph.margin
+    if strips is not None and margin is not None:  # as in a canvas, which leaves out strips of context only
+        shown = shown.only(np.isin(strips, strips[~margin])).visible
     x, y = np.rint(shown.pixels).astype(np.intp).T
+    labels = picture.labels[y, x]
+    if shown.graph.margin is None:
+        neighbors, cells = with_dilations(shown.graph.neighbors, manifest.model.groups, manifest.dilations), None
+    else:
+        neighbors, cells = np.zeros((len(shown) + 1, 0), dtype=np.int32), shown.graph.cells
+        labels = np.where(shown.graph.margin, CONTEXT, labels)
+    points = np.full((len(shown) + 1, 3), OFF_SCREEN, dtype=np.float32)
     distances = plane_distances(shown.graph.rays, picture.orientation.height)
-    neighbors = with_dilations(shown.graph.neighbors, manifest.model.groups, manifest.dilations)
-    return LabeledGraph(points, neighbors, picture.labels[y, x], distances, shown.pixels)
+    graph = LabeledGraph(points, neighbors, labels, distances, shown.pixels, cells)
+    levels = levels_of(picture, shown.graph, manifest, grid)
+    colors = sample(Pyramid(picture.image, "bgr"), shown.pixels, levels)
+    points[:-1] = normalized(colors, manifest.colors, graph.counted).T
+    return graph
 
 
-def levels_of(picture: Picture, rays: Floats, manifest: Manifest, grid: Grid) -> Levels:
-    """Which picture of the pyramid colors each of the points with rays (n, 3)."""
+def levels_of(picture: Picture, graph: PointGraph, manifest: Manifest, grid: Grid) -> Levels:
+    """Which picture of the pyramid colors each of the points."""
     if grid.is_visual:
-        return levels_for(manifest, rays, picture.orientation.height, picture.fitted_lens)
+        return levels_for(manifest, graph, picture.orientation.height, picture.fitted_lens)
     width, height = picture.size
     single = manifest.sampling == "bilinear"
-    return uniform_levels(len(rays), 1.0 if single else math.sqrt(height * width / max(len(rays), 1)))
+    return uniform_levels(len(graph), 1.0 if single else math.sqrt(height * width / max(len(graph), 1)))
 
 
 def plane_distances(rays: Floats, height: float) -> Floats:
@@ -79,19 +108,24 @@ def plane_distances(rays: Floats, height: float) -> Floats:
         return np.asarray(np.where(down > 0.0, height * across / down, np.inf))
 
 
-def empty_graph(columns: int) -> LabeledGraph:
-    """A graph without points, whose off-screen point has that many columns of neighbors."""
+def empty_graph(manifest: Manifest) -> LabeledGraph:
+    """A graph without points, for a network with this manifest."""
+    on_strips = manifest.mesh == "octaves"
     return LabeledGraph(
         np.full((1, 3), OFF_SCREEN, dtype=np.float32),
-        np.zeros((1, columns), dtype=np.int32),
+        np.zeros((1, 0 if on_strips else manifest.neighbor_columns), dtype=np.int32),
         np.empty(0, dtype=np.int8),
         np.empty(0),
         np.empty((0, 2)),
+        np.empty((0, 2), dtype=np.int32) if on_strips else None,
     )
 
 
 def join_graphs(graphs: Sequence[LabeledGraph]) -> tuple[LabeledGraph, npt.NDArray[np.intp]]:
-    """Several graphs as one with a single off-screen point, and where each begins (len(graphs) + 1,)."""
+    """Several graphs as one with a single off-screen point, and where each begins (len(graphs) + 1,).
+
+    Each keeps its own strips.
+    """
     starts = np.cumsum([0, *map(len, graphs)])
     last = int(starts[-1])
     neighbors = [
@@ -99,11 +133,15 @@ def join_graphs(graphs: Sequence[LabeledGraph]) -> tuple[LabeledGraph, npt.NDArr
         for each, start in zip(graphs, starts, strict=False)
     ]
     off_screen = np.full((1, graphs[0].neighbors.shape[1]), last)
+    cells = [each.cells for each in graphs if each.cells is not None]
+    strips = np.cumsum([0, *(int(each[:, 1].max(initial=-1)) // STRIDE + 1 for each in cells)])
+    apart = [each + np.array([0, STRIDE * strip], np.int32) for each, strip in zip(cells, strips, strict=False)]
     joined = LabeledGraph(
         np.concatenate([*(each.points[:-1] for each in graphs), graphs[0].points[-1:]]),
         np.concatenate([*neighbors, off_screen]).astype(np.int32),
         np.concatenate([each.labels for each in graphs]),
         np.concatenate([each.distances for each in graphs]),
         np.concatenate([each.pixels for each in graphs]),
+        np.concatenate(apart) if apart else None,
     )
     return joined, starts

@@ -103,7 +103,7 @@ class StreamedGraphs(Dataset[LabeledGraph]):
             return recipe.make_graph(picture, recipe.manifest, item.seed)
         except InputError as error:
             self._skip(InputError(f"picture {raw.number} of the stream: {error}"))
-            return empty_graph(recipe.manifest.neighbor_columns)
+            return empty_graph(recipe.manifest)
 
     def _raw(self, item: StreamedItem) -> RawPicture:
         """Read on in the item's lane. Begins the lane again for another epoch, or a place that is passed already."""

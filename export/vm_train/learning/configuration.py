@@ -10,7 +10,9 @@ from vm_embedded.errors import InputError
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.manifest import MOST_DILATION, POINT_COLORS, POINT_SAMPLINGS, Manifest
+from vm_export.canvas_network import CanvasShape
 from vm_export.grid import GRIDS, Grid
+from vm_export.mesh_networks import MeshShape
 from vm_export.network_shape import ACTIVATIONS, NetworkShape
 from vm_workstation.ranges import whole_numbers
 
@@ -79,8 +81,12 @@ class MeshSettings:
 class NetworkSettings:
     """Section [network]: the layers of the network."""
 
-    depth: int = number(9, "number of graph convolutions", "", (1, 100))
-    width: int = number(8, "channels of each convolution", "", (1, 1024))
+    depth: int = number(
+        9, "number of graph convolutions; of mesh octaves: separable convolutions at full resolution", "", (1, 100)
+    )
+    width: int = number(
+        8, "channels of each convolution; of mesh octaves: at full resolution, a multiple of 8", "", (1, 1024)
+    )
     activation: str = one_of(tuple(ACTIVATIONS), "selu", "activation after each convolution; the paper found selu best")
     kind: str = one_of(("convolution", "separable"), "convolution", "kind of convolution; separable has fewer weights")
     dilations: tuple[int, ...] = whole_numbers(
@@ -116,10 +122,22 @@ class TrainConfiguration:
     training: Recipe = dataclasses.field(default_factory=Recipe)
     augmentation: Augmentation = dataclasses.field(default_factory=Augmentation)
 
+    def __post_init__(self) -> None:
+        if self.mesh.model == "octaves":
+            self._check_octaves()
+
+    def _check_octaves(self) -> None:
+        """Raise InputError for entries that a network on octaves can't have."""
+        network, usual = self.network, NetworkSettings()
+        for name in ("activation", "kind", "dilations"):
+            if getattr(network, name) != getattr(usual, name):
+                raise InputError(f"{name} of [network] has no effect for mesh octaves; remove the entry")
+        CanvasShape(network.depth, network.width, len(self.classes.colors))
+
     @property
     def manifest(self) -> Manifest:
         """The manifest of this training's model files, without provenance."""
-        mesh = self.mesh
+        mesh, shape = self.mesh, self.network_shape
         return Manifest(
             shape=mesh.shape,
             radius=mesh.radius,
@@ -133,7 +151,8 @@ class TrainConfiguration:
             any_radius=mesh.radius_of == "scene",
             sampling=mesh.sampling,
             colors=mesh.colors,
-            layer_dilations=self.network_shape.layer_dilations,
+            layout="canvas" if mesh.model == "octaves" else "plain",
+            layer_dilations=() if isinstance(shape, CanvasShape) else shape.layer_dilations,
         )
 
     @property
@@ -142,9 +161,11 @@ class TrainConfiguration:
         return Grid(self.mesh.grid, self.mesh.equal_at if self.mesh.grid == "hexagonal" else 0.0)
 
     @property
-    def network_shape(self) -> NetworkShape:
+    def network_shape(self) -> MeshShape:
         """The layers of the network."""
         network = self.network
+        if self.mesh.model == "octaves":
+            return CanvasShape(network.depth, network.width, len(self.classes.colors))
         return NetworkShape.uniform(
             network.depth,
             network.width,

@@ -13,7 +13,7 @@ from vm_embedded.arrays import Floats
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError, install_extra
 from vm_embedded.files import atomic_write, check_writable
-from vm_export.network import Network
+from vm_export.mesh_networks import MeshNetwork
 
 from ..graphs.loading import load_batches
 from ..graphs.schedule import schedule
@@ -39,7 +39,7 @@ class RateSearch:
         return float(self.rates[self.losses.argmin()]) / 3.0
 
 
-def find_rate(run: TrainingRun, hardware: Hardware, network: Network, steps: int) -> RateSearch:
+def find_rate(run: TrainingRun, hardware: Hardware, network: MeshNetwork, steps: int) -> RateSearch:
     """Train for up to `steps` steps, each with a higher rate, and with the point selection of the first round.
 
     Stops early when the loss diverges. Raises InputError if it is NaN or infinite.

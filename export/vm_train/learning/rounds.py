@@ -22,7 +22,7 @@ import torch
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
 from vm_export.checkpoint import Checkpoint
-from vm_export.network import Network
+from vm_export.mesh_networks import new_network
 
 from ..graphs.labeled_graph import LabeledGraph
 from ..graphs.loading import load_batches
@@ -244,7 +244,7 @@ def _round_trainer(run: TrainingRun, hardware: Hardware, progress: TrainingProgr
     """The trainer of a round, resumed from the saved state if that belongs to this round."""
     recipe = run.configuration.training
     torch.manual_seed(int(np.random.default_rng([recipe.seed, progress.round]).integers(2**31)))
-    network = Network(run.configuration.network_shape)
+    network = new_network(run.configuration.network_shape)
     if run.start is not None:
         network.load_state_dict(run.start.checkpoint.network.state_dict())
     # The networks of earlier rounds: their errors raise the chance of a point to be selected.

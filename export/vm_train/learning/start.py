@@ -12,8 +12,9 @@ from vm_embedded.errors import InputError
 from vm_embedded.files import read_bytes
 from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_embedded.network.model_file import read_model
+from vm_export.canvas_network import CanvasShape
 from vm_export.checkpoint import Checkpoint
-from vm_export.network_shape import NetworkShape
+from vm_export.mesh_networks import MeshShape
 from vm_export.network_weights import network_of
 
 from .class_table import ClassTable
@@ -93,18 +94,24 @@ def _class_entries(manifest: Manifest) -> dict[str, dict[str, Any]]:
     return {each.name: {"kind": each.kind, "colors": colors(each)} for each in manifest.classes}
 
 
-def _network_entries(shape: NetworkShape) -> dict[str, Any]:
+def _network_entries(shape: MeshShape) -> dict[str, Any]:
     """The section [network]. For layers of several widths or kinds, it describes the first one; `check` refuses it."""
+    if isinstance(shape, CanvasShape):
+        return {"depth": shape.depth, "width": shape.width}
     first = shape.layers[0]
     activation = {} if len(shape.layers) == 1 else {"activation": first.activation}
     dilations = {"dilations": [each.dilation for each in shape.layers]} if shape.layer_dilations else {}
     return {"depth": len(shape.layers), "width": first.width, "kind": first.kind, **dilations, **activation}
 
 
-def _listed(shape: NetworkShape) -> str:
+def _listed(shape: MeshShape) -> str:
+    if isinstance(shape, CanvasShape):
+        return f"depth {shape.depth} and width {shape.width} on octaves"
     layers = ", ".join(f"{each.kind} {each.width} {each.activation}" for each in shape.layers)
     return f"[{layers}] with {shape.neighbors} neighbors"
 
 
-def _undilated(shape: NetworkShape) -> NetworkShape:
+def _undilated(shape: MeshShape) -> MeshShape:
+    if isinstance(shape, CanvasShape):
+        return shape
     return replace(shape, layers=tuple(replace(each, dilation=1) for each in shape.layers))

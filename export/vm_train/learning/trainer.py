@@ -20,7 +20,7 @@ from torch import distributed, nn
 
 from vm_embedded.arrays import Floats, Singles
 from vm_embedded.errors import InputError, one_line
-from vm_export.network import Network
+from vm_export.mesh_networks import MeshNetwork
 from vm_export.torch_files import load_values, save_values
 
 from ..graphs.labeled_graph import LabeledGraph, join_graphs
@@ -70,12 +70,12 @@ class Trainer:
 
     def __init__(
         self,
-        network: Network,
+        network: MeshNetwork,
         recipe: Recipe,
         total: int,
         shares: Floats,
         weights: Floats,
-        graders: Sequence[Network] = (),
+        graders: Sequence[MeshNetwork] = (),
         device: str = "cpu",
     ) -> None:
         self.network = network.to(device).train()
@@ -110,29 +110,29 @@ class Trainer:
         return StepResult(self.done, mean, int(sum_over_processes(torch.tensor(part.points))), rate)
 
     def _batch_loss(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> _BatchLoss:
-        if not graphs:  # a small batch may leave this process nothing
+        if not any(map(len, graphs)):  # a small batch may leave this process nothing, and a camera may see nothing
             if self._graders:  # the other processes wait for its part of the sum in _chance_factors
                 sum_over_processes(torch.zeros((2, self.network.shape.classes), dtype=torch.float64))
             return _BatchLoss(torch.zeros(()), 0.0, 0)
         graph, _ = join_graphs(graphs)
         points = torch.from_numpy(graph.points).to(self._device)
-        neighbors = torch.from_numpy(graph.neighbors).to(self._device)
+        around = torch.from_numpy(graph.around).to(self._device)
         # Section "Training" of the paper: gradients come from the selected points only; the others get label -1.
-        factors = self._chance_factors(points, neighbors, graph) if self._graders else None
+        factors = self._chance_factors(points, around, graph) if self._graders else None
         chosen = select_points(graph.labels, self._shares, _draws(items, graphs), factors)
         labels = torch.from_numpy(np.where(chosen, graph.labels, -1).astype(np.int64)).to(self._device)
         with torch.autocast(torch.device(self._device).type, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
-            logits = self.network.logits(points, neighbors)
+            logits = self.network.logits(points, around)
         losses = point_losses(logits[:-1], labels, self.recipe)  # without the off-screen point, the last one
         weights = torch.where(labels >= 0, self._weights[labels], 0.0)
         return _BatchLoss(losses @ weights, float(weights.sum()), int(chosen.sum()))
 
     @torch.no_grad()
-    def _chance_factors(self, points: torch.Tensor, neighbors: torch.Tensor, graph: LabeledGraph) -> Floats:
+    def _chance_factors(self, points: torch.Tensor, around: torch.Tensor, graph: LabeledGraph) -> Floats:
         """Factors (n,) of the points' chances to be selected, from the graders' errors; mean 1 in each class."""
         errors = np.zeros(len(graph), dtype=np.float32)
         for grader in self._graders:
-            errors += point_errors(grader(points, neighbors)[:-1].cpu().numpy(), graph.labels)
+            errors += point_errors(grader.probabilities(points, around)[:-1].cpu().numpy(), graph.labels)
         weights = hardness_weights(errors)
         totals = torch.from_numpy(class_totals(graph.labels, weights, len(self._shares)))
         sums, counts = sum_over_processes(totals).numpy()
@@ -143,8 +143,11 @@ class Trainer:
     def probabilities(self, graph: LabeledGraph) -> Singles:
         """Probabilities (n, C) that the network gives the points of a graph."""
         # torch.tensor copies the neighbors: those of a mesh are read-only, and torch.from_numpy warns about that.
-        points, neighbors = torch.from_numpy(graph.points), torch.tensor(graph.neighbors)
-        answers: Singles = self.network(points.to(self._device), neighbors.to(self._device))[:-1].cpu().numpy()
+        points, around = torch.from_numpy(graph.points), torch.tensor(graph.around)
+        self.network.eval()
+        answer = self.network.probabilities(points.to(self._device), around.to(self._device))
+        self.network.train()
+        answers: Singles = answer[:-1].cpu().numpy()
         return answers
 
     def save(self, path: Path, more: Mapping[str, Any]) -> None:

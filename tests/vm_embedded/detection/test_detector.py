@@ -59,7 +59,7 @@ def without_bucket(detector, image, orientation, lens):
         view = prepared(orientation, lens, size)
         height = fresh.cache.mesh_height(orientation.height)
         layout = choose_layout(fresh.cache._build(height), fresh.manifest)
-        return view._replace(layout=layout, levels=levels_for(fresh.manifest, layout.rays, height, lens))
+        return view._replace(layout=layout, levels=levels_for(fresh.manifest, layout, height, lens))
 
     fresh.cache.view = whole
     return fresh.detect(image, orientation, lens)

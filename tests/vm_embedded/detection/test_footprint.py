@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.detection.footprint import BLOCK, Levels, footprint_levels, uniform_levels
+from vm_embedded.detection.footprint import BLOCK, Levels, footprint_widths, level_of, uniform_levels
 from vm_embedded.detection.pixel_formats import checked_image
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.sampling import sample
@@ -18,7 +18,7 @@ spheres = st.builds(Sphere, st.floats(0.03, 0.12))
 @given(spheres, st.floats(0.4, 2.0), st.floats(2.0, 6.0), st.floats(50.0, 3000.0))
 def test_levels_follow_the_distance_between_rings(shape, height, intersections, scale):
     mesh = build_mesh(shape, height, intersections, 5.0)
-    levels = footprint_levels(mesh.rays, shape, height, intersections, scale)
+    levels = Levels.of(level_of(footprint_widths(mesh.rays, shape, height, intersections, scale)))
     assert np.unique(levels.order).tolist() == list(range(len(mesh)))
     inclination = np.arccos(np.clip(-mesh.rays[:, 2], -1.0, 1.0))
     ring = shape.n(inclination, height) * intersections
@@ -34,7 +34,7 @@ def test_levels_follow_the_distance_between_rings(shape, height, intersections, 
 
 def test_gaps_have_a_level_too():
     rays = np.array([[0.0, 0.0, -1.0], [np.nan] * 3])
-    levels = footprint_levels(rays, Sphere(0.1), 1.0, 4.0, 400.0)
+    levels = Levels.of(level_of(footprint_widths(rays, Sphere(0.1), 1.0, 4.0, 400.0)))
     assert np.unique(levels.order).tolist() == [0, 1]
 
 

@@ -40,7 +40,7 @@ def shape_for(model):
 def test_the_twelve_models_of_the_reference_are_there():
     assert set(TWELVE) < set(MESH_MODELS)
     assert len(TWELVE) == 12
-    for model in MESH_MODELS:
+    for model in set(MESH_MODELS) - {"octaves"}:
         assert mesh_model(model).neighbors == int(model[-1])
 
 
@@ -137,7 +137,7 @@ def test_a_camera_not_above_the_object_is_refused(model, shape, height):
         build_mesh(shape, height, 4.0, 3.0, model)
 
 
-@pytest.mark.parametrize("model", [*TWELVE, "cap6"])
+@pytest.mark.parametrize("model", [*TWELVE, "cap6", "octaves"])
 @pytest.mark.parametrize(("k", "reach"), [(1e300, 10.0), (2000.0, 10.0), (4.0, 1e300)])
 def test_a_mesh_that_fits_no_memory_is_refused(model, k, reach):
     if model.startswith("xy") and k == 4.0:
@@ -149,5 +149,7 @@ def test_a_mesh_that_fits_no_memory_is_refused(model, k, reach):
 @pytest.mark.parametrize("model", [model for model in MESH_MODELS if model != "wall6"])
 def test_a_mesh_within_a_step_is_the_point_below_the_camera(model):
     mesh = build_mesh(BALL, 1.0, 4.0, 1e-3, model)
+    if mesh.margin is not None:
+        mesh = mesh.part(np.flatnonzero(~mesh.margin))
     np.testing.assert_allclose(mesh.rays, [[0.0, 0.0, -1.0]], atol=1e-15)
-    np.testing.assert_array_equal(mesh.neighbors, np.ones((2, int(model[-1]))))
+    np.testing.assert_array_equal(mesh.neighbors, np.ones((2, mesh_model(model).neighbors)))

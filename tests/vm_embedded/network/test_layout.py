@@ -22,7 +22,6 @@ from vm_embedded.mesh.mesh import SELF, Mesh
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.lattice_layout import LatticeLayout
-from vm_embedded.network.manifest import LAYOUTS
 from vm_embedded.network.model_file import ModelFile
 from vm_embedded.network.plain_layout import PlainLayout
 from vm_embedded.network.runs_layout import RunsLayout
@@ -38,6 +37,9 @@ LARGEST_LOGIT = 2.0
 
 MODELS = ["ring4", "ring6", "ring8", "cap6", "xygrid4", "xmgrid6", "xygrid8"]
 """Of every arrangement and number of neighbors one; those with equal neighbors are laid out alike."""
+
+LAYOUTS = ("plain", "runs", "lattice")
+"""Those of networks on graphs. Networks on a canvas have no other layout."""
 
 MOST = 5
 """Largest dilation that is drawn."""

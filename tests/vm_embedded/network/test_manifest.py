@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.looks import look_contract
-from tests.manifests import ball_manifest
+from tests.manifests import MESHES, ball_manifest
 from vm_embedded.errors import GeometryError, InputError, ModelError
 from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.make_shape import SHAPES
@@ -54,11 +54,11 @@ orders = st.sampled_from(
 
 
 def _manifest(order, tall, layer_dilations, **entries):
-    """A cylinder has a height; layout lattice is for grids only. Not all orders allow dilations."""
+    """A cylinder has a height; lattice and canvas need their meshes. Not all orders allow dilations."""
     edge, layout = order
-    if edge == "hard" and layout != "lattice":
+    if edge == "hard" and layout in ("plain", "runs"):
         entries["layer_dilations"] = layer_dilations
-    mesh = "xygrid6" if layout == "lattice" else entries.pop("mesh")
+    mesh = entries.pop("mesh") if layout in ("plain", "runs") else MESHES[layout]
     entries = entries | {"mesh": mesh, "object_height": tall if entries["shape"] == "cylinder" else 0.0}
     return Manifest(edge=edge, layout=layout, **entries)
 
@@ -72,7 +72,7 @@ manifests = st.builds(
     radius=reals(1e-3, 10.0),
     object_radius=reals(1e-3, 10.0),
     intersections=reals(0.1, 20.0),
-    mesh=st.sampled_from(sorted(set(MESH_MODELS) - {"wall6"})),
+    mesh=st.sampled_from(sorted(set(MESH_MODELS) - {"wall6", "octaves"})),
     max_distance=reals(0.1, 100.0),
     classes=classes,
     self_test=st.one_of(st.none(), self_tests()),
@@ -153,6 +153,17 @@ def test_files_without_dilations_lack_their_entry_as_before():
         ({"layer_dilations": [True]}, "not True"),
         ({"layer_dilations": [2], "edge": "same"}, "edge hard and layout plain or runs, not same and plain"),
         ({"layer_dilations": [2], "layout": "lattice", "mesh": "xygrid6"}, "not hard and lattice"),
+        ({"layer_dilations": [2], "layout": "canvas", "mesh": "octaves"}, "not hard and canvas"),
+        *(
+            ({"layout": layout, "mesh": mesh}, f"the mesh is {mesh}, the layout {layout}")
+            for layout, mesh in (
+                ("plain", "octaves"),
+                ("runs", "octaves"),
+                ("lattice", "octaves"),
+                ("canvas", "xygrid6"),
+            )
+        ),
+        ({"layout": "canvas", "mesh": "octaves", "edge": "same"}, "canvas"),
     ],
 )
 def test_impossible_dilations_are_refused(entries, said):

@@ -5,6 +5,7 @@ import pytest
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
+from vm_export.canvas_network import CanvasShape
 from vm_train.learning.configuration import TrainConfiguration
 from vm_train.learning.recipe import Recipe
 
@@ -50,6 +51,15 @@ def test_classes_come_in_their_order_with_their_colors(write):
         ("[network]\ndilations = [1, 2]\n", "dilations must be 9 numbers, one for each convolution, not 2"),
         ("[network]\ndepth = 1\ndilations = [65]\n", r"whole numbers from 1 to 64, not \[65\]"),
         ("[network]\ndepth = 1\ndilations = 2\n", "dilations must be a list of whole numbers"),
+        ("[mesh]\nmodel = 'octaves'\n[network]\nwidth = 12\n", "multiple of 8, such as 8, not 12"),
+        *(
+            (
+                f"[mesh]\nmodel = 'octaves'\n[network]\ndepth = 1\n{entry}\n",
+                f"{entry.split()[0]} of .network. has no effect",
+            )
+            for entry in ("activation = 'relu'", "kind = 'separable'", "dilations = [2]")
+        ),
+        ("[mesh]\nmodel = 'octaves'\ngrid = 'hexagonal'\n", "hexagonal grid needs a mesh.model with six neighbors"),
         ("[classes]\nball = 3\n", "ball must be like"),
         ("[classes]\nball = { kind = 'thing', colors = [[1, 2, 3]] }\n", "kind must be one of"),
         ("[classes]\nball = { kind = 'object', colors = [[1, 2]] }\n", r"a color is \[red, green, blue\]"),
@@ -75,6 +85,13 @@ def test_entries_can_be_overridden(write):
     assert found.network_shape.layer_dilations == found.manifest.layer_dilations == (1, 4, 2)
     assert (found.training.epochs, found.training.batch) == (7, 2)
     assert (found.training.selection, found.mesh.radius) == ("balanced", 0.1)
+
+
+def test_octaves_have_a_network_and_a_layout_of_their_own(write):
+    found = read_sections(TrainConfiguration, write("[mesh]\nmodel = 'octaves'\n[network]\ndepth = 2\nwidth = 24\n"))
+    assert found.network_shape == CanvasShape(2, 24, len(found.classes.colors))
+    assert (found.manifest.mesh, found.manifest.layout, found.manifest.layer_dilations) == ("octaves", "canvas", ())
+    assert read_sections(TrainConfiguration, write(to_commented_toml(found))) == found
 
 
 @pytest.mark.parametrize("text", ["epochs=7", "training.epochs", "training.=7", "=7"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from tests.manifests import ball_manifest
 from tests.vm_train.weights import same
 from vm_embedded.errors import InputError
 from vm_export.network import Network
@@ -124,7 +125,7 @@ def test_graders_change_which_points_are_selected_but_hardly_how_many():
 def test_a_batch_without_points_changes_no_weights():
     made = training()
     before = weights(made)
-    step = made.step(batches_of(made.recipe)[0].items[:1], [empty_graph(6)])
+    step = made.step(batches_of(made.recipe)[0].items[:1], [empty_graph(ball_manifest())])
     assert (step.loss, made.done) == (0.0, 1)
     assert same(weights(made), before)
 

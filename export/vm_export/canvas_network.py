@@ -1,0 +1,171 @@
+"""The network of the layout `canvas` in torch: convolutions on the strips of mesh octaves, at four resolutions.
+
+A convolution is separable: 3 x 3 cells in each channel by itself, then a mix of the channels. Three times the canvas is
+halved, so that a cell sees far around; then the answers of the coarser canvases are added to the finer ones (a U-Net:
+Ronneberger and others, 2015). All channels come in multiples of eight, which ONNX Runtime computes fastest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from typing import Any, cast
+
+import numpy as np
+import torch
+from torch import nn
+
+from vm_embedded.errors import InputError
+from vm_embedded.network.canvas_layout import place_on_canvas
+
+COARSER = ((1.5, 1), (2.0, 2), (3.0, 2))
+"""Of each coarser canvas: its channels, as a multiple of those of the finest one, and its separable convolutions."""
+
+_BLOCK = 8
+"""Channels that ONNX Runtime computes together."""
+
+_MOMENTUM = 0.05
+"""Weight of a batch in the mean colors of batch normalization: a batch has few pictures."""
+
+
+@dataclass(frozen=True)
+class CanvasShape:
+    """The shape of a network: separable convolutions and channels at full resolution, and classes.
+
+    Raises InputError if the width is not a multiple of eight.
+    """
+
+    depth: int
+    width: int
+    classes: int
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.width % _BLOCK:
+            low = max(self.width // _BLOCK, 1) * _BLOCK
+            raise InputError(
+                f"the width of a network on octaves must be a multiple of 8, such as {low}, not {self.width}"
+            )
+        if self.depth < 1:
+            raise InputError(f"the depth of a network on octaves must be at least 1, not {self.depth}")
+
+    @property
+    def widths(self) -> tuple[int, ...]:
+        """Channels at each resolution, the finest first."""
+        return (self.width, *(-(-round(self.width * share) // _BLOCK) * _BLOCK for share, _ in COARSER))
+
+    @property
+    def depths(self) -> tuple[int, ...]:
+        """Separable convolutions on the way down at each resolution, the finest first."""
+        return (self.depth, *(each for _, each in COARSER))
+
+    @property
+    def summary(self) -> str:
+        """The shape in a few words."""
+        return f"depth {self.depth}, width {self.width}"
+
+    @property
+    def operations(self) -> int:
+        """Multiplications and additions for each cell, without activations."""
+        widths, depths = self.widths, self.depths
+        total = 9.0 * 4 * widths[0] + widths[0] * self.classes
+        for level, (width, depth) in enumerate(zip(widths, depths, strict=True)):
+            share = 0.25**level
+            separable = width * (9 + width)
+            total += share * separable * (depth + (level + 1 < len(widths)))
+            if level + 1 < len(widths):
+                total += 0.25 * share * width * (9 + widths[level + 1]) + 0.25 * share * widths[level + 1] * width
+        return round(2.0 * total)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The shape as plain values for a checkpoint."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> CanvasShape:
+        """Inverse of `as_dict`. Raises InputError."""
+        try:
+            return cls(int(data["depth"]), int(data["width"]), int(data["classes"]))
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f"can't read the shape of a network: {error}") from error
+
+
+class Separable(nn.Module):
+    """A separable convolution with batch normalization, added to its input if nothing changes the size, then ReLU."""
+
+    def __init__(self, inputs: int, outputs: int, stride: int = 1) -> None:
+        super().__init__()
+        self.depthwise = nn.Conv2d(inputs, inputs, 3, stride, padding=1, groups=inputs, bias=False)
+        self.mix = nn.Conv2d(inputs, outputs, 1, bias=False)
+        self.norm = nn.BatchNorm2d(outputs, momentum=_MOMENTUM)
+        self.adds = stride == 1 and inputs == outputs
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """(1, outputs, H, W) from (1, inputs, H, W), halved if the stride is two."""
+        found = self.norm(self.mix(self.depthwise(x)))
+        return torch.relu(x + found if self.adds else found)
+
+
+class CanvasNetwork(nn.Module):
+    """A network on a canvas: from colors to probabilities, or to logits in training."""
+
+    def __init__(self, shape: CanvasShape) -> None:
+        super().__init__()
+        self.shape = shape
+        widths, depths = shape.widths, shape.depths
+        steps = list(pairwise(widths))
+        self.stem = nn.Conv2d(4, widths[0], 3, padding=1, bias=False)
+        self.stem_norm = nn.BatchNorm2d(widths[0], momentum=_MOMENTUM)
+        self.down = nn.ModuleList(
+            nn.ModuleList(Separable(width, width) for _ in range(depth))
+            for width, depth in zip(widths, depths, strict=True)
+        )
+        self.halve = nn.ModuleList(Separable(fine, coarse, stride=2) for fine, coarse in steps)
+        self.lift = nn.ModuleList(nn.Conv2d(coarse, fine, 1) for fine, coarse in steps)
+        self.up = nn.ModuleList(Separable(fine, fine) for fine, _ in steps)
+        self.head = nn.Conv2d(widths[0], shape.classes, 1)
+
+    @property
+    def blocks(self) -> list[list[Separable]]:
+        """The separable convolutions on the way down at each resolution, the finest first."""
+        return cast("list[list[Separable]]", self.down)
+
+    def canvas_logits(self, points: torch.Tensor, shown: torch.Tensor) -> torch.Tensor:
+        """Outputs (1, C, H, W) before the softmax, from colors (1, 3, H, W), 0 where nothing is, and the cells (1, 1,
+        H, W) that are shown."""
+        canvas = torch.cat([points, shown.to(points.dtype)], dim=1).contiguous(memory_format=torch.channels_last)
+        x = torch.relu(self.stem_norm(self.stem(canvas)))
+        finer = []
+        for level, blocks in enumerate(self.blocks):
+            for block in blocks:
+                x = block(x)
+            if level < len(self.halve):
+                finer.append(x)
+                x = self.halve[level](x)
+        for level in reversed(range(len(finer))):
+            lifted = nn.functional.interpolate(self.lift[level](x), scale_factor=2.0, mode="nearest")
+            x = self.up[level](torch.relu(finer[level] + lifted))
+        return self.head(x)  # type: ignore[no-any-return]
+
+    def logits(self, points: torch.Tensor, cells: torch.Tensor) -> torch.Tensor:
+        """Outputs (n + 1, C) before the softmax, from points (n + 1, 3) and their cells (n, 2) on the lattice.
+
+        The last row is the off-screen point, which takes no part. The strips of the cells are placed on a canvas as the
+        runtime places them.
+        """
+        count = len(cells)
+        _, shape, slot = place_on_canvas(cells.cpu().numpy(), np.ones(count, dtype=bool))
+        slots = torch.from_numpy(slot.astype(np.int64)).to(points.device)
+        canvas = torch.zeros((4, shape[0] * shape[1]), dtype=points.dtype, device=points.device)
+        canvas[:3, slots], canvas[3, slots] = points[:count].T, 1.0
+        canvas = canvas.reshape(1, 4, *shape)
+        found = self.canvas_logits(canvas[:, :3], canvas[:, 3:])[0].flatten(1)
+        return torch.cat([found[:, slots], torch.zeros_like(found[:, :1])], dim=1).T
+
+    def probabilities(self, points: torch.Tensor, cells: torch.Tensor) -> torch.Tensor:
+        """Probabilities (n + 1, C); see `logits`."""
+        return self.logits(points, cells).softmax(dim=1)
+
+    def forward(self, points: torch.Tensor, shown: torch.Tensor) -> torch.Tensor:
+        """Probabilities (1, C, H, W) of the cells of a canvas; see `canvas_logits`."""
+        return self.canvas_logits(points, shown).softmax(dim=1)

@@ -1,0 +1,123 @@
+"""Networks on strips learn, and do so repeatably: after an interruption, and whatever a batch shows."""
+
+import numpy as np
+import pytest
+import torch
+
+from tests.manifests import ball_manifest
+from tests.vm_train.learning.test_trainer import weights
+from tests.vm_train.weights import same
+from vm_export.canvas_network import CanvasNetwork, CanvasShape
+from vm_train.graphs.labeled_graph import CONTEXT, LabeledGraph, empty_graph
+from vm_train.graphs.schedule import schedule
+from vm_train.learning.recipe import Recipe
+from vm_train.learning.trainer import Trainer, read_state
+
+COUNT = 4
+RECIPES = {
+    "muon": Recipe(epochs=3, batch=2, optimizer="muon", rate=0.02),
+    "adamw": Recipe(epochs=3, batch=3),
+}
+NOTHING = empty_graph(ball_manifest(mesh="octaves", layout="canvas"))
+
+
+def graph(position, rows=13, columns=30):
+    """A strip in whose rows and columns bright points are of class 1, with context around."""
+    random = np.random.default_rng([position, 17])
+    cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(np.int32)
+    points = random.random((len(cells) + 1, 3), dtype=np.float32)
+    points[-1] = -1.0
+    labels = (points[:-1].mean(axis=1) > 0.5).astype(np.int8)
+    labels[::7] = -1
+    labels[(cells == 0).any(axis=1)] = CONTEXT
+    neighbors = np.zeros((len(cells) + 1, 0), dtype=np.int32)
+    return LabeledGraph(points, neighbors, labels, np.linspace(0.0, 10.0, len(cells)), np.zeros((len(cells), 2)), cells)
+
+
+def network(seed=3):
+    torch.manual_seed(seed)
+    return CanvasNetwork(CanvasShape(1, 8, 2))
+
+
+def batches_of(recipe):
+    return list(schedule((recipe.seed, 1), recipe.epochs, recipe.batch, COUNT, 0))
+
+
+def training(recipe, graders=()):
+    return Trainer(network(), recipe, len(batches_of(recipe)), np.array([0.7, 1.0]), np.array([1.5, 0.5]), graders)
+
+
+def run(made, until=None):
+    """Losses of the steps that are left, or of those before `until`."""
+    batches = batches_of(made.recipe)[made.done : until]
+    return [made.step(each.items, [graph(item.position) for item in each.items]).loss for each in batches]
+
+
+def test_it_learns_what_a_checkpoint_then_knows():
+    """Batch normalization by the statistics of the whole training gives about the answers of the last batches."""
+    made = training(Recipe(epochs=30, batch=2, rate=0.02))
+    losses = run(made)
+    assert np.mean(losses[-6:]) < 0.3 * np.mean(losses[:6])
+    for position in range(COUNT):
+        shown = graph(position)
+        labeled = shown.labels >= 0
+        found = made.probabilities(shown)
+        assert (found.argmax(axis=1) == shown.labels)[labeled].mean() > 0.9
+    assert made.network.training
+
+
+@pytest.mark.parametrize("recipe", RECIPES.values(), ids=RECIPES)
+@pytest.mark.parametrize("stop", [1, 4])
+def test_what_is_interrupted_ends_with_the_same_weights(recipe, stop, tmp_path):
+    whole = training(recipe)
+    losses = run(whole)
+    first = training(recipe)
+    before = run(first, until=stop)
+    first.probabilities(graph(0))  # a validation, which no training may notice
+    first.save(tmp_path / "state.pt", {})
+    second = training(recipe)
+    second.load(read_state(tmp_path / "state.pt"))
+    assert before + run(second) == losses
+    assert same(weights(second), weights(whole))
+
+
+def test_graders_answer_as_trained_networks_and_stay_as_they_are():
+    graders = [network(8), network(9)]
+    before = [{name: value.clone() for name, value in each.state_dict().items()} for each in graders]
+    first, second = training(RECIPES["muon"]), training(RECIPES["muon"], graders)
+    run(first), run(second)
+    assert not same(weights(first), weights(second))
+    assert all(same(each.state_dict(), old) for each, old in zip(graders, before, strict=True))
+
+
+def test_a_batch_without_points_changes_nothing():
+    made = training(RECIPES["muon"])
+    before = weights(made)
+    step = made.step(batches_of(made.recipe)[0].items[:1], [NOTHING])
+    assert (step.loss, made.done) == (0.0, 1)
+    assert same(weights(made), before)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 5), (5, 1), (3, 8)])
+def test_a_window_of_a_few_points_is_learned_from(shape):
+    """A canvas of one cell at the coarsest resolution would have no deviation to divide by."""
+    made = training(RECIPES["muon"])
+    small = graph(2, *shape)
+    small.labels[:] = 1
+    step = made.step(batches_of(made.recipe)[0].items[:1], [small])
+    assert step.points == len(small)
+    assert np.isfinite(step.loss)
+    assert all(torch.isfinite(each).all() for each in weights(made).values())
+
+
+def test_context_gives_no_gradient_but_is_seen():
+    made = training(RECIPES["muon"])
+    shown = graph(0)
+    hidden = graph(0)
+    hidden.points[:-1][hidden.labels == CONTEXT] = 0.0
+    assert not np.array_equal(made.probabilities(shown), made.probabilities(hidden))
+    shown.labels[:] = CONTEXT
+    before = {name: each for name, each in weights(made).items() if "running" not in name and "batches" not in name}
+    assert made.step(batches_of(made.recipe)[0].items[:1], [shown]).points == 0
+    after = weights(made)
+    assert same({name: after[name] for name in before}, before)
