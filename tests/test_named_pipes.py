@@ -51,6 +51,8 @@ frames/image0.jpg           vm-detect frames/image0.jpg frames/image1.jpg
 frames/image0.jpg           vm-detect frames --save-boxes new_boxes
 frames/lens0.yaml           vm-detect frames/image0.jpg
 video.avi                   vm-detect video.avi --height 1 --fov 90deg
+bag.mcap                    vm-detect bag.mcap
+bag/bag.mcap                vm-detect bag
 model.onnx                  vm-detect frames/image0.jpg --model model.onnx
 lens.yaml                   vm-detect frames/image0.jpg --lens lens.yaml
 vm.toml                     vm-detect --config vm.toml
@@ -72,7 +74,7 @@ frames/image0.jpg           vm-bench --image frames/image0.jpg
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("files")
-    for name in ("pictures", "frames", "run", "set"):
+    for name in ("pictures", "frames", "run", "set", "bag"):
         (made / name).mkdir()
     write_pictures(made / "pictures")
     write_shards(find_pictures(made / "pictures"), made / "shards", 2, lambda: None)
@@ -86,6 +88,7 @@ def folder(tmp_path_factory):
         (made / "frames" / f"image{number}.jpg").symlink_to(image)
         lens = image.with_name(f"lens{image.stem.removeprefix('image')}.yaml")
         (made / "frames" / f"lens{number}.yaml").symlink_to(lens)
+    (made / "bag" / "metadata.yaml").touch()
     (made / "model.onnx").symlink_to(model_path("ball"))
     return made
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from ...arrays import Image
 from ...errors import InputError, VisualMeshError, one_line, unknown
-from ...files import is_file
+from ...files import is_file, open_regular
 from ...geometry.lens import Lens
 from ...geometry.orientation import Orientation
 from ...poses.buffer import PoseBuffer, StalePoseError
@@ -67,11 +67,14 @@ def open_bag(name: str, reading: BagReading) -> Source:
     try:
         if not path.exists():
             raise InputError(f"no such bag: {name}")
-        files = tuple(sorted(path.iterdir())) if path.is_dir() else (path,)
+        files = tuple(sorted(each for each in path.iterdir() if not each.is_dir())) if path.is_dir() else (path,)
+        for each in files:
+            open_regular(each).close()  # rosbags waits for the writer of a pipe
         reader = rosbags.highlevel.AnyReader([path], default_typestore=typestore())
         reader.open()
     except damage_errors() as error:
-        raise InputError(f"can't read bag {name}: {getattr(error, 'strerror', None) or one_line(error)}") from error
+        place, reason = getattr(error, "filename", None) or name, getattr(error, "strerror", None) or one_line(error)
+        raise InputError(f"can't read bag {place}: {reason}") from error
     try:
         images = _image_topic(name, reader, reading.ros.image)
         info = reading.ros.camera_info or camera_info_beside(images)
