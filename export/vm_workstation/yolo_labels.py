@@ -20,6 +20,9 @@ from .yolo_names import tables_in
 
 _VALUES = ("x", "y", "width", "height", "confidence")
 
+_MOST_SHOWN = 20
+"""Most names in a message about a line."""
+
 _OUTSIDE = 0.1
 """How far a box may reach outside of the image, as a share of the image. Boxes in pixels reach farther."""
 
@@ -114,5 +117,6 @@ def _class_name(word: str, names: Sequence[str]) -> str:
         raise InputError(f"class {word[:20]!r} is not a whole number from 0 up")
     number = int(word)
     if names and number >= len(names):
-        raise InputError(f"class {number} is unknown; the table of names has 0 to {len(names) - 1}: {', '.join(names)}")
+        shown = ", ".join([*names[:_MOST_SHOWN], *(["..."] if len(names) > _MOST_SHOWN else [])])
+        raise InputError(f"class {number} is unknown; the table of names has 0 to {len(names) - 1}: {shown}")
     return names[number] if names else str(number)

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
-from vm_embedded.output.box_files import edges
+from vm_embedded.output.box_files import edges, overlap
+from vm_label import box_folder
 from vm_label.box_folder import clipped, read_box_folder
 from vm_label.crops import most_doubtful_first
 
@@ -117,3 +120,33 @@ def test_a_box_is_clipped_to_the_image(shares):
     np.testing.assert_allclose(edges(clipped(shares)), expected, rtol=0.0, atol=1e-12)
     if (expected == edges(shares)).all():
         assert clipped(shares) == shares
+
+
+def candidate_lines(boxes):
+    fields = {"image": "image0000.jpg", "class": "ball", "confidence": 0.2, "found": False}
+    return "".join(json.dumps(fields | {"box": box}) + "\n" for box in boxes)
+
+
+@given(st.lists(SHARES, max_size=12), st.lists(SHARES, max_size=5))
+def test_a_near_miss_at_the_place_of_another_box_is_left_out(misses, labels):
+    with tempfile.TemporaryDirectory() as place:
+        folder = make_folder(Path(place), 1)
+        (folder / "image0000.txt").write_text("".join(f"0 {' '.join(map(repr, each))}\n" for each in labels))
+        (folder / "candidates.jsonl").write_text(candidate_lines(misses))
+        crops = read_box_folder(folder).crops
+    drawn = [crop.shares for crop in crops if crop.confidence is None]
+    left = [*drawn]
+    for each in misses:
+        if all(overlap(edges(each), edges(other)) <= 0.5 for other in left):
+            left.append(each)
+    assert [crop.shares for crop in crops] == left
+
+
+def test_thousands_of_near_misses_are_compared_with_few(tmp_path, monkeypatch):
+    compared = []
+    monkeypatch.setattr(box_folder, "overlap", lambda one, other: compared.append(0) or overlap(one, other))
+    folder, count = make_folder(tmp_path, 1), 2000
+    corners = np.random.default_rng(1).uniform(0.1, 0.9, (count, 2)).tolist()
+    (folder / "candidates.jsonl").write_text(candidate_lines([(*each, 0.01, 0.01) for each in corners]))
+    assert len(read_box_folder(folder).crops) > count / 2
+    assert len(compared) < 50 * count

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from ..graphs.streamed import StreamSource
     from ..learning.hardware import Hardware
 
+_MOST_SHARDS, _MOST_DIGITS = 10**6, 20
+
 _RANGE = re.compile(r"\{(\d+)\.\.(\d+)\}")
 
 
@@ -92,6 +94,8 @@ def _expanded(pattern: str) -> list[str]:
 
 
 def _numbers(first: str, last: str) -> list[str]:
+    if max(len(first), len(last)) > _MOST_DIGITS or int(last) - int(first) >= _MOST_SHARDS:
+        raise InputError(f"the range {{{first[:20]}..{last[:20]}}} has more than {_MOST_SHARDS} shards")
     if int(first) > int(last):
         raise InputError(f"the range {{{first}..{last}}} ends before it begins")
     return [f"{number:0{len(first)}d}" for number in range(int(first), int(last) + 1)]

@@ -19,6 +19,7 @@ def test_ranges_stand_for_all_their_numbers(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
+        (["--stream", "http://a/{00000000..99999999}.tar", "--epoch-pictures", "9"], "more than 1000000 shards"),
         (["--stream", "http://a/{3..1}.tar", "--epoch-pictures", "9"], "the range {3..1} ends before it begins"),
         (["--stream", "nowhere.tar", "--epoch-pictures", "9"], "shard 'nowhere.tar' does not exist"),
         (["--stream", "", "--epoch-pictures", "9"], "shard '' does not exist"),
