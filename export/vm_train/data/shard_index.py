@@ -69,7 +69,11 @@ def _entries(shard: Path) -> Iterator[_Entry]:
     entries: dict[str, _Entry] = {}
     after = "its start"
     try:
-        with open_regular(shard) as file:
+        opened = open_regular(shard)
+    except OSError as error:
+        raise InputError(f"can't read {shard}: {error.strerror or error}") from error
+    try:
+        with opened as file:
             source = TarSource(file)
             with tarfile.open(fileobj=source, mode="r:") as tar:
                 for member in members(tar, source):

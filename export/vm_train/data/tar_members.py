@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import io
 import tarfile
 from collections.abc import Iterator
@@ -10,8 +9,8 @@ from typing import IO
 
 from .picture_files import LARGEST_FILE
 
-_LARGEST_HEADERS = 2**16
-"""Most bytes of the headers of one member: long names take a few hundred."""
+_LARGEST_HEADERS = 20 * 2**10
+"""Most bytes of the headers of one member: long names take a few hundred. The time of tarfile grows with the square."""
 
 _MOST_ENDS = 8  # reads that give nothing
 
@@ -31,9 +30,9 @@ class TarSource(io.RawIOBase):
         self.limit: int | None = _LARGEST_HEADERS
 
     def read(self, size: int = -1) -> bytes:
-        """The next bytes. Raises OSError beyond the limit, and EOFError if there were none again and again."""
+        """The next bytes. Raises ReadError beyond the limit, and EOFError if there were none again and again."""
         if self.limit is not None and not 0 <= size <= self.limit - self.count:
-            raise OSError(errno.EFBIG, f"the headers of a member have more than {_LARGEST_HEADERS} bytes")
+            raise tarfile.ReadError(f"the headers of a member have more than {_LARGEST_HEADERS} bytes")
         data = self._source.read(size)
         self._ends = 0 if data else self._ends + 1
         if self._ends > _MOST_ENDS:
