@@ -97,24 +97,34 @@ def atomic_write(path: Path) -> Iterator[Path]:
 def atomic_folder(path: Path) -> Iterator[Path]:
     """A new folder beside `path`, which gets the name `path` when the block ends without an error.
 
-    An empty folder is replaced, and gives its mode to the new one; anything else of that name stays. Missing parent
-    folders are created. Raises InputError if the folder can't be written, and for the current folder.
+    An empty folder is replaced, and gives its mode to the new one. The current folder gets the content instead, because
+    a shell would stay in a replaced one. Anything else of that name stays. Missing parent folders are created. Raises
+    InputError if the folder can't be written.
     """
     try:
         target = real_path(path)
-        if target.is_dir() and target.samefile("."):  # a shell would stay in the replaced one, which looks empty
-            raise OSError(errno.EBUSY, "this is the current folder: give the name of a new one")
         part = unused_name(target)
         part.mkdir(parents=True)
         try:
             yield part
-            if target.is_dir():
-                part.chmod(stat.S_IMODE(target.stat().st_mode))
-            part.rename(target)
+            if target.is_dir() and target.samefile("."):
+                _move_content(part, target)
+            else:
+                if target.is_dir():
+                    part.chmod(stat.S_IMODE(target.stat().st_mode))
+                part.rename(target)
         finally:
             shutil.rmtree(part, ignore_errors=True)
     except OSError as error:
         raise InputError(f"can't write {path}: {error.strerror or error}") from error
+
+
+def _move_content(part: Path, target: Path) -> None:
+    """Move everything in a folder to another one. Raises OSError if that one is not empty; it stays as it is then."""
+    if any(target.iterdir()):
+        raise OSError(errno.ENOTEMPTY, os.strerror(errno.ENOTEMPTY), str(target))
+    for each in part.iterdir():
+        each.rename(target / each.name)
 
 
 def real_path(path: Path) -> Path:

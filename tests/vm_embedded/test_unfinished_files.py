@@ -82,11 +82,21 @@ def test_an_empty_folder_is_replaced_and_keeps_its_mode_and_its_link(tmp_path):
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
 
 
-def test_the_current_folder_is_refused_because_a_shell_would_stay_in_the_replaced_one(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match=r"can't write \.: .*current folder"), atomic_folder(Path()):
-        pytest.fail("the work began")
-    assert not list(tmp_path.iterdir())
+def test_the_current_folder_gets_the_content_because_a_shell_would_stay_in_a_replaced_one(tmp_path, monkeypatch):
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    before = folder.stat().st_ino
+    with atomic_folder(Path()) as part:
+        (part / "within").mkdir()
+        (part / "within" / "file").write_text("whole")
+        assert not list(folder.iterdir())
+    assert folder.stat().st_ino == before
+    assert (folder / "within" / "file").read_text() == "whole"
+    with pytest.raises(InputError, match=r"can't write \."), atomic_folder(Path()) as part:
+        (part / "other").touch()
+    assert [each.name for each in folder.iterdir()] == ["within"]
+    assert [each.name for each in tmp_path.iterdir()] == ["here"]
 
 
 @pytest.mark.parametrize("fill", [lambda path: (path / "own").touch(), lambda path: (path.rmdir(), path.touch())])
