@@ -13,7 +13,8 @@ from torch import nn
 from vm_embedded.arrays import Singles
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
-from .canvas_network import CanvasNetwork, CanvasShape, Separable
+from .canvas_network import CanvasNetwork, Separable
+from .canvas_shape import CanvasShape
 from .onnx_graph import BOOL, FLOAT, OnnxGraph
 
 _LARGEST = 60.0

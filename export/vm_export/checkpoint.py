@@ -11,7 +11,7 @@ from typing import Any
 from vm_embedded.errors import InputError, ModelError, one_line
 from vm_embedded.network.manifest import Manifest
 
-from .canvas_network import CanvasShape
+from .canvas_shape import CanvasShape
 from .grid import VISUAL, Grid
 from .look_checkpoint import LOOK_FORMAT
 from .mesh_networks import MeshNetwork, new_network, read_shape

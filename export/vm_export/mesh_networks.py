@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .canvas_network import CanvasNetwork, CanvasShape
+from .canvas_network import CanvasNetwork
+from .canvas_shape import CanvasShape
 from .network import Network
 from .network_shape import NetworkShape
 

@@ -4,7 +4,8 @@ import torch
 
 from tests.manifests import ball_manifest
 from vm_embedded.mesh.models import MESH_MODELS
-from vm_export.canvas_network import CanvasNetwork, CanvasShape
+from vm_export.canvas_network import CanvasNetwork
+from vm_export.canvas_shape import CanvasShape
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape

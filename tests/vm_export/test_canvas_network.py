@@ -21,7 +21,7 @@ from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.model_file import ModelFile, read_model
 from vm_embedded.network.session import Session
 from vm_export import export
-from vm_export.canvas_network import CanvasShape
+from vm_export.canvas_shape import CanvasShape
 
 SIZE = (320, 240)
 

@@ -19,7 +19,7 @@ from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.manifest import LAYOUTS
 from vm_embedded.network.model_file import read_model
 from vm_export import export
-from vm_export.canvas_network import CanvasShape
+from vm_export.canvas_shape import CanvasShape
 from vm_export.checkpoint import Checkpoint
 from vm_export.network import Network
 from vm_export.network_shape import ACTIVATIONS, HEADS, Layer, NetworkShape

@@ -10,9 +10,8 @@ from vm_embedded.errors import InputError
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.manifest import MOST_DILATION, POINT_COLORS, POINT_SAMPLINGS, Manifest
-from vm_export.canvas_network import CanvasShape
+from vm_export.canvas_shape import CanvasShape
 from vm_export.grid import GRIDS, Grid
-from vm_export.mesh_networks import MeshShape
 from vm_export.network_shape import ACTIVATIONS, NetworkShape
 from vm_workstation.ranges import whole_numbers
 
@@ -161,7 +160,7 @@ class TrainConfiguration:
         return Grid(self.mesh.grid, self.mesh.equal_at if self.mesh.grid == "hexagonal" else 0.0)
 
     @property
-    def network_shape(self) -> MeshShape:
+    def network_shape(self) -> NetworkShape | CanvasShape:
         """The layers of the network."""
         network = self.network
         if self.mesh.model == "octaves":

@@ -12,7 +12,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.files import read_bytes
 from vm_embedded.network.manifest import Manifest, ObjectClass
 from vm_embedded.network.model_file import read_model
-from vm_export.canvas_network import CanvasShape
+from vm_export.canvas_shape import CanvasShape
 from vm_export.checkpoint import Checkpoint
 from vm_export.mesh_networks import MeshShape
 from vm_export.network_weights import network_of

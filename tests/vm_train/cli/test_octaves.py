@@ -9,7 +9,7 @@ import pytest
 from tests.vm_train.commands import run, run_and_stop, run_module
 from tests.vm_train.drawn import CLASSES
 from tests.vm_train.weights import same, weights_of
-from vm_export.canvas_network import CanvasShape
+from vm_export.canvas_shape import CanvasShape
 from vm_export.checkpoint import Checkpoint
 from vm_train.learning.log import read_log
 

@@ -17,7 +17,8 @@ from vm_embedded.mesh.mesh import STRIDE
 from vm_embedded.mesh.models import mesh_model
 from vm_embedded.network.canvas_layout import place_on_canvas
 from vm_embedded.network.choose_layout import choose_layout
-from vm_export.canvas_network import CanvasNetwork, CanvasShape
+from vm_export.canvas_network import CanvasNetwork
+from vm_export.canvas_shape import CanvasShape
 from vm_train.data.pictures import Picture, find_pictures
 from vm_train.graphs.augmentation import Augmentation
 from vm_train.graphs.graph_augmentation import mirror_image, random_window

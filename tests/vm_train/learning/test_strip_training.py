@@ -7,7 +7,8 @@ import torch
 from tests.manifests import ball_manifest
 from tests.vm_train.learning.test_trainer import weights
 from tests.vm_train.weights import same
-from vm_export.canvas_network import CanvasNetwork, CanvasShape
+from vm_export.canvas_network import CanvasNetwork
+from vm_export.canvas_shape import CanvasShape
 from vm_train.graphs.labeled_graph import CONTEXT, LabeledGraph, empty_graph
 from vm_train.graphs.schedule import schedule
 from vm_train.learning.recipe import Recipe
