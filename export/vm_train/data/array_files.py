@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -12,6 +13,9 @@ import numpy.typing as npt
 
 from vm_embedded.errors import InputError, one_line
 from vm_embedded.files import LARGEST, open_regular
+
+_DAMAGE = (OSError, ValueError, KeyError, EOFError, OverflowError, RuntimeError, zipfile.BadZipFile, zlib.error)
+"""What numpy and zipfile raise for a damaged file. RuntimeError: a part is encrypted, or packed in an unknown way."""
 
 
 def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
@@ -22,7 +26,7 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
             _check_sizes(file)
             with np.load(file, allow_pickle=False) as arrays:
                 return {name: arrays[name] for name in arrays.files}
-    except (OSError, ValueError, KeyError, EOFError, OverflowError, NotImplementedError, zipfile.error) as error:
+    except _DAMAGE as error:
         raise InputError(f"can't read {path}: {one_line(error)}") from error
 
 

@@ -228,3 +228,19 @@ def _empty(folder):
     path = folder / "empty"
     path.touch()
     return path
+
+
+@pytest.mark.parametrize("fault", ["encrypted", "damaged"])
+def test_arrays_that_can_not_be_unpacked_are_a_fault_of_the_file(tmp_path, fault):
+    path = tmp_path / "arrays.npz"
+    np.savez_compressed(path, values=np.arange(1000))
+    content = bytearray(path.read_bytes())
+    if fault == "encrypted":  # a flag of the part, in the list at the end, too
+        for header, place in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+            content[content.index(header) + place] |= 1
+    else:
+        middle = len(content) // 3
+        content[middle : middle + 200] = bytes(200)
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"arrays\.npz"):
+        read_arrays(path)
