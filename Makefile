@@ -31,7 +31,7 @@ demo: .venv/runtime ## find balls and field features in the twelve test pictures
 	@$(BIN)/vm-detect --model soccer --camera $(DEMO) --save-overlay demo-out
 	@echo "Annotated pictures: $(CURDIR)/demo-out/"
 
-test: lint ## lint and tests (10 to 15 minutes); LONG=1 adds the long ones (30 to 60 minutes): camera faults, a booted robot
+test: lint ## lint and tests (10 to 15 minutes); LONG=1 adds the long ones (40 to 70 minutes): camera faults, a booted robot
 	$(BIN)/python deploy/bundle.py --download
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder $(if $(LONG),,-m 'not long')
 

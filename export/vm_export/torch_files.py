@@ -49,9 +49,8 @@ def _check_packed(content: bytes) -> None:
     part of kilobytes would be unpacked to gigabytes."""
     with zipfile.ZipFile(io.BytesIO(content)) as packed:
         parts = packed.infolist()
-    if any(each.compress_type != zipfile.ZIP_STORED for each in parts) or sum(e.file_size for e in parts) > len(
-        content
-    ):
+    is_stored = all(each.compress_type == zipfile.ZIP_STORED for each in parts)
+    if not is_stored or sum(each.file_size for each in parts) > len(content):
         raise zipfile.BadZipFile
 
 

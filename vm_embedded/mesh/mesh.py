@@ -60,7 +60,7 @@ class Mesh:
     neighbors: (n + 1, N) indices of points. Index n is the off-screen point, which takes the place of every missing
         neighbor. It is linked to itself.
     cells: (n, 2) column and row of each point, in a lattice where all neighbors are fixed steps away; else None.
-    margin: (n,) points that only give context to the network and are no part of its answer; None if there are none.
+    margin: (n,) which points only give context to the network and are no part of its answer; None for no point.
     """
 
     rays: Floats
