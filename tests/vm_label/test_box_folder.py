@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
@@ -128,14 +128,14 @@ def candidate_lines(boxes):
 
 
 @given(st.lists(SHARES, max_size=12), st.lists(SHARES, max_size=5))
+@example([(0.0, 0.0, 1.0, 1.0), (0.5, 0.5, 1.0, 1.0)], [(0.5, 0.5, 1.0, 1.0)])  # a near miss that became a box
 def test_a_near_miss_at_the_place_of_another_box_is_left_out(misses, labels):
     with tempfile.TemporaryDirectory() as place:
-        folder = make_folder(Path(place), 1)
+        folder = make_folder(Path(place), 1, near=False)
         (folder / "image0000.txt").write_text("".join(f"0 {' '.join(map(repr, each))}\n" for each in labels))
+        left = [crop.shares for crop in read_box_folder(folder).crops]
         (folder / "candidates.jsonl").write_text(candidate_lines(misses))
         crops = read_box_folder(folder).crops
-    drawn = [crop.shares for crop in crops if crop.confidence is None]
-    left = [*drawn]
     for each in misses:
         if all(overlap(edges(each), edges(other)) <= 0.5 for other in left):
             left.append(each)
