@@ -24,10 +24,10 @@ from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import read_model
 from vm_export.grid import VISUAL
 from vm_train.data.pictures import Picture, find_pictures, read_picture
-from vm_train.evaluation.object_truth import read_scene
 from vm_train.graphs.labeled_graph import levels_of, plane_distances
 from vm_train.graphs.seen_points import seen_points
 from vm_train.scores.point_scores import PointScores
+from vm_train.truth.objects import read_scene
 from vm_workstation.text_tables import aligned
 
 LIMITS = np.linspace(0.05, 0.95, 19)

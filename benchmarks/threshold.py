@@ -23,11 +23,11 @@ from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import GeometryError
 from vm_train.data.pictures import read_picture
 from vm_train.evaluation.answers import ExactSubject, load_subject
-from vm_train.evaluation.object_truth import read_scene, true_objects
 from vm_train.evaluation.picture_selection import select_pictures
 from vm_train.learning.class_table import ClassTable
 from vm_train.scores.object_scores import ObjectScores
 from vm_train.scores.overlaps import TrueObject
+from vm_train.truth.objects import read_scene, true_objects
 
 THRESHOLDS, INSIDES, AROUNDS = (0.5, 0.6, 0.7, 0.8, 0.9), (0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95), (0.25, 0.4)
 

@@ -21,9 +21,9 @@ from vm_train.data.classes import Classes
 from vm_train.data.picture_files import PictureFiles
 from vm_train.data.pictures import Picture, find_pictures, read_picture
 from vm_train.data.split import split_by_seed
-from vm_train.evaluation.object_truth import read_scene, true_objects
 from vm_train.scores.object_scores import MIN_VISIBLE
 from vm_train.scores.overlaps import TrueObject
+from vm_train.truth.objects import read_scene, true_objects
 
 from ..shipped import classes_of
 

@@ -25,7 +25,7 @@ def canvas_model(network: CanvasNetwork, manifest: Manifest) -> bytes:
     """The bytes of an ONNX model in the layout `canvas`.
 
     Inputs: points (1, 3, rows, columns) float32 and shown (1, 1, rows, columns) bool, as CanvasLayout gives them.
-    Output: probabilities (1, C, rows, columns) float32.
+    Output: probabilities (1, C + 4 P, rows, columns) float32, which end with four numbers for each class with peaks.
     """
     writer = _Writer(OnnxGraph())
     graph = writer.graph
@@ -54,11 +54,16 @@ def canvas_model(network: CanvasNetwork, manifest: Manifest) -> bytes:
     limits = [graph.constant("lowest", -_LARGEST), graph.constant("highest", _LARGEST)]
     powers = graph.node("Exp", [graph.node("Clip", [head, *limits], "head.limited")], "powers")
     sums = graph.node("ReduceSum", [powers, graph.constant("classes", [1])], "sums")
-    graph.node("Div", [powers, sums], "probabilities")
+    if network.peaks is None:
+        graph.node("Div", [powers, sums], "probabilities")
+    else:
+        shares = graph.node("Div", [powers, sums], "shares")
+        peaks = writer.convolve("peaks", x, _array(network.peaks.weight), _array(network.peaks.bias))
+        graph.node("Concat", [shares, peaks], "probabilities", axis=1)
     sizes: list[int | str] = ["rows", "columns"]
     return graph.model(
         {"points": (FLOAT, [1, 3, *sizes]), "shown": (BOOL, [1, 1, *sizes])},
-        {"probabilities": (FLOAT, [1, network.shape.classes, *sizes])},
+        {"probabilities": (FLOAT, [1, network.shape.outputs, *sizes])},
         {METADATA_KEY: manifest.as_json()},
         "Visual Mesh network on strips of octaves, laid out as a picture. vm_embedded prepares it.",
     )
@@ -71,7 +76,8 @@ def read_canvas(constants: Mapping[str, Singles]) -> CanvasNetwork:
     InputError for other models.
     """
     depth = sum(name.startswith("down0.") and name.endswith(".mix.kernel") for name in constants)
-    shape = CanvasShape(depth, len(constants["stem.kernel"]), len(constants["head.kernel"]))
+    peaks = len(constants["peaks.kernel"]) // 4 if "peaks.kernel" in constants else 0
+    shape = CanvasShape(depth, len(constants["stem.kernel"]), len(constants["head.kernel"]), peaks)
     network = CanvasNetwork(shape)
 
     def load(name: str, convolution: nn.Conv2d, norm: nn.BatchNorm2d | None = None) -> None:
@@ -90,6 +96,8 @@ def read_canvas(constants: Mapping[str, Singles]) -> CanvasNetwork:
 
     load("stem", network.stem, network.stem_norm)
     load("head", network.head)
+    if network.peaks is not None:
+        load("peaks", network.peaks)
     for level, blocks in enumerate(network.blocks):
         for number, block in enumerate(blocks):
             load_block(f"down{level}.{number}", block)

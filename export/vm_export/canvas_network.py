@@ -22,6 +22,11 @@ _MOMENTUM = 0.05
 """Weight of a batch in the mean colors of batch normalization: a batch has few pictures."""
 
 
+_RARE = -4.6
+"""Score of peaks before training: the logit of the share of cells that hold an object, so that the first steps do not
+learn this share only (T. Lin and others, 2017)."""
+
+
 class Separable(nn.Module):
     """A separable convolution with batch normalization, added to its input if nothing changes the size, then ReLU."""
 
@@ -56,6 +61,10 @@ class CanvasNetwork(nn.Module):
         self.lift = nn.ModuleList(nn.Conv2d(coarse, fine, 1) for fine, coarse in steps)
         self.up = nn.ModuleList(Separable(fine, fine) for fine, _ in steps)
         self.head = nn.Conv2d(widths[0], shape.classes, 1)
+        self.peaks = nn.Conv2d(widths[0], 4 * shape.peaks, 1) if shape.peaks else None
+        if self.peaks is not None:
+            assert self.peaks.bias is not None
+            self.peaks.bias.data[::4] = _RARE
 
     @property
     def blocks(self) -> list[list[Separable]]:
@@ -63,8 +72,10 @@ class CanvasNetwork(nn.Module):
         return cast("list[list[Separable]]", self.down)
 
     def canvas_logits(self, points: torch.Tensor, shown: torch.Tensor) -> torch.Tensor:
-        """Outputs (1, C, H, W) before the softmax, from colors (1, 3, H, W), 0 where nothing is, and the cells (1, 1,
-        H, W) that are shown."""
+        """Outputs (1, C + 4 P, H, W) before the softmax; the manifest says what those of the P classes with peaks are.
+
+        points (1, 3, H, W): colors, 0 where nothing is. shown (1, 1, H, W): the cells that are shown.
+        """
         canvas = torch.cat([points, shown.to(points.dtype)], dim=1).contiguous(memory_format=torch.channels_last)
         x = torch.relu(self.stem_norm(self.stem(canvas)))
         finer = []
@@ -77,10 +88,11 @@ class CanvasNetwork(nn.Module):
         for level in reversed(range(len(finer))):
             lifted = nn.functional.interpolate(self.lift[level](x), scale_factor=2.0, mode="nearest")
             x = self.up[level](torch.relu(finer[level] + lifted))
-        return self.head(x)  # type: ignore[no-any-return]
+        logits: torch.Tensor = self.head(x)
+        return logits if self.peaks is None else torch.cat([logits, self.peaks(x)], dim=1)
 
     def logits(self, points: torch.Tensor, cells: torch.Tensor) -> torch.Tensor:
-        """Outputs (n + 1, C) before the softmax, from points (n + 1, 3) and their cells (n, 2) on the lattice.
+        """Outputs (n + 1, C + 4 P) before the softmax, from points (n + 1, 3) and their cells (n, 2) on the lattice.
 
         The last row is the off-screen point, which takes no part. The strips of the cells are placed on a canvas as the
         runtime places them.
@@ -96,8 +108,13 @@ class CanvasNetwork(nn.Module):
 
     def probabilities(self, points: torch.Tensor, cells: torch.Tensor) -> torch.Tensor:
         """Probabilities (n + 1, C); see `logits`."""
-        return self.logits(points, cells).softmax(dim=1)
+        return self.logits(points, cells)[:, : self.shape.classes].softmax(dim=1)
 
     def forward(self, points: torch.Tensor, shown: torch.Tensor) -> torch.Tensor:
-        """Probabilities (1, C, H, W) of the cells of a canvas; see `canvas_logits`."""
-        return self.canvas_logits(points, shown).softmax(dim=1)
+        """Answers (1, C + 4 P, H, W) for the cells of a canvas, as a model file gives them; see `canvas_logits`."""
+        return self.answers(self.canvas_logits(points, shown))
+
+    def answers(self, logits: torch.Tensor) -> torch.Tensor:
+        """Probabilities of the classes, and the outputs for peaks as they are, from outputs (n, C + 4 P, ...)."""
+        classes = self.shape.classes
+        return torch.cat([logits[:, :classes].softmax(dim=1), logits[:, classes:]], dim=1)

@@ -17,7 +17,7 @@ _BLOCK = 8
 
 @dataclass(frozen=True)
 class CanvasShape:
-    """The shape of a network: separable convolutions and channels at full resolution, and classes.
+    """The shape of a network: separable convolutions and channels at full resolution, classes, and classes with peaks.
 
     Raises InputError if the width is not a multiple of eight.
     """
@@ -25,6 +25,7 @@ class CanvasShape:
     depth: int
     width: int
     classes: int
+    peaks: int = 0
 
     def __post_init__(self) -> None:
         if self.width < 1 or self.width % _BLOCK:
@@ -34,6 +35,11 @@ class CanvasShape:
             )
         if self.depth < 1:
             raise InputError(f"the depth of a network on octaves must be at least 1, not {self.depth}")
+
+    @property
+    def outputs(self) -> int:
+        """Channels of the output: probabilities of the classes, and four numbers for each class with peaks."""
+        return self.classes + 4 * self.peaks
 
     @property
     def widths(self) -> tuple[int, ...]:
@@ -54,7 +60,7 @@ class CanvasShape:
     def operations(self) -> int:
         """Multiplications and additions for each cell, without activations."""
         widths, depths = self.widths, self.depths
-        total = 9.0 * 4 * widths[0] + widths[0] * self.classes
+        total = 9.0 * 4 * widths[0] + widths[0] * self.outputs
         for level, (width, depth) in enumerate(zip(widths, depths, strict=True)):
             share = 0.25**level
             separable = width * (9 + width)
@@ -71,6 +77,6 @@ class CanvasShape:
     def from_dict(cls, data: Mapping[str, Any]) -> CanvasShape:
         """Inverse of `as_dict`. Raises InputError."""
         try:
-            return cls(int(data["depth"]), int(data["width"]), int(data["classes"]))
+            return cls(int(data["depth"]), int(data["width"]), int(data["classes"]), int(data["peaks"]))
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"can't read the shape of a network: {error}") from error

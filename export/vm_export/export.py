@@ -30,7 +30,7 @@ from .canvas_network import CanvasNetwork
 from .checkpoint import Checkpoint
 from .lattice_graph import lattice_model
 from .look_checkpoint import LookCheckpoint
-from .mesh_networks import MeshNetwork
+from .mesh_networks import MeshNetwork, model_outputs
 from .network import Network
 from .plain_graph import plain_model
 from .runs_graph import runs_model
@@ -173,5 +173,5 @@ def random_example(
     else:
         around = with_dilations(neighbors, groups, network.shape.dilations)
     with torch.inference_mode():
-        answer = network.probabilities(torch.from_numpy(colors), torch.from_numpy(around)).numpy()
+        answer = model_outputs(network, torch.from_numpy(colors), torch.from_numpy(around)).numpy()
     return SelfTest(colors, neighbors, answer, cells)

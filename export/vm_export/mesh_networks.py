@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import torch
+
 from .canvas_network import CanvasNetwork
 from .canvas_shape import CanvasShape
 from .network import Network
@@ -18,6 +20,16 @@ MeshShape = NetworkShape | CanvasShape
 def new_network(shape: MeshShape) -> MeshNetwork:
     """A network of this shape with random weights."""
     return CanvasNetwork(shape) if isinstance(shape, CanvasShape) else Network(shape)
+
+
+def model_outputs(network: MeshNetwork, points: torch.Tensor, around: torch.Tensor) -> torch.Tensor:
+    """What a model file of this network gives (n + 1, outputs): probabilities, and after them the outputs for peaks.
+
+    points (n + 1, 3). around: neighbors (n + 1, D N), or cells (n, 2) on strips.
+    """
+    if isinstance(network, CanvasNetwork):
+        return network.answers(network.logits(points, around))
+    return network.probabilities(points, around)
 
 
 def read_shape(data: Mapping[str, Any]) -> MeshShape:

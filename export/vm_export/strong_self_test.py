@@ -17,7 +17,7 @@ from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.self_test import SelfTest
 
 from .canvas_network import CanvasNetwork
-from .mesh_networks import MeshNetwork
+from .mesh_networks import MeshNetwork, model_outputs
 
 _HOPS, _MOST_HOPS = 3, 6
 """Links from the middle of a patch to its edge, without and with dilations: ring6 gets patches of about 37 points, and
@@ -46,7 +46,7 @@ def strong_self_test(network: MeshNetwork, manifest: Manifest) -> SelfTest:
         around = cells
     colors = _fitted_colors(network, around, np.repeat(wanted, len(patch), axis=0), _RANGES[manifest.colors])
     with torch.inference_mode():
-        answer = network.probabilities(torch.from_numpy(colors), torch.from_numpy(around)).numpy()
+        answer = model_outputs(network, torch.from_numpy(colors), torch.from_numpy(around)).numpy()
     return SelfTest(colors, neighbors, answer, cells if manifest.layout in ("lattice", "canvas") else None)
 
 
@@ -102,7 +102,8 @@ def _fitted_colors(network: MeshNetwork, around: Indices, wanted: Singles, limit
     functional = torch.nn.functional
     loss = functional.cross_entropy if softmax else functional.binary_cross_entropy_with_logits
     for step in range(_STEPS):
-        (gradient,) = torch.autograd.grad(loss(network.logits(colors(), links)[:-1], target), free)
+        logits = network.logits(colors(), links)[:-1, : target.shape[1]]
+        (gradient,) = torch.autograd.grad(loss(logits, target), free)
         with torch.no_grad():
             free -= _RATE * (1.0 - step / _STEPS) * gradient.sign()
     return np.round(colors().detach().numpy().astype(float), 4).astype(np.float32)

@@ -35,5 +35,8 @@ def canvas_checkpoint(seed, shape):
                 each.running_var.uniform_(0.3, 2.0)
                 each.weight.uniform_(0.5, 1.5)
                 each.bias.normal_(std=0.2)
-    facts = manifest([f"class{i}" for i in range(shape.classes)], "octaves", layout="canvas")
+    names = [f"class{i}" for i in range(shape.classes)]
+    peaks = names[: shape.peaks]
+    kinds = [f"{each}:object" if each in peaks else each for each in names]
+    facts = manifest(kinds, "octaves", layout="canvas", peaks=tuple(peaks))
     return Checkpoint(network.eval(), facts)

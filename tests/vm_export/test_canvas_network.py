@@ -67,7 +67,7 @@ def counted(network, rows, columns):
     return sum(total)
 
 
-@pytest.mark.parametrize("shape", [CanvasShape(1, 8, 2), CanvasShape(2, 16, 6), CanvasShape(3, 24, 4)], ids=str)
+@pytest.mark.parametrize("shape", [CanvasShape(1, 8, 2), CanvasShape(2, 16, 6, 3), CanvasShape(3, 24, 4)], ids=str)
 def test_operations_are_those_of_its_convolutions(shape):
     network = checkpoint(0, shape, "octaves").network
     assert counted(network, 64, 80) / (64 * 80) == pytest.approx(shape.operations, rel=1e-3)
@@ -75,7 +75,7 @@ def test_operations_are_those_of_its_convolutions(shape):
 
 def test_the_file_has_operators_without_weights_that_a_frame_changes():
     """Each convolution has constant weights, without which ONNX Runtime does not choose its fast format."""
-    made = checkpoint(1, mesh="octaves")
+    made = checkpoint(1, CanvasShape(1, 8, 3, 1), "octaves")
     graph = onnx.load_from_string(export.onnx_model(made.network, made.manifest)).graph
     constants = {each.name for each in graph.initializer}
     convolutions = [node for node in graph.node if node.op_type == "Conv"]
@@ -87,7 +87,7 @@ def test_the_file_has_operators_without_weights_that_a_frame_changes():
 @functools.cache
 def loaded():
     """A network, the session of its model file, and its manifest."""
-    made = checkpoint(3, CanvasShape(1, 8, 3), "octaves")
+    made = checkpoint(3, CanvasShape(1, 8, 3, 2), "octaves")
     model = ModelFile(Path("canvas.onnx"), export.onnx_model(made.network, made.manifest), made.manifest, "")
     return made.network, Session(model), made.manifest
 

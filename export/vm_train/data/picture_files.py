@@ -57,6 +57,11 @@ class PictureFiles:
     shard: Path | None = None
     places: tuple[tuple[str, Place], ...] = ()
 
+    @property
+    def scene(self) -> Path:
+        """The path of the picture's scene file, if vm-synth made it; shards hold none."""
+        return (self.shard or self.image).with_name(f"scene{self.number}.json")
+
     def path(self, part: str) -> Path:
         """The path of a part, or its name inside the shard."""
         return {"image": self.image, "mask": self.mask, "lens": self.lens}[part]

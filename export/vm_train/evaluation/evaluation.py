@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
@@ -20,9 +19,9 @@ from ..scores.field_scores import FieldScores
 from ..scores.object_scores import ObjectScores
 from ..scores.point_scores import PointScores
 from ..scores.proposal_scores import ProposalScores
+from ..truth.field import CLASSES, FieldScene, field_truth, read_field
+from ..truth.objects import SceneTruth, read_scene, true_objects
 from .answers import PictureAnswer, Subject
-from .field_truth import CLASSES, FieldScene, field_truth, read_field
-from .object_truth import SceneTruth, read_scene, true_objects
 from .worst_errors import WorstErrors, worst_errors_of
 
 
@@ -138,7 +137,7 @@ def evaluate_pictures(subject: Subject, pictures: Sequence[PictureFiles], classe
     for files in pictures:
         try:
             picture, scene = _read(files, classes, rules)
-            stage = None if result.features is None else read_field(_scene_file(files))
+            stage = None if result.features is None else read_field(files.scene)
             answer = subject.answer(picture, scene.radius if scene and rules.radius_of == "scene" else None)
         except (InputError, GeometryError) as error:
             if isinstance(error, PictureFault) and error.kind == "color":
@@ -155,11 +154,7 @@ def evaluate_pictures(subject: Subject, pictures: Sequence[PictureFiles], classe
 
 def _read(files: PictureFiles, classes: Classes, rules: Rules) -> tuple[Picture, SceneTruth | None]:
     picture = read_picture(files, classes)
-    scene = read_scene(_scene_file(files))
+    scene = read_scene(files.scene)
     if scene is None and rules.radius_of == "scene":
         raise InputError(f"scene{files.number}.json: is missing, but --radius-of scene needs its ball radius")
     return picture, scene
-
-
-def _scene_file(files: PictureFiles) -> Path:
-    return files.image.with_name(f"scene{files.number}.json")

@@ -55,7 +55,13 @@ def mirror_image(graph: LabeledGraph, model: MeshModel) -> LabeledGraph:
     """
     if graph.cells is not None:
         columns, rows = graph.cells.T
-        return replace(graph, cells=np.stack([columns.max(initial=0) - columns, rows], axis=1))
+        last = columns.max(initial=0)
+        turned = replace(graph, cells=np.stack([last - columns, rows], axis=1))
+        if graph.objects is None:
+            return turned
+        objects = graph.objects.copy()
+        objects[:, 1] = last - objects[:, 1]
+        return replace(turned, objects=objects)
     columns = mirrored_columns(model)
     first = np.arange(0, graph.neighbors.shape[1], model.neighbors)[:, None]  # of each dilation
     return replace(graph, neighbors=np.ascontiguousarray(graph.neighbors[:, (first + columns).ravel()]))

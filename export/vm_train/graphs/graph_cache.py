@@ -1,9 +1,9 @@
 """Views of pictures on disk, because a small network learns from a graph in less time than it takes to make one.
 
 graph_recipe says what a view is. Windows, mirror images and tones are drawn anew for each example. A file holds a
-header, then neighbors, colors, pixels, distances, labels and, without neighbors, cells as raw arrays. Colors are
-float16: half the bytes to read, with an error of at most 0.00025, far below a level of an 8-bit picture (0.0039).
-Trainings share the views that they would make in the same way.
+header, then neighbors, colors, pixels, distances, labels and, without neighbors, cells and objects as raw arrays.
+Colors are float16: half the bytes to read, with an error of at most 0.00025, far below a level of an 8-bit picture
+(0.0039). Trainings share the views that they would make in the same way.
 """
 
 from __future__ import annotations
@@ -27,9 +27,19 @@ from ..data.picture_files import PictureFiles
 from .graph_recipe import GraphRecipe
 from .labeled_graph import LabeledGraph
 
-_HEADER = struct.Struct("<8s32sII")  # magic, fingerprint of the picture's files, number of points, neighbors of a point
-_MAGIC = b"vmviews1"
-_OF_MESH = ("shape", "radius", "object_height", "intersections", "mesh", "max_distance", "sampling", "dilations")
+_HEADER = struct.Struct("<8s32sIII")  # magic, fingerprint of the picture's files, points, neighbors of each, objects
+_MAGIC = b"vmviews2"
+_OF_MESH = (
+    "shape",
+    "radius",
+    "object_height",
+    "intersections",
+    "mesh",
+    "max_distance",
+    "sampling",
+    "dilations",
+    "peaks",
+)
 """Entries of a manifest that decide the points of a view."""
 
 
@@ -42,6 +52,7 @@ class GraphCache:
     def __init__(self, folder: Path, count: int, recipe: GraphRecipe) -> None:
         self.count = count
         self._classes = recipe.classes
+        self._peaks = bool(recipe.manifest.peaks)
         mesh = {name: getattr(recipe.manifest, name) for name in _OF_MESH}
         decisive = [mesh, asdict(recipe.grid), asdict(recipe.augmentation), recipe.own_radius]
         digest = hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
@@ -59,7 +70,7 @@ class GraphCache:
         """A view, or None if it is absent or older than its picture's files."""
         try:
             content = read_regular(self._path(files, view))
-            magic, source, points, neighbors = _HEADER.unpack_from(content)
+            magic, source, points, neighbors, objects = _HEADER.unpack_from(content)
             if magic != _MAGIC or source != fingerprint(files, self._classes):
                 return None
             read = _Reader(content, _HEADER.size)
@@ -70,6 +81,7 @@ class GraphCache:
                 distances=read.array(np.float32, (points,)),
                 labels=read.array(np.int8, (points,)),
                 cells=None if neighbors else read.array(np.int32, (points, 2)),
+                objects=read.array(np.float32, (objects, 5)) if self._peaks else None,
             )
         except (OSError, ValueError, struct.error):
             return None
@@ -80,11 +92,12 @@ class GraphCache:
         try:
             if shutil.disk_usage(self._folder).free < KEPT_FREE:
                 return
-            header = _HEADER.pack(_MAGIC, fingerprint(files, self._classes), len(graph), graph.neighbors.shape[1])
+            more = [each for each in (graph.cells, graph.objects) if each is not None]
+            sizes = len(graph), graph.neighbors.shape[1], 0 if graph.objects is None else len(graph.objects)
+            header = _HEADER.pack(_MAGIC, fingerprint(files, self._classes), *sizes)
             parts = (graph.neighbors, graph.points.astype(np.float16), graph.pixels, graph.distances, graph.labels)
-            cells = () if graph.cells is None else (graph.cells,)
             with atomic_write(self._path(files, view)) as part, part.open("wb") as file:
-                for each in (header, *(array.tobytes() for array in (*parts, *cells))):
+                for each in (header, *(array.tobytes() for array in (*parts, *more))):
                     file.write(each)
         except (OSError, InputError):
             return  # the next training example makes it again
@@ -110,6 +123,7 @@ def rounded(graph: LabeledGraph) -> LabeledGraph:
         distances=graph.distances.astype(np.float32),
         labels=graph.labels,
         cells=graph.cells,
+        objects=graph.objects,
     )
 
 

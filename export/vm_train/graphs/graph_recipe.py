@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -25,6 +27,7 @@ from ..data.pictures import Picture
 from .augmentation import Augmentation, perturb_camera, perturb_colors, perturb_sharpness
 from .graph_augmentation import mirror_image, random_window
 from .labeled_graph import LabeledGraph, empty_graph, graph_of
+from .true_places import TruePlace, true_places
 
 
 @dataclass(frozen=True)
@@ -47,18 +50,26 @@ class GraphRecipe:
         """The manifest, with the radius of the picture's own ball if own_radius is set. Raises InputError."""
         return replace(self.manifest, radius=ball_radius(files)) if self.own_radius else self.manifest
 
-    def make_graph(self, picture: Picture, manifest: Manifest, seed: tuple[int, ...] | None) -> LabeledGraph:
-        """The graph of a picture: as it is without a seed, else augmented. Raises InputError."""
+    def make_graph(
+        self, picture: Picture, manifest: Manifest, seed: tuple[int, ...] | None, scene: Path | None = None
+    ) -> LabeledGraph:
+        """The graph of a picture: as it is without a seed, else augmented. scene: its scene file. Raises InputError."""
         if seed is None:
-            return self._whole_graph(picture, manifest)
+            return self._whole_graph(picture, manifest, self._places(picture, scene))
         random = np.random.default_rng(seed)
-        return self.draw_example(self.draw_view(picture, manifest, random), random)
+        return self.draw_example(self.draw_view(picture, manifest, random, scene), random)
 
-    def draw_view(self, picture: Picture, manifest: Manifest, random: np.random.Generator) -> LabeledGraph:
-        """The whole graph of a picture with random camera error and blur, in absolute colors. Raises InputError."""
+    def draw_view(
+        self, picture: Picture, manifest: Manifest, random: np.random.Generator, scene: Path | None = None
+    ) -> LabeledGraph:
+        """The whole graph of a picture with random camera error and blur, in absolute colors. Raises InputError.
+
+        scene: the picture's scene file.
+        """
+        places = self._places(picture, scene)
         changed = perturb_sharpness(perturb_camera(picture, self.augmentation, random), self.augmentation, random)
         # Without normalized colors: draw_example first changes the tone, then normalizes.
-        return self._whole_graph(changed, replace(manifest, colors="absolute"))
+        return self._whole_graph(changed, replace(manifest, colors="absolute"), places)
 
     def draw_example(self, view: LabeledGraph, random: np.random.Generator) -> LabeledGraph:
         """A random window of a view in a random tone, perhaps mirrored."""
@@ -70,16 +81,20 @@ class GraphRecipe:
         seen = random_window(colored, self.window, objects, random)
         return mirror_image(seen, self.manifest.model) if random.random() < self.mirrored else seen
 
-    def _whole_graph(self, picture: Picture, manifest: Manifest) -> LabeledGraph:
+    def _places(self, picture: Picture, scene: Path | None) -> list[TruePlace]:
+        """The places of a picture's objects: a camera error moves none of them. None for a network without peaks."""
+        return true_places(picture, scene, self.manifest) if self.manifest.peaks else []
+
+    def _whole_graph(self, picture: Picture, manifest: Manifest, places: Sequence[TruePlace]) -> LabeledGraph:
         try:
-            return graph_of(picture, manifest, self.grid)
+            return graph_of(picture, manifest, self.grid, places)
         except GeometryError:  # the camera is too low to see any point of the mesh
             return empty_graph(manifest)
 
 
 def ball_radius(files: PictureFiles) -> float:
     """Radius [m] of the balls in a picture of vm-synth, even if it shows none. Raises InputError."""
-    path = files.image.with_name(f"scene{files.number}.json")
+    path = files.scene
     try:
         radius = float(json.loads(read_regular(path))["ball_radius"])
     except OSError as error:

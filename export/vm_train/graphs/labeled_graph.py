@@ -22,7 +22,9 @@ from vm_export.grid import VISUAL, Grid
 
 from ..data.classes import Labels
 from ..data.pictures import Picture
+from .peak_targets import in_cells
 from .seen_points import seen_points
+from .true_places import TruePlace, pixels_of
 
 CONTEXT = np.int8(-2)
 """Label of a point in the margin of its mesh, which is no part of the answer."""
@@ -36,6 +38,7 @@ class LabeledGraph:
     as with_dilations gives them. labels (n,): positions of classes, -1 for unlabeled, or CONTEXT. distances (n,): along
     the plane, from the camera to an object at the point [m]. pixels (n, 2): places of the points in their pictures,
     (x, y) [px]. cells (n, 2): columns and rows of points on strips (mesh octaves), which have no neighbors; else None.
+    objects (o, 5): what a network with peaks learns, as `in_cells` gives it, of a graph that is not joined; else None.
     """
 
     points: Singles
@@ -44,6 +47,7 @@ class LabeledGraph:
     distances: Floats
     pixels: Floats
     cells: Indices | None = None
+    objects: Singles | None = None
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -66,12 +70,23 @@ class LabeledGraph:
         neighbors = position[self.neighbors[rows]]
         cells = None if self.cells is None else self.cells[kept]
         return LabeledGraph(
-            self.points[rows], neighbors, self.labels[kept], self.distances[kept], self.pixels[kept], cells
+            self.points[rows],
+            neighbors,
+            self.labels[kept],
+            self.distances[kept],
+            self.pixels[kept],
+            cells,
+            self.objects,
         )
 
 
-def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> LabeledGraph:
-    """The graph of a picture for a network with this manifest. Raises GeometryError or InputError as seen_points."""
+def graph_of(
+    picture: Picture, manifest: Manifest, grid: Grid = VISUAL, places: Sequence[TruePlace] = ()
+) -> LabeledGraph:
+    """The graph of a picture for a network with this manifest. Raises GeometryError or InputError as seen_points.
+
+    places: of the picture's objects, for a network with peaks.
+    """
     shown = seen_points(picture.lens, picture.size, manifest, grid)
     strips, margin = shown.graph.strips, shown.graph.margin
     if strips is not None and margin is not None:  # as in a canvas, which leaves out strips of context only
@@ -83,9 +98,13 @@ def graph_of(picture: Picture, manifest: Manifest, grid: Grid = VISUAL) -> Label
     else:
         neighbors, cells = np.zeros((len(shown) + 1, 0), dtype=np.int32), shown.graph.cells
         labels = np.where(shown.graph.margin, CONTEXT, labels)
+    objects = None
+    if manifest.peaks:
+        toward = picture.fitted_lens.unproject(pixels_of(places), picture.size)
+        objects = in_cells(places, toward @ picture.orientation.level.T, shown.graph, manifest)
     points = np.full((len(shown) + 1, 3), OFF_SCREEN, dtype=np.float32)
     distances = plane_distances(shown.graph.rays, picture.orientation.height)
-    graph = LabeledGraph(points, neighbors, labels, distances, shown.pixels, cells)
+    graph = LabeledGraph(points, neighbors, labels, distances, shown.pixels, cells, objects)
     levels = levels_of(picture, shown.graph, manifest, grid)
     colors = sample(Pyramid(picture.image, "bgr"), shown.pixels, levels)
     points[:-1] = normalized(colors, manifest.colors, graph.counted).T
@@ -118,13 +137,14 @@ def empty_graph(manifest: Manifest) -> LabeledGraph:
         np.empty(0),
         np.empty((0, 2)),
         np.empty((0, 2), dtype=np.int32) if on_strips else None,
+        np.empty((0, 5), dtype=np.float32) if manifest.peaks else None,
     )
 
 
 def join_graphs(graphs: Sequence[LabeledGraph]) -> tuple[LabeledGraph, npt.NDArray[np.intp]]:
     """Several graphs as one with a single off-screen point, and where each begins (len(graphs) + 1,).
 
-    Each keeps its own strips.
+    Each keeps its own strips. The objects are left out.
     """
     starts = np.cumsum([0, *map(len, graphs)])
     last = int(starts[-1])

@@ -41,7 +41,8 @@ class PictureGraphs(Dataset[LabeledGraph]):
     def __getitem__(self, item: Item) -> LabeledGraph:
         files = self.pictures[item.position]
         if self.views is None or item.seed is None:
-            return self.recipe.make_graph(self._picture(files), self.recipe.manifest_for(files), item.seed)
+            manifest = self.recipe.manifest_for(files)
+            return self.recipe.make_graph(self._picture(files), manifest, item.seed, files.scene)
         random = np.random.default_rng(item.seed)
         view = int(random.integers(self.views.count))
         return self.recipe.draw_example(self._view(files, view, self.views), random)
@@ -51,7 +52,8 @@ class PictureGraphs(Dataset[LabeledGraph]):
         graph = views.get(files, view)
         if graph is None:
             manifest = self.recipe.manifest_for(files)
-            graph = rounded(self.recipe.draw_view(self._picture(files), manifest, views.random(files, view)))
+            random = views.random(files, view)
+            graph = rounded(self.recipe.draw_view(self._picture(files), manifest, random, files.scene))
             views.put(files, view, graph)
         return graph
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from vm_embedded.config.entries import check_entries, number, one_of, share
 from vm_embedded.errors import InputError
+from vm_embedded.field.uprights import KINDS
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.manifest import MOST_DILATION, POINT_COLORS, POINT_SAMPLINGS, Manifest
@@ -131,7 +132,14 @@ class TrainConfiguration:
         for name in ("activation", "kind", "dilations"):
             if getattr(network, name) != getattr(usual, name):
                 raise InputError(f"{name} of [network] has no effect for mesh octaves; remove the entry")
-        CanvasShape(network.depth, network.width, len(self.classes.colors))
+        CanvasShape(network.depth, network.width, len(self.classes.colors), len(self._peaks))
+
+    @property
+    def _peaks(self) -> tuple[str, ...]:
+        """The classes whose objects a network on octaves finds by peaks."""
+        if self.mesh.model != "octaves":
+            return ()
+        return tuple(each.name for each in self.classes.outputs if each.kind == "object" or each.name in KINDS)
 
     @property
     def manifest(self) -> Manifest:
@@ -151,8 +159,14 @@ class TrainConfiguration:
             sampling=mesh.sampling,
             colors=mesh.colors,
             layout="canvas" if mesh.model == "octaves" else "plain",
+            peaks=self._peaks,
             layer_dilations=() if isinstance(shape, CanvasShape) else shape.layer_dilations,
         )
+
+    @property
+    def peak_numbers(self) -> tuple[int, ...]:
+        """The numbers of the classes with peaks."""
+        return tuple(self.manifest.column(each) for each in self._peaks)
 
     @property
     def grid(self) -> Grid:
@@ -164,7 +178,7 @@ class TrainConfiguration:
         """The layers of the network."""
         network = self.network
         if self.mesh.model == "octaves":
-            return CanvasShape(network.depth, network.width, len(self.classes.colors))
+            return CanvasShape(network.depth, network.width, len(self.classes.colors), len(self._peaks))
         return NetworkShape.uniform(
             network.depth,
             network.width,

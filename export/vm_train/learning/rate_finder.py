@@ -48,7 +48,8 @@ def find_rate(run: TrainingRun, hardware: Hardware, network: MeshNetwork, steps:
     training = run.data.split.training
     epochs = -(-steps * recipe.batch // len(training))
     batches = list(schedule((recipe.seed, 0), epochs, recipe.batch, len(training), 0))[:steps]
-    trainer = Trainer(network, recipe, len(batches), *run.shares_and_weights(1), device=hardware.device)
+    peaks = run.configuration.peak_numbers
+    trainer = Trainer(network, recipe, len(batches), *run.shares_and_weights(1), device=hardware.device, peaks=peaks)
     rates = np.geomspace(LOWEST, HIGHEST, len(batches))
     bar = ProgressBar(len(batches), "vm-train")
     losses: list[float] = []

@@ -252,7 +252,8 @@ def _round_trainer(run: TrainingRun, hardware: Hardware, progress: TrainingProgr
     # looks: how often an epoch uses each picture
     total = recipe.epochs * steps_an_epoch(recipe.looks * run.data.pictures_per_epoch, recipe.batch)
     shares, weights = run.shares_and_weights(progress.round)
-    trainer = Trainer(network, recipe, total, shares, weights, graders, hardware.device)
+    peaks = run.configuration.peak_numbers
+    trainer = Trainer(network, recipe, total, shares, weights, graders, hardware.device, peaks)
     if run.state_path.exists():
         state = read_state(run.state_path)
         if state["more"]["round"] == progress.round:

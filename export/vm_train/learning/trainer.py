@@ -27,6 +27,7 @@ from ..graphs.labeled_graph import LabeledGraph, join_graphs
 from ..graphs.schedule import Item
 from .loss import point_losses
 from .optimizer import ScheduledOptimizer
+from .peak_loss import peak_losses, targets_of
 from .recipe import Recipe
 from .selection import class_totals, hardness_weights, point_errors, select_points
 
@@ -50,13 +51,14 @@ class StepResult:
 
 @dataclass(frozen=True)
 class _BatchLoss:
-    """Sums over the selected points of this process's part of a batch.
+    """Sums over this process's part of a batch.
 
-    loss: weighted losses, a scalar tensor. weight: weights. points: number of points.
+    losses (3,): of the selected points, of the scores of peaks, and of their ways. weights (3,): what they are divided
+    by. points: number of selected points.
     """
 
-    loss: torch.Tensor
-    weight: float
+    losses: torch.Tensor
+    weights: torch.Tensor
     points: int
 
 
@@ -65,7 +67,7 @@ class Trainer:
 
     shares (C,): chance that a point of each class is selected. weights (C,): weight of a selected point in the loss.
     graders: networks of earlier rounds; a point is more likely to be selected if they were wrong about it. device:
-    "cpu" or "cuda", as torch names it.
+    "cpu" or "cuda", as torch names it. peaks: numbers of the classes with peaks.
     """
 
     def __init__(
@@ -77,10 +79,11 @@ class Trainer:
         weights: Floats,
         graders: Sequence[MeshNetwork] = (),
         device: str = "cpu",
+        peaks: Sequence[int] = (),
     ) -> None:
         self.network = network.to(device).train()
         self.recipe, self.total, self.done = recipe, total, 0
-        self._shares, self._device = shares, device
+        self._shares, self._device, self._peaks = shares, device, tuple(peaks)
         self._weights = torch.from_numpy(weights.astype(np.float32)).to(device)
         self._graders = [each.to(device).eval() for each in graders]
         self._optimizer = ScheduledOptimizer(self.network, recipe, total)
@@ -93,15 +96,16 @@ class Trainer:
         """Learn from this process's part of a batch. Raises DivergedError if the loss is NaN or infinite."""
         rate = self._optimizer.rate
         part = self._batch_loss(items, graphs)
-        weight = float(sum_over_processes(torch.tensor(part.weight))) or 1.0
-        mean = float(sum_over_processes(part.loss.detach().cpu())) / weight
+        weights = sum_over_processes(part.weights)
+        weights = torch.where(weights > 0.0, weights, 1.0)
+        mean = float((sum_over_processes(part.losses.detach().cpu()) / weights).sum())
         if not math.isfinite(mean):
             raise DivergedError(
                 f"the loss of step {self.done + 1} is NaN or infinite: begin again with a lower training.rate"
             )
         self._optimizer.zero_grad()
         if part.points:
-            (part.loss / weight).backward()  # type: ignore[no-untyped-call]
+            (part.losses / weights.to(part.losses.device)).sum().backward()  # type: ignore[no-untyped-call]
         _sum_gradients(self.network)
         if self.recipe.clip:
             nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.clip)
@@ -113,7 +117,7 @@ class Trainer:
         if not any(map(len, graphs)):  # a small batch may leave this process nothing, and a camera may see nothing
             if self._graders:  # the other processes wait for its part of the sum in _chance_factors
                 sum_over_processes(torch.zeros((2, self.network.shape.classes), dtype=torch.float64))
-            return _BatchLoss(torch.zeros(()), 0.0, 0)
+            return _BatchLoss(torch.zeros(3), torch.zeros(3), 0)
         graph, _ = join_graphs(graphs)
         points = torch.from_numpy(graph.points).to(self._device)
         around = torch.from_numpy(graph.around).to(self._device)
@@ -122,10 +126,15 @@ class Trainer:
         chosen = select_points(graph.labels, self._shares, _draws(items, graphs), factors)
         labels = torch.from_numpy(np.where(chosen, graph.labels, -1).astype(np.int64)).to(self._device)
         with torch.autocast(torch.device(self._device).type, torch.bfloat16, enabled=self.recipe.precision == "mixed"):
-            logits = self.network.logits(points, around)
-        losses = point_losses(logits[:-1], labels, self.recipe)  # without the off-screen point, the last one
+            logits = self.network.logits(points, around)[:-1]  # without the off-screen point, the last one
+        classes = self.network.shape.classes
+        losses = point_losses(logits[:, :classes], labels, self.recipe)
         weights = torch.where(labels >= 0, self._weights[labels], 0.0)
-        return _BatchLoss(losses @ weights, float(weights.sum()), int(chosen.sum()))
+        peaks, ways = torch.zeros(2, device=losses.device), torch.zeros(2)
+        if self._peaks:
+            peaks, ways = peak_losses(logits[:, classes:], targets_of(graphs, self._peaks))
+        sums = torch.cat([(losses @ weights)[None], peaks])
+        return _BatchLoss(sums, torch.cat([weights.sum()[None].cpu(), ways]), int(chosen.sum()))
 
     @torch.no_grad()
     def _chance_factors(self, points: torch.Tensor, around: torch.Tensor, graph: LabeledGraph) -> Floats:

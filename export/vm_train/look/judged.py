@@ -11,7 +11,7 @@ from vm_embedded.network.look_contract import MOST_NETWORKS
 from vm_export.look_checkpoint import LookCheckpoint
 
 from ..evaluation.answers import ExactSubject, load_subject
-from ..evaluation.field_truth import CLASSES
+from ..truth.field import CLASSES
 from .configuration import LookConfiguration
 
 

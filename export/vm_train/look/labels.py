@@ -16,9 +16,9 @@ from vm_embedded.errors import InputError
 from vm_embedded.network.manifest import Manifest
 
 from ..data.pictures import Picture
-from ..evaluation.field_truth import FieldScene, field_truth
-from ..evaluation.object_truth import SceneTruth, true_objects
 from ..scores.overlaps import TrueObject
+from ..truth.field import FieldScene, field_truth
+from ..truth.objects import SceneTruth, true_objects
 
 NOTHING, OBJECT, UNLABELED = 0, 1, -1
 

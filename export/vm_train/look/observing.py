@@ -15,8 +15,8 @@ from ..data.classes import Classes
 from ..data.picture_files import PictureFiles
 from ..data.pictures import find_pictures, read_picture
 from ..evaluation.answers import ExactSubject
-from ..evaluation.field_truth import read_field
-from ..evaluation.object_truth import SceneTruth, read_scene
+from ..truth.field import read_field
+from ..truth.objects import SceneTruth, read_scene
 from .configuration import PatchSettings
 from .labels import Truths, find_truths, true_bases
 from .run_folder import LookRun
@@ -81,14 +81,14 @@ class Observer:
     def observe(self, files: PictureFiles) -> Observed:
         """Raises InputError or GeometryError for a picture that can't be used."""
         picture = read_picture(files, self.classes)
-        scene = read_scene(files.image.with_name(f"scene{files.number}.json"))
+        scene = read_scene(files.scene)
         observation = self.subject.observe(picture, self._radius(scene))
         manifest = observation.manifest
         probabilities = observation.slot_probabilities[:, manifest.column(self.object_class)]
         if self.kind is not None:
             probabilities = nearest_points(observation, probabilities, self.patches.above)
             circles = around_bases(observation, self.patches.upright_radius)
-            field = read_field(files.image.with_name(f"scene{files.number}.json"))
+            field = read_field(files.scene)
             return Observed(
                 circles, probabilities, true_bases(picture, field, self.classes.names, circles.view, self.kind)
             )

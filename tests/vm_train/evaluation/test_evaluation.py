@@ -19,9 +19,9 @@ from vm_train.data.pictures import Picture, find_pictures, read_picture
 from vm_train.evaluation.answers import ExactSubject, load_subject
 from vm_train.evaluation.evaluation import Evaluation, Rules, evaluate_pictures
 from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
-from vm_train.evaluation.object_truth import SceneObject, SceneTruth, read_scene, true_objects
 from vm_train.evaluation.tables import as_csv, as_json
 from vm_train.evaluation.workers import Job, evaluate
+from vm_train.truth.objects import SceneObject, SceneTruth, read_scene, true_objects
 
 from ...drawn_scenes import CHECKPOINT, FOLDER, IMAGES, MODEL, TRUTH
 from ..drawn import RADIUS, draw_set

@@ -32,9 +32,9 @@ from vm_train.boxes.read import read_boxes
 from vm_train.cli.import_boxes import import_boxes_parser, run_import_boxes
 from vm_train.data.classes import Classes
 from vm_train.data.pictures import find_pictures, read_picture
-from vm_train.evaluation.object_truth import read_scene, true_objects
 from vm_train.formats.box_import import _number, import_boxes
 from vm_train.formats.box_masks import MaskRule, mask_of
+from vm_train.truth.objects import read_scene, true_objects
 from vm_workstation.outlines import sphere_outline
 
 TWO_CLASSES = """

@@ -1,5 +1,7 @@
 """Networks on strips learn, and do so repeatably: after an interruption, and whatever a batch shows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -10,7 +12,7 @@ from tests.vm_train.weights import same
 from vm_export.canvas_network import CanvasNetwork
 from vm_export.canvas_shape import CanvasShape
 from vm_train.graphs.labeled_graph import CONTEXT, LabeledGraph, empty_graph
-from vm_train.graphs.schedule import schedule
+from vm_train.graphs.schedule import Item, schedule
 from vm_train.learning.recipe import Recipe
 from vm_train.learning.trainer import Trainer, read_state
 
@@ -122,3 +124,42 @@ def test_context_gives_no_gradient_but_is_seen():
     assert made.step(batches_of(made.recipe)[0].items[:1], [shown]).points == 0
     after = weights(made)
     assert same({name: after[name] for name in before}, before)
+
+
+def test_it_learns_where_objects_are():
+    """Their cells, the way to them, and their sizes, from colors that tell all three."""
+    made = Trainer(
+        CanvasNetwork(CanvasShape(1, 8, 2, 1)),
+        Recipe(epochs=120, batch=2, optimizer="muon", rate=0.02),
+        240,
+        np.ones(2),
+        np.ones(2),
+        peaks=(1,),
+    )
+
+    def spotted(position):
+        shown = graph(position)
+        random = np.random.default_rng(position)
+        shown.labels[shown.labels >= 0] = 0
+        objects = []
+        for column, row in ((6.0, 4.0), (15.0, 8.0), (23.0, 5.0)):
+            place, size = np.array([column, row]) + random.uniform(-0.4, 0.4, 2), float(random.uniform(-0.5, 0.5))
+            objects.append((1.0, *place, size, 1.0))
+            step = place - shown.cells
+            near = np.hypot(*step.T) < 1.6
+            shown.points[:-1][near] = np.column_stack([0.5 + 0.3 * step, np.full(len(step), 2.0 + size)])[near]
+        return replace(shown, objects=np.array(objects, np.float32))
+
+    items = [Item(each, (each,)) for each in range(2)]
+    for step in range(240):
+        made.step(items, [spotted(2 * step), spotted(2 * step + 1)])
+    shown = spotted(1000)
+    made.network.eval()
+    with torch.inference_mode():
+        logits = made.network.logits(torch.from_numpy(shown.points), torch.from_numpy(shown.cells))[:-1, 2:].numpy()
+    apart = np.hypot(*np.moveaxis(shown.objects[:, None, 1:3] - shown.cells, 2, 0))
+    own, beyond = apart.argmin(axis=1), (apart > 2.5).all(axis=0) & (shown.labels >= 0)
+    assert logits[own, 0].min() > logits[beyond, 0].max() + 2.0
+    ways = np.column_stack([shown.cells[own] + logits[own, 1:3], logits[own, 3]])
+    np.testing.assert_allclose(ways, shown.objects[:, 1:4], atol=0.3)
+    assert made.probabilities(shown).shape == (len(shown), 2)

@@ -15,9 +15,9 @@ from vm_embedded.detection.settings import Settings
 from vm_embedded.network.bundled import model_path
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.answers import load_subject
-from vm_train.evaluation.object_truth import SceneTruth, read_scene
 from vm_train.look.configuration import LookConfiguration
 from vm_train.look.labels import NOTHING, OBJECT, UNLABELED, Truths, find_truths, label_places
+from vm_train.truth.objects import SceneTruth, read_scene
 
 VIEW = view_at()
 pixels = st.tuples(st.floats(60.0, 580.0), st.floats(150.0, 500.0))

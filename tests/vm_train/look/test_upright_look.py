@@ -17,9 +17,9 @@ from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_train.evaluation.answers import load_subject
-from vm_train.evaluation.field_truth import FieldScene, Standing
 from vm_train.look.labels import NOTHING, OBJECT, UNLABELED, label_places, true_bases
 from vm_train.look.places import Places
+from vm_train.truth.field import FieldScene, Standing
 
 RADIUS = 0.3
 SCENE = FieldScene(

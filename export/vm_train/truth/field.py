@@ -102,13 +102,20 @@ def _standing(table: dict[str, Any]) -> Standing:
 def field_truth(picture: Picture, scene: FieldScene | None, classes: Sequence[str]) -> FieldTruth:
     """The true field features of a picture. classes: names in the order of the labels; they include CLASSES."""
     view = GroundView.of(picture)
+    line = picture.labels == classes.index("line")
+    field = _true_field(view, line, scene.field) if scene is not None and scene.has_field else None
+    return FieldTruth(true_uprights(picture, scene, classes), field, view.shows)
+
+
+def true_uprights(
+    picture: Picture, scene: FieldScene | None, classes: Sequence[str]
+) -> dict[str, Sequence[TrueUpright]] | None:
+    """What stands on the plane, by kind; None if no scene file tells. classes: as `field_truth` takes them."""
+    if scene is None or scene.standing is None:
+        return None
+    view = GroundView.of(picture)
     by_name = {name: picture.labels == number for number, name in enumerate(classes) if name in CLASSES}
-    standing = None if scene is None else scene.standing
-    uprights: dict[str, Sequence[TrueUpright]] | None = None
-    if standing is not None:
-        uprights = {kind: _uprights(view, by_name, standing, kind) for kind in KINDS}
-    field = _true_field(view, by_name["line"], scene.field) if scene is not None and scene.has_field else None
-    return FieldTruth(uprights, field, view.shows)
+    return {kind: _uprights(view, by_name, scene.standing, kind) for kind in KINDS}
 
 
 def _uprights(view: GroundView, by_name: dict[str, Mask], standing: Iterable[Standing], kind: str) -> list[TrueUpright]:

@@ -15,7 +15,7 @@ from vm_embedded.network.manifest import ObjectClass
 from vm_embedded.network.model_file import read_model
 from vm_train.data.pictures import find_pictures, read_picture
 from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
-from vm_train.evaluation.object_truth import SceneObject, SceneTruth, read_scene, true_objects
+from vm_train.truth.objects import SceneObject, SceneTruth, read_scene, true_objects
 from vm_workstation.outlines import sphere_outline
 
 from ...drawn_scenes import MODEL

@@ -7,10 +7,10 @@ import pytest
 
 from vm_embedded.errors import InputError
 from vm_synth.render.ground import paint_ground
-from vm_train.evaluation.field_model import FieldModel
-from vm_train.evaluation.field_truth import field_truth, read_field
-from vm_train.evaluation.ground_view import GroundView
 from vm_train.scores.field_scores import FieldScores
+from vm_train.truth.field import field_truth, read_field
+from vm_train.truth.field_model import FieldModel
+from vm_train.truth.ground_view import GroundView
 
 from ..fields import CAMERA, CLASSES, FIELD, features, picture, pixels_of, scene_table, write_scene
 

@@ -136,6 +136,12 @@ def _of_scene(picture: Picture, shown: SceneObject) -> TrueObject:
     return TrueObject(mask, shown.center, radius, shown.visible, toward / distance, angle)
 
 
+def piece_centers(shown: Mask) -> Floats:
+    """The mean pixels (n, 2) of the connected pieces of a mask (h, w)."""
+    centers: Floats = cv2.connectedComponentsWithStats(shown.astype(np.uint8), connectivity=8)[3][1:]
+    return centers
+
+
 def _of_mask(picture: Picture, shown: Mask, shape: Shape) -> list[TrueObject]:
     count, pieces, facts, _ = cv2.connectedComponentsWithStats(shown.astype(np.uint8), connectivity=8)
     areas = facts[1:, cv2.CC_STAT_AREA].tolist()
