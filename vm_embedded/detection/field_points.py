@@ -10,12 +10,14 @@ from ..arrays import Floats
 from ..field.features import FieldFeatures
 from ..field.find import find_features
 from ..field.ground_points import ROLES, GroundPoints
+from ..field.uprights import KINDS as UPRIGHTS
 from .looking import Look
 from .observation import Observation
 from .prepared_view import PreparedView
 from .profiles import brightness_along
 from .settings import Settings
 from .upright_looks import find_bases
+from .upright_peaks import peak_bases
 
 _LOWEST = 1e-3
 """Rays less steep than this do not meet the plane near enough to matter."""
@@ -24,14 +26,16 @@ _LOWEST = 1e-3
 def locate_features(observation: Observation, looks: Mapping[str, Look], settings: Settings) -> FieldFeatures | None:
     """Goal posts, robots, lines and border; None if the network has no class for any of them.
 
-    looks: look networks for classes of uprights, by class; rules find the uprights of the others. Raises ModelError if
-    a look network does not run.
+    looks: look networks for classes of uprights, by class. Peaks show the uprights of the other classes, and rules find
+    those of classes without peaks. Raises ModelError if a look network does not run.
     """
     names = [each.name for each in observation.manifest.classes]
     if not set(ROLES) & set(names):
         return None
     view, pyramid = observation.view, observation.pyramid
-    bases = {name: find_bases(observation, look, settings) for name, look in looks.items()}
+    uprights = [name for name in observation.manifest.peaks if name in UPRIGHTS and name not in looks]
+    bases = {name: peak_bases(observation, name, settings) for name in uprights}
+    bases |= {name: find_bases(observation, look, settings) for name, look in looks.items()}
     return find_features(
         ground_points(observation),
         lambda places: _pixels(view, places),

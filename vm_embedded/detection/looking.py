@@ -19,6 +19,7 @@ from ..arrays import Chosen, Floats, Image, Mask, Singles
 from ..network.look_contract import LookContract
 from .judging import repeated
 from .observation import Observation
+from .peaks import LARGEST_SIZE, probability_of
 from .places import Places, PlanePlaces, mean_center
 from .prepared_view import PreparedView
 from .proposals import best_apart, propose_places
@@ -60,9 +61,6 @@ _EARLIER = 0.3
 _SUREST = 1.0 - 1e-6
 """Limit of a probability: one that is rounded to 1 would outvote all others in a mean, and pass a threshold of 1."""
 
-_LARGEST_SIZE = 3.0
-"""Limit of the logarithm of a size: with a bad network, math.exp would overflow, and JSON has no infinity."""
-
 
 class Look(Protocol):
     """Anything that judges patches: a CloseLook, or a look network in torch."""
@@ -103,16 +101,25 @@ def look_closely(
     watch: Stopwatch,
     explain: bool = False,
 ) -> list[Judgment]:
-    """The objects of the look's class, most probable first, from the slots' probabilities (m,).
+    """The objects of the look's class, most probable first.
 
-    explain: also the rejected proposals, with their reasons. watch: gets the stages propose and look. Raises
-    ModelError if the network does not run.
+    The class's peaks propose them, or, without peaks, the slots' probabilities (m,). With a `mesh_weight`, the score of
+    a peak counts in the probability of its object, wherever the look moves it. explain: also the rejected
+    proposals, with their reasons. watch: gets the stages propose and look. Raises ModelError if the network does not
+    run.
     """
-    centers = propose_places(observation, probabilities, look.contract.above, settings.max_proposals)
+    view, contract, scores = observation.view, look.contract, None
+    if contract.object_class in observation.manifest.peaks:
+        peaks = observation.find_peaks(contract.object_class, settings.max_proposals)
+        centers, scores = view.shape.center_along(peaks.rays, view.height), peaks.scores
+    else:
+        centers = propose_places(observation, probabilities, contract.above, settings.max_proposals)
     watch.lap("propose")
     places = PlanePlaces(observation, centers)
     answers = look_at(places, look)
-    judged = _judged(observation.view, places.centers, answers, settings, explain)
+    if scores is not None and contract.mesh_weight:
+        answers[:, 0] = probability_of(_log_odds(answers[:, 0]) + contract.mesh_weight * scores)
+    judged = _judged(view, places.centers, answers, settings, explain)
     watch.lap("look")
     return judged
 
@@ -192,9 +199,20 @@ def _is_last(places: Places, rows: Chosen, following: Sequence[Look]) -> Mask:
 
 def _mean_odds(probabilities: Singles, weights: Sequence[float]) -> Floats:
     """Probabilities (n,) whose log-odds are the weighted mean of those of (k, n). weights (k,): with the sum 1."""
-    likely = np.clip(probabilities.astype(np.float64), 1.0 - _SUREST, _SUREST)
+    likely = _possible(probabilities)
     yes, no = (np.prod(each ** np.array(weights)[:, None], axis=0) for each in (likely, 1.0 - likely))
     return np.asarray(yes / (yes + no))
+
+
+def _possible(probabilities: Singles) -> Floats:
+    """Probabilities of any shape, neither 0 nor 1."""
+    return np.clip(probabilities.astype(np.float64), 1.0 - _SUREST, _SUREST)
+
+
+def _log_odds(probabilities: Singles) -> Floats:
+    """Log-odds of probabilities (n,)."""
+    likely = _possible(probabilities)
+    return np.asarray(np.log(likely / (1.0 - likely)))
 
 
 def _second_opinion(places: Places, rows: Chosen, look: Look, zooms: tuple[float, ...], answers: Singles) -> Singles:
@@ -233,6 +251,6 @@ def _judged(view: PreparedView, centers: Floats, answers: Singles, settings: Set
             kept.append(center)
             center = mean_center(view, centers, answers[:, 0], number)
         if reason is None or explain:
-            scale = math.exp(min(max(log_size, -_LARGEST_SIZE), _LARGEST_SIZE))
+            scale = math.exp(min(max(log_size, -LARGEST_SIZE), LARGEST_SIZE))
             judged.append(Judgment(center, probability, scale, reason))
     return judged

@@ -14,6 +14,7 @@ from ..network.canvas_layout import CanvasLayout
 from ..network.layout import Layout
 from ..network.manifest import Manifest
 from .color_normalization import normalized
+from .peaks import Peaks, peaks_of
 from .prepared_view import PreparedView
 from .projection import Projection, project
 from .pyramid import Pyramid
@@ -27,7 +28,10 @@ class Network(Protocol):
     """Anything that gives points their probabilities: a Session, or a network in torch."""
 
     def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
-        """Probabilities (m, C) of a layout's slots, from their colors (3, m) and which slots (m,) are on screen."""
+        """All outputs (m, outputs) for a layout's slots, from their colors (3, m) and which slots (m,) are on screen.
+
+        See `Manifest.outputs`.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +40,15 @@ class Observation:
 
     pyramid: the frame. view: its mesh points, lens and orientation. manifest: of the network. projected: pixels of the
     m slots of the layout. A slot is one place in the network's input; it holds a point, a copy of a point, or nothing.
-    Only original points count as on screen. slot_probabilities (m, C): the network's output; it has no meaning for
-    slots off screen. timing_ms: time of each stage [ms].
+    Only original points count as on screen. slot_answers (m, outputs): the network's outputs, as `Manifest.outputs`
+    counts them; they have no meaning for slots off screen. timing_ms: time of each stage [ms].
     """
 
     pyramid: Pyramid
     view: PreparedView
     manifest: Manifest
     projected: Projection[Layout]
-    slot_probabilities: Singles
+    slot_answers: Singles
     timing_ms: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -54,6 +58,11 @@ class Observation:
     def layout(self) -> Layout:
         """The network's order of the points."""
         return self.view.layout
+
+    @property
+    def slot_probabilities(self) -> Singles:
+        """Probabilities (m, C) of the slots."""
+        return self.slot_answers[:, : len(self.manifest.classes)]
 
     @cached_property
     def _shown(self) -> Indices:
@@ -75,6 +84,14 @@ class Observation:
     def probabilities(self) -> Singles:
         """Probabilities (n, C) of the points, in the order of the manifest's classes."""
         return self.slot_probabilities[self._shown]
+
+    def find_peaks(self, class_name: str, most: int) -> Peaks:
+        """At most `most` peaks of a class that the network has peaks for (`Manifest.peaks`), best first."""
+        return self._peaks[class_name].part(slice(most))
+
+    @cached_property
+    def _peaks(self) -> Mapping[str, Peaks]:
+        return peaks_of(self.slot_answers, self.projected.on_screen, self.view, self.manifest)
 
 
 def observe(
@@ -108,6 +125,6 @@ def classify(
         sampled = sample(pyramid, projected.pixels, view.levels)
     colors = normalized(sampled, manifest.colors, shown.on_screen)
     watch.lap("sample")
-    probabilities = network.run(layout, colors, projected.on_screen)
+    answers = network.run(layout, colors, projected.on_screen)
     watch.lap("infer")
-    return Observation(pyramid, view, manifest, shown, probabilities, watch.stages)
+    return Observation(pyramid, view, manifest, shown, answers, watch.stages)

@@ -46,9 +46,11 @@ class Settings:
     )
     threshold: float = share(0.5, "a point belongs to a class if its probability is above this")
     min_confidence: float = share(
-        0.3, "close look: lowest probability of an object; below it, the proposal is rejected"
+        0.3, "close look, and peaks of posts and robots: lowest probability of an object; below it, it is rejected"
     )
-    max_proposals: int = number(40, "close look: largest number of proposals", "", (1, 1000))
+    max_proposals: int = number(
+        40, "close look, and peaks of posts and robots: largest number of proposals", "", (1, 1000)
+    )
     min_inside: float = share(
         0.85, "without close look: lowest mean probability inside the outline; below it, the object is rejected"
     )

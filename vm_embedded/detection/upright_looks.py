@@ -9,13 +9,12 @@ class propose a place: the nearest of all, and those of the more probable ones.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..arrays import Singles
-from ..field.uprights import Base
+from ..field.uprights import Base, apart
 from ..geometry.circle import Circle
 from .looking import Look, look_closely
 from .observation import Observation
@@ -30,10 +29,6 @@ _JUMP = 0.12
 
 _LEVELS = (0.1, 0.3, 0.6, 0.9)
 """Probabilities at which points are sought again, so that a less probable point in front does not hide a base."""
-
-_SAME = 0.12
-"""Two bases nearer to each other than this share of their distance are those of one upright: far away, a small error in
-the picture is a large one on the plane."""
 
 
 def around_bases(observation: Observation, radius: float) -> Observation:
@@ -72,25 +67,11 @@ def find_bases(observation: Observation, look: Look, settings: Settings) -> list
     """
     contract = look.contract
     probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
-    nearest = nearest_points(observation, probabilities, contract.above)
+    if contract.object_class not in observation.manifest.peaks:
+        probabilities = nearest_points(observation, probabilities, contract.above)
     circles = around_bases(observation, contract.upright_radius)
-    judged = look_closely(circles, look, nearest, settings, Stopwatch())
+    judged = look_closely(circles, look, probabilities, settings, Stopwatch())
     heading = observation.view.heading[:2]
     width = 2.0 * contract.upright_radius
     found = [Base(heading @ each.center, width * each.scale, each.confidence) for each in judged]
-    return sorted(_apart(found), key=lambda each: float(np.hypot(*each.position)))
-
-
-def _apart(bases: Sequence[Base]) -> list[Base]:
-    """Bases without those of an upright whose base is there already. bases: most probable first."""
-    kept: list[Base] = []
-    for each in bases:
-        if not any(_is_same(each, other) for other in kept):
-            kept.append(each)
-    return kept
-
-
-def _is_same(base: Base, better: Base) -> bool:
-    """Whether a base is that of the same upright as a more probable one."""
-    apart = float(np.hypot(*(base.position - better.position)))
-    return apart < max(_SAME * float(np.hypot(*better.position)), better.width / 2.0)
+    return apart(found)

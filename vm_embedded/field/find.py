@@ -35,8 +35,8 @@ def find_features(
 ) -> FieldFeatures:
     """All field features among the points of a frame.
 
-    profiles: brightness of the frame across lines. bases: of the classes that a close look has judged, by class. Rules
-    find the uprights of the others.
+    profiles: brightness of the frame across lines. bases: of the classes that have peaks or a close look, by class.
+    Rules find the uprights of the others.
     """
     found = {
         name: bases[name] if name in bases else _by_rules(points, name, rules)

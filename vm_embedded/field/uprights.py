@@ -6,6 +6,7 @@ points in each direction are at the base.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,15 +54,43 @@ _COLUMN = 0.012
 _MOST = 20
 """Largest number of things of a class."""
 
+_SAME = 0.12
+"""Two bases nearer to each other than this share of their distance are those of one thing: far away, a small error in
+the picture is a large one on the plane."""
+
 
 @dataclass(frozen=True, eq=False)
 class Base:
     """A thing on the plane: its base (2,) [m], its width across the ray [m], and its confidence: the mean probability
-    of its points, or that of a close look."""
+    of its points, or that of a peak or of a close look."""
 
     position: Floats
     width: float
     confidence: float
+
+
+def apart(bases: Sequence[Base]) -> list[Base]:
+    """Bases without those of a thing whose base is there already, nearest first. bases: most probable first."""
+    places = np.array([each.position for each in bases]).reshape(-1, 2)
+    ranges = np.hypot(*places.T)
+    reach = np.maximum(_SAME * ranges, 0.5 * np.array([each.width for each in bases]))
+    same = np.hypot(*(places[:, None] - places).T) < reach[:, None]
+    kept = first_apart(same)
+    return [bases[number] for number in kept[np.argsort(ranges[kept], kind="stable")]]
+
+
+def first_apart(near: Mask) -> Chosen:
+    """Numbers of those of p places, best first, that are not near a better one that counts itself.
+
+    near (p, p): whether each is so near the place of the row that it is the same one.
+    """
+    numbers = np.arange(len(near))
+    worse = near & (numbers > numbers[:, None])
+    kept = np.ones(len(near), dtype=bool)
+    for better in np.flatnonzero(worse.any(axis=1)):
+        if kept[better]:
+            kept &= ~worse[better]
+    return np.flatnonzero(kept)
 
 
 def find_uprights(points: GroundPoints, probabilities: Singles, rules: UprightRules) -> list[Base]:

@@ -58,7 +58,7 @@ class Layout(ABC):
 
     @abstractmethod
     def answers(self, network: Run, colors: Singles, on_screen: Mask) -> Singles:
-        """Probabilities (m, C) of the slots, valid only on screen.
+        """All outputs (m, outputs) for the slots, valid only on screen.
 
         colors (3, m): of the slots, as the network takes them. on_screen (m,): which slots are on screen.
         """

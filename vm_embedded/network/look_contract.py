@@ -34,6 +34,8 @@ class LookContract:
     above: probability above which a mesh point counts for a proposal, 0 to 0.99.
     passes: how often a proposal is judged at most, 1 to 4; each further pass judges a new patch around the center that
         the previous pass found. In its last pass, a doubtful place gets a second opinion.
+    mesh_weight: how much the score of a peak of the mesh network counts beside this network's answer, 0 to 2: it is
+        added so many times to the answer's log-odds. That of a glance is not used.
     channels: of the network's convolutions at each resolution; the runtime does not use them.
     glance: of the look network for the same class that judges before this one, which judges only what the glance
         passes on. The glance may have a glance, too; then this one is a wide look.
@@ -49,6 +51,7 @@ class LookContract:
     extent: float
     above: float
     passes: int
+    mesh_weight: float = 0.0
     channels: tuple[int, ...] = ()
     glance: LookContract | None = None
     self_test: LookTest | None = None
@@ -66,6 +69,7 @@ class LookContract:
             ("extent", False, 0.5, 8.0),
             ("above", False, 0.0, 0.99),
             ("passes", True, 1, 4),
+            ("mesh_weight", False, 0.0, 2.0),
         ):
             value = getattr(self, name)
             right_kind = isinstance(value, int if whole else int | float) and not isinstance(value, bool)
@@ -112,6 +116,8 @@ class LookContract:
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         data = {each.name: getattr(self, each.name) for each in fields(self)}
+        if not self.mesh_weight:  # as in files of earlier releases
+            del data["mesh_weight"]
         return data | {
             "channels": list(self.channels),
             "glance": None if self.glance is None else self.glance.as_dict(),
@@ -125,8 +131,8 @@ class LookContract:
         entries."""
         if not networks:
             raise ModelError(_too_many(MOST_NETWORKS + 1))
-        names = {each.name for each in fields(cls)}
-        if not isinstance(data, dict) or set(data) != names:
+        names = {each.name for each in fields(cls)} - {"mesh_weight"}
+        if not isinstance(data, dict) or set(data) - {"mesh_weight"} != names:
             found = sorted(data) if isinstance(data, dict) else data
             raise ModelError(f"look in the model's manifest must have the entries {sorted(names)}, not {found!r}")
         try:

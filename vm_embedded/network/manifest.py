@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from types import UnionType
+from typing import Any
 
 from ..borders.text import name_fault
 from ..errors import GeometryError, InputError, ModelError, unknown
@@ -48,10 +49,16 @@ _LARGEST = 1e9
 """Limit of every radius, distance, number of rings and number of operations."""
 
 MOST_CLASSES = 127
-"""Most outputs of a network: the labels of a training are signed bytes."""
+"""Most classes of a network: the labels of a training are signed bytes."""
+
+PEAK_OUTPUTS = 4
+"""Outputs for a class with peaks: score, shift to the right and up, size; see `Manifest.peaks`."""
 
 MOST_DILATION = 64
 """Largest dilation of a convolution: a picture has about a hundred points from one side to the other."""
+
+_LATER = ("layer_dilations", "peaks")
+"""Lists that a file has only if they are not empty: files of earlier releases lack them."""
 
 _SMALLEST_CIRCLE = 0.01
 """Smallest `upright_radius` of a look at uprights [m]."""
@@ -106,6 +113,11 @@ class Manifest:
     upright_looks: descriptions of the look networks for classes of kind upright.
     layer_dilations: of the convolutions, in their order, at most MOST_DILATION; empty if all are 1. Others need edge
         hard, and layout plain or runs.
+    peaks: names of classes of kind object or upright, for which the network also says where objects are; only in
+        layout canvas. After the probabilities of all classes, each of them has four outputs for each cell: the score, a
+        logit of whether the place of an object is in the cell; the shift to the right and up from the cell to this
+        place [cells]; and the natural logarithm of the object's width over the diameter of the object that the mesh is
+        made for. The place is the center of an object, or the base of an upright.
     provenance: origin of the file; the runtime does not use it.
 
     Raises ModelError for unknown values.
@@ -131,6 +143,7 @@ class Manifest:
     look: LookContract | None = None
     upright_looks: tuple[LookContract, ...] = ()
     layer_dilations: tuple[int, ...] = ()
+    peaks: tuple[str, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -162,6 +175,7 @@ class Manifest:
             if not _is_number(value) or not 0 < value <= _LARGEST:
                 raise ModelError(f"{name} in the model's manifest must be a number above 0, not {value!r}")
         self._check_object_height()
+        self._check_peaks()
         self._check_looks()
         if self.mesh == "wall6":
             self._check_walls()
@@ -190,6 +204,16 @@ class Manifest:
                 f"dilations other than 1 need edge hard and layout plain or runs, not {self.edge} and {self.layout}"
             )
 
+    def _check_peaks(self) -> None:
+        able = [each.name for each in self.classes if each.kind in ("object", "upright")]
+        for each in self.peaks:
+            if each not in able:
+                raise ModelError(unknown("class of kind object or upright in the manifest's peaks", each, able))
+        if len(set(self.peaks)) != len(self.peaks):
+            raise ModelError(f"peaks in the model's manifest must be different classes, not {list(self.peaks)}")
+        if self.peaks and self.layout != "canvas":
+            raise ModelError(f"peaks need layout canvas, not {self.layout}")
+
     def _check_object_height(self) -> None:
         tall = self.object_height
         if not _is_number(tall) or not 0 <= tall <= _LARGEST:
@@ -214,6 +238,12 @@ class Manifest:
             raise ModelError(
                 f"the close look at objects has an upright_radius of {self.look.upright_radius:g} m; it must be 0"
             )
+        for each in self.looks:
+            if each.mesh_weight and each.object_class not in self.peaks:
+                raise ModelError(
+                    f"the close look at {each.object_class!r} has a mesh_weight of {each.mesh_weight:g}, but the "
+                    f"network has peaks only for {list(self.peaks)}; without peaks it must be 0"
+                )
         uprights = [each.name for each in self.classes if each.kind == "upright"]
         judged = [each.object_class for each in self.upright_looks]
         if len(set(judged)) != len(judged) or not set(judged) <= set(uprights):
@@ -261,6 +291,11 @@ class Manifest:
         return names.index(class_name)
 
     @property
+    def outputs(self) -> int:
+        """Outputs of the network for each point: the probabilities of the C classes, then four for each of P peaks."""
+        return len(self.classes) + PEAK_OUTPUTS * len(self.peaks)
+
+    @property
     def neighbors(self) -> int:
         """Neighbors of each point, N."""
         return self.model.neighbors
@@ -300,8 +335,9 @@ class Manifest:
         data["look"] = self.look.as_dict() if self.look else None
         data["upright_looks"] = [each.as_dict() for each in self.upright_looks]
         data["self_test"] = None if self.self_test is None else self.self_test.as_dict()
-        if not self.layer_dilations:  # as in files of earlier releases
-            del data["layer_dilations"]
+        for name in _LATER:
+            if not data[name]:  # as in files of earlier releases
+                del data[name]
         return json.dumps(data, sort_keys=True, separators=(",", ":"))
 
     @classmethod
@@ -323,7 +359,7 @@ class Manifest:
         for key in data:
             if key not in known:
                 raise ModelError(unknown("entry in the model's manifest", key, known))
-        data.setdefault("layer_dilations", [])
+        data = dict[str, Any]({name: [] for name in _LATER} | data)
         missing = [name for name in known if name not in data]
         if missing:
             raise ModelError(f"the model's manifest lacks {', '.join(missing)}")
@@ -337,9 +373,10 @@ class Manifest:
         if not isinstance(data["upright_looks"], list):
             raise ModelError(f"upright_looks in the model's manifest must be a list, not {data['upright_looks']!r}")
         data["upright_looks"] = tuple(map(LookContract.from_dict, data["upright_looks"]))
-        if not isinstance(data["layer_dilations"], list):
-            raise ModelError(f"layer_dilations in the model's manifest must be a list, not {data['layer_dilations']!r}")
-        data["layer_dilations"] = tuple(data["layer_dilations"])
+        for name in _LATER:
+            if not isinstance(data[name], list):
+                raise ModelError(f"{name} in the model's manifest must be a list, not {data[name]!r}")
+            data[name] = tuple(data[name])
         if data["self_test"] is not None:
             data["self_test"] = SelfTest.from_dict(data["self_test"])
         return cls(**data)

@@ -17,9 +17,10 @@ _FARTHEST = 4096
 
 @dataclass(frozen=True, eq=False)
 class SelfTest:
-    """A small graph and the network's answer: points (n + 1, 3), neighbors (n + 1, N), probabilities (n + 1, C).
+    """A small graph and the network's answer: points (n + 1, 3), neighbors (n + 1, N), probabilities (n + 1, outputs).
 
-    The last row is the off-screen point. cells (n, 2): columns and rows of points on a lattice, as in Mesh, else None.
+    The last row is the off-screen point. With peaks, their outputs follow the probabilities of the classes. cells (n,
+    2): columns and rows of points on a lattice, as in Mesh, else None.
     """
 
     points: Singles

@@ -62,7 +62,7 @@ class Session:
         return SplitLayout(mesh, sectors, lambda part: choose_layout(part, manifest), self._others)
 
     def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
-        """Probabilities (m, C) of a layout's slots, from their colors (3, m) and which slots (m,) are on screen.
+        """Answers (m, outputs) to a layout's slots, from their colors (3, m) and which slots (m,) are on screen.
 
         Raises ModelError, also if the system has no thread left, for answers that are not finite, and for several
         threads in a process that was forked after the model was loaded.
@@ -81,7 +81,7 @@ class Session:
         return answers
 
     def answer(self, test: SelfTest) -> Singles:
-        """Probabilities (n, C) of an example's points."""
+        """Answers (n, outputs) to an example's points."""
         mesh = Mesh(np.zeros((len(test.points) - 1, 3)), test.neighbors, test.cells)
         # In an example a missing neighbor is always the off-screen point, also for networks with another edge policy.
         layout = choose_layout(mesh, replace(self.model.manifest, edge="hard"))
@@ -103,14 +103,14 @@ class Session:
 
 def _interface(manifest: Manifest) -> Interface:
     """The inputs and outputs of a mesh network, which depend on its layout."""
-    classes = len(manifest.classes)
+    outputs = manifest.outputs
     if manifest.layout == "canvas":
         return {
             "points": ("tensor(float)", [1, 3]),
             "shown": ("tensor(bool)", [1, 1]),
-            "probabilities": ("tensor(float)", [1, classes]),
+            "probabilities": ("tensor(float)", [1, outputs]),
         }
-    interface: Interface = {"points": ("tensor(float)", [3]), "probabilities": ("tensor(float)", [classes])}
+    interface: Interface = {"points": ("tensor(float)", [3]), "probabilities": ("tensor(float)", [outputs])}
     if manifest.layout == "plain":
         interface["neighbors"] = ("tensor(int32)", [manifest.neighbor_columns])
     elif manifest.layout == "runs":

@@ -246,7 +246,7 @@ def test_places_tell_how_large_an_object_is_in_the_picture(scene, column, row):
 
 def test_only_proposals_with_a_chance_are_looked_at_again(scene):
     look = BrightDisk()
-    bare = replace(scene, slot_probabilities=np.full_like(scene.slot_probabilities, 0.5))
+    bare = replace(scene, slot_answers=np.full_like(scene.slot_probabilities, 0.5))
     found_in(bare, look, max_proposals=30)
     assert look.seen == [30, 30, 30 * OPINION]  # 0.05 is a chance
 
@@ -371,7 +371,7 @@ def test_an_object_that_is_seen_from_two_proposals_is_one(scene):
             answers[:, 0] = np.where(answers[:, 3] > -3.0, 0.9, 0.0)
             return answers
 
-    background = replace(scene, slot_probabilities=np.maximum(scene.slot_probabilities, np.float32(0.1)))
+    background = replace(scene, slot_answers=np.maximum(scene.slot_probabilities, np.float32(0.1)))
     found, rejected = found_in(background, Everywhere(passes=3))
     assert len(found) == 2
     assert any(each.reason.startswith("the same object as the one at ") for each in rejected)

@@ -73,7 +73,7 @@ def lowest_of(scene):
 
 
 def objects_in(scene, probability, **settings):
-    answered = replace(scene, slot_probabilities=probability[:, None])
+    answered = replace(scene, slot_answers=probability[:, None])
     return locate(answered, None, Settings(**settings), Stopwatch(), explain=True)
 
 
@@ -182,7 +182,7 @@ def test_noise_never_breaks_the_search(seed, share):
 
 def test_reasons_are_only_collected_when_asked_for():
     scene = scene_at()
-    observation = replace(scene, slot_probabilities=ideal(scene, (1.3, 0.0), radius=0.3)[:, None])
+    observation = replace(scene, slot_answers=ideal(scene, (1.3, 0.0), radius=0.3)[:, None])
     _, rejected = locate(observation, None, Settings(), Stopwatch())
     assert rejected == ()
 

@@ -48,7 +48,7 @@ def post_at(detector, base, height=1.0, half=0.08, yaw=0.0):
     return replace(
         seen,
         manifest=replace(seen.manifest, classes=CLASSES, look=None),
-        slot_probabilities=np.eye(4, dtype=np.float32)[label] * 0.9 + 0.025,
+        slot_answers=np.eye(4, dtype=np.float32)[label] * 0.9 + 0.025,
     )
 
 
@@ -90,7 +90,7 @@ def test_the_nearest_points_of_a_post_propose_its_base(detector, base):
 
 def test_each_of_two_posts_is_found_and_the_nearest_comes_first(detector):
     near, far = post_at(detector, (2.0, -0.4)), post_at(detector, (3.0, 0.5))
-    both = replace(near, slot_probabilities=np.maximum(near.slot_probabilities, far.slot_probabilities))
+    both = replace(near, slot_answers=np.maximum(near.slot_probabilities, far.slot_probabilities))
     found = [each.position for each in find_bases(both, Sure(), SETTINGS)]
     assert found[0] == pytest.approx((2.0, -0.4), abs=0.3)
     assert min(np.hypot(*(each - (3.0, 0.5))) for each in found[1:]) < 0.4
@@ -101,7 +101,7 @@ def test_bases_of_one_upright_are_reported_once(detector, width):
     here = post_at(detector, (6.0, 0.0))
     for beside, is_same in ((0.5, True), (1.0, width > 1.0), (2.0, False)):
         there = post_at(detector, (6.0, beside))
-        both = replace(here, slot_probabilities=np.maximum(here.slot_probabilities, there.slot_probabilities))
+        both = replace(here, slot_answers=np.maximum(here.slot_probabilities, there.slot_probabilities))
         found = [each.position for each in find_bases(both, Sure(width=width), SETTINGS)]
         assert (min([9.0, *(np.hypot(*(each - found[0])) for each in found[1:])]) > beside + 0.3) == is_same
 
@@ -144,7 +144,7 @@ def test_a_doubtful_look_reports_nothing(detector):
 
 def test_without_points_of_the_class_there_is_nothing_to_look_at(detector):
     seen = post_at(detector, (2.5, 0.3))
-    nothing = replace(seen, slot_probabilities=np.zeros_like(seen.slot_probabilities))
+    nothing = replace(seen, slot_answers=np.zeros_like(seen.slot_probabilities))
     assert find_bases(nothing, Sure(), SETTINGS) == []
 
 
@@ -192,4 +192,4 @@ def test_circles_around_bases_change_nothing_but_the_shape(detector):
     circles = around_bases(seen, 0.4)
     assert circles.view.shape.half_size == 0.4
     assert circles.view._replace(shape=seen.view.shape) == seen.view
-    assert circles.slot_probabilities is seen.slot_probabilities
+    assert circles.slot_answers is seen.slot_answers

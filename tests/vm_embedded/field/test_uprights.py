@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.field.uprights import POST, ROBOT, find_uprights
+from vm_embedded.field.uprights import POST, ROBOT, Base, apart, find_uprights
 
 from .ground import ACROSS, HEIGHT, behind, ground, mesh, turned
 
@@ -82,3 +82,22 @@ def test_wide_near_things_keep_the_order():
 
 def test_a_wall_is_no_robot():
     assert found_among([((2.0, 0.0), 3.5, 0.8)], "robot", ROBOT) == []
+
+
+places = st.tuples(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0))
+
+
+@given(st.lists(st.tuples(places, st.floats(0.05, 2.0)), max_size=12))
+def test_of_bases_of_one_thing_the_most_probable_is_kept(things):
+    """Two are of one thing within 12 % of the distance of the better one, or within half its width."""
+    bases = [Base(np.array(place), width, 0.9 - 0.01 * number) for number, (place, width) in enumerate(things)]
+    kept = []
+    for each in bases:
+        limits = [max(0.12 * np.hypot(*better.position), better.width / 2.0) for better in kept]
+        away = [np.hypot(*(each.position - better.position)) for better in kept]
+        if all(distance >= limit for distance, limit in zip(away, limits, strict=True)):
+            kept.append(each)
+    found = apart(bases)
+    assert {id(each) for each in found} == {id(each) for each in kept}
+    ranges = [float(np.hypot(*each.position)) for each in found]
+    assert ranges == sorted(ranges)

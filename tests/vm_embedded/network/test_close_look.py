@@ -196,6 +196,11 @@ def test_a_missing_entry_is_refused(entry):
         from_json(**{entry: ...})
 
 
+def test_a_look_that_no_score_counts_for_has_no_weight_as_before():
+    assert "mesh_weight" not in look_contract().as_dict()
+    assert from_json(mesh_weight=0).look.as_dict() == from_json().look.as_dict()
+
+
 def test_an_unknown_entry_is_refused():
     with pytest.raises(ModelError, match="'depth'"):
         from_json(depth=3)
@@ -227,6 +232,10 @@ def test_a_look_that_is_no_table_is_refused(look):
         ("passes", 0),
         ("passes", 5),
         ("passes", True),
+        ("mesh_weight", 2.1),
+        ("mesh_weight", -0.1),
+        ("mesh_weight", True),
+        ("mesh_weight", None),
         ("channels", 3),
         ("channels", ["many"]),
         ("channels", [float("inf")]),
@@ -258,6 +267,7 @@ def contracts(draw):
         extent=draw(reals(0.5, 8.0)),
         above=draw(reals(0.0, 0.99)),
         passes=draw(st.integers(1, 4)),
+        mesh_weight=draw(st.just(0.0) | reals(0.0, 2.0)),
         channels=tuple(draw(st.lists(st.integers(1, 99), max_size=4))),
         self_test=draw(st.sampled_from([None, test])),
         provenance=draw(st.dictionaries(class_names, st.text(printable, max_size=8), max_size=3)),
@@ -280,7 +290,7 @@ json_values = st.recursive(
 )
 
 
-@given(st.sampled_from(sorted(look_contract().as_dict())), json_values)
+@given(st.sampled_from(sorted(look_contract(mesh_weight=1.0).as_dict())), json_values)
 def test_any_value_of_an_entry_is_read_or_refused_with_a_model_error(entry, value):
     found = attempt(ModelError, LookContract.from_dict, MANIFEST.look.as_dict() | {entry: value})
     assert isinstance(found, LookContract | ModelError)

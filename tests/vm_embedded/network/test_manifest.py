@@ -58,6 +58,8 @@ def _manifest(order, tall, layer_dilations, **entries):
     edge, layout = order
     if edge == "hard" and layout in ("plain", "runs"):
         entries["layer_dilations"] = layer_dilations
+    if layout == "canvas":
+        entries["peaks"] = tuple(each.name for each in entries["classes"][::-1] if each.kind in ("object", "upright"))
     mesh = entries.pop("mesh") if layout in ("plain", "runs") else MESHES[layout]
     entries = entries | {"mesh": mesh, "object_height": tall if entries["shape"] == "cylinder" else 0.0}
     return Manifest(edge=edge, layout=layout, **entries)
@@ -138,8 +140,8 @@ def test_a_missing_entry_is_refused_by_name(entry):
         Manifest.from_json(changed(**{entry: ...}))
 
 
-def test_files_without_dilations_lack_their_entry_as_before():
-    assert "layer_dilations" not in json.loads(BALL.as_json())
+def test_files_without_dilations_and_peaks_lack_their_entries_as_before():
+    assert not {"layer_dilations", "peaks"} & set(json.loads(BALL.as_json()))
     assert Manifest.from_json(changed(layer_dilations=[1, 4, 2, 4])).dilations == (1, 2, 4)
 
 
@@ -169,6 +171,49 @@ def test_files_without_dilations_lack_their_entry_as_before():
 def test_impossible_dilations_are_refused(entries, said):
     with pytest.raises(ModelError, match=said):
         Manifest.from_json(changed(**entries))
+
+
+STRIPS = ball_manifest("ball", "goal:upright", "line", "other", mesh="octaves", layout="canvas")
+
+
+def test_peaks_are_outputs_after_the_classes():
+    both = replace(STRIPS, peaks=("goal", "ball"))
+    assert (STRIPS.outputs, both.outputs) == (4, 12)
+    assert json.loads(both.as_json())["peaks"] == ["goal", "ball"]
+    assert replace(both, object_radius=0.2).used_for(0.3, 5.0).peaks == ("goal", "ball")
+
+
+@pytest.mark.parametrize(
+    ("peaks", "said"),
+    [
+        (["bal"], r"'bal'.*'ball'.*allowed: ball, goal"),
+        (["ball", "line"], "'line'"),
+        (["other"], "'other'"),
+        ([["ball"]], r"\['ball'\]"),
+        ([None], "None"),
+        (["ball", "goal", "ball"], r"\['ball', 'goal', 'ball'\]"),
+        ("ball", "must be a list, not 'ball'"),
+        ({"ball": 1}, "must be a list"),
+    ],
+)
+def test_impossible_peaks_are_refused(peaks, said):
+    data = json.loads(STRIPS.as_json()) | {"peaks": peaks}
+    with pytest.raises(ModelError, match=said):
+        Manifest.from_json(json.dumps(data))
+
+
+@pytest.mark.parametrize("layout", ["plain", "runs", "lattice"])
+def test_other_layouts_have_no_peaks(layout):
+    with pytest.raises(ModelError, match=f"peaks.*canvas.*{layout}"):
+        ball_manifest("ball", layout=layout, mesh=MESHES[layout], peaks=("ball",))
+
+
+def test_a_look_counts_scores_only_of_classes_with_peaks():
+    weighing = look_contract(mesh_weight=0.4)
+    assert replace(STRIPS, peaks=("ball",), look=weighing).look.mesh_weight == 0.4
+    for peaks in ((), ("goal",)):
+        with pytest.raises(ModelError, match=r"'ball'.*mesh_weight.*0\.4"):
+            replace(STRIPS, peaks=peaks, look=weighing)
 
 
 def test_an_unknown_entry_names_itself_and_the_nearest_known_one():
