@@ -14,10 +14,10 @@ from ..arrays import Chosen, Floats, Mask
 from .ground_points import cross
 from .lines import LinePoints
 
-_TRIES = 120
+_TRIES = 60
 """Number of circles that are tried."""
 
-_MOST_VOTERS = 150
+_MOST_VOTERS = 100
 """Largest number of points that suggest circles and vote for them."""
 
 _RADII = (0.35, 1.7)

@@ -24,7 +24,7 @@ _FARTHEST = 10.0
 _ANGLES = 45
 """Directions that the Hough transform tries, from 0 to a right angle."""
 
-_MOST_VOTERS = 400
+_MOST_VOTERS = 200
 """Largest number of points that choose the direction."""
 
 _BIN = 0.06
@@ -141,6 +141,10 @@ def find_pieces(points: LinePoints, likely: LinePoints) -> list[Piece]:
         return []
     angle, certainty = _main_direction(likely), 1.0 / _FIRST_ERROR**2
     binned, bins = angle, _bins(likely, angle)
+    # A line turns little from these normals, so how far its points may be changes little, too.
+    normals = _normals(angle)
+    reaches = [[each.tolerance(normal) for normal in normals] for each in (points, likely)]
+    moments = _moments(likely.positions)
     free = np.ones(len(likely), dtype=bool)
     weights = likely.weights.astype(np.float64)  # 0 where not free
     pieces: list[Piece] = []
@@ -152,8 +156,8 @@ def find_pieces(points: LinePoints, likely: LinePoints) -> list[Piece]:
         if sums[axis][peak] < _LEAST_VOTES:
             break
         near = free & ((bins[axis] == peak) | (bins[axis] == peak + 1))
-        line = _fit(likely, near, free, _normals(angle)[axis], _SKEW**2 + 1.0 / certainty)
-        found = _cut(points, likely, line)
+        line = _fit(moments, weights, reaches[1][axis], near, free, _normals(angle)[axis], _SKEW**2 + 1.0 / certainty)
+        found = _cut(points, reaches[0][axis], likely, line)
         pieces += found
         free[line.members] = False
         free[near] = False
@@ -211,43 +215,53 @@ class _Line:
     certainty: float
 
 
-def _fit(likely: LinePoints, near: Mask, free: Mask, normal: Floats, variance: float) -> _Line:
-    """A line through free points.
+def _moments(positions: Floats) -> Floats:
+    """1, x, y, x^2, x y and y^2 (6, n) of n places (n, 2)."""
+    x, y = positions.T
+    return np.stack([np.ones(len(x)), x, y, x * x, x * y, y * y])
 
-    near: the points to begin with. normal (2,): the expected normal, whose direction has this variance [rad^2].
+
+def _fit(
+    moments: Floats, weights: Floats, reach: Floats, near: Mask, free: Mask, normal: Floats, variance: float
+) -> _Line:
+    """A line through free points with moments (6, n) and weights (n,).
+
+    reach (n,): how far a point may be from the line [m]. near (n,): the points to begin with. normal (2,): the expected
+    normal, whose direction has this variance [rad^2].
     """
-    expected = np.array([-normal[1], normal[0]])
-    members = np.flatnonzero(near)
-    tolerance = likely.tolerance(normal)
-    weights = likely.weights / tolerance**2
+    _, x, y = moments[:3]
+    ex, ey = -float(normal[1]), float(normal[0])  # the expected direction
+    precise = moments * (weights / reach**2)
+    members = near
     for _ in range(3):
-        own = weights[members]
-        middle = own @ likely.positions[members] / own.sum()
-        away = likely.positions[members] - middle
-        (xx, xy), (_, yy) = (away * own[:, None]).T @ away
+        total, sx, sy, sxx, sxy, syy = (precise * members).sum(axis=1).tolist()
+        mx, my = sx / total, sy / total
+        xx, xy, yy = sxx - sx * mx, sxy - sx * my, syy - sy * my
         angle = 0.5 * math.atan2(2.0 * xy, xx - yy)  # of the longer axis
-        turn = math.remainder(angle - math.atan2(expected[1], expected[0]), math.pi)
+        turn = math.remainder(angle - math.atan2(ey, ex), math.pi)
         if abs(turn) > _TURN:
             turn = 0.0  # its points are a blob, or belong to a line at a right angle
-        certainty = float(own @ (away @ expected) ** 2) / _NOISE**2
+        certainty = max(ex * ex * xx + 2.0 * ex * ey * xy + ey * ey * yy, 0.0) / _NOISE**2
         kept = turn * certainty / (certainty + 1.0 / variance)
         c, s = math.cos(kept), math.sin(kept)
-        direction = np.array([c * expected[0] - s * expected[1], s * expected[0] + c * expected[1]])
-        across = np.array([direction[1], -direction[0]])
-        off = np.abs(likely.positions @ across - middle @ across)
-        members = np.flatnonzero((off < tolerance) & free)
-        if len(members) < 2:
+        dx, dy = c * ex - s * ey, s * ex + c * ey
+        off = x * dy
+        off -= y * dx
+        off -= mx * dy - my * dx
+        members = np.abs(off, out=off) < reach
+        members &= free
+        if np.count_nonzero(members) < 2:
             break
-    return _Line(middle, direction, members, turn, certainty)
+    return _Line(np.array([mx, my]), np.array([dx, dy]), np.flatnonzero(members), turn, certainty)
 
 
-def _cut(points: LinePoints, likely: LinePoints, line: _Line) -> list[Piece]:
-    """The pieces of a line that its points speak for."""
+def _cut(points: LinePoints, reach: Floats, likely: LinePoints, line: _Line) -> list[Piece]:
+    """The pieces of a line that its points speak for. reach (n,): how far each of the points may be from it [m]."""
     if len(line.members) < _FEWEST:
         return []
     normal = np.array([line.direction[1], -line.direction[0]])
     off = np.abs(points.positions @ normal - line.middle @ normal)
-    on = np.flatnonzero(off < points.tolerance(normal))
+    on = np.flatnonzero(off < reach)
     t = (points.positions[on] - line.middle) @ line.direction
     order = np.argsort(t)
     t, values = t[order], points.weights[on[order]].astype(np.float64) - _EXPECTED

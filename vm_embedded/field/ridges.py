@@ -20,16 +20,16 @@ Profiles = Callable[[Floats, int], tuple[Singles, Floats]]
 """Brightness (n, count), 0 to 255, at evenly spaced places from one end to the other of each stretch (n, 2, 2) [m] on
 the plane, NaN outside of the picture, and the pixels (n,) between two of these places."""
 
-_STATIONS = 16
+_STATIONS = 12
 """Profiles of a piece."""
 
-_HALF = 24
+_HALF = 20
 """Samples of a profile on each side of the piece."""
 
 _MARGIN = 0.12
 """How far profiles reach beyond the places where the ridge may be [m], to see what is beside it."""
 
-_SHIFTS = 9
+_SHIFTS = 7
 """Places that are tried for each end of a piece."""
 
 _TURN = 0.06
