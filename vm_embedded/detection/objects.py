@@ -1,8 +1,8 @@
 """From an observation to objects on the plane.
 
-For the class of the close look, the likely points propose places, and a second network judges each of them
-(`looking.py`). For any other class, clusters of likely points are candidates, and their points decide: propose, fit,
-judge (`candidates.py`, `fitting.py`, `judging.py`).
+For the class of the close look, peaks or likely points propose places, and a second network judges each of them
+(`looking.py`). Without a close look, the peaks of a class are its objects. For any other class, clusters of likely
+points are candidates, and their points decide: propose, fit, judge (`candidates.py`, `fitting.py`, `judging.py`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .candidates import Candidate, propose
 from .detection import Detection
 from .fitting import best_scale, fit
 from .judging import judge
-from .looking import Judgment, Look, look_closely
+from .looking import Judgment, Look, judge_peaks, look_closely
 from .observation import Observation
 from .projection import along
 from .settings import Settings
@@ -44,6 +44,9 @@ def locate(
             continue
         if look is not None and look.contract.object_class == name:
             judged = look_closely(observation, look, probabilities, settings, watch, explain)
+            found = [_describe_judgment(observation, name, each) for each in judged]
+        elif name in observation.manifest.peaks:
+            judged = judge_peaks(observation, name, settings, explain)
             found = [_describe_judgment(observation, name, each) for each in judged]
         else:
             candidates = _candidates(observation, name, probabilities, settings)

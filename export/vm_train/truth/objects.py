@@ -138,8 +138,7 @@ def _of_scene(picture: Picture, shown: SceneObject) -> TrueObject:
 
 def piece_centers(shown: Mask) -> Floats:
     """The mean pixels (n, 2) of the connected pieces of a mask (h, w)."""
-    centers: Floats = cv2.connectedComponentsWithStats(shown.astype(np.uint8), connectivity=8)[3][1:]
-    return centers
+    return np.asarray(cv2.connectedComponentsWithStats(shown.astype(np.uint8), connectivity=8)[3][1:], dtype=np.float64)
 
 
 def _of_mask(picture: Picture, shown: Mask, shape: Shape) -> list[TrueObject]:

@@ -465,6 +465,22 @@ def test_without_peaks_probable_points_propose():
     assert look_closely(without, Sure(), seen.slot_probabilities[:, 1], SETTINGS, Stopwatch())
 
 
+def test_without_a_look_the_peaks_are_the_objects():
+    """With their scores as confidence, and the size that the network sees as the apparent one."""
+    rays = VIEW.layout.rays[cells_ahead(1.2, 2.5, 5.0)]
+    scores, sizes = (1.0, 3.0, -2.0), (0.0, 0.1, 0.0)
+    rows = [("ball", *each) for each in zip(rays, sizes, scores, strict=True)]
+    for larger in (1.0, 1.5):
+        balls = replace(BALLS, object_radius=larger * BALLS.radius)
+        found, rejected = locate(observed(VIEW, balls, rows), None, SETTINGS, Stopwatch(), explain=True)
+        assert [each.confidence for each in found] == pytest.approx([0.9526, 0.7311], abs=1e-3)
+        for each, ray, size in zip(found, rays[[1, 0]], (0.1, 0.0), strict=True):
+            assert offset(VIEW, VIEW.heading.T @ each.bearing, ray) < 0.01
+            assert each.distance_by_angle == pytest.approx(each.distance * larger / np.exp(size), rel=1e-3)
+        (other,) = rejected
+        assert (other.confidence, "below" in other.reason) == (pytest.approx(0.1192, abs=1e-3), True)
+
+
 def test_a_look_at_uprights_judges_their_peaks():
     (cell,) = cells_ahead(2.0)
     seen = observed(VIEW, BALLS, [("goal", VIEW.layout.rays[cell], 0.0, 3.0)])
