@@ -154,7 +154,7 @@ def test_a_patch_is_read_from_the_sharpest_level_that_has_a_pixel_for_each_sampl
         image = np.random.default_rng(0).integers(0, 256, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
         pyramid = Pyramid(image, "bgr")
         cut_patches(pyramid, patch_nodes(view, Tangents.at(view, center[None]), EXTENT), size)
-        assert len(pyramid._levels) == expected + 1
+        assert max(pyramid._levels) == expected
 
 
 @given(st.floats(0.02, 0.2), st.floats(0.2, 5.0), st.floats(1.1, 6.0), st.floats(4.0, 30.0), st.floats(0.0, 6.28))
