@@ -1,19 +1,20 @@
-"""A model file with other look networks or another canary; its mesh network stays as it is."""
+"""A model file with other look networks, another confidence or another canary; its mesh network stays as it is."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vm_embedded.errors import ModelError
 from vm_embedded.files import write_file
-from vm_embedded.network.canary import CANARY_KEY
+from vm_embedded.network.canary import CANARY_KEY, Canary
 from vm_embedded.network.manifest import METADATA_KEY
 from vm_embedded.network.model_file import read_model
 
 from .attach_canary import CanaryPicture, NotFoundError, with_canary
 from .attach_look import detached, tested_contract
+from .calibrated_peaks import with_calibrated_peaks
 from .export import with_looks
 from .look_checkpoint import LookCheckpoint
 from .look_weights import look_of, upright_looks_of
@@ -42,18 +43,40 @@ def change_looks(model: str | Path, path: str | Path, looks: Sequence[LookCheckp
     file's classes, or if there is no look to remove. Raises InputError if the file can't be written.
     """
     read = read_model(model)
-    (content, difference), lost = with_looks(path, read.content, looks), False
+    content, difference = with_looks(path, read.content, looks)
     if not looks:
         if read.look is None and not read.upright_looks:
             raise ModelError(f"{model} has no close look to remove")
         content = detached(read.content, read.manifest)
-    if read.canary is not None:
+    return ChangedLooks(difference, _finish(path, content, read.canary))
+
+
+def change_confidence(
+    model: str | Path,
+    path: str | Path,
+    looks: Sequence[LookCheckpoint],
+    peaks: Mapping[str, tuple[float, float]],
+) -> bool:
+    """Write a copy of a model file with these look networks, each in the place of the one for the same class, and with
+    other scores of peaks: `scale * score + offset`, by class. Returns whether its canary is lost, as in ChangedLooks.
+
+    Raises ModelError and InputError as `change_looks`.
+    """
+    read = read_model(model)
+    content = with_calibrated_peaks(path, read, peaks) if peaks else read.content
+    return _finish(path, with_looks(path, content, looks)[0], read.canary)
+
+
+def _finish(path: str | Path, content: bytes, canary: Canary | None) -> bool:
+    """Write a model file whose networks have changed, with new answers to its canary. Returns whether it is lost."""
+    lost = False
+    if canary is not None:
         try:
-            content = with_canary(content, CanaryPicture.of(read.canary))
+            content = with_canary(content, CanaryPicture.of(canary))
         except NotFoundError:
             content, lost = with_metadata(content, {CANARY_KEY: None}), True
     write_file(Path(path), content)
-    return ChangedLooks(difference, lost)
+    return lost
 
 
 def lost_canary_message(output: Path, model: str | Path) -> str:

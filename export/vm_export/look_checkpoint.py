@@ -61,7 +61,7 @@ class LookCheckpoint:
         return LookCheckpoint(self.network, contract, self.examples, glance)
 
     def recalibrated(self, scale: float, offset: float, source: str) -> LookCheckpoint:
-        """The same networks, whose probability has the logit `scale * logit + offset`.
+        """The same networks, whose probability, with all that counts in it, has the logit `scale * logit + offset`.
 
         The glance changes only if this is a wide look with one pass: then its logit is a part of a mean with that of
         the glance. source: the answers that the scale and the offset fit, for the provenance.
@@ -72,7 +72,8 @@ class LookCheckpoint:
         network, (first, before) = copy.deepcopy(self.network), self.network.calibration.tolist()
         network.calibration.copy_(torch.tensor([scale * first, scale * before + offset]))
         provenance = {**self.contract.provenance, "calibrated_on": source}
-        contract = replace(self.contract, provenance=provenance)
+        weight = scale * self.contract.mesh_weight
+        contract = replace(self.contract, provenance=provenance, mesh_weight=weight)
         if glance is not None:
             contract = replace(contract, glance=glance.contract)
         return LookCheckpoint(network, contract, self.examples, glance)

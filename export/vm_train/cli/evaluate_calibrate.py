@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import argparse
 import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vm_embedded.cli.program import EXIT_OK
@@ -19,8 +23,10 @@ if TYPE_CHECKING:
     from vm_embedded.arrays import Floats, Mask
     from vm_export.look_checkpoint import LookCheckpoint
 
+    from ..data.picture_files import PictureFiles
     from ..evaluation.evaluation import Evaluation
-
+    from ..evaluation.workers import Job
+    from ..scores.calibration import Calibration
 
 _FEWEST = 10
 """Right and wrong answers that a calibration needs, of each."""
@@ -31,6 +37,9 @@ _CANDIDATES = Settings(min_confidence=0.01)
 _OVERLAP = 0.5
 """IoU of a right answer."""
 
+_MESH_WEIGHTS = (0.0, 0.2, 0.4, 0.6, 0.8)
+"""Weights of the scores of peaks that are tried beside a close look."""
+
 
 def run_calibrate(options: argparse.Namespace) -> int:
     """Find objects in the pictures, fit the confidence, write the model file, and return the exit status.
@@ -39,7 +48,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
     close look.
     """
     # Imported here: without torch, help works and the error is one clear line.
-    from vm_export.change_model import change_looks, lost_canary_message
+    from vm_export.change_model import change_confidence, lost_canary_message
     from vm_export.look_weights import look_of, upright_looks_of
 
     from ..evaluation.evaluation import Rules
@@ -52,21 +61,33 @@ def run_calibrate(options: argparse.Namespace) -> int:
         raise InputError(f"{options.output} must end in .onnx: it becomes a model file")
     check_writable(options.output, (path, options.list))
     model = read_model(path)
-    looks = upright_looks_of(model)
-    if model.look is not None or not looks:
+    looks, manifest = upright_looks_of(model), model.manifest
+    if model.look is not None or not (looks or manifest.peaks):
         looks.insert(0, look_of(model))
+    judged = [each.contract.object_class for each in looks]
     pictures = select_pictures(options.data, options.list, options.part)
     classes = classes_with_colors(model.manifest, default_colors(path, options.list), options.color)
     rules = Rules(options.radius_of, options.min_radius, options.strict)
     job = Job(path, _CANDIDATES, False, classes, rules)
-    result = evaluate_with_progress(job, job.subject(), pictures, options.workers)
+    if model.look is not None and judged[0] in manifest.peaks:
+        looks[0], result = _weighted(looks[0], job, pictures, options.workers)
+    else:
+        result = evaluate_with_progress(job, job.subject(), pictures, options.workers)
     if options.radius_of == "all":
         for note in other_radii(result, model.manifest.object_radius):
             print(f"vm-evaluate: {note}", file=sys.stderr)
-    calibrated = [_calibrated(look, *_answers(result, look.contract.object_class), len(result.poses)) for look in looks]
-    changed = change_looks(path, options.output, calibrated)
+    calibrated = []
+    for look in looks:
+        fitted, source = _calibration(look.contract.object_class, result)
+        calibrated.append(look.recalibrated(fitted.scale, fitted.offset, source))
+    scores = {}
+    for name in manifest.peaks:
+        if name not in judged:
+            fitted, _ = _calibration(name, result)
+            scores[name] = fitted.scale, fitted.offset
+    lost_canary = change_confidence(path, options.output, calibrated, scores)
     print(f"{options.output}: written; other objects may now pass --min-confidence")
-    if changed.lost_canary:
+    if lost_canary:
         print(f"vm-evaluate: {lost_canary_message(options.output, options.model)}", file=sys.stderr)
     return EXIT_OK
 
@@ -77,16 +98,39 @@ def _answers(result: Evaluation, name: str) -> tuple[Floats, Mask]:
         ranking = result.objects[name].ranking(_OVERLAP)
         return ranking.confidence, ranking.right
     if result.features is None:
-        raise InputError(f"the look at {name} needs pictures with the classes of a field to be calibrated")
+        raise InputError(f"{name} needs pictures with the classes of a field to be calibrated")
     scores = result.features.posts if name == "goal" else result.features.robots
     return scores.judged()
 
 
-def _calibrated(look: LookCheckpoint, confidence: Floats, right: Mask, pictures: int) -> LookCheckpoint:
-    """The look network with the confidence that fits these answers; print how well it fits before and after."""
+def _weighted(
+    look: LookCheckpoint, job: Job, pictures: Sequence[PictureFiles], workers: int | None
+) -> tuple[LookCheckpoint, Evaluation]:
+    """The look network with the weight of the peaks' scores that ranks its objects best, and what it then finds."""
+    from vm_export.change_model import change_confidence
+
+    name, found = look.contract.object_class, []
+    with tempfile.TemporaryDirectory() as folder:
+        for weight in _MESH_WEIGHTS:
+            weighted = replace(look, contract=replace(look.contract, mesh_weight=weight))
+            path = Path(folder) / "weighted.onnx"
+            change_confidence(job.model, path, [weighted], {})
+            tried = replace(job, model=path)
+            result = evaluate_with_progress(tried, tried.subject(), pictures, workers)
+            precision = result.objects[name].ranking(_OVERLAP).precision_recall.average_precision
+            print(f"{name}: average precision {precision:.4f} with a mesh weight of {weight:g}")
+            found.append((precision, weighted, result))
+    _, best, result = max(found, key=lambda each: each[0])
+    return best, result
+
+
+def _calibration(name: str, result: Evaluation) -> tuple[Calibration, str]:
+    """The scale and offset of a class's confidence that fit what was found, and a text about that; print how well the
+    confidence fits before and after."""
     from ..scores.calibration import Calibration, Reliability, logits_from
 
-    name, count = look.contract.object_class, int(right.sum())
+    confidence, right = _answers(result, name)
+    count = int(right.sum())
     if min(count, len(right) - count) < _FEWEST:
         raise InputError(
             f"class {name}: {count} right and {len(right) - count} wrong answers are too few for a calibration, which "
@@ -95,11 +139,11 @@ def _calibrated(look: LookCheckpoint, confidence: Floats, right: Mask, pictures:
     logits = logits_from(confidence)
     fitted = Calibration.fit(logits, right)
     before, after = (Reliability.of(each, right).error for each in (confidence, fitted.probabilities(logits)))
-    source = f"{len(right)} answers in {pictures} pictures"
+    source = f"{len(right)} answers in {len(result.poses)} pictures"
     print(
         f"{name}: {source}; expected calibration error {before:.3f} before, {after:.3f} after "
         f"(scale {fitted.scale:.2f}, offset {fitted.offset:+.2f} of the logit)"
     )
     if after >= before:
         print(f"vm-evaluate: class {name}: the error is not smaller than before: give more pictures", file=sys.stderr)
-    return look.recalibrated(fitted.scale, fitted.offset, source)
+    return fitted, source

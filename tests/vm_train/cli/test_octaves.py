@@ -58,7 +58,7 @@ def test_it_learns_is_exported_and_detects(trained, data, tmp_path):
     losses = losses_of(trained)
     tenth = len(losses) // 10
     assert np.mean(losses[-tenth:]) < 0.6 * np.mean(losses[:tenth])
-    assert Checkpoint.load(trained / "model.pt").network.shape == CanvasShape(1, 8, 4)
+    assert Checkpoint.load(trained / "model.pt").network.shape == CanvasShape(1, 8, 4, 1)
     run_module("vm_export.cli", trained / "model.pt", "-o", tmp_path / "model.onnx")
     done = run_module(
         "vm_embedded.cli.detect", "--model", tmp_path / "model.onnx", "--camera", data, "--emit-points", "field"
@@ -95,7 +95,7 @@ def test_it_is_trained_further_from_its_checkpoint_and_from_its_model_file(train
     for start in (trained / "model.pt", tmp_path / "model.onnx"):
         folder = tmp_path / start.suffix.removeprefix(".")
         run(data, "-o", folder, "--from", start, *settings)
-        assert Checkpoint.load(folder / "model.pt").network.shape == CanvasShape(1, 8, 4)
+        assert Checkpoint.load(folder / "model.pt").network.shape == CanvasShape(1, 8, 4, 1)
     wrong = run(
         data, "-o", tmp_path / "w", "--from", trained / "model.pt", *settings, "--set", "network.width=16", code=1
     )
