@@ -27,13 +27,25 @@ _RARE = -4.6
 learn this share only (T. Lin and others, 2017)."""
 
 
+class Mix(nn.Conv2d):
+    """A convolution of single cells, as a product of matrices: torch takes half the time for it in a training."""
+
+    def __init__(self, inputs: int, outputs: int, bias: bool = True) -> None:
+        super().__init__(inputs, outputs, 1, bias=bias)
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """(1, outputs, H, W) from (1, inputs, H, W)."""
+        mixed = nn.functional.linear(x.permute(0, 2, 3, 1), self.weight[:, :, 0, 0], self.bias)
+        return mixed.permute(0, 3, 1, 2)
+
+
 class Separable(nn.Module):
     """A separable convolution with batch normalization, added to its input if nothing changes the size, then ReLU."""
 
     def __init__(self, inputs: int, outputs: int, stride: int = 1) -> None:
         super().__init__()
         self.depthwise = nn.Conv2d(inputs, inputs, 3, stride, padding=1, groups=inputs, bias=False)
-        self.mix = nn.Conv2d(inputs, outputs, 1, bias=False)
+        self.mix = Mix(inputs, outputs, bias=False)
         self.norm = nn.BatchNorm2d(outputs, momentum=_MOMENTUM)
         self.adds = stride == 1 and inputs == outputs
 
@@ -58,10 +70,10 @@ class CanvasNetwork(nn.Module):
             for width, depth in zip(widths, depths, strict=True)
         )
         self.halve = nn.ModuleList(Separable(fine, coarse, stride=2) for fine, coarse in steps)
-        self.lift = nn.ModuleList(nn.Conv2d(coarse, fine, 1) for fine, coarse in steps)
+        self.lift = nn.ModuleList(Mix(coarse, fine) for fine, coarse in steps)
         self.up = nn.ModuleList(Separable(fine, fine) for fine, _ in steps)
-        self.head = nn.Conv2d(widths[0], shape.classes, 1)
-        self.peaks = nn.Conv2d(widths[0], 4 * shape.peaks, 1) if shape.peaks else None
+        self.head = Mix(widths[0], shape.classes)
+        self.peaks = Mix(widths[0], 4 * shape.peaks) if shape.peaks else None
         if self.peaks is not None:
             assert self.peaks.bias is not None
             self.peaks.bias.data[::4] = _RARE
