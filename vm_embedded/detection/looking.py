@@ -129,7 +129,7 @@ def judge_peaks(observation: Observation, class_name: str, settings: Settings, e
     view, manifest = observation.view, observation.manifest
     peaks = observation.find_peaks(class_name, settings.max_proposals)
     sizes = peaks.log_sizes + math.log(manifest.radius / manifest.object_radius)
-    answers = np.column_stack([peaks.probabilities, np.zeros((len(peaks), 2)), sizes])
+    answers = np.column_stack([peaks.probabilities, np.zeros((len(peaks), 2)), sizes]).astype(np.float32)
     return _judged(view, view.shape.center_along(peaks.rays, view.height), answers, settings, explain)
 
 
@@ -240,9 +240,7 @@ def _second_opinion(places: Places, rows: Chosen, look: Look, zooms: tuple[float
     return np.asarray(mean, dtype=np.float32)
 
 
-def _judged(
-    view: PreparedView, centers: Floats, answers: Singles | Floats, settings: Settings, explain: bool
-) -> list[Judgment]:
+def _judged(view: PreparedView, centers: Floats, answers: Singles, settings: Settings, explain: bool) -> list[Judgment]:
     """Judgments of places with centers (c, 3) [m] and the network's answers (c, 4), most probable first."""
     kept: list[Floats] = []
     judged: list[Judgment] = []
