@@ -21,9 +21,9 @@ from vm_embedded.arrays import Floats
 from .network import GraphConvolution, GraphLayer, Network, SeparableConvolution
 from .onnx_graph import OnnxGraph
 
-Convolve = Callable[[str, str, Floats, int], str]
-"""Writes the nodes of a convolution without its bias: from a name for the nodes, the name of its input (inputs, m), a
-kernel (outputs, N + 1, inputs), the point itself first, and its dilation, to the name of its output (outputs, m)."""
+Convolve = Callable[[str, str, Floats], str]
+"""Writes the nodes of a convolution without its bias: from a name for the nodes, the name of its input (inputs, m) and
+a kernel (outputs, N + 1, inputs), the point itself first, to the name of its output (outputs, m)."""
 
 _FLAT = -30.0
 """The smallest exponent. e^-30 vanishes beside a float32 near 1, and it is far above the denormal numbers, with which
@@ -77,7 +77,7 @@ def write_layers(graph: OnnxGraph, network: Network, convolve: Convolve) -> None
         if kernel.shape[1] == 1:  # a dense layer
             sums = graph.node("MatMul", [graph.constant(f"{name}.kernel", kernel[:, 0]), x], f"{name}.sums")
         else:
-            sums = convolve(name, x, kernel, spec.dilation)
+            sums = convolve(name, x, kernel)
         z = graph.node("Add", [sums, graph.constant(f"{name}.bias", bias[:, None])], f"{name}.linear")
         if last:
             _write_head(graph, spec.activation, spec.width, z)

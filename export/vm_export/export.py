@@ -14,9 +14,7 @@ import vm_embedded
 from vm_embedded.arrays import Indices, Singles
 from vm_embedded.errors import ModelError
 from vm_embedded.files import write_file
-from vm_embedded.mesh.dilation import with_dilations
 from vm_embedded.mesh.grids import lattice_neighbors
-from vm_embedded.mesh.mesh import Groups
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import ModelFile, parse_model
@@ -137,22 +135,17 @@ def largest_difference(content: bytes, network: MeshNetwork, manifest: Manifest)
     """
     session = Session(ModelFile(Path("the new model"), content, replace(manifest, self_test=None), ""))
     steps = manifest.model.steps if manifest.layout in ("lattice", "canvas") else None
-    groups = manifest.model.groups
-    tests = (random_example(network, points, seed, groups, steps) for seed, points in enumerate(_CHECKED_POINTS))
+    tests = (random_example(network, points, seed, steps) for seed, points in enumerate(_CHECKED_POINTS))
     return float(np.max([np.abs(session.answer(test) - test.probabilities[:-1]).max() for test in tests]))
 
 
 def random_example(
-    network: MeshNetwork,
-    points: int,
-    seed: int,
-    groups: Groups = (),
-    steps: tuple[tuple[int, int], ...] | None = None,
+    network: MeshNetwork, points: int, seed: int, steps: tuple[tuple[int, int], ...] | None = None
 ) -> SelfTest:
     """A random graph of `points` points with random colors, rounded as SelfTest.as_dict rounds, and torch's answer.
 
-    groups: `MeshModel.groups`, for a network with dilations. steps: with them, for the layouts `lattice` and `canvas`,
-    the graph is a random part of a lattice with these `MeshModel.steps`.
+    steps: with them, for the layouts `lattice` and `canvas`, the graph is a random part of a lattice with these
+    `MeshModel.steps`.
     """
     random = np.random.default_rng(seed)
     colors: Singles = np.full((points + 1, 3), OFF_SCREEN, dtype=np.float32)
@@ -167,11 +160,10 @@ def random_example(
         assert isinstance(network, Network)
         neighbors = random.integers(0, points + 1, (points + 1, network.shape.neighbors)).astype(np.int32)
         neighbors[-1] = points
+    around = neighbors
     if isinstance(network, CanvasNetwork):
         assert cells is not None
         around = cells
-    else:
-        around = with_dilations(neighbors, groups, network.shape.dilations)
     with torch.inference_mode():
         answer = model_outputs(network, torch.from_numpy(colors), torch.from_numpy(around)).numpy()
     return SelfTest(colors, neighbors, answer, cells)

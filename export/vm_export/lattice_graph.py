@@ -36,7 +36,7 @@ def lattice_model(network: Network, manifest: Manifest) -> bytes:
     width = graph.node("Gather", [size, graph.constant("second", [1])], "width")
     off_screen_point = graph.node("Add", [width, graph.constant("one", [1])], "nowhere")
 
-    def convolve(name: str, x: str, kernel: Floats, _: int) -> str:
+    def convolve(name: str, x: str, kernel: Floats) -> str:
         outputs, _, inputs = kernel.shape
         if x != "points":  # the input already has -1 off screen
             instead = graph.node("Gather", [x, off_screen_point], f"{name}.instead", axis=1)

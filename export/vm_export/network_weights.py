@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -75,7 +75,7 @@ def network_of(model: ModelFile) -> Checkpoint:
             network = read_canvas(graph.constants)
         else:
             layers = _plain(graph) if manifest.layout == "plain" else _columns(graph, manifest)
-            network = _network(_dilated(layers, manifest.layer_dilations), manifest.neighbors)
+            network = _network(layers, manifest.neighbors)
         difference = largest_difference(model.content, network, manifest)
     except (KeyError, IndexError, ValueError, RuntimeError, InputError) as error:
         raise ModelError(f"{foreign}: {error}") from error
@@ -95,18 +95,6 @@ def _network(layers: list[_Weights], neighbors: int) -> Network:
             state[f"layers.{index}.depthwise"] = each.depthwise
     network.load_state_dict({name: torch.from_numpy(value.astype(np.float32)) for name, value in state.items()})
     return network.eval()
-
-
-def _dilated(layers: list[_Weights], dilations: Sequence[int]) -> list[_Weights]:
-    """The layers, with the dilations of their convolutions; without any, all are 1.
-
-    Raises ValueError for another number of dilations than of convolutions.
-    """
-    convolutions = [index for index, each in enumerate(layers) if each.layer.kind != "dense"]
-    found = list(layers)
-    for index, dilation in zip(convolutions, dilations or [1] * len(convolutions), strict=True):
-        found[index] = replace(layers[index], layer=replace(layers[index].layer, dilation=dilation))
-    return found
 
 
 def _plain(graph: _Graph) -> list[_Weights]:

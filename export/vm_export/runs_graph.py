@@ -3,8 +3,7 @@
 vm_embedded/network/runs_layout.py prepares its inputs, and explains the words slot, gap, group and column. The
 neighbors of a point come in groups that lie beside each other in memory, so a convolution over the graph is:
 
-1. one convolution of width 3 along memory, which gives a sum for each slot and each group of neighbors (with a
-   dilation d, the three slots are d apart);
+1. one convolution of width 3 along memory, which gives a sum for each slot and each group of neighbors;
 2. one look-up for each group, which gives a point the sums of the slots in the middle of its groups;
 3. the sum over the groups.
 """
@@ -28,37 +27,32 @@ from .onnx_graph import FLOAT, INT64, OnnxGraph
 def runs_model(network: Network, manifest: Manifest) -> bytes:
     """The bytes of an ONNX model in the layout `runs`.
 
-    Inputs: points (3, m) float32 and columns (D G, m) int64, as RunsLayout gives them. Output: probabilities (C, m)
+    Inputs: points (3, m) float32 and columns (G, m) int64, as RunsLayout gives them. Output: probabilities (C, m)
     float32.
     """
-    graph, groups, dilations = OnnxGraph(), manifest.model.groups, manifest.dilations
-    columns = {each: graph.part("columns", at, len(dilations), len(groups), 0) for at, each in enumerate(dilations)}
+    graph, groups = OnnxGraph(), manifest.model.groups
 
-    def convolve(name: str, x: str, kernel: Floats, dilation: int) -> str:
-        return _convolve_along_runs(graph, name, x, kernel, groups, dilation, columns[dilation])
+    def convolve(name: str, x: str, kernel: Floats) -> str:
+        return _convolve_along_runs(graph, name, x, kernel, groups)
 
     write_layers(graph, network, convolve)
     return graph.model(
-        {"points": (FLOAT, [3, "slots"]), "columns": (INT64, [len(dilations) * len(groups), "slots"])},
+        {"points": (FLOAT, [3, "slots"]), "columns": (INT64, [len(groups), "slots"])},
         {"probabilities": (FLOAT, [network.shape.classes, "slots"])},
         {METADATA_KEY: manifest.as_json()},
         "Visual Mesh network, laid out in runs. The slots and their columns are prepared by vm_embedded.",
     )
 
 
-def _convolve_along_runs(
-    graph: OnnxGraph, name: str, x: str, kernel: Floats, groups: Groups, d: int, columns: str
-) -> str:
-    """Write a convolution with dilation d over the graph; return the name of its sums (outputs, m), from x (inputs, m).
-
-    columns: name of the columns (G, m) for d.
-    """
+def _convolve_along_runs(graph: OnnxGraph, name: str, x: str, kernel: Floats, groups: Groups) -> str:
+    """Write a convolution over the graph; return the name of its sums (outputs, m), from x (inputs, m)."""
     outputs, _, inputs = kernel.shape
-    # All windows of three slots that are d apart, without a copy of each. A row of `thrice` holds a channel of x twice,
-    # and a third time without its last 3 d slots: 3 (m - d) values. Cut into three rows of m - d values, each row
-    # begins d slots earlier in x than the row before. Entry j of these rows is x at j, j - d and j - 2 d: a window
-    # around j - d. (From j = 2 d on; x begins with gaps, so nothing looks up the entries before.)
-    most = graph.slice(x, 0, -3 * d, 1, f"{name}.most")
+    # All windows of three slots, without a copy of each. A row of `thrice` holds a channel of x twice, and a third time
+    # without its last three slots: 3 (m - 1) values. Cut into three rows of m - 1 values, each row begins one slot
+    # earlier in x than the row before. Entry j of these rows is x at j, j - 1 and j - 2: a window around j - 1. (From
+    # j = 2 on; x begins with gaps, so nothing looks up the first two.)
+    cut = [graph.constant(f"slice.{key}", [value]) for key, value in (("start", 0), ("end", -3), ("axis", 1))]
+    most = graph.node("Slice", [x, *cut], f"{name}.most")
     thrice = graph.node("Concat", [x, x, most], f"{name}.thrice", axis=1)
     window = graph.node("Reshape", [thrice, graph.constant(f"{name}.window.shape", [3 * inputs, -1])], f"{name}.window")
 
@@ -68,9 +62,9 @@ def _convolve_along_runs(
     weights = graph.constant(f"{name}.kernel", taps.reshape(outputs * len(groups), 3 * inputs))
     sums = graph.node("MatMul", [weights, window], f"{name}.sums")
 
-    # The sums of all groups as one table (outputs, G * (m - d)): `columns` points to the middles of a point's groups.
+    # The sums of all groups as one table (outputs, G * (m - 1)): `columns` points to the middles of a point's groups.
     table = graph.node("Reshape", [sums, graph.constant(f"{name}.table.shape", [outputs, -1])], f"{name}.table")
-    found = graph.columns_of(table, columns, f"{name}.found")
+    found = graph.columns_of(table, "columns", f"{name}.found")
     shape = graph.constant(f"{name}.groups.shape", [outputs, len(groups), -1])
     grouped = graph.node("Reshape", [found, shape], f"{name}.groups")
     return graph.node("ReduceSum", [grouped, graph.constant("second", [1])], f"{name}.summed", keepdims=0)

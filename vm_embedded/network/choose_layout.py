@@ -14,9 +14,9 @@ from .runs_layout import RunsLayout
 def choose_layout(mesh: Mesh, manifest: Manifest) -> WholeLayout:
     """The mesh in the layout that the manifest's network takes."""
     if manifest.layout == "runs":
-        return RunsLayout(mesh, manifest.model.groups, manifest.dilations)
+        return RunsLayout(mesh, manifest.model.groups)
     if manifest.layout in ("lattice", "canvas"):
         assert manifest.model.steps is not None  # Manifest accepts these layouts only for lattices.
         kind = LatticeLayout if manifest.layout == "lattice" else CanvasLayout
         return kind(mesh, manifest.model.steps)
-    return PlainLayout(mesh, manifest.edge, manifest.model.groups, manifest.dilations)
+    return PlainLayout(mesh, manifest.edge)

@@ -15,7 +15,6 @@ from ..borders.text import name_fault
 from ..errors import GeometryError, InputError, ModelError, unknown
 from ..geometry.make_shape import SHAPES, make_shape
 from ..geometry.shape import Shape
-from ..mesh.dilation import distinct_dilations
 from ..mesh.mesh import MeshModel
 from ..mesh.models import MESH_MODELS
 from ..mesh.walls import wall_counts
@@ -49,9 +48,6 @@ _LARGEST = 1e9
 
 MOST_CLASSES = 127
 """Most outputs of a network: the labels of a training are signed bytes."""
-
-MOST_DILATION = 64
-"""Largest dilation of a convolution: a picture has about a hundred points from one side to the other."""
 
 _SMALLEST_CIRCLE = 0.01
 """Smallest `upright_radius` of a look at uprights [m]."""
@@ -104,8 +100,6 @@ class Manifest:
     colors: one of POINT_COLORS.
     look: description of the look network, if the file has one; see close_look.py.
     upright_looks: descriptions of the look networks for classes of kind upright.
-    layer_dilations: of the convolutions, in their order, at most MOST_DILATION; empty if all are 1. Others need edge
-        hard, and layout plain or runs.
     provenance: origin of the file; the runtime does not use it.
 
     Raises ModelError for unknown values.
@@ -130,7 +124,6 @@ class Manifest:
     colors: str = "absolute"
     look: LookContract | None = None
     upright_looks: tuple[LookContract, ...] = ()
-    layer_dilations: tuple[int, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -148,7 +141,6 @@ class Manifest:
                 raise ModelError(unknown(f"{name} in the model's manifest", getattr(self, name), allowed))
         if self.layout != "plain" and self.edge != "hard":
             raise ModelError(f"layout {self.layout} needs edge hard; edge {self.edge} needs layout plain")
-        self._check_dilations()
         if self.layout == "lattice" and MESH_MODELS[self.mesh].steps is None:
             raise ModelError(
                 f"layout lattice needs a grid, whose neighbors are fixed steps away; mesh {self.mesh} is not a grid"
@@ -178,17 +170,6 @@ class Manifest:
                 f"{len(names)}: {names}"
             )
         check_provenance(self.provenance)
-
-    def _check_dilations(self) -> None:
-        for each in self.layer_dilations:
-            if not _is_number(each, int) or not 1 <= each <= MOST_DILATION:
-                raise ModelError(
-                    f"layer_dilations in the model's manifest must be whole numbers up to {MOST_DILATION}, not {each!r}"
-                )
-        if self.dilations != (1,) and (self.edge != "hard" or self.layout in ("lattice", "canvas")):
-            raise ModelError(
-                f"dilations other than 1 need edge hard and layout plain or runs, not {self.edge} and {self.layout}"
-            )
 
     def _check_object_height(self) -> None:
         tall = self.object_height
@@ -266,16 +247,6 @@ class Manifest:
         return self.model.neighbors
 
     @property
-    def dilations(self) -> tuple[int, ...]:
-        """The different dilations of the convolutions, as with_dilations takes them."""
-        return distinct_dilations(self.layer_dilations)
-
-    @property
-    def neighbor_columns(self) -> int:
-        """Columns of with_dilations, D N."""
-        return len(self.dilations) * self.neighbors
-
-    @property
     def model(self) -> MeshModel:
         """The mesh model, which places and links the points."""
         return MESH_MODELS[self.mesh]
@@ -300,8 +271,6 @@ class Manifest:
         data["look"] = self.look.as_dict() if self.look else None
         data["upright_looks"] = [each.as_dict() for each in self.upright_looks]
         data["self_test"] = None if self.self_test is None else self.self_test.as_dict()
-        if not self.layer_dilations:  # as in files of earlier releases
-            del data["layer_dilations"]
         return json.dumps(data, sort_keys=True, separators=(",", ":"))
 
     @classmethod
@@ -323,7 +292,6 @@ class Manifest:
         for key in data:
             if key not in known:
                 raise ModelError(unknown("entry in the model's manifest", key, known))
-        data.setdefault("layer_dilations", [])
         missing = [name for name in known if name not in data]
         if missing:
             raise ModelError(f"the model's manifest lacks {', '.join(missing)}")
@@ -337,9 +305,6 @@ class Manifest:
         if not isinstance(data["upright_looks"], list):
             raise ModelError(f"upright_looks in the model's manifest must be a list, not {data['upright_looks']!r}")
         data["upright_looks"] = tuple(map(LookContract.from_dict, data["upright_looks"]))
-        if not isinstance(data["layer_dilations"], list):
-            raise ModelError(f"layer_dilations in the model's manifest must be a list, not {data['layer_dilations']!r}")
-        data["layer_dilations"] = tuple(data["layer_dilations"])
         if data["self_test"] is not None:
             data["self_test"] = SelfTest.from_dict(data["self_test"])
         return cls(**data)

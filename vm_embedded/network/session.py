@@ -112,9 +112,9 @@ def _interface(manifest: Manifest) -> Interface:
         }
     interface: Interface = {"points": ("tensor(float)", [3]), "probabilities": ("tensor(float)", [classes])}
     if manifest.layout == "plain":
-        interface["neighbors"] = ("tensor(int32)", [manifest.neighbor_columns])
+        interface["neighbors"] = ("tensor(int32)", [manifest.neighbors])
     elif manifest.layout == "runs":
-        interface["columns"] = ("tensor(int64)", [len(manifest.dilations) * len(manifest.model.groups)])
+        interface["columns"] = ("tensor(int64)", [len(manifest.model.groups)])
     else:
         interface["shown"] = ("tensor(bool)", [])
     return interface

@@ -1,7 +1,6 @@
 """All layouts give the same answers, torch's, and hold what they say."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,6 @@ from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.geometry.sphere import Sphere
-from vm_embedded.mesh.dilation import with_dilations
 from vm_embedded.mesh.mesh import SELF, Mesh
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import choose_layout
@@ -41,9 +39,6 @@ MODELS = ["ring4", "ring6", "ring8", "cap6", "xygrid4", "xmgrid6", "xygrid8"]
 LAYOUTS = ("plain", "runs", "lattice")
 """Those of networks on graphs. Networks on a canvas have no other layout."""
 
-MOST = 5
-"""Largest dilation that is drawn."""
-
 models = st.sampled_from(MODELS)
 kinds = st.sampled_from(["convolution", "separable", "dense"])
 activations = st.sampled_from(sorted(ACTIVATIONS))
@@ -53,15 +48,10 @@ heads = st.sampled_from(
 
 
 @st.composite
-def network_shapes(draw, model, most=1):
-    """Networks for a mesh model whose convolutions have dilations of at most `most`."""
+def network_shapes(draw, model):
     first = Layer(draw(st.sampled_from(["convolution", "separable"])), draw(st.integers(1, 8)), draw(activations))
     inner = draw(st.lists(st.builds(Layer, kinds, st.integers(1, 8), activations), max_size=4))
-    layers = (first, *inner, Layer(draw(kinds), *draw(heads)))
-    return NetworkShape(
-        tuple(each if each.kind == "dense" else replace(each, dilation=draw(st.integers(1, most))) for each in layers),
-        MESH_MODELS[model].neighbors,
-    )
+    return NetworkShape((first, *inner, Layer(draw(kinds), *draw(heads))), MESH_MODELS[model].neighbors)
 
 
 def network_of(shape, seed):
@@ -126,13 +116,12 @@ def masks(draw, count, seen=None):
     return np.random.default_rng(draw(seeds)).random(count) < share
 
 
-def torch_logits(network, model, mesh, colors, on_screen):
+def torch_logits(network, mesh, colors, on_screen):
     """Logits (n, C) of the points on screen, from torch and the mesh of just those."""
     kept = np.flatnonzero(on_screen)
     points = np.vstack([colors[kept], np.full((1, 3), -1.0)]).astype(np.float32)
-    farther = Mesh(mesh.rays, with_dilations(mesh.neighbors, MESH_MODELS[model].groups, network.shape.dilations))
     with torch.inference_mode():
-        logits = network.logits(torch.from_numpy(points), torch.from_numpy(farther.part(kept).neighbors.copy()))
+        logits = network.logits(torch.from_numpy(points), torch.from_numpy(mesh.part(kept).neighbors.copy()))
     return logits[:-1].double().numpy()
 
 
@@ -159,8 +148,7 @@ def slot_colors(layout, colors, shown):
 
 
 def session_of(network, model, layout, **changes):
-    dilations = network.shape.layer_dilations
-    manifest = manifest_of(model, layout, network.shape.classes, layer_dilations=dilations, **changes)
+    manifest = manifest_of(model, layout, network.shape.classes, **changes)
     return Session(ModelFile(Path(f"{layout}.onnx"), onnx_model(network, manifest), manifest, ""))
 
 
@@ -174,19 +162,18 @@ def _centered(logits):
     return logits - logits.mean(axis=1, keepdims=True)
 
 
-def layouts_of(mesh, network=None):
-    """The layouts that there are for a mesh and a network."""
-    fits_lattice = mesh.cells is not None and (network is None or not network.shape.layer_dilations)
-    return [layout for layout in LAYOUTS if layout != "lattice" or fits_lattice]
+def layouts_of(mesh):
+    """The layouts that there are for a mesh."""
+    return [layout for layout in LAYOUTS if layout != "lattice" or mesh.cells is not None]
 
 
 def assert_same_answers(network, model, mesh, on_screen, seed):
     """All layouts that there are for the mesh, and torch, agree on the logits of every point on screen."""
     head = network.shape.layers[-1].activation
     colors = np.random.default_rng(seed).random((len(mesh), 3))
-    expected = tamed(network, torch_logits(network, model, mesh, colors, on_screen))
+    expected = tamed(network, torch_logits(network, mesh, colors, on_screen))
     found = {}
-    for layout in layouts_of(mesh, network):
+    for layout in layouts_of(mesh):
         probabilities, arranged = answers(session_of(network, model, layout), mesh, colors, on_screen)
         assert probabilities.shape == (len(arranged.slots), network.shape.classes)
         found[layout] = logits_of(probabilities[arranged.places][on_screen], head)
@@ -202,14 +189,14 @@ def assert_same_answers(network, model, mesh, on_screen, seed):
 
 @given(st.data(), models, seeds)
 def test_all_layouts_give_the_same_answers_on_any_graph(data, model, seed):
-    network = network_of(data.draw(network_shapes(model, MOST)), seed)
+    network = network_of(data.draw(network_shapes(model)), seed)
     mesh = data.draw(random_meshes(MESH_MODELS[model].neighbors))
     assert_same_answers(network, model, mesh, data.draw(masks(len(mesh))), seed)
 
 
 @given(st.data(), models, seeds)
 def test_all_layouts_give_the_same_answers_on_ring_meshes(data, model, seed):
-    network = network_of(data.draw(network_shapes(model, MOST)), seed)
+    network = network_of(data.draw(network_shapes(model)), seed)
     mesh, seen = data.draw(ring_meshes(model))
     assert_same_answers(network, model, mesh, data.draw(masks(len(mesh), seen)), seed)
 
@@ -252,11 +239,11 @@ def test_all_layouts_take_a_frame_in_which_nothing_is_on_screen(model):
 @settings(max_examples=20)
 def test_a_layout_is_used_for_one_frame_after_the_other(data, model, seed):
     """No frame leaves anything behind for the next one."""
-    network = network_of(data.draw(network_shapes(model, MOST)), seed)
+    network = network_of(data.draw(network_shapes(model)), seed)
     mesh, seen = data.draw(ring_meshes(model))
     colors = np.random.default_rng(seed).random((2, len(mesh), 3)).astype(np.float32)
     shown = [data.draw(masks(len(mesh), seen)) for _ in range(2)]
-    for layout in layouts_of(mesh, network):
+    for layout in layouts_of(mesh):
         session = session_of(network, model, layout)
         arranged = choose_layout(mesh, session.model.manifest)
         for each, on_screen in zip(colors, shown, strict=True):
@@ -277,7 +264,7 @@ def test_the_edge_policy_same_links_what_is_off_screen_to_the_point_itself(data,
     part = mesh.part(kept)
     itself = np.arange(len(kept) + 1, dtype=np.int32)[:, None]
     alone = Mesh(part.rays, np.where(part.neighbors == len(kept), itself, part.neighbors))
-    expected = tamed(network, torch_logits(network, model, alone, colors[kept], np.ones(len(kept), dtype=bool)))
+    expected = tamed(network, torch_logits(network, alone, colors[kept], np.ones(len(kept), dtype=bool)))
     probabilities, layout = answers(session_of(network, model, "plain", edge="same"), mesh, colors, on_screen)
     head = network.shape.layers[-1].activation
     reference = expected if head == "sigmoid" else _centered(expected)
