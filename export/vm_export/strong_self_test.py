@@ -38,14 +38,11 @@ def strong_self_test(network: MeshNetwork, manifest: Manifest) -> SelfTest:
     wanted = _wanted(len(manifest.classes))
     patch = _patch(manifest)
     neighbors, cells = _repeated(patch, len(wanted))
-    around = neighbors
-    if manifest.layout == "canvas":
-        assert cells is not None
-        around = cells
+    around = neighbors if cells is None else cells
     colors = _fitted_colors(network, around, np.repeat(wanted, len(patch), axis=0), _RANGES[manifest.colors])
     with torch.inference_mode():
         answer = model_outputs(network, torch.from_numpy(colors), torch.from_numpy(around)).numpy()
-    return SelfTest(colors, neighbors, answer, cells if manifest.layout in ("lattice", "canvas") else None)
+    return SelfTest(colors, neighbors, answer, cells)
 
 
 def _wanted(classes: int) -> Singles:

@@ -30,7 +30,7 @@ def test_every_network_comes_back_from_its_model_file(layout, data, seed):
     model = ModelFile(Path("model.onnx"), export.onnx_model(made.network, facts), facts, "")
     read = network_of(model)
     on_canvas = layout == "canvas"
-    test = export.random_example(made.network, 200, seed, facts.model.steps if on_canvas else None)
+    test = export.random_example(made.network, 200, seed)
     around = test.cells if on_canvas else test.neighbors
     with torch.inference_mode():
         answer = read.network.probabilities(torch.from_numpy(test.points), torch.from_numpy(around)).numpy()

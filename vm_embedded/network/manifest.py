@@ -31,9 +31,9 @@ with bearings. background: everything else."""
 EDGES = ("hard", "same")
 """Replacement of a missing neighbor. hard: the off-screen point, whose input is -1. same: the point itself."""
 
-LAYOUTS = ("plain", "runs", "lattice", "canvas")
-"""Order of the points in the network's input; see layout.py. plain: point by point. runs: slots, ring by ring. lattice:
-a picture. canvas: the strips of mesh octaves on a picture."""
+LAYOUTS = ("plain", "runs", "canvas")
+"""Order of the points in the network's input; see layout.py. plain: point by point. runs: slots, ring by ring. canvas:
+the strips of mesh octaves on a picture."""
 
 POINT_SAMPLINGS = ("bilinear", "footprint")
 """Color of a point. bilinear: at its pixel, from the four around it. footprint: the mean of the area that it stands
@@ -141,10 +141,6 @@ class Manifest:
                 raise ModelError(unknown(f"{name} in the model's manifest", getattr(self, name), allowed))
         if self.layout != "plain" and self.edge != "hard":
             raise ModelError(f"layout {self.layout} needs edge hard; edge {self.edge} needs layout plain")
-        if self.layout == "lattice" and MESH_MODELS[self.mesh].steps is None:
-            raise ModelError(
-                f"layout lattice needs a grid, whose neighbors are fixed steps away; mesh {self.mesh} is not a grid"
-            )
         if (self.layout == "canvas") != (self.mesh == "octaves"):
             raise ModelError(
                 f"mesh octaves and layout canvas need each other; the mesh is {self.mesh}, the layout {self.layout}"

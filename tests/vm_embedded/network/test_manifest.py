@@ -53,7 +53,7 @@ orders = st.sampled_from(
 
 
 def _manifest(order, tall, **entries):
-    """A cylinder has a height; lattice and canvas need their meshes."""
+    """A cylinder has a height; layout canvas needs its mesh."""
     edge, layout = order
     mesh = entries.pop("mesh") if layout in ("plain", "runs") else MESHES[layout]
     entries = entries | {"mesh": mesh, "object_height": tall if entries["shape"] == "cylinder" else 0.0}
@@ -142,7 +142,6 @@ def test_a_missing_entry_is_refused_by_name(entry):
             for layout, mesh in (
                 ("plain", "octaves"),
                 ("runs", "octaves"),
-                ("lattice", "octaves"),
                 ("canvas", "xygrid6"),
             )
         ),
