@@ -9,7 +9,7 @@ from vm_embedded.network.manifest import Manifest, ObjectClass
 KINDS = {"ball": "object", "field": "area", "line": "area"}
 """Kinds of classes by name; all others are background."""
 
-MESHES = {"plain": "ring6", "runs": "ring6", "lattice": "xmgrid6", "canvas": "octaves"}
+MESHES = {"plain": "ring6", "runs": "ring6", "canvas": "octaves"}
 """A mesh for each layout."""
 
 

@@ -104,7 +104,7 @@ class CanvasNetwork(nn.Module):
         return logits if self.peaks is None else torch.cat([logits, self.peaks(x)], dim=1)
 
     def logits(self, points: torch.Tensor, cells: torch.Tensor) -> torch.Tensor:
-        """Outputs (n + 1, C + 4 P) before the softmax, from points (n + 1, 3) and their cells (n, 2) on the lattice.
+        """Outputs (n + 1, C + 4 P) before the softmax, from points (n + 1, 3) and their cells (n, 2) on strips.
 
         The last row is the off-screen point, which takes no part. The strips of the cells are placed on a canvas as the
         runtime places them.

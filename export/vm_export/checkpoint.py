@@ -42,10 +42,6 @@ class Checkpoint:
             raise ModelError(
                 f"the network is for {shape.neighbors} neighbors, but mesh {manifest.mesh} has {manifest.neighbors}"
             )
-        if shape.layer_dilations != manifest.layer_dilations:
-            raise ModelError(
-                f"the network has the dilations {shape.layer_dilations}, but the manifest {manifest.layer_dilations}"
-            )
 
     def save(self, path: str | Path) -> None:
         """Write the checkpoint. Raises InputError."""

@@ -14,9 +14,7 @@ import vm_embedded
 from vm_embedded.arrays import Indices, Singles
 from vm_embedded.errors import ModelError
 from vm_embedded.files import write_file
-from vm_embedded.mesh.dilation import with_dilations
-from vm_embedded.mesh.grids import lattice_neighbors
-from vm_embedded.mesh.mesh import Groups
+from vm_embedded.mesh.grids import STEPS, lattice_neighbors
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import ModelFile, parse_model
@@ -28,10 +26,8 @@ from .attach_look import attached
 from .canvas_graph import canvas_model
 from .canvas_network import CanvasNetwork
 from .checkpoint import Checkpoint
-from .lattice_graph import lattice_model
 from .look_checkpoint import LookCheckpoint
 from .mesh_networks import MeshNetwork, model_outputs
-from .network import Network
 from .plain_graph import plain_model
 from .runs_graph import runs_model
 from .strong_self_test import strong_self_test
@@ -60,14 +56,10 @@ def fastest_layout(checkpoint: Checkpoint) -> str:
 
 
 def onnx_model(network: MeshNetwork, manifest: Manifest) -> bytes:
-    """The bytes of an ONNX model in the manifest's layout, of standard operators only.
-
-    Raises ModelError for `lattice` with a mesh that has none.
-    """
+    """The bytes of an ONNX model in the manifest's layout, of standard operators only."""
     if isinstance(network, CanvasNetwork):
         return canvas_model(network, manifest)
-    models = {"plain": plain_model, "runs": runs_model, "lattice": lattice_model}
-    return models[manifest.layout](network, manifest)
+    return (plain_model if manifest.layout == "plain" else runs_model)(network, manifest)
 
 
 def export(
@@ -136,42 +128,28 @@ def largest_difference(content: bytes, network: MeshNetwork, manifest: Manifest)
     NaN if a probability is NaN.
     """
     session = Session(ModelFile(Path("the new model"), content, replace(manifest, self_test=None), ""))
-    steps = manifest.model.steps if manifest.layout in ("lattice", "canvas") else None
-    groups = manifest.model.groups
-    tests = (random_example(network, points, seed, groups, steps) for seed, points in enumerate(_CHECKED_POINTS))
+    tests = (random_example(network, points, seed) for seed, points in enumerate(_CHECKED_POINTS))
     return float(np.max([np.abs(session.answer(test) - test.probabilities[:-1]).max() for test in tests]))
 
 
-def random_example(
-    network: MeshNetwork,
-    points: int,
-    seed: int,
-    groups: Groups = (),
-    steps: tuple[tuple[int, int], ...] | None = None,
-) -> SelfTest:
+def random_example(network: MeshNetwork, points: int, seed: int) -> SelfTest:
     """A random graph of `points` points with random colors, rounded as SelfTest.as_dict rounds, and torch's answer.
 
-    groups: `MeshModel.groups`, for a network with dilations. steps: with them, for the layouts `lattice` and `canvas`,
-    the graph is a random part of a lattice with these `MeshModel.steps`.
+    For a network on a canvas: a random part of a strip.
     """
     random = np.random.default_rng(seed)
     colors: Singles = np.full((points + 1, 3), OFF_SCREEN, dtype=np.float32)
     colors[:-1] = np.round(random.random((points, 3)), 4)
     cells: Indices | None = None
-    if steps is not None:
+    if isinstance(network, CanvasNetwork):
         side = math.ceil(math.sqrt(1.5 * points))
         chosen = np.sort(random.choice(side * side, points, replace=False))
         cells = np.stack([chosen % side, chosen // side], axis=1).astype(np.int32)
-        neighbors = lattice_neighbors(cells, steps)
+        neighbors = lattice_neighbors(cells, STEPS[8])  # as in mesh octaves
     else:
-        assert isinstance(network, Network)
         neighbors = random.integers(0, points + 1, (points + 1, network.shape.neighbors)).astype(np.int32)
         neighbors[-1] = points
-    if isinstance(network, CanvasNetwork):
-        assert cells is not None
-        around = cells
-    else:
-        around = with_dilations(neighbors, groups, network.shape.dilations)
+    around = neighbors if cells is None else cells
     with torch.inference_mode():
         answer = model_outputs(network, torch.from_numpy(colors), torch.from_numpy(around)).numpy()
     return SelfTest(colors, neighbors, answer, cells)

@@ -25,7 +25,7 @@ def new_network(shape: MeshShape) -> MeshNetwork:
 def model_outputs(network: MeshNetwork, points: torch.Tensor, around: torch.Tensor) -> torch.Tensor:
     """What a model file of this network gives (n + 1, outputs): probabilities, and after them the outputs for peaks.
 
-    points (n + 1, 3). around: neighbors (n + 1, D N), or cells (n, 2) on strips.
+    points (n + 1, 3). around: neighbors (n + 1, N), or cells (n, 2) on strips.
     """
     if isinstance(network, CanvasNetwork):
         return network.answers(network.logits(points, around))

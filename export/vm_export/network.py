@@ -83,16 +83,14 @@ class Network(nn.Module):
         return [layer for layer in self.layers if isinstance(layer, GraphLayer)]
 
     def logits(self, points: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
-        """Outputs (n + 1, C) before the head, from points (n + 1, 3) and neighbors (n + 1, D N), with_dilations."""
-        parts = torch.split(neighbors, self.shape.neighbors, dim=1)
-        around = dict(zip(self.shape.dilations, map(Neighborhood, parts), strict=True))
-        x = points
-        for spec, layer, activation in zip(self.shape.layers, self.layers, self.activations, strict=False):
-            x = activation(layer(x, around[spec.dilation]))
-        return self.layers[-1](x, around[self.shape.layers[-1].dilation])  # type: ignore[no-any-return]
+        """Outputs (n + 1, C) before the head, from points (n + 1, 3) and neighbors (n + 1, N)."""
+        x, neighborhood = points, Neighborhood(neighbors)
+        for layer, activation in zip(self.layers, self.activations, strict=False):
+            x = activation(layer(x, neighborhood))
+        return self.layers[-1](x, neighborhood)  # type: ignore[no-any-return]
 
     def probabilities(self, points: torch.Tensor, neighbors: torch.Tensor) -> torch.Tensor:
-        """Probabilities (n + 1, C) from points (n + 1, 3) and neighbors (n + 1, D N), with_dilations."""
+        """Probabilities (n + 1, C) from points (n + 1, 3) and neighbors (n + 1, N)."""
         logits = self.logits(points, neighbors)
         return logits.softmax(dim=1) if self.shape.layers[-1].activation == "softmax" else logits.sigmoid()
 

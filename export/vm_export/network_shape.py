@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from vm_embedded.errors import InputError, unknown
-from vm_embedded.mesh.dilation import distinct_dilations
-from vm_embedded.network.manifest import MOST_DILATION
 
 ACTIVATIONS = ("selu", "relu", "elu", "tanh")
 HEADS = ("softmax", "sigmoid")
@@ -17,15 +15,11 @@ KINDS = ("convolution", "separable", "dense")
 
 @dataclass(frozen=True)
 class Layer:
-    """One layer: its kind (one of KINDS), its width, and its activation (of ACTIVATIONS; the last layer: of HEADS).
-
-    dilation: how many steps away a convolution looks (mesh/dilation.py); 1 for its point's neighbors and dense layers.
-    """
+    """One layer: its kind (one of KINDS), its width, and its activation (of ACTIVATIONS; the last layer: of HEADS)."""
 
     kind: str
     width: int
     activation: str
-    dilation: int = 1
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -34,10 +28,6 @@ class Layer:
             raise InputError(unknown("activation", self.activation, (*ACTIVATIONS, *HEADS)))
         if self.width < 1:
             raise InputError(f"the width of a layer must be at least 1, not {self.width}")
-        if not 1 <= self.dilation <= MOST_DILATION or (self.kind == "dense" and self.dilation > 1):
-            raise InputError(
-                f"the dilation of a layer must be from 1 to {MOST_DILATION}, and 1 if it is dense, not {self.dilation}"
-            )
 
 
 @dataclass(frozen=True)
@@ -67,32 +57,18 @@ class NetworkShape:
         head: str = "softmax",
         kind: str = "convolution",
         neighbors: int = 6,
-        dilations: Sequence[int] = (),
     ) -> NetworkShape:
         """`depth` convolutions, all but the last one of `width` channels.
 
-        The networks of the paper (section "Network Architecture"). dilations: one for each convolution; empty if all
-        are 1, as in the paper.
+        The networks of the paper (section "Network Architecture").
         """
-        layers = (*(Layer(kind, width, activation),) * (depth - 1), Layer(kind, classes, head))
-        spaced = zip(layers, dilations or (1,) * depth, strict=True)
-        return cls(tuple(replace(layer, dilation=dilation) for layer, dilation in spaced), neighbors)
+        inner = (Layer(kind, width, activation),) * (depth - 1)
+        return cls((*inner, Layer(kind, classes, head)), neighbors)
 
     @property
     def classes(self) -> int:
         """Number of outputs."""
         return self.layers[-1].width
-
-    @property
-    def layer_dilations(self) -> tuple[int, ...]:
-        """The dilations of the convolutions, as in the manifest: empty if all are 1."""
-        each = tuple(layer.dilation for layer in self.layers if layer.kind != "dense")
-        return each if max(each) > 1 else ()
-
-    @property
-    def dilations(self) -> tuple[int, ...]:
-        """The different dilations, as with_dilations takes them."""
-        return distinct_dilations(self.layer_dilations)
 
     @property
     def summary(self) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,17 +12,15 @@ from onnx import numpy_helper
 from vm_embedded.arrays import Floats
 from vm_embedded.errors import InputError, ModelError
 from vm_embedded.mesh.mesh import Groups
-from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import ModelFile
 
 from .canvas_graph import read_canvas
 from .checkpoint import Checkpoint
-from .column_layers import ACTIVATION_PARTS, Activation
 from .export import LARGEST_DIFFERENCE, largest_difference
 from .mesh_networks import MeshNetwork
 from .network import Network
 from .network_shape import Layer, NetworkShape
-from .runs_graph import kernel_places
+from .runs_graph import ACTIVATION_PARTS, Activation, kernel_places
 
 _OPERATORS = {"Selu": "selu", "Relu": "relu", "Elu": "elu", "Tanh": "tanh", "Softmax": "softmax", "Sigmoid": "sigmoid"}
 """Activations by the operators of the layout `plain`."""
@@ -64,8 +61,8 @@ class _Graph:
 def network_of(model: ModelFile) -> Checkpoint:
     """The mesh network of a model file that vm-export wrote, in any layout; its answers are the same.
 
-    In the layouts `runs` and `lattice`, a separable convolution comes back as a full one. Raises ModelError for files
-    of other programs.
+    In the layout `runs`, a separable convolution comes back as a full one. Raises ModelError for files of other
+    programs.
     """
     manifest, foreign = model.manifest, f"{model.path}: its mesh network has other layers than vm-export writes"
     try:
@@ -74,8 +71,8 @@ def network_of(model: ModelFile) -> Checkpoint:
         if manifest.layout == "canvas":
             network = read_canvas(graph.constants)
         else:
-            layers = _plain(graph) if manifest.layout == "plain" else _columns(graph, manifest)
-            network = _network(_dilated(layers, manifest.layer_dilations), manifest.neighbors)
+            layers = _plain(graph) if manifest.layout == "plain" else _runs(graph, manifest.model.groups)
+            network = _network(layers, manifest.neighbors)
         difference = largest_difference(model.content, network, manifest)
     except (KeyError, IndexError, ValueError, RuntimeError, InputError) as error:
         raise ModelError(f"{foreign}: {error}") from error
@@ -97,18 +94,6 @@ def _network(layers: list[_Weights], neighbors: int) -> Network:
     return network.eval()
 
 
-def _dilated(layers: list[_Weights], dilations: Sequence[int]) -> list[_Weights]:
-    """The layers, with the dilations of their convolutions; without any, all are 1.
-
-    Raises ValueError for another number of dilations than of convolutions.
-    """
-    convolutions = [index for index, each in enumerate(layers) if each.layer.kind != "dense"]
-    found = list(layers)
-    for index, dilation in zip(convolutions, dilations or [1] * len(convolutions), strict=True):
-        found[index] = replace(layers[index], layer=replace(layers[index].layer, dilation=dilation))
-    return found
-
-
 def _plain(graph: _Graph) -> list[_Weights]:
     """The layers of plain_graph.plain_model. Raises KeyError for other graphs."""
     found = []
@@ -125,14 +110,13 @@ def _plain(graph: _Graph) -> list[_Weights]:
     return found
 
 
-def _columns(graph: _Graph, manifest: Manifest) -> list[_Weights]:
-    """The layers of column_layers.write_layers, whose rewritings are undone. Raises KeyError for other graphs."""
-    unfold = _from_taps(manifest) if manifest.layout == "lattice" else _from_runs(manifest.model.groups)
+def _runs(graph: _Graph, groups: Groups) -> list[_Weights]:
+    """The layers of runs_graph.runs_model, whose rewritings are undone. Raises KeyError for other graphs."""
     found, before = [], Activation()
     for name in graph.layers:
         kernel, bias = graph.weights(f"{name}.kernel"), graph.weights(f"{name}.bias")[:, 0]
-        is_dense = f"{name}.window" not in graph.nodes and f"{name}.picture" not in graph.nodes
-        kernel = (kernel[:, None] if is_dense else unfold(kernel)) / before.scale
+        is_dense = f"{name}.window" not in graph.nodes
+        kernel = (kernel[:, None] if is_dense else _unfolded(kernel, groups)) / before.scale
         is_last = name == graph.layers[-1]
         activation = _head(graph) if is_last else _activation(graph, name)
         parts = Activation() if is_last else ACTIVATION_PARTS[activation]
@@ -145,21 +129,10 @@ def _columns(graph: _Graph, manifest: Manifest) -> list[_Weights]:
     return found
 
 
-def _from_runs(groups: Groups) -> Callable[[Floats], Floats]:
+def _unfolded(weights: Floats, groups: Groups) -> Floats:
     """The inverse of how runs_graph lays out a kernel: (outputs, N + 1, inputs) from (outputs * G, 3 * inputs)."""
-
-    def unfold(weights: Floats) -> Floats:
-        taps = weights.reshape(-1, len(groups), weights.shape[1] // 3, 3)
-        places = sorted(kernel_places(groups))
-        return np.stack([taps[:, group, :, 1 - shift] for _, group, shift in places], axis=1)
-
-    return unfold
-
-
-def _from_taps(manifest: Manifest) -> Callable[[Floats], Floats]:
-    """The inverse of how lattice_graph lays out a kernel: (outputs, N + 1, inputs) from (outputs, inputs, 3, 3)."""
-    steps = ((0, 0), *(manifest.model.steps or ()))
-    return lambda taps: np.stack([taps[:, :, 1 + up, 1 + right] for right, up in steps], axis=1)
+    taps = weights.reshape(-1, len(groups), weights.shape[1] // 3, 3)
+    return np.stack([taps[:, group, :, 1 - shift] for _, group, shift in sorted(kernel_places(groups))], axis=1)
 
 
 def _activation(graph: _Graph, name: str) -> str:

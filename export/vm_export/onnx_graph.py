@@ -43,20 +43,6 @@ class OnnxGraph:
         self._nodes.append(helper.make_node(operator, inputs, [output], name=output, domain=domain, **attributes))
         return output
 
-    def slice(self, table: str, start: int, end: int, axis: int, output: str) -> str:
-        """Add a slice of a table along an axis; return its name. The same limits are one constant for all slices."""
-        limits = [self.constant(f"slice.{value}", [value]) for value in (start, end, axis)]
-        return self.node("Slice", [table, *limits], output)
-
-    def part(self, table: str, number: int, parts: int, size: int, axis: int) -> str:
-        """The name of one of `parts` equal parts of a table, each of that size along an axis: the table, if it is all.
-
-        number: of the part, from 0.
-        """
-        if parts == 1:
-            return table
-        return self.slice(table, number * size, (number + 1) * size, axis, f"{table}.{number}")
-
     def columns_of(self, table: str, columns: str, output: str) -> str:
         """Add a look-up of columns (k,) in a table (rows, m); return the name of the result (rows, k).
 

@@ -15,15 +15,14 @@ _OPERATORS = {"selu": "Selu", "relu": "Relu", "elu": "Elu", "tanh": "Tanh", "sof
 def plain_model(network: Network, manifest: Manifest) -> bytes:
     """The bytes of an ONNX model in the layout `plain`.
 
-    Inputs: points (n + 1, 3) float32 and neighbors (n + 1, D N) int32 for D dilations, as PlainLayout gives them, where
-    row n is the off-screen point. Output: probabilities (n + 1, C) float32.
+    Inputs: points (n + 1, 3) float32 and neighbors (n + 1, N) int32, where row n is the off-screen point. Output:
+    probabilities (n + 1, C) float32.
     """
-    graph, width, dilations = OnnxGraph(), network.shape.neighbors, manifest.dilations
-    neighbors = {each: graph.part("neighbors", at, len(dilations), width, 1) for at, each in enumerate(dilations)}
+    graph = OnnxGraph()
     x = "points"
     for index, (spec, layer) in enumerate(zip(network.shape.layers, network.typed_layers, strict=True)):
         name = f"layer{index}"
-        x = _receptive_field(graph, name, layer, x, neighbors[spec.dilation], width)
+        x = _receptive_field(graph, name, layer, x, network.shape.neighbors)
         kernel = graph.constant(f"{name}.kernel", layer.linear.weight.detach().numpy().T)
         bias = graph.constant(f"{name}.bias", layer.linear.bias.detach().numpy())
         x = graph.node("Gemm", [x, kernel, bias], f"{name}.linear")
@@ -34,22 +33,19 @@ def plain_model(network: Network, manifest: Manifest) -> bytes:
 
     rows = "points_and_off_screen"
     return graph.model(
-        {"points": (FLOAT, [rows, 3]), "neighbors": (INT32, [rows, manifest.neighbor_columns])},
+        {"points": (FLOAT, [rows, 3]), "neighbors": (INT32, [rows, network.shape.neighbors])},
         {"probabilities": (FLOAT, [rows, network.shape.classes])},
         {METADATA_KEY: manifest.as_json()},
         "Visual Mesh network. Row n of points and neighbors is the off-screen point: -1, linked to itself.",
     )
 
 
-def _receptive_field(graph: OnnxGraph, name: str, layer: GraphLayer, x: str, neighbors: str, count: int) -> str:
-    """Write what the matrix product of a layer takes from x (n + 1, C): (n + 1, inputs of the product).
-
-    neighbors: name of the `count` neighbors of each point.
-    """
+def _receptive_field(graph: OnnxGraph, name: str, layer: GraphLayer, x: str, neighbors: int) -> str:
+    """Write what the matrix product of a layer takes from x (n + 1, C): (n + 1, inputs of the product)."""
     if isinstance(layer, GraphConvolution | SeparableConvolution):
-        gathered = graph.node("Gather", [x, neighbors], f"{name}.gathered", axis=0)
+        gathered = graph.node("Gather", [x, "neighbors"], f"{name}.gathered", axis=0)
     if isinstance(layer, GraphConvolution):
-        width = layer.linear.in_features * count // (count + 1)
+        width = layer.linear.in_features * neighbors // (neighbors + 1)
         flat = graph.node("Reshape", [gathered, graph.constant(f"{name}.shape", [-1, width])], f"{name}.flat")
         return graph.node("Concat", [x, flat], f"{name}.receptive", axis=1)
     if isinstance(layer, SeparableConvolution):

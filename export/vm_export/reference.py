@@ -207,9 +207,6 @@ def write_reference(checkpoint: Checkpoint, path: str | Path) -> None:
             f"the format of the reference has no shape {manifest.shape} with mesh {manifest.mesh}; it has circles and "
             f"spheres with one of the meshes {', '.join(_MESHES)}"
         )
-    if manifest.layer_dilations:
-        steps = ", ".join(map(str, manifest.layer_dilations))
-        raise InputError(f"the format of the reference has no dilations; this network has {steps}")
     assert isinstance(network, Network)  # other meshes are refused above
     neighbors = network.shape.neighbors
     groups: list[list[dict[str, Any]]] = []

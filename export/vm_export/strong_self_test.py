@@ -10,7 +10,6 @@ import numpy as np
 import torch
 
 from vm_embedded.arrays import Indices, Singles
-from vm_embedded.mesh.dilation import links_across, with_dilations
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
@@ -19,9 +18,8 @@ from vm_embedded.network.self_test import SelfTest
 from .canvas_network import CanvasNetwork
 from .mesh_networks import MeshNetwork, model_outputs
 
-_HOPS, _MOST_HOPS = 3, 6
-"""Links from the middle of a patch to its edge, without and with dilations: ring6 gets patches of about 37 points, and
-of at most 127. In them, a large dilation leads to missing points only."""
+_HOPS = 3
+"""Links from the middle of a patch to its edge: ring6 gets patches of about 37 points."""
 
 _STEPS, _RATE = 150, 0.2
 """Number of steps, and the size of the first one. They become shorter. A step takes only the gradient's signs: points
@@ -40,14 +38,11 @@ def strong_self_test(network: MeshNetwork, manifest: Manifest) -> SelfTest:
     wanted = _wanted(len(manifest.classes))
     patch = _patch(manifest)
     neighbors, cells = _repeated(patch, len(wanted))
-    around = with_dilations(neighbors, manifest.model.groups, manifest.dilations)
-    if manifest.layout == "canvas":
-        assert cells is not None
-        around = cells
+    around = neighbors if cells is None else cells
     colors = _fitted_colors(network, around, np.repeat(wanted, len(patch), axis=0), _RANGES[manifest.colors])
     with torch.inference_mode():
         answer = model_outputs(network, torch.from_numpy(colors), torch.from_numpy(around)).numpy()
-    return SelfTest(colors, neighbors, answer, cells if manifest.layout in ("lattice", "canvas") else None)
+    return SelfTest(colors, neighbors, answer, cells)
 
 
 def _wanted(classes: int) -> Singles:
@@ -57,13 +52,12 @@ def _wanted(classes: int) -> Singles:
 
 
 def _patch(manifest: Manifest) -> Mesh:
-    """The points of a small mesh that are a few links from one in its middle."""
+    """The points of a small mesh that are at most _HOPS links from one in its middle."""
     height = manifest.object_height + 10.0 * manifest.radius
     reach = min(manifest.max_distance, 100.0 * manifest.radius)
     mesh = manifest.model.build(manifest.mesh_shape, height, manifest.intersections, reach)
     kept = np.array([len(mesh) // 2])
-    hops = links_across(manifest.model.groups, manifest.dilations[-1])
-    for _ in range(min(max(_HOPS, hops), _MOST_HOPS)):
+    for _ in range(_HOPS):
         kept = np.unique([*kept, *mesh.links(kept).ravel()])
         kept = kept[kept < len(mesh)]
     return mesh.part(kept)
@@ -86,8 +80,7 @@ def _repeated(patch: Mesh, count: int) -> tuple[Indices, Indices | None]:
 def _fitted_colors(network: MeshNetwork, around: Indices, wanted: Singles, limits: tuple[float, float]) -> Singles:
     """Colors (n + 1, 3), rounded as SelfTest.as_dict rounds, whose answers are close to `wanted` (n, C).
 
-    around: neighbors (n + 1, D N), with_dilations, or for a network on a canvas cells (n, 2). limits: smallest and
-    largest color.
+    around: neighbors (n + 1, N), or for a network on a canvas cells (n, 2). limits: smallest and largest color.
     """
     low, high = limits
     links, target = torch.from_numpy(around), torch.from_numpy(wanted)

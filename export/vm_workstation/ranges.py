@@ -24,11 +24,6 @@ def some_of(allowed: tuple[str, ...], help: str, default: tuple[str, ...] | None
     return entry(_checked_names, allowed if default is None else default, help, allowed=allowed)
 
 
-def whole_numbers(help: str, limits: tuple[int, int]) -> Any:
-    """An entry that lists whole numbers within the limits; none by default."""
-    return entry(_checked_whole_numbers, (), help, limits=limits)
-
-
 def _checked_range(entry: Field[Any], value: Any) -> Range:
     if not isinstance(value, list | tuple) or len(value) != 2:
         raise InputError(f"{entry.name} must be a range [low, high], not {value!r}")
@@ -46,14 +41,6 @@ def _checked_names(entry: Field[Any], value: Any) -> tuple[str, ...]:
         if each not in allowed:
             raise InputError(unknown(entry.name, each, allowed))
     return tuple(value)
-
-
-def _checked_whole_numbers(entry: Field[Any], value: Any) -> tuple[int, ...]:
-    low, high = entry.metadata["limits"]
-    numbers = value if isinstance(value, list | tuple) else None
-    if numbers is None or any(type(each) is not int or not low <= each <= high for each in numbers):
-        raise InputError(f"{entry.name} must be a list of whole numbers from {low} to {high}, not {value!r}")
-    return tuple(numbers)
 
 
 def drawn(random: np.random.Generator, share: float) -> bool:

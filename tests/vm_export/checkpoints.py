@@ -20,8 +20,7 @@ def checkpoint(seed=0, shape=None, mesh="ring6"):
         return canvas_checkpoint(seed, shape or CanvasShape(1, 8, 2))
     torch.manual_seed(seed)
     shape = shape or NetworkShape.uniform(3, 4, 2, neighbors=MESH_MODELS[mesh].neighbors)
-    facts = manifest([f"class{i}" for i in range(shape.classes)], mesh, layer_dilations=shape.layer_dilations)
-    return Checkpoint(Network(shape).eval(), facts)
+    return Checkpoint(Network(shape).eval(), manifest([f"class{i}" for i in range(shape.classes)], mesh))
 
 
 def canvas_checkpoint(seed, shape):

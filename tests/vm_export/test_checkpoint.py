@@ -45,5 +45,3 @@ def test_foreign_and_mismatched_checkpoints_are_refused(tmp_path):
     for one, other in ((rings, canvas), (canvas, rings)):
         with pytest.raises(ModelError, match=f"mesh {other.manifest.mesh} is for another kind of network"):
             Checkpoint(one.network, other.manifest)
-    with pytest.raises(ModelError, match=r"the dilations \(\), but the manifest \(1, 2, 1\)"):
-        Checkpoint(checkpoint().network, manifest(layer_dilations=(1, 2, 1)))

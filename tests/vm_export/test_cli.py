@@ -77,7 +77,7 @@ def test_command_writes_one_file_where_the_portable_layout_is_the_fastest(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("layout", "mesh"), [("plain", "ring4"), ("runs", "ring8"), ("lattice", "nmgrid8"), ("runs", "cap6")]
+    ("layout", "mesh"), [("plain", "ring4"), ("runs", "ring8"), ("runs", "nmgrid8"), ("runs", "cap6")]
 )
 def test_command_writes_one_file_in_the_layout_that_it_is_told(layout, mesh, tmp_path):
     checkpoint(mesh=mesh).save(tmp_path / "model.pt")

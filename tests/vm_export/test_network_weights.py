@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from tests.vm_export.checkpoints import checkpoint
 from tests.vm_export.test_export import any_checkpoint, in_all_layouts
 from vm_embedded.errors import ModelError
-from vm_embedded.mesh.dilation import with_dilations
 from vm_embedded.network.bundled import SHIPPED, model_path
 from vm_embedded.network.model_file import ModelFile, read_model
 from vm_export import export
@@ -30,9 +29,9 @@ def test_every_network_comes_back_from_its_model_file(layout, data, seed):
     facts = replace(made.manifest, layout=layout)
     model = ModelFile(Path("model.onnx"), export.onnx_model(made.network, facts), facts, "")
     read = network_of(model)
-    groups, on_canvas = facts.model.groups, layout == "canvas"
-    test = export.random_example(made.network, 200, seed, groups, facts.model.steps if on_canvas else None)
-    around = test.cells if on_canvas else with_dilations(test.neighbors, groups, read.network.shape.dilations)
+    on_canvas = layout == "canvas"
+    test = export.random_example(made.network, 200, seed)
+    around = test.cells if on_canvas else test.neighbors
     with torch.inference_mode():
         answer = read.network.probabilities(torch.from_numpy(test.points), torch.from_numpy(around)).numpy()
     np.testing.assert_allclose(answer, test.probabilities, atol=2e-5)

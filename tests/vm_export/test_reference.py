@@ -44,14 +44,6 @@ def test_a_network_that_sees_other_colors_is_not_written(tmp_path, facts):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_network_with_dilations_is_not_written(tmp_path):
-    """The reference would run it without them."""
-    shape = NetworkShape.uniform(3, 4, 2, dilations=(1, 2, 1))
-    with pytest.raises(InputError, match="has no dilations; this network has 1, 2, 1"):
-        write_reference(checkpoint(9, shape), tmp_path / "model.yaml")
-    assert not list(tmp_path.iterdir())
-
-
 def test_the_authors_file_survives_a_round_trip(shared, tmp_path):
     source = shared / "reference/model.yaml"
     write_reference(read_reference(source, Overrides(intersections=6.0)), tmp_path / "again.yaml")

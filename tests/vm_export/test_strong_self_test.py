@@ -28,7 +28,7 @@ def test_the_network_is_sure_of_each_class_and_unsure_between_classes():
 
 @pytest.mark.parametrize(
     ("layout", "mesh"),
-    [("plain", "ring4"), ("runs", "ring8"), ("lattice", "xygrid6"), ("plain", "cap6"), ("canvas", "octaves")],
+    [("plain", "ring4"), ("runs", "ring8"), ("runs", "xygrid6"), ("plain", "cap6"), ("canvas", "octaves")],
 )
 def test_a_model_file_with_another_weight_is_refused(layout, mesh, tmp_path):
     right = checkpoint(1, mesh=mesh)

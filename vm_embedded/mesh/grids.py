@@ -87,7 +87,7 @@ class Grid(MeshModel):
         rays[:, 2] = shape.center_height - height
         rays /= np.sqrt(rays[:, 0] ** 2 + rays[:, 1] ** 2 + rays[:, 2] ** 2)[:, None]
         cells = np.stack([column - column.min(), row - row.min()], axis=1)
-        return Mesh(frozen(rays), frozen(lattice_neighbors(cells, self.steps)), frozen(cells))
+        return Mesh(frozen(rays), frozen(lattice_neighbors(cells, self.steps)))
 
     def _quarter(self, shape: Shape, height: float, intersections: float, max_distance: float) -> tuple[Floats, Floats]:
         """x and y [m] in the quarter of the lattice with x >= 0 and y >= 0; the other quarters are its mirror images.

@@ -59,7 +59,7 @@ class Mesh:
         observation plane without the camera's yaw, so x is ahead of the camera and z up.
     neighbors: (n + 1, N) indices of points. Index n is the off-screen point, which takes the place of every missing
         neighbor. It is linked to itself.
-    cells: (n, 2) column and row of each point, in a lattice where all neighbors are fixed steps away; else None.
+    cells: (n, 2) column and row of each point on strips (mesh octaves); None for a mesh without strips.
     margin: (n,) which points only give context to the network and are no part of its answer; None for no point.
     """
 
@@ -74,7 +74,7 @@ class Mesh:
     @property
     def strips(self) -> Indices | None:
         """The strip (n,) of each point; None for a mesh without strips."""
-        return None if self.margin is None or self.cells is None else self.cells[:, 1] // np.int32(STRIDE)
+        return None if self.cells is None else self.cells[:, 1] // np.int32(STRIDE)
 
     def links(self, members: npt.NDArray[np.integer]) -> Indices:
         """Neighbors (m, N) of the points `members` (m,)."""

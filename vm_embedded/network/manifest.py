@@ -10,13 +10,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from types import UnionType
-from typing import Any
 
 from ..borders.text import name_fault
 from ..errors import GeometryError, InputError, ModelError, unknown
 from ..geometry.make_shape import SHAPES, make_shape
 from ..geometry.shape import Shape
-from ..mesh.dilation import distinct_dilations
 from ..mesh.mesh import MeshModel
 from ..mesh.models import MESH_MODELS
 from ..mesh.walls import wall_counts
@@ -33,9 +31,9 @@ with bearings. background: everything else."""
 EDGES = ("hard", "same")
 """Replacement of a missing neighbor. hard: the off-screen point, whose input is -1. same: the point itself."""
 
-LAYOUTS = ("plain", "runs", "lattice", "canvas")
-"""Order of the points in the network's input; see layout.py. plain: point by point. runs: slots, ring by ring. lattice:
-a picture. canvas: the strips of mesh octaves on a picture."""
+LAYOUTS = ("plain", "runs", "canvas")
+"""Order of the points in the network's input; see layout.py. plain: point by point. runs: slots, ring by ring. canvas:
+the strips of mesh octaves on a picture."""
 
 POINT_SAMPLINGS = ("bilinear", "footprint")
 """Color of a point. bilinear: at its pixel, from the four around it. footprint: the mean of the area that it stands
@@ -53,12 +51,6 @@ MOST_CLASSES = 127
 
 PEAK_OUTPUTS = 4
 """Outputs for a class with peaks: score, shift to the right and up, size; see `Manifest.peaks`."""
-
-MOST_DILATION = 64
-"""Largest dilation of a convolution: a picture has about a hundred points from one side to the other."""
-
-_LATER = ("layer_dilations", "peaks")
-"""Lists that a file has only if they are not empty: files of earlier releases lack them."""
 
 _SMALLEST_CIRCLE = 0.01
 """Smallest `upright_radius` of a look at uprights [m]."""
@@ -111,8 +103,6 @@ class Manifest:
     colors: one of POINT_COLORS.
     look: description of the look network, if the file has one; see close_look.py.
     upright_looks: descriptions of the look networks for classes of kind upright.
-    layer_dilations: of the convolutions, in their order, at most MOST_DILATION; empty if all are 1. Others need edge
-        hard, and layout plain or runs.
     peaks: names of classes of kind object or upright, for which the network also says where objects are; only in
         layout canvas. After the probabilities of all classes, each of them has four outputs for each cell: the score, a
         logit of whether the place of an object is in the cell; the shift to the right and up from the cell to this
@@ -142,7 +132,6 @@ class Manifest:
     colors: str = "absolute"
     look: LookContract | None = None
     upright_looks: tuple[LookContract, ...] = ()
-    layer_dilations: tuple[int, ...] = ()
     peaks: tuple[str, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
 
@@ -161,11 +150,6 @@ class Manifest:
                 raise ModelError(unknown(f"{name} in the model's manifest", getattr(self, name), allowed))
         if self.layout != "plain" and self.edge != "hard":
             raise ModelError(f"layout {self.layout} needs edge hard; edge {self.edge} needs layout plain")
-        self._check_dilations()
-        if self.layout == "lattice" and MESH_MODELS[self.mesh].steps is None:
-            raise ModelError(
-                f"layout lattice needs a grid, whose neighbors are fixed steps away; mesh {self.mesh} is not a grid"
-            )
         if (self.layout == "canvas") != (self.mesh == "octaves"):
             raise ModelError(
                 f"mesh octaves and layout canvas need each other; the mesh is {self.mesh}, the layout {self.layout}"
@@ -192,17 +176,6 @@ class Manifest:
                 f"{len(names)}: {names}"
             )
         check_provenance(self.provenance)
-
-    def _check_dilations(self) -> None:
-        for each in self.layer_dilations:
-            if not _is_number(each, int) or not 1 <= each <= MOST_DILATION:
-                raise ModelError(
-                    f"layer_dilations in the model's manifest must be whole numbers up to {MOST_DILATION}, not {each!r}"
-                )
-        if self.dilations != (1,) and (self.edge != "hard" or self.layout in ("lattice", "canvas")):
-            raise ModelError(
-                f"dilations other than 1 need edge hard and layout plain or runs, not {self.edge} and {self.layout}"
-            )
 
     def _check_peaks(self) -> None:
         able = [each.name for each in self.classes if each.kind in ("object", "upright")]
@@ -301,16 +274,6 @@ class Manifest:
         return self.model.neighbors
 
     @property
-    def dilations(self) -> tuple[int, ...]:
-        """The different dilations of the convolutions, as with_dilations takes them."""
-        return distinct_dilations(self.layer_dilations)
-
-    @property
-    def neighbor_columns(self) -> int:
-        """Columns of with_dilations, D N."""
-        return len(self.dilations) * self.neighbors
-
-    @property
     def model(self) -> MeshModel:
         """The mesh model, which places and links the points."""
         return MESH_MODELS[self.mesh]
@@ -335,9 +298,8 @@ class Manifest:
         data["look"] = self.look.as_dict() if self.look else None
         data["upright_looks"] = [each.as_dict() for each in self.upright_looks]
         data["self_test"] = None if self.self_test is None else self.self_test.as_dict()
-        for name in _LATER:
-            if not data[name]:  # as in files of earlier releases
-                del data[name]
+        if not self.peaks:  # as in files of earlier releases
+            del data["peaks"]
         return json.dumps(data, sort_keys=True, separators=(",", ":"))
 
     @classmethod
@@ -359,7 +321,7 @@ class Manifest:
         for key in data:
             if key not in known:
                 raise ModelError(unknown("entry in the model's manifest", key, known))
-        data = dict[str, Any]({name: [] for name in _LATER} | data)
+        data = {"peaks": []} | data
         missing = [name for name in known if name not in data]
         if missing:
             raise ModelError(f"the model's manifest lacks {', '.join(missing)}")
@@ -373,10 +335,9 @@ class Manifest:
         if not isinstance(data["upright_looks"], list):
             raise ModelError(f"upright_looks in the model's manifest must be a list, not {data['upright_looks']!r}")
         data["upright_looks"] = tuple(map(LookContract.from_dict, data["upright_looks"]))
-        for name in _LATER:
-            if not isinstance(data[name], list):
-                raise ModelError(f"{name} in the model's manifest must be a list, not {data[name]!r}")
-            data[name] = tuple(data[name])
+        if not isinstance(data["peaks"], list):
+            raise ModelError(f"peaks in the model's manifest must be a list, not {data['peaks']!r}")
+        data["peaks"] = tuple(data["peaks"])
         if data["self_test"] is not None:
             data["self_test"] = SelfTest.from_dict(data["self_test"])
         return cls(**data)

@@ -16,7 +16,6 @@ from pathlib import Path
 
 from ..errors import ModelError
 from ..files import read_regular
-from ..mesh.dilation import links_across
 from .canary import CANARY_KEY, Canary
 from .look_contract import GLANCE_KEY, LOOK_KEY, LookContract
 from .manifest import METADATA_KEY, Manifest
@@ -81,14 +80,10 @@ class ModelFile:
 
     @cached_property
     def depth(self) -> int:
-        """How many links away a point may be on which an answer depends: without dilations, the number of the network's
-        convolutions.
+        """How many links away a point may be on which an answer depends: the number of the network's convolutions.
 
         Only for the layouts plain and runs.
         """
-        if self.manifest.layer_dilations:
-            groups = self.manifest.model.groups
-            return sum(links_across(groups, each) for each in self.manifest.layer_dilations)
         return _look_ups(memoryview(self.content))
 
 

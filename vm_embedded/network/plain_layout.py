@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Indices, Mask, Singles, frozen
-from ..mesh.dilation import with_dilations
-from ..mesh.mesh import Groups, Mesh
+from ..mesh.mesh import Mesh
 from .layout import OFF_SCREEN, Feeds, WholeLayout
 
 
@@ -17,20 +14,18 @@ class PlainLayout(WholeLayout):
     """Slot i is point i, without gaps or copies. The off-screen point is the last row of every input.
 
     edge: the policy for a neighbor that is off screen. Policy "hard" puts the off-screen point in its place, "same" the
-    point itself. groups: of the mesh's model. dilations: see with_dilations, which gives the columns of the input
-    `neighbors`.
+    point itself.
     """
 
-    def __init__(self, mesh: Mesh, edge: str, groups: Groups = (), dilations: Sequence[int] = (1,)) -> None:
+    def __init__(self, mesh: Mesh, edge: str) -> None:
         self.slots = self.places = frozen(np.arange(len(mesh), dtype=np.int32))
         self.original = frozen(np.ones(len(mesh), dtype=bool))
         self.rays = mesh.rays
-        self._width = mesh.neighbors.shape[1]
-        self._neighbors = with_dilations(mesh.neighbors, groups, dilations)
+        self._neighbors = mesh.neighbors
         self._edge = edge
 
     def links(self, members: npt.NDArray[np.integer]) -> Indices:
-        return np.take(self._neighbors[:, : self._width], members, axis=0)
+        return np.take(self._neighbors, members, axis=0)
 
     @property
     def nbytes(self) -> int:

@@ -33,23 +33,24 @@ around slot s is in column s + 1. The columns of point 1 are 4 + 1 = 5 and 22 + 
 
 A copy looks up the same sums as its original, and a gap the same sums as the off-screen point. So both keep the right
 values in all layers, without masks or special cases.
-
-For a convolution with dilation d, the members of a group (mesh/dilation.py) are d slots apart, and so are the slots of
-a window. So each dilation has its own columns, m - d for each group: column s + d is the window around slot s. With g
-as the largest dilation, g gaps follow each run, 2 g + 1 gaps come first and 2 g last. In the example, g is 1.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Indices, Mask, Singles, frozen
-from ..mesh.dilation import dilated
 from ..mesh.mesh import SELF, Groups, Mesh
 from .layout import OFF_SCREEN, Feeds, WholeLayout, rays_in
+
+_GAP = 1
+"""The middle one of the three gaps that come first. All slots around it are gaps, as around the off-screen point."""
+
+_GAPS_BEFORE = 3
+_GAPS_BEHIND = 2
+"""Each group has m - 1 columns, and column j is the window around slot j - 1. So the slots m - 2 and m - 1 have no
+window."""
 
 _Positions = npt.NDArray[np.int64]
 
@@ -57,13 +58,12 @@ _Positions = npt.NDArray[np.int64]
 class RunsLayout(WholeLayout):
     """The slots of a mesh in the layout `runs`, and the columns in which each slot finds the sums of its groups.
 
-    dilations: see with_dilations; the first one is 1. columns: (D G, m) positions in a layer's table, for one of D
-    dilations after the other. A table for dilation d has G (m - d) sums.
+    columns: (G, m) positions in a layer's table of G (m - 1) sums.
     """
 
-    def __init__(self, mesh: Mesh, groups: Groups, dilations: Sequence[int] = (1,)) -> None:
+    def __init__(self, mesh: Mesh, groups: Groups) -> None:
         self._groups = groups
-        slots, places, middles = _arranged(mesh.neighbors, self._groups, dilations)
+        slots, places, middles = _arranged(mesh.neighbors, self._groups)
         count = len(slots)
         self.slots = frozen(slots.astype(np.int32))
         self.places = frozen(places.astype(np.int32))
@@ -71,10 +71,8 @@ class RunsLayout(WholeLayout):
         original[places] = True
         self.original = frozen(original)
         self.rays = rays_in(mesh, slots)
-        self._gap = _gap(dilations)
         # Of each group: the column of the sum around slot 0.
-        spacing, group = np.array(dilations)[:, None], np.arange(len(groups))
-        self._first_columns = (spacing + (count - spacing) * group).astype(np.int32).reshape(-1, 1)
+        self._first_columns = 1 + (count - 1) * np.arange(len(middles), dtype=np.int32)[:, None]
         self.columns = frozen(middles.astype(np.int32) + self._first_columns)
 
     def links(self, members: npt.NDArray[np.integer]) -> Indices:
@@ -82,8 +80,7 @@ class RunsLayout(WholeLayout):
         places = np.append(self.places, np.int32(len(self)))  # with m for the off-screen point
         neighbors = sum(map(len, self._groups)) - 1  # in all groups together, one member is the point itself
         found = np.empty((len(members), neighbors), dtype=np.int32)
-        # The first columns are those for dilation 1, with the neighbors themselves.
-        for group, columns, first in zip(self._groups, self.columns, self._first_columns, strict=False):
+        for group, columns, first in zip(self._groups, self.columns, self._first_columns, strict=True):
             middle = columns[members] - first
             for offset, neighbor in zip(group_offsets(group), group, strict=True):
                 if neighbor != SELF:
@@ -96,7 +93,7 @@ class RunsLayout(WholeLayout):
 
     def feeds(self, colors: Singles, on_screen: Mask) -> Feeds:
         columns = self.columns.astype(np.int64)
-        np.copyto(columns, self._gap + self._first_columns, where=~on_screen)
+        np.copyto(columns, _GAP + self._first_columns, where=~on_screen)
         return {"points": np.where(on_screen, colors, OFF_SCREEN), "columns": columns}
 
     def probabilities(self, output: Singles) -> Singles:
@@ -109,73 +106,48 @@ def group_offsets(group: tuple[int, ...]) -> range:
     return range(first, first + len(group))
 
 
-def _gap(dilations: Sequence[int]) -> int:
-    """The middle one of the gaps that come first. All slots of its windows are gaps, as around the off-screen point."""
-    return max(dilations)
-
-
-def _arranged(
-    neighbors: Indices, groups: Groups, dilations: Sequence[int]
-) -> tuple[_Positions, _Positions, _Positions]:
+def _arranged(neighbors: Indices, groups: Groups) -> tuple[_Positions, _Positions, _Positions]:
     """Arranges a mesh's points in slots, from their neighbors (n + 1, N).
 
-    Returns three arrays: the point in each slot (m,), n in gaps; the slot of each point (n,); and middles (D G, m): for
-    the point in each slot, the slot of the middle of each of its groups, for one dilation after the other, and _gap in
-    gaps.
+    Returns three arrays: the point in each slot (m,), n in gaps; the slot of each point (n,); and middles (G, m): for
+    the point in each slot, the slot of the middle of each of its groups, _GAP in gaps.
     """
-    n, most = len(neighbors) - 1, max(dilations)
-    # More gaps at the end. If the last point is the left one of a group of three, `_found_in_runs` reads the slots of
-    # two more members.
-    runs = _in_runs(neighbors[:n, groups[0][0]], neighbors[:n, groups[0][-1]], most)
-    runs = np.append(runs, np.full(most, n))
-    slot_of = np.full(n + 1, _gap(dilations))  # each point, and the off-screen point
+    n = len(neighbors) - 1
+    # A second gap at the end. If the last point is the left one of a group of three, `_found_in_runs` reads the two
+    # slots after it.
+    runs = np.append(_in_runs(neighbors[:n, groups[0][0]], neighbors[:n, groups[0][-1]]), n)
+    slot_of = np.full(n + 1, _GAP)  # each point, and the off-screen point
     filled = np.flatnonzero(runs < n)
     slot_of[runs[filled]] = filled
 
     parts, middles, count = [runs], [], len(runs)
-    for dilation in dilations:
-        farther = dilated(neighbors, groups, dilation)
-        for group in groups:
-            members: npt.NDArray[np.integer] = np.stack(
-                [np.arange(n) if each == SELF else farther[:n, each] for each in group]
-            )
-            offsets = [dilation * each for each in group_offsets(group)]
-            middle, torn = _found_in_runs(members, offsets, runs, slot_of)
-            copies, copy_of = np.unique(members[:, torn], axis=1, return_inverse=True)
-            laid, first = _interleaved(copies, dilation, n)
-            # The first member of a group of three has a negative offset from its middle; that of a shorter one has 0.
-            middle[:n][torn] = count + first[copy_of.reshape(-1)] - offsets[0]
-            parts.append(laid)
-            count += len(laid)
-            middles.append(middle)
-    point_at = np.concatenate([*parts, np.full(2 * most, n)])
+    for group in groups:
+        members: npt.NDArray[np.integer] = np.stack(
+            [np.arange(n) if each == SELF else neighbors[:n, each] for each in group]
+        )
+        middle, torn = _found_in_runs(members, group_offsets(group), runs, slot_of)
+        copies, copy_of = np.unique(members[:, torn], axis=1, return_inverse=True)
+        # The copy of a torn group begins at slot count + len(group) * its copy's number. Its middle is one slot later
+        # in a group of three, whose first offset is -1; it is the same slot in a shorter group.
+        middle[:n][torn] = count + len(group) * copy_of.reshape(-1) - group_offsets(group)[0]
+        parts.append(copies.T.reshape(-1))
+        count += copies.size
+        middles.append(middle)
+    point_at = np.concatenate([*parts, np.full(_GAPS_BEHIND, n)])
     return point_at, slot_of[:n], np.stack([middle[point_at] for middle in middles])
 
 
-def _interleaved(copies: npt.NDArray[np.integer], dilation: int, gap: int) -> tuple[_Positions, _Positions]:
-    """Copies of c groups (group size, c) in slots in which the members of each are `dilation` slots apart.
-
-    So `dilation` groups take turns; gap: fills the places that are left. Returns the slots, and in which of them each
-    group begins (c,).
-    """
-    size, count = copies.shape
-    full = np.pad(copies, ((0, 0), (0, -count % dilation)), constant_values=gap)
-    number = np.arange(count)
-    slots = full.reshape(size, -1, dilation).swapaxes(0, 1).reshape(-1)
-    return slots, number // dilation * (size * dilation) + number % dilation
-
-
 def _found_in_runs(
-    members: npt.NDArray[np.integer], offsets: Sequence[int], runs: _Positions, slot_of: _Positions
+    members: npt.NDArray[np.integer], offsets: range, runs: _Positions, slot_of: _Positions
 ) -> tuple[_Positions, Mask]:
     """Where the group of each point lies in the runs, and whether the runs tear it apart.
 
     members: (group size, n) the points in the group of each point; the number n stands for a missing one. runs: the
-    point in each slot. slot_of: (n + 1,) the slot of each point, and the gap for a missing one. Returns the slots of
-    the groups' middles (n + 1,), that gap where all members are missing, and a mask (n,) of the groups that are torn.
+    point in each slot. slot_of: (n + 1,) the slot of each point. Returns the slots of the groups' middles (n + 1,),
+    _GAP where all members are missing, and a mask (n,) of the groups that are torn.
     """
     n = members.shape[1]
-    middle = np.full(n + 1, slot_of[n])
+    middle = np.full(n + 1, _GAP)
     # If the group is whole, each member that is not missing leads to the same middle.
     for offset, points in zip(offsets, members, strict=True):
         np.copyto(middle[:n], slot_of[points] - offset, where=points < n)
@@ -186,8 +158,8 @@ def _found_in_runs(
     return middle, torn
 
 
-def _in_runs(left: Indices, right: Indices, gaps: int) -> _Positions:
-    """The point in each slot of the runs; n in gaps. 2 gaps + 1 gaps come first, and `gaps` follow each run.
+def _in_runs(left: Indices, right: Indices) -> _Positions:
+    """The point in each slot of the runs; n in gaps. Three gaps come first, and one gap follows each run.
 
     left, right: neighbors (n,) of each point. Two points are *linked* if they are each other's right and left neighbor.
     A *piece* is a sequence of points i, i + 1, ... each linked to the next. numpy finds all pieces at once, and a loop
@@ -208,8 +180,8 @@ def _in_runs(left: Indices, right: Indices, gaps: int) -> _Positions:
 
     order, ends_run = _chained(follower)
     lengths = (ends - starts + 1)[order]
-    # The first slot of each piece; the last entry is the number of slots. Gaps follow each piece that ends a run.
-    first_slot = 2 * gaps + 1 + np.cumsum(np.append(0, lengths + gaps * ends_run))
+    # The first slot of each piece; the last entry is the number of slots. One gap follows each piece that ends a run.
+    first_slot = _GAPS_BEFORE + np.cumsum(np.append(0, lengths + ends_run))
     runs = np.full(first_slot[-1], n)
     within = np.arange(n) - np.repeat(np.cumsum(lengths) - lengths, lengths)  # place of a point in its piece
     runs[np.repeat(first_slot[:-1], lengths) + within] = np.repeat(starts[order], lengths) + within

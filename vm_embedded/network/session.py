@@ -30,17 +30,16 @@ class Session:
     """A loaded mesh network.
 
     threads: never more than this process may use. With several, a large network runs on sectors of the mesh at the same
-    time (split_layout.py), each in one thread of ONNX Runtime; in the layouts lattice and canvas, ONNX Runtime splits
-    each operator instead. spinning: see OnnxModel; it only matters in these layouts. Loading runs the model's
-    self-test. Raises ModelError if the file does not load, has other inputs and outputs than its manifest says, or
-    fails its self-test.
+    time (split_layout.py), each in one thread of ONNX Runtime; in the layout canvas, ONNX Runtime splits each operator
+    instead. spinning: see OnnxModel; it only matters in this layout. Loading runs the model's self-test. Raises
+    ModelError if the file does not load, has other inputs and outputs than its manifest says, or fails its self-test.
     """
 
     def __init__(self, model: ModelFile, threads: int = 1, spinning: bool = False) -> None:
         self.model = model
         self.threads = usable_threads(threads)
         self._process = os.getpid()
-        is_split = self.threads > 1 and model.manifest.layout not in ("lattice", "canvas")
+        is_split = self.threads > 1 and model.manifest.layout != "canvas"
         self._others = ThreadPoolExecutor(self.threads - 1, "network") if is_split else None
         interface = _interface(model.manifest)
         inside = 1 if is_split else self.threads
@@ -96,8 +95,8 @@ class Session:
                 f"{self.model.path}: self-test has {test.neighbors.shape[1]} neighbors for each point, "
                 f"its mesh {manifest.mesh} has {manifest.neighbors}"
             )
-        if manifest.layout in ("lattice", "canvas") and test.cells is None:
-            raise ModelError(f"{self.model.path}: self-test lacks the cells of its points in the lattice")
+        if manifest.layout == "canvas" and test.cells is None:
+            raise ModelError(f"{self.model.path}: self-test lacks the cells of its points on strips")
         self.onnx.check_answer(self.answer(test), test.probabilities[:-1])
 
 
@@ -112,9 +111,7 @@ def _interface(manifest: Manifest) -> Interface:
         }
     interface: Interface = {"points": ("tensor(float)", [3]), "probabilities": ("tensor(float)", [outputs])}
     if manifest.layout == "plain":
-        interface["neighbors"] = ("tensor(int32)", [manifest.neighbor_columns])
-    elif manifest.layout == "runs":
-        interface["columns"] = ("tensor(int64)", [len(manifest.dilations) * len(manifest.model.groups)])
+        interface["neighbors"] = ("tensor(int32)", [manifest.neighbors])
     else:
-        interface["shown"] = ("tensor(bool)", [])
+        interface["columns"] = ("tensor(int64)", [len(manifest.model.groups)])
     return interface

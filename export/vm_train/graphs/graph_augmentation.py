@@ -62,9 +62,7 @@ def mirror_image(graph: LabeledGraph, model: MeshModel) -> LabeledGraph:
         objects = graph.objects.copy()
         objects[:, 1] = last - objects[:, 1]
         return replace(turned, objects=objects)
-    columns = mirrored_columns(model)
-    first = np.arange(0, graph.neighbors.shape[1], model.neighbors)[:, None]  # of each dilation
-    return replace(graph, neighbors=np.ascontiguousarray(graph.neighbors[:, (first + columns).ravel()]))
+    return replace(graph, neighbors=np.ascontiguousarray(graph.neighbors[:, mirrored_columns(model)]))
 
 
 def mirrored_columns(model: MeshModel) -> npt.NDArray[np.intp]:

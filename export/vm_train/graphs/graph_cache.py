@@ -29,17 +29,7 @@ from .labeled_graph import LabeledGraph
 
 _HEADER = struct.Struct("<8s32sIII")  # magic, fingerprint of the picture's files, points, neighbors of each, objects
 _MAGIC = b"vmviews2"
-_OF_MESH = (
-    "shape",
-    "radius",
-    "object_height",
-    "intersections",
-    "mesh",
-    "max_distance",
-    "sampling",
-    "dilations",
-    "peaks",
-)
+_OF_MESH = ("shape", "radius", "object_height", "intersections", "mesh", "max_distance", "sampling", "peaks")
 """Entries of a manifest that decide the points of a view."""
 
 

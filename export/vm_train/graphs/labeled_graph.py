@@ -14,7 +14,6 @@ from vm_embedded.detection.color_normalization import normalized
 from vm_embedded.detection.footprint import Levels, levels_for, uniform_levels
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.sampling import sample
-from vm_embedded.mesh.dilation import with_dilations
 from vm_embedded.mesh.mesh import STRIDE, PointGraph
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
@@ -34,11 +33,11 @@ CONTEXT = np.int8(-2)
 class LabeledGraph:
     """n points of one picture, or of several joined.
 
-    points (n + 1, 3): colors, RGB from 0 to 1; row n is the off-screen point. neighbors (n + 1, D N): rows of points,
-    as with_dilations gives them. labels (n,): positions of classes, -1 for unlabeled, or CONTEXT. distances (n,): along
-    the plane, from the camera to an object at the point [m]. pixels (n, 2): places of the points in their pictures,
-    (x, y) [px]. cells (n, 2): columns and rows of points on strips (mesh octaves), which have no neighbors; else None.
-    objects (o, 5): what a network with peaks learns, as `in_cells` gives it, of a graph that is not joined; else None.
+    points (n + 1, 3): colors, RGB from 0 to 1; row n is the off-screen point. neighbors (n + 1, N): rows of points.
+    labels (n,): positions of classes, -1 for unlabeled, or CONTEXT. distances (n,): along the plane, from the camera to
+    an object at the point [m]. pixels (n, 2): places of the points in their pictures, (x, y) [px]. cells (n, 2):
+    columns and rows of points on strips (mesh octaves), which have no neighbors; else None. objects (o, 5): what a
+    network with peaks learns, as `in_cells` gives it, of a graph that is not joined; else None.
     """
 
     points: Singles
@@ -94,7 +93,7 @@ def graph_of(
     x, y = np.rint(shown.pixels).astype(np.intp).T
     labels = picture.labels[y, x]
     if shown.graph.margin is None:
-        neighbors, cells = with_dilations(shown.graph.neighbors, manifest.model.groups, manifest.dilations), None
+        neighbors, cells = shown.graph.neighbors, None
     else:
         neighbors, cells = np.zeros((len(shown) + 1, 0), dtype=np.int32), shown.graph.cells
         labels = np.where(shown.graph.margin, CONTEXT, labels)
@@ -132,7 +131,7 @@ def empty_graph(manifest: Manifest) -> LabeledGraph:
     on_strips = manifest.mesh == "octaves"
     return LabeledGraph(
         np.full((1, 3), OFF_SCREEN, dtype=np.float32),
-        np.zeros((1, 0 if on_strips else manifest.neighbor_columns), dtype=np.int32),
+        np.zeros((1, 0 if on_strips else manifest.neighbors), dtype=np.int32),
         np.empty(0, dtype=np.int8),
         np.empty(0),
         np.empty((0, 2)),

@@ -10,11 +10,10 @@ from vm_embedded.errors import InputError
 from vm_embedded.field.uprights import KINDS
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
-from vm_embedded.network.manifest import MOST_DILATION, POINT_COLORS, POINT_SAMPLINGS, Manifest
+from vm_embedded.network.manifest import POINT_COLORS, POINT_SAMPLINGS, Manifest
 from vm_export.canvas_shape import CanvasShape
 from vm_export.grid import GRIDS, Grid
 from vm_export.network_shape import ACTIVATIONS, NetworkShape
-from vm_workstation.ranges import whole_numbers
 
 from ..graphs.augmentation import Augmentation
 from .class_table import ClassTable
@@ -89,16 +88,9 @@ class NetworkSettings:
     )
     activation: str = one_of(tuple(ACTIVATIONS), "selu", "activation after each convolution; the paper found selu best")
     kind: str = one_of(("convolution", "separable"), "convolution", "kind of convolution; separable has fewer weights")
-    dilations: tuple[int, ...] = whole_numbers(
-        "how many steps away each convolution looks, one number for each; empty: 1 for all", (1, MOST_DILATION)
-    )
 
     def __post_init__(self) -> None:
         check_entries(self)
-        if len(self.dilations) not in (0, self.depth):
-            raise InputError(
-                f"dilations must be {self.depth} numbers, one for each convolution, not {len(self.dilations)}"
-            )
 
 
 HEADER = """Configuration of vm-train. `vm-train config` prints this file.
@@ -129,7 +121,7 @@ class TrainConfiguration:
     def _check_octaves(self) -> None:
         """Raise InputError for entries that a network on octaves can't have."""
         network, usual = self.network, NetworkSettings()
-        for name in ("activation", "kind", "dilations"):
+        for name in ("activation", "kind"):
             if getattr(network, name) != getattr(usual, name):
                 raise InputError(f"{name} of [network] has no effect for mesh octaves; remove the entry")
         CanvasShape(network.depth, network.width, len(self.classes.colors), len(self._peaks))
@@ -144,7 +136,7 @@ class TrainConfiguration:
     @property
     def manifest(self) -> Manifest:
         """The manifest of this training's model files, without provenance."""
-        mesh, shape = self.mesh, self.network_shape
+        mesh = self.mesh
         return Manifest(
             shape=mesh.shape,
             radius=mesh.radius,
@@ -160,7 +152,6 @@ class TrainConfiguration:
             colors=mesh.colors,
             layout="canvas" if mesh.model == "octaves" else "plain",
             peaks=self._peaks,
-            layer_dilations=() if isinstance(shape, CanvasShape) else shape.layer_dilations,
         )
 
     @property
@@ -186,5 +177,4 @@ class TrainConfiguration:
             network.activation,
             kind=network.kind,
             neighbors=MESH_MODELS[self.mesh.model].neighbors,
-            dilations=network.dilations,
         )

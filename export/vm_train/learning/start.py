@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -65,12 +65,9 @@ class Start:
         }
 
     def check(self, configuration: TrainConfiguration) -> None:
-        """Raise InputError if a configuration describes a network with another mesh, other classes or layers.
-
-        Other dilations are allowed: the weights fit, and the training adapts them.
-        """
+        """Raise InputError if a configuration describes a network with another mesh, other classes or layers."""
         check_same_mesh(self.path, self.checkpoint, configuration.manifest, configuration.grid)
-        theirs, ours = _undilated(self.checkpoint.network.shape), _undilated(configuration.network_shape)
+        theirs, ours = self.checkpoint.network.shape, configuration.network_shape
         if theirs != ours:
             raise InputError(f"{self.path} has other layers: {_listed(theirs)}, not {_listed(ours)} as in [network]")
 
@@ -100,8 +97,7 @@ def _network_entries(shape: MeshShape) -> dict[str, Any]:
         return {"depth": shape.depth, "width": shape.width}
     first = shape.layers[0]
     activation = {} if len(shape.layers) == 1 else {"activation": first.activation}
-    dilations = {"dilations": [each.dilation for each in shape.layers]} if shape.layer_dilations else {}
-    return {"depth": len(shape.layers), "width": first.width, "kind": first.kind, **dilations, **activation}
+    return {"depth": len(shape.layers), "width": first.width, "kind": first.kind, **activation}
 
 
 def _listed(shape: MeshShape) -> str:
@@ -109,9 +105,3 @@ def _listed(shape: MeshShape) -> str:
         return f"depth {shape.depth} and width {shape.width} on octaves"
     layers = ", ".join(f"{each.kind} {each.width} {each.activation}" for each in shape.layers)
     return f"[{layers}] with {shape.neighbors} neighbors"
-
-
-def _undilated(shape: MeshShape) -> MeshShape:
-    if isinstance(shape, CanvasShape):
-        return shape
-    return replace(shape, layers=tuple(replace(each, dilation=1) for each in shape.layers))

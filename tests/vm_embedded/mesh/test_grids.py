@@ -16,16 +16,23 @@ from ..strategies import reals
 from .test_models import BALL, CASES, GRIDS, every_case, mesh_of
 
 
-def around_nadir(mesh):
-    """Columns and rows (n, 2) from the point straight below the camera."""
-    (nadir,) = np.flatnonzero(mesh.rays[:, 2] == -1.0)
-    return mesh.cells - mesh.cells[nadir]
+def around_nadir(mesh, width):
+    """Column and row of each point from the one straight below the camera: the steps of a path of links to it."""
+    (nadir,) = np.flatnonzero(mesh.rays[:, 2] == -1.0).tolist()
+    cells, waiting = {nadir: (0, 0)}, [nadir]
+    for point in waiting:
+        n, m = cells[point]
+        for there, (right, up) in zip(mesh.neighbors[point].tolist(), STEPS[width], strict=True):
+            if there < len(mesh) and there not in cells:
+                cells[there] = n + right, m + up
+                waiting.append(there)
+    return [cells[point] for point in range(len(mesh))]
 
 
 def assert_is_flood_filled(mesh, kind, width, shape, height, k, max_distance):
     """The mesh has the plain flood fill's points and links, in any order of points."""
     expected = plain_grid(kind, shape, height, k, max_distance, width)
-    cells = [tuple(cell) for cell in around_nadir(mesh).tolist()]
+    cells = around_nadir(mesh, width)
     assert len(cells) == len(expected)
     assert set(cells) == set(expected)
     points = np.array([(*expected[cell], center_height(shape) - height) for cell in cells])
@@ -111,8 +118,8 @@ def test_an_nm_lattice_for_thin_cylinders_has_both_slices_where_they_should_be()
     mesh = build_mesh(post, height, k, 3.0, "nmgrid4")
     g, c = height - post.center_height, post.center_height
     x, y = (mesh.rays[:, :2] * (g / -mesh.rays[:, 2:])).T
-    middle = mesh.cells[np.argmin(np.hypot(x, y))]
-    for along, other, cell in ((x, y, mesh.cells[:, 0] - middle[0]), (y, x, mesh.cells[:, 1] - middle[1])):
+    columns, rows = np.transpose(around_nadir(mesh, 4))
+    for along, other, cell in ((x, y, columns), (y, x, rows)):
         slant = np.hypot(g, other)
         np.testing.assert_allclose(post.n(np.arctan2(along, slant), slant + c), cell / k, atol=1e-6)
 

@@ -1,7 +1,6 @@
 """All layouts give the same answers, torch's, and hold what they say."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +16,9 @@ from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.geometry.sphere import Sphere
-from vm_embedded.mesh.dilation import with_dilations
 from vm_embedded.mesh.mesh import SELF, Mesh
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import choose_layout
-from vm_embedded.network.lattice_layout import LatticeLayout
 from vm_embedded.network.model_file import ModelFile
 from vm_embedded.network.plain_layout import PlainLayout
 from vm_embedded.network.runs_layout import RunsLayout
@@ -38,11 +35,8 @@ LARGEST_LOGIT = 2.0
 MODELS = ["ring4", "ring6", "ring8", "cap6", "xygrid4", "xmgrid6", "xygrid8"]
 """Of every arrangement and number of neighbors one; those with equal neighbors are laid out alike."""
 
-LAYOUTS = ("plain", "runs", "lattice")
+LAYOUTS = ("plain", "runs")
 """Those of networks on graphs. Networks on a canvas have no other layout."""
-
-MOST = 5
-"""Largest dilation that is drawn."""
 
 models = st.sampled_from(MODELS)
 kinds = st.sampled_from(["convolution", "separable", "dense"])
@@ -53,15 +47,10 @@ heads = st.sampled_from(
 
 
 @st.composite
-def network_shapes(draw, model, most=1):
-    """Networks for a mesh model whose convolutions have dilations of at most `most`."""
+def network_shapes(draw, model):
     first = Layer(draw(st.sampled_from(["convolution", "separable"])), draw(st.integers(1, 8)), draw(activations))
     inner = draw(st.lists(st.builds(Layer, kinds, st.integers(1, 8), activations), max_size=4))
-    layers = (first, *inner, Layer(draw(kinds), *draw(heads)))
-    return NetworkShape(
-        tuple(each if each.kind == "dense" else replace(each, dilation=draw(st.integers(1, most))) for each in layers),
-        MESH_MODELS[model].neighbors,
-    )
+    return NetworkShape((first, *inner, Layer(draw(kinds), *draw(heads))), MESH_MODELS[model].neighbors)
 
 
 def network_of(shape, seed):
@@ -126,13 +115,12 @@ def masks(draw, count, seen=None):
     return np.random.default_rng(draw(seeds)).random(count) < share
 
 
-def torch_logits(network, model, mesh, colors, on_screen):
+def torch_logits(network, mesh, colors, on_screen):
     """Logits (n, C) of the points on screen, from torch and the mesh of just those."""
     kept = np.flatnonzero(on_screen)
     points = np.vstack([colors[kept], np.full((1, 3), -1.0)]).astype(np.float32)
-    farther = Mesh(mesh.rays, with_dilations(mesh.neighbors, MESH_MODELS[model].groups, network.shape.dilations))
     with torch.inference_mode():
-        logits = network.logits(torch.from_numpy(points), torch.from_numpy(farther.part(kept).neighbors.copy()))
+        logits = network.logits(torch.from_numpy(points), torch.from_numpy(mesh.part(kept).neighbors.copy()))
     return logits[:-1].double().numpy()
 
 
@@ -159,8 +147,7 @@ def slot_colors(layout, colors, shown):
 
 
 def session_of(network, model, layout, **changes):
-    dilations = network.shape.layer_dilations
-    manifest = manifest_of(model, layout, network.shape.classes, layer_dilations=dilations, **changes)
+    manifest = manifest_of(model, layout, network.shape.classes, **changes)
     return Session(ModelFile(Path(f"{layout}.onnx"), onnx_model(network, manifest), manifest, ""))
 
 
@@ -174,19 +161,13 @@ def _centered(logits):
     return logits - logits.mean(axis=1, keepdims=True)
 
 
-def layouts_of(mesh, network=None):
-    """The layouts that there are for a mesh and a network."""
-    fits_lattice = mesh.cells is not None and (network is None or not network.shape.layer_dilations)
-    return [layout for layout in LAYOUTS if layout != "lattice" or fits_lattice]
-
-
 def assert_same_answers(network, model, mesh, on_screen, seed):
-    """All layouts that there are for the mesh, and torch, agree on the logits of every point on screen."""
+    """All layouts, and torch, agree on the logits of every point on screen."""
     head = network.shape.layers[-1].activation
     colors = np.random.default_rng(seed).random((len(mesh), 3))
-    expected = tamed(network, torch_logits(network, model, mesh, colors, on_screen))
+    expected = tamed(network, torch_logits(network, mesh, colors, on_screen))
     found = {}
-    for layout in layouts_of(mesh, network):
+    for layout in LAYOUTS:
         probabilities, arranged = answers(session_of(network, model, layout), mesh, colors, on_screen)
         assert probabilities.shape == (len(arranged.slots), network.shape.classes)
         found[layout] = logits_of(probabilities[arranged.places][on_screen], head)
@@ -202,25 +183,26 @@ def assert_same_answers(network, model, mesh, on_screen, seed):
 
 @given(st.data(), models, seeds)
 def test_all_layouts_give_the_same_answers_on_any_graph(data, model, seed):
-    network = network_of(data.draw(network_shapes(model, MOST)), seed)
+    network = network_of(data.draw(network_shapes(model)), seed)
     mesh = data.draw(random_meshes(MESH_MODELS[model].neighbors))
     assert_same_answers(network, model, mesh, data.draw(masks(len(mesh))), seed)
 
 
 @given(st.data(), models, seeds)
 def test_all_layouts_give_the_same_answers_on_ring_meshes(data, model, seed):
-    network = network_of(data.draw(network_shapes(model, MOST)), seed)
+    network = network_of(data.draw(network_shapes(model)), seed)
     mesh, seen = data.draw(ring_meshes(model))
     assert_same_answers(network, model, mesh, data.draw(masks(len(mesh), seen)), seed)
 
 
 WHOLE = {model: build_mesh(Sphere(0.1), 0.8, 1.5, 2.0, model) for model in MODELS}
-PAIRS = [(model, layout) for model in MODELS for layout in LAYOUTS if layout != "lattice" or MESH_MODELS[model].steps]
+in_all_layouts = pytest.mark.parametrize("layout", LAYOUTS)
+for_all_models = pytest.mark.parametrize("model", MODELS)
 
 
 @pytest.mark.parametrize("head", [(2, "softmax"), (3, "softmax"), (5, "softmax"), (2, "sigmoid")], ids=str)
 @pytest.mark.parametrize("activation", sorted(ACTIVATIONS))
-@pytest.mark.parametrize("model", MODELS)
+@for_all_models
 def test_all_layouts_give_the_same_answers_with_every_activation_and_head(model, activation, head):
     layers = (
         Layer("convolution", 6, activation),
@@ -233,7 +215,7 @@ def test_all_layouts_give_the_same_answers_with_every_activation_and_head(model,
     assert_same_answers(network, model, mesh, np.random.default_rng(1).random(len(mesh)) < 0.9, 1)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@for_all_models
 @pytest.mark.parametrize("count", [0, 1])
 @pytest.mark.parametrize("shown", [False, True])
 def test_all_layouts_take_a_mesh_of_no_point_or_of_one(model, count, shown):
@@ -242,7 +224,7 @@ def test_all_layouts_take_a_mesh_of_no_point_or_of_one(model, count, shown):
     assert_same_answers(network, model, mesh, np.full(count, shown), 0)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@for_all_models
 def test_all_layouts_take_a_frame_in_which_nothing_is_on_screen(model):
     network = network_of(NetworkShape.uniform(3, 4, 2, neighbors=MESH_MODELS[model].neighbors), 0)
     assert_same_answers(network, model, WHOLE[model], np.zeros(len(WHOLE[model]), dtype=bool), 0)
@@ -252,11 +234,11 @@ def test_all_layouts_take_a_frame_in_which_nothing_is_on_screen(model):
 @settings(max_examples=20)
 def test_a_layout_is_used_for_one_frame_after_the_other(data, model, seed):
     """No frame leaves anything behind for the next one."""
-    network = network_of(data.draw(network_shapes(model, MOST)), seed)
+    network = network_of(data.draw(network_shapes(model)), seed)
     mesh, seen = data.draw(ring_meshes(model))
     colors = np.random.default_rng(seed).random((2, len(mesh), 3)).astype(np.float32)
     shown = [data.draw(masks(len(mesh), seen)) for _ in range(2)]
-    for layout in layouts_of(mesh, network):
+    for layout in LAYOUTS:
         session = session_of(network, model, layout)
         arranged = choose_layout(mesh, session.model.manifest)
         for each, on_screen in zip(colors, shown, strict=True):
@@ -277,7 +259,7 @@ def test_the_edge_policy_same_links_what_is_off_screen_to_the_point_itself(data,
     part = mesh.part(kept)
     itself = np.arange(len(kept) + 1, dtype=np.int32)[:, None]
     alone = Mesh(part.rays, np.where(part.neighbors == len(kept), itself, part.neighbors))
-    expected = tamed(network, torch_logits(network, model, alone, colors[kept], np.ones(len(kept), dtype=bool)))
+    expected = tamed(network, torch_logits(network, alone, colors[kept], np.ones(len(kept), dtype=bool)))
     probabilities, layout = answers(session_of(network, model, "plain", edge="same"), mesh, colors, on_screen)
     head = network.shape.layers[-1].activation
     reference = expected if head == "sigmoid" else _centered(expected)
@@ -286,13 +268,12 @@ def test_the_edge_policy_same_links_what_is_off_screen_to_the_point_itself(data,
 
 
 def arrays_of(layout):
-    named = [layout.slots, layout.places, layout.original, layout.rays]
-    if isinstance(layout, LatticeLayout):
-        return named
-    return [*named, layout.columns if isinstance(layout, RunsLayout) else layout._neighbors]
+    links = layout.columns if isinstance(layout, RunsLayout) else layout._neighbors
+    return [layout.slots, layout.places, layout.original, layout.rays, links]
 
 
-@pytest.mark.parametrize(("model", "layout"), PAIRS)
+@in_all_layouts
+@for_all_models
 def test_what_a_layout_holds_is_read_only_and_counted(layout, model):
     arranged = choose_layout(WHOLE[model], manifest_of(model, layout))
     for array in arrays_of(arranged):
@@ -304,14 +285,15 @@ def test_what_a_layout_holds_is_read_only_and_counted(layout, model):
     assert 0 <= held - arranged.nbytes <= 100  # a number for each group is too little to count
 
 
-@pytest.mark.parametrize(("model", "layout"), PAIRS)
+@in_all_layouts
+@for_all_models
 def test_rays_are_column_by_column_in_memory(layout, model):
     """As of every mesh; each frame's projection goes through them by columns."""
     for mesh in (WHOLE[model], WHOLE[model].part(np.arange(50, 230))):
         assert choose_layout(mesh, manifest_of(model, layout)).rays.T.flags.c_contiguous
 
 
-@pytest.mark.parametrize("model", MODELS)
+@for_all_models
 def test_plain_is_the_mesh_as_it_is(model):
     layout = choose_layout(WHOLE[model], manifest_of(model))
     assert isinstance(layout, PlainLayout)
@@ -322,7 +304,7 @@ def test_plain_is_the_mesh_as_it_is(model):
     assert layout.original.all()
 
 
-@pytest.mark.parametrize("model", MODELS)
+@for_all_models
 def test_every_neighbor_and_the_point_itself_are_in_exactly_one_group(model):
     together = sorted(each for group in MESH_MODELS[model].groups for each in group)
     assert together == [SELF, *range(MESH_MODELS[model].neighbors)]
@@ -330,11 +312,11 @@ def test_every_neighbor_and_the_point_itself_are_in_exactly_one_group(model):
     assert all(1 <= len(group) <= 3 for group in MESH_MODELS[model].groups)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@for_all_models
 def test_feeds_have_the_colors_on_screen_and_change_none_of_what_they_take(model):
     """The network's inputs are contiguous, of the types that its file asks for, and in range whatever is on screen."""
     random = np.random.default_rng(2)
-    for layout in layouts_of(WHOLE[model]):
+    for layout in LAYOUTS:
         arranged = choose_layout(WHOLE[model], manifest_of(model, layout))
         m = len(arranged.slots)
         on_screen = np.append(random.random(len(WHOLE[model])) < 0.7, False)[arranged.slots]
@@ -354,17 +336,13 @@ def test_feeds_have_the_colors_on_screen_and_change_none_of_what_they_take(model
             np.testing.assert_array_equal(points[-1], [-1.0] * 3)
             continue
         np.testing.assert_array_equal(points[:, ~on_screen], -1.0)
-        if layout == "lattice":
-            assert set(feeds) == {"points", "shown"}
-            np.testing.assert_array_equal(feeds["shown"].reshape(-1), on_screen)
-        else:
-            assert set(feeds) == {"points", "columns"}
-            assert feeds["columns"].dtype == np.int64
-            assert feeds["columns"].shape == (len(MESH_MODELS[model].groups), m)
-            assert 0 <= feeds["columns"].min() <= feeds["columns"].max() < len(MESH_MODELS[model].groups) * (m - 1)
+        assert set(feeds) == {"points", "columns"}
+        assert feeds["columns"].dtype == np.int64
+        assert feeds["columns"].shape == (len(MESH_MODELS[model].groups), m)
+        assert 0 <= feeds["columns"].min() <= feeds["columns"].max() < len(MESH_MODELS[model].groups) * (m - 1)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@in_all_layouts
 def test_answers_that_are_not_finite_are_an_error(layout):
     network = network_of(NetworkShape((Layer("convolution", 4, "elu"), Layer("convolution", 2, "softmax")), 6), 1)
     mesh = build_mesh(Sphere(0.1), 0.8, 2.0, 1.0, "xmgrid6")

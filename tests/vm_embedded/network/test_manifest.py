@@ -19,7 +19,6 @@ from vm_embedded.network.manifest import (
     FORMAT_VERSION,
     KINDS,
     LAYOUTS,
-    MOST_DILATION,
     Manifest,
     ObjectClass,
 )
@@ -53,11 +52,9 @@ orders = st.sampled_from(
 """Edges and the layouts that there are for them."""
 
 
-def _manifest(order, tall, layer_dilations, **entries):
-    """A cylinder has a height; lattice and canvas need their meshes. Not all orders allow dilations."""
+def _manifest(order, tall, **entries):
+    """A cylinder has a height; layout canvas needs its mesh."""
     edge, layout = order
-    if edge == "hard" and layout in ("plain", "runs"):
-        entries["layer_dilations"] = layer_dilations
     if layout == "canvas":
         entries["peaks"] = tuple(each.name for each in entries["classes"][::-1] if each.kind in ("object", "upright"))
     mesh = entries.pop("mesh") if layout in ("plain", "runs") else MESHES[layout]
@@ -69,7 +66,6 @@ manifests = st.builds(
     _manifest,
     order=orders,
     tall=reals(0.01, 3.0),
-    layer_dilations=st.lists(st.integers(1, MOST_DILATION), max_size=4).map(tuple),
     shape=st.sampled_from(sorted(SHAPES)),
     radius=reals(1e-3, 10.0),
     object_radius=reals(1e-3, 10.0),
@@ -140,35 +136,25 @@ def test_a_missing_entry_is_refused_by_name(entry):
         Manifest.from_json(changed(**{entry: ...}))
 
 
-def test_files_without_dilations_and_peaks_lack_their_entries_as_before():
-    assert not {"layer_dilations", "peaks"} & set(json.loads(BALL.as_json()))
-    assert Manifest.from_json(changed(layer_dilations=[1, 4, 2, 4])).dilations == (1, 2, 4)
+def test_files_without_peaks_lack_their_entry_as_before():
+    assert "peaks" not in json.loads(BALL.as_json())
 
 
 @pytest.mark.parametrize(
     ("entries", "said"),
     [
-        ({"layer_dilations": 2}, "must be a list, not 2"),
-        ({"layer_dilations": [0]}, "whole numbers up to 64, not 0"),
-        ({"layer_dilations": [1, 65]}, "whole numbers up to 64, not 65"),
-        ({"layer_dilations": [1.5]}, "not 1.5"),
-        ({"layer_dilations": [True]}, "not True"),
-        ({"layer_dilations": [2], "edge": "same"}, "edge hard and layout plain or runs, not same and plain"),
-        ({"layer_dilations": [2], "layout": "lattice", "mesh": "xygrid6"}, "not hard and lattice"),
-        ({"layer_dilations": [2], "layout": "canvas", "mesh": "octaves"}, "not hard and canvas"),
         *(
             ({"layout": layout, "mesh": mesh}, f"the mesh is {mesh}, the layout {layout}")
             for layout, mesh in (
                 ("plain", "octaves"),
                 ("runs", "octaves"),
-                ("lattice", "octaves"),
                 ("canvas", "xygrid6"),
             )
         ),
         ({"layout": "canvas", "mesh": "octaves", "edge": "same"}, "canvas"),
     ],
 )
-def test_impossible_dilations_are_refused(entries, said):
+def test_a_layout_and_a_mesh_that_do_not_fit_are_refused(entries, said):
     with pytest.raises(ModelError, match=said):
         Manifest.from_json(changed(**entries))
 
@@ -202,7 +188,7 @@ def test_impossible_peaks_are_refused(peaks, said):
         Manifest.from_json(json.dumps(data))
 
 
-@pytest.mark.parametrize("layout", ["plain", "runs", "lattice"])
+@pytest.mark.parametrize("layout", ["plain", "runs"])
 def test_other_layouts_have_no_peaks(layout):
     with pytest.raises(ModelError, match=f"peaks.*canvas.*{layout}"):
         ball_manifest("ball", layout=layout, mesh=MESHES[layout], peaks=("ball",))

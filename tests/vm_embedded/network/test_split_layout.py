@@ -25,7 +25,6 @@ from vm_export.network_shape import Layer, NetworkShape
 from ..strategies import seeds
 from .test_layout import (
     MODELS,
-    MOST,
     WHOLE,
     answers,
     masks,
@@ -62,7 +61,7 @@ def convolutions(network):
 @given(st.data(), models, counts, seeds)
 @settings(max_examples=60)
 def test_sectors_give_the_answers_of_the_whole_mesh(others, data, model, count, seed):
-    network = network_of(data.draw(network_shapes(model, MOST)), seed)
+    network = network_of(data.draw(network_shapes(model)), seed)
     is_any = data.draw(st.booleans())
     mesh, seen = (
         (data.draw(random_meshes(MESH_MODELS[model].neighbors)), None) if is_any else data.draw(ring_meshes(model))

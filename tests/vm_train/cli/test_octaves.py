@@ -107,7 +107,6 @@ def test_it_is_trained_further_from_its_checkpoint_and_from_its_model_file(train
     [
         ("network.activation=relu", "activation"),
         ("network.kind=separable", "kind"),
-        ("network.dilations=[2]", "dilations"),
         ("network.width=20", "16"),
         ("mesh.grid=hexagonal", "hexagonal"),
     ],

@@ -40,7 +40,7 @@ def data(tmp_path_factory):
     ("model", "layouts"),
     [
         ("cap6", ("plain", "runs")),
-        ("xmgrid8", ("runs", "lattice")),
+        ("xmgrid8", ("plain", "runs")),
         ("wall6", ("plain", "runs")),
     ],
 )

@@ -48,16 +48,13 @@ def test_classes_come_in_their_order_with_their_colors(write):
         ("[training]\nselection = 'balance'\n", "did you mean 'balanced'"),
         ("[mesh]\nradius = 'big'\n", "radius must be a number"),
         ("[mesh]\ngrid = 'hexagonal'\nmodel = 'ring8'\n", "six neighbors"),
-        ("[network]\ndilations = [1, 2]\n", "dilations must be 9 numbers, one for each convolution, not 2"),
-        ("[network]\ndepth = 1\ndilations = [65]\n", r"whole numbers from 1 to 64, not \[65\]"),
-        ("[network]\ndepth = 1\ndilations = 2\n", "dilations must be a list of whole numbers"),
         ("[mesh]\nmodel = 'octaves'\n[network]\nwidth = 12\n", "multiple of 8, such as 8, not 12"),
         *(
             (
                 f"[mesh]\nmodel = 'octaves'\n[network]\ndepth = 1\n{entry}\n",
                 f"{entry.split()[0]} of .network. has no effect",
             )
-            for entry in ("activation = 'relu'", "kind = 'separable'", "dilations = [2]")
+            for entry in ("activation = 'relu'", "kind = 'separable'")
         ),
         ("[mesh]\nmodel = 'octaves'\ngrid = 'hexagonal'\n", "hexagonal grid needs a mesh.model with six neighbors"),
         ("[classes]\nball = 3\n", "ball must be like"),
@@ -80,9 +77,7 @@ def test_what_is_wrong_is_said(write, text, said):
 def test_entries_can_be_overridden(write):
     path = write("[training]\nepochs = 3\nbatch = 2\n")
     given = parse_overrides(["training.epochs=7", "training.selection=balanced", "mesh.radius = 0.1"], "a.b=c")
-    given |= parse_overrides(["network.depth=3", "network.dilations=[1, 4, 2]"], "a.b=c")
     found = read_sections(TrainConfiguration, path, given)
-    assert found.network_shape.layer_dilations == found.manifest.layer_dilations == (1, 4, 2)
     assert (found.training.epochs, found.training.batch) == (7, 2)
     assert (found.training.selection, found.mesh.radius) == ("balanced", 0.1)
 
@@ -90,7 +85,7 @@ def test_entries_can_be_overridden(write):
 def test_octaves_have_a_network_and_a_layout_of_their_own(write):
     found = read_sections(TrainConfiguration, write("[mesh]\nmodel = 'octaves'\n[network]\ndepth = 2\nwidth = 24\n"))
     assert found.network_shape == CanvasShape(2, 24, len(found.classes.colors))
-    assert (found.manifest.mesh, found.manifest.layout, found.manifest.layer_dilations) == ("octaves", "canvas", ())
+    assert (found.manifest.mesh, found.manifest.layout) == ("octaves", "canvas")
     assert read_sections(TrainConfiguration, write(to_commented_toml(found))) == found
 
 

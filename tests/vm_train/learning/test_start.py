@@ -4,8 +4,6 @@ import hashlib
 import shutil
 from dataclasses import replace
 
-import cv2
-import numpy as np
 import pytest
 import torch
 
@@ -13,7 +11,6 @@ from tests.vm_export.checkpoints import manifest
 from tests.vm_train.commands import run
 from tests.vm_train.drawn import CLASSES
 from tests.vm_train.weights import weights_of
-from vm_embedded import Detector, read_lens_file
 from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import SHIPPED, model_path
@@ -54,26 +51,6 @@ def test_with_a_tiny_rate_the_network_stays_the_same_from_a_checkpoint_and_from_
         assert hashlib.sha256(copy.read_bytes()).hexdigest() == digest
         assert Checkpoint.load(folder / "model.pt").manifest.provenance["start_sha256"] == digest
     assert Checkpoint.load(first).manifest.provenance["start_sha256"] == "none"
-
-
-@pytest.mark.long
-def test_dilations_are_trained_exported_and_trained_further(data, configuration, tmp_path):
-    """Both layouts answer alike. A training from a model file has the same dilations, or others that are given."""
-    made, tables, model = tmp_path / "run" / "model.pt", tmp_path / "classes.toml", tmp_path / "model.onnx"
-    settings = ("--config", configuration, "--set", "network.dilations=[1,3,2]")
-    run(data, "-o", made.parent, *settings, *ONE_EPOCH)
-    image, shown = cv2.imread(str(next(data.glob("image*")))), read_lens_file(next(data.glob("lens*.yaml")))
-    answers = []
-    for layout in ("plain", "runs"):
-        export(Checkpoint.load(made), model, layout)
-        found = Detector.from_file(model).detect(image, shown.orientation, shown.lens)
-        answers.append(found.probabilities[np.lexsort(found.pixels.T)])
-    np.testing.assert_allclose(*answers, atol=1e-4)
-    tables.write_text(CLASSES)
-    for folder, others in (("same", ()), ("others", ("--set", "network.dilations=[2,1,1]"))):
-        run(data, "-o", tmp_path / folder, "--from", model, "--config", tables, *others, *ONE_EPOCH, *STILL)
-        shape = Checkpoint.load(tmp_path / folder / "model.pt").network.shape
-        assert shape.layer_dilations == ((2, 1, 1) if others else (1, 3, 2))
 
 
 @pytest.mark.long
