@@ -298,7 +298,7 @@ class Manifest:
         data["look"] = self.look.as_dict() if self.look else None
         data["upright_looks"] = [each.as_dict() for each in self.upright_looks]
         data["self_test"] = None if self.self_test is None else self.self_test.as_dict()
-        if not self.peaks:  # as in files of earlier releases
+        if not self.peaks:
             del data["peaks"]
         return json.dumps(data, sort_keys=True, separators=(",", ":"))
 
@@ -321,7 +321,7 @@ class Manifest:
         for key in data:
             if key not in known:
                 raise ModelError(unknown("entry in the model's manifest", key, known))
-        data = {"peaks": []} | data
+        data.setdefault("peaks", [])  # of a network without any
         missing = [name for name in known if name not in data]
         if missing:
             raise ModelError(f"the model's manifest lacks {', '.join(missing)}")
