@@ -18,7 +18,7 @@ from .coco import is_coco, read_coco
 from .coco_file import coco_files
 from .fit import fit
 from .folder_files import FolderFiles, find_files
-from .image_facts import UPRIGHT, ImageFacts, image_facts
+from .image_facts import ImageFacts, image_facts
 from .recordings import recordings
 from .voc import is_voc, read_voc
 from .yolo import is_yolo, read_yolo
@@ -129,8 +129,6 @@ def _lens(files: FolderFiles, image: Path, facts: ImageFacts) -> tuple[Path | No
     if path is None:
         return None, []
     try:
-        if facts.orientation != UPRIGHT:
-            raise InputError(f"{image.name} is turned by its EXIF orientation {facts.orientation}, the lens is not")
         read_lens_file(path).lens.for_image(facts.size)
     except InputError as error:
         return None, [f"{files.label(path)}: {error}; {files.label(image)} is used without lens"]
