@@ -1,13 +1,13 @@
 """The camera protocol: shots, errors and settings that all live cameras share.
 
-The kinds of cameras: devices and streams through OpenCV (opencv.py), Motion JPEG over HTTP (mjpeg.py), files played at
-their own rate (files.py), a drawn field (synthetic.py), and another camera with scripted faults (fault.py).
+The kinds of cameras: devices and streams through OpenCV (opencv.py), Motion JPEG (mjpeg.py) and single images over HTTP
+(snapshots.py), files played at their own rate (files.py), a drawn field (synthetic.py), and another camera with
+scripted faults (fault.py).
 open_camera.py chooses among them.
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -112,8 +112,3 @@ class CameraSettings:
 def camera_number(source: str) -> int | None:
     """The number of a device, as in /dev/videoN; None for any other source."""
     return int(source) if source.isascii() and source.isdigit() and len(source) <= _DIGITS else None
-
-
-def without_password(source: str) -> str:
-    """The source to show in messages: user and password are removed from an address."""
-    return re.sub(r"//[^/]*@", "//", source)

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Image
+from ..borders.credentials import without_password
 from ..borders.opencv_text import open_capture
 from ..borders.text import utf8
 from ..detection.pixel_formats import FORMATS
@@ -135,7 +136,7 @@ def _open(name: str, path: Path, raw: bool, max_megapixels: float) -> Source:
         if not found:
             raise InputError(f"no images match {name}")
         return _images(_without_companions(found), read)
-    raise InputError(f"no such image, directory, video or camera: {name}")
+    raise InputError(f"no such image, directory, video or camera: {without_password(name)}")
 
 
 def _deeper(folder: Path) -> str:

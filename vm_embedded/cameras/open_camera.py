@@ -7,14 +7,17 @@ from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
+from ..borders.credentials import without_password
 from ..borders.opencv_text import check_address
 from ..errors import InputError, unknown
 from ..files import exists, is_file
-from .camera import Camera, CameraSettings, without_password
+from .camera import Camera, CameraSettings
 from .fault import FaultCamera, Faults, FaultScript
 from .files import FileCamera
-from .mjpeg import MjpegCamera, NotMotionJpegError, parse_url
+from .http_get import parse_url
+from .mjpeg import MjpegCamera, NotMotionJpegError
 from .opencv import OpenCvCamera, check_opencv_settings, device_path
+from .snapshots import SnapshotCamera
 from .synthetic import SyntheticCamera, parse_motion
 
 ROS = "ros"
@@ -90,8 +93,8 @@ def _check_protocol(source: str) -> None:
 
 
 def _network_camera(settings: CameraSettings, raw: bool) -> Camera:
-    """A Motion JPEG stream, or any other stream that OpenCV reads from the address."""
+    """A Motion JPEG stream, single images, or any other stream that OpenCV reads from the address."""
     try:
         return MjpegCamera(settings, raw)
-    except NotMotionJpegError:
-        return OpenCvCamera(settings, raw)
+    except NotMotionJpegError as error:
+        return SnapshotCamera(settings, raw) if error.kind.startswith("image/") else OpenCvCamera(settings, raw)
