@@ -69,7 +69,11 @@ class HttpGet:
     def _authorization(self, challenges: list[str]) -> str:
         user, password = (unquote(each or "") for each in (self._url.username, self._url.password))
         digest = digest_authorization(challenges, user, password, self._target)
-        return digest or "Basic " + base64.b64encode(f"{user}:{password}".encode()).decode()
+        if digest is not None:
+            return digest
+        if challenges and not any("basic" in each.lower() for each in challenges):
+            raise CameraError(f"{self._name} asks for a kind of authentication that is neither basic nor digest")
+        return "Basic " + base64.b64encode(f"{user}:{password}".encode()).decode()
 
     def _no_response(self, error: Exception) -> CameraError:
         return CameraError(f"no response from {self._name}: {one_line(error)}{password_hint(self._source)}")
@@ -79,7 +83,7 @@ class HttpGet:
         if self.response.status != 401:
             return ""
         if self._url.username is None:
-            return ": give user and password as in http://USER:PASSWORD@HOST/"
+            return ": write USER:PASSWORD@ before the host in the address"
         return f": check user and password; {HINT}"
 
     def close(self) -> None:
