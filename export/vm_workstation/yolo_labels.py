@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import exists
+from vm_embedded.files import exists, there
 from vm_embedded.output.box_files import Shares, edges
 
 from .yolo_names import tables_in
@@ -54,7 +54,7 @@ def find_labels(image: Path) -> Path | None:
     places = [image.parent, image.parent / "labels"]
     above = [folder for folder in image.parents if folder.name == "images"]
     places += [folder.with_name("labels") / image.parent.relative_to(folder) for folder in above]
-    return next((path for path in (place / f"{image.stem}.txt" for place in places) if exists(path)), None)
+    return next(filter(exists, (there(place / f"{image.stem}.txt") for place in places)), None)
 
 
 def yolo_files(images: Iterable[Path]) -> Iterator[Path]:

@@ -17,6 +17,7 @@ from typing import Any, NoReturn, ParamSpec
 
 from ..borders.credentials import without_credentials
 from ..errors import VisualMeshError, unknown
+from ..files import there
 from .terminal import lost_output, open_streams, printable_output
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
@@ -130,7 +131,7 @@ def _path(text: str) -> Path:
     """The path in an argument. Raises ArgumentTypeError for an empty one, which Path takes for the current folder."""
     if not text:
         raise argparse.ArgumentTypeError("the path is empty")
-    return Path(text)
+    return there(Path(text))
 
 
 def _whole_number(text: str) -> int:
