@@ -63,7 +63,7 @@ def one_number(value: object, name: str) -> float:
 
     It may be NaN or infinite. Raises InputError with the name of the argument for anything else, also for true.
     """
-    numbers = _numbers(value) if isinstance(value, np.ndarray) or np.ndim(value) == 0 else None
+    numbers = None if isinstance(value, list | tuple) else _numbers(value)
     if numbers is None or numbers.size != 1:
         raise InputError(f"{name} must be a number, not {str(value)[:60]!r} ({type(value).__name__})")
     return float(numbers.item())

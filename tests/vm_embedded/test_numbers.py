@@ -64,7 +64,21 @@ KINDS = [
     np.float64, np.float32, lambda value: np.array(value), lambda value: np.array([value]),
     lambda value: np.array([[value]], dtype=np.float32),
 ]  # fmt: skip
-OTHERS = ["0.8", "much", b"0.8", [0.8], (0.8, 0.9), [], {}, True, np.array([0.8, 0.9]), np.array([]), 1j, object()]
+OTHERS = [
+    "0.8",
+    "much",
+    b"0.8",
+    [0.8],
+    (0.8, 0.9),
+    [],
+    [[1], [2, 3]],
+    {},
+    True,
+    np.array([0.8, 0.9]),
+    np.array([]),
+    1j,
+    object(),
+]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -65,20 +65,23 @@ class _Reader:
         """The images that can be used, with their boxes."""
         images = self._images()
         boxes: dict[Id, list[RawBox]] = defaultdict(list)
-        known = {str(entry["id"]): entry["id"] for entry in self._content.images if is_id(entry.get("id"))}
+        ids = [entry["id"] for entry in self._content.images if is_id(entry.get("id"))]
+        known = {str(each): each for each in ids} | {each: each for each in ids}  # some programs write 1 as "1"
         for position, entry in enumerate(self._content.annotations):
             name = shown(entry["id"]) if "id" in entry else f"at position {position}"
             place = f"{self._label} annotation {name}"
+            key = entry.get("image_id")
+            key = known.get(key, known.get(str(key))) if is_id(key) else None
+            if key is None:
+                self.faults.append(f"{place}: there is no image with id {shown(entry.get('image_id'))}; box not used")
+                continue
             try:
-                key = entry.get("image_id")
-                if not is_id(key) or str(key) not in known:  # some programs write a number as a text
-                    raise InputError(f"there is no image with id {shown(key)}; box not used")
-                key = known[str(key)]
                 boxes[key].append(_box(entry, place, self._content.categories))
             except InputError as error:
-                path, _ = images.get(key, (None, None))
-                self.faults.append(f"{place}: {error}" + (f"; {self._index.labels([path])} not used" if path else ""))
-                self.spoiled.update([path] if path else [])
+                self.faults.append(f"{place}: {error}")
+                if key in images:
+                    self.faults[-1] += f"; {self._index.labels([images[key][0]])} not used"
+                    self.spoiled.add(images[key][0])
         return [
             Annotation(path, self._label, tuple(boxes[key]), size)
             for key, (path, size) in images.items()

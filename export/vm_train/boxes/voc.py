@@ -88,7 +88,8 @@ def _parse(path: Path) -> ElementTree.Element:
         raise InputError(f"is cut short or not XML ({one_line(error)})") from error
     assert isinstance(root, ElementTree.Element)
     if root.tag != "annotation":
-        raise InputError(f"begins with <{root.tag}>, not with <annotation>")
+        hint = ": this is CVAT's own format; export as COCO, Pascal VOC or YOLO" if root.tag == "annotations" else ""
+        raise InputError(f"begins with <{root.tag}>, not with <annotation>{hint}")
     return root
 
 

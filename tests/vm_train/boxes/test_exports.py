@@ -137,6 +137,14 @@ def test_an_export_is_read_without_a_format_and_with_any_text_beside_it(export, 
     assert [box.name for some in boxes.values() for box in some] == ["ball"]
 
 
+def test_cvat_s_own_format_is_named(tmp_path):
+    write_image(tmp_path / "images/a.jpg")
+    (tmp_path / "annotations.xml").write_text('<annotations><image id="0" name="a.jpg"/></annotations>')
+    faults = read_boxes(tmp_path).faults
+    assert "CVAT" in faults[0]
+    assert "annotations.xml" in faults[0]
+
+
 def test_the_case(shared):
     folder = shared / "cases/boxes/roboflow-coco"
     if not folder.is_dir():

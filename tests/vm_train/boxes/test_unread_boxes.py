@@ -104,6 +104,29 @@ def test_an_image_of_coco_whose_number_is_a_text_elsewhere_keeps_its_boxes(tmp_p
     assert faults == []
 
 
+@pytest.mark.parametrize("key", [[1], {}, None, 0.5, True, "12 ", 10**30])
+def test_an_annotation_of_coco_without_an_image_is_a_fault_of_its_own(key, tmp_path):
+    write_coco(tmp_path, {**GOOD, "a": [BALL]})
+    path = tmp_path / "instances.json"
+    table = json.loads(path.read_text())
+    table["annotations"].append({"id": 9, "image_id": key, "category_id": 3, "bbox": [1, 2, 30, 30]})
+    path.write_text(json.dumps(table))
+    boxes, faults = boxes_of(tmp_path)
+    assert [len(each) for each in boxes.values()] == [1, 1, 0]
+    assert len(faults) == 1
+    assert "annotation 9" in faults[0]
+
+
+def test_a_number_and_a_text_are_two_ids_of_coco_if_both_are_there(tmp_path):
+    write_coco(tmp_path, {"a": [BALL], "b": []})
+    path = tmp_path / "instances.json"
+    table = json.loads(path.read_text())
+    table["images"][1]["id"] = str(table["images"][0]["id"])
+    path.write_text(json.dumps(table))
+    boxes, _ = boxes_of(tmp_path)
+    assert {name: len(each) for name, each in boxes.items()} == {"a": 1, "b": 0}
+
+
 @pytest.mark.parametrize("angle", [0.0, 30.0, 90.0, -45.0])
 def test_oriented_boxes_of_cvat_and_polygons_of_coco_give_outer_boxes(angle, tmp_path):
     table = coco_table({"a": [BALL], "b": [BALL]})
