@@ -1,7 +1,12 @@
 """Images that their EXIF entry turns: one rule for all formats and programs."""
 
+import http.server
 import io
 import struct
+import threading
+import zlib
+from contextlib import closing
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -11,9 +16,12 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from tests.vm_embedded.cli.commands import lines, run
+from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cameras.decoding import decode
 from vm_embedded.cameras.exif import orientation_of, turned
 from vm_embedded.cameras.image_files import open_source, read_image
+from vm_embedded.cameras.open_camera import camera_opener
+from vm_embedded.cameras.ros.images import image_of
 
 STORED = np.kron(np.random.default_rng(0).integers(0, 255, (3, 4, 3), dtype=np.uint8), np.ones((16, 16, 1), np.uint8))
 LOSSLESS = {".jpg": {"quality": 100, "subsampling": 0}, ".png": {}, ".webp": {"lossless": True}, ".tif": {}}
@@ -57,13 +65,10 @@ def test_a_gray_image_is_turned_too(suffix):
 
 
 def test_the_rule_is_that_of_opencv():
-    content = written(".jpg", 1)
-    start = content.index(b"Exif\0\0")
     for orientation in range(1, 9):
-        other = written(".jpg", orientation)
-        assert other[start:].startswith(b"Exif\0\0")
-        image = cv2.imdecode(np.frombuffer(other, np.uint8), cv2.IMREAD_COLOR)
-        np.testing.assert_array_equal(decode(other), image)
+        content = written(".jpg", orientation)
+        image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+        np.testing.assert_array_equal(decode(content), image)
 
 
 @pytest.mark.parametrize("value", [0, 9, 65535])
@@ -75,8 +80,6 @@ def test_an_orientation_that_does_not_exist_turns_nothing(value):
 
 
 def chunk(kind, content):
-    import zlib
-
     return struct.pack(">I4s", len(content), kind) + content + struct.pack(">I", zlib.crc32(kind + content))
 
 
@@ -144,3 +147,32 @@ def test_a_phone_s_photo_shows_the_balls_that_the_upright_one_shows(shared, tmp_
 def turned_back(image):
     """An image as a camera stores it that writes the orientation 6."""
     return np.ascontiguousarray(np.rot90(image))
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".png"])
+def test_cameras_of_the_network_and_topics_are_turned_as_files_are(suffix, tmp_path):
+    content = written(suffix, 6)
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            part = b"--frame\r\nContent-Length: %d\r\n\r\n%s\r\n" % (len(content), content)
+            stream = self.path == "/stream"
+            kind = (
+                "multipart/x-mixed-replace; boundary=frame" if stream else f"image/{suffix[1:].replace('jpg', 'jpeg')}"
+            )
+            self.send_response(200)
+            self.send_header("Content-Type", kind)
+            self.end_headers()
+            self.wfile.write(part * 2 if stream else content)
+
+        def log_message(self, *_):
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        for place in ("stream", f"snapshot{suffix}"):
+            source = f"http://127.0.0.1:{server.server_port}/{place}"
+            with closing(camera_opener(CameraSettings(source=source))()) as camera:
+                assert near(camera.read().image, upright(6))
+        server.shutdown()
+    assert near(image_of(SimpleNamespace(format=suffix[1:], data=content)), upright(6))
