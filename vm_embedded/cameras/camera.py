@@ -41,7 +41,7 @@ class Shot:
     image: BGR, or the camera's own channels if the pixel format is another. captured: when the frame was taken, in
     monotonic time [s]. encoded: the JPEG that the camera sent, if it did. orientation, lens: of the camera, if the
     source knows them. truth: what a synthetic camera knows about its scene. arrived: when the frame arrived, in
-    monotonic time [s]; the grabber sets it.
+    monotonic time [s]; the grabber sets it. topic: of ROS, if the frame came from one.
     """
 
     image: Image
@@ -51,6 +51,7 @@ class Shot:
     lens: Lens | None = None
     truth: dict[str, Any] = field(default_factory=dict)
     arrived: float = 0.0
+    topic: str = ""
 
 
 class Camera(Protocol):
