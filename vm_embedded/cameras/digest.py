@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from typing import Any
 from urllib.request import parse_http_list
 
-_ALGORITHMS = {"SHA-256": hashlib.sha256, "MD5": partial(hashlib.md5, usedforsecurity=False)}
+_ALGORITHMS: dict[str, Callable[[bytes], Any]] = {
+    "SHA-256": hashlib.sha256,
+    "MD5": partial(hashlib.md5, usedforsecurity=False),
+}
 """Hash functions by name, the strongest first."""
 
 
@@ -24,7 +28,7 @@ def digest_authorization(challenges: Sequence[str], user: str, password: str, ta
     algorithm, is_session = _algorithm(offer)
 
     def hashed(*parts: str) -> str:
-        return _ALGORITHMS[algorithm](":".join(parts).encode()).hexdigest()
+        return str(_ALGORITHMS[algorithm](":".join(parts).encode()).hexdigest())
 
     nonce, client = offer["nonce"], secrets.token_hex(8)
     identity = hashed(user, offer.get("realm", ""), password)
