@@ -31,6 +31,8 @@ def without_credentials(text: str) -> str:
 def _without_user(start: re.Match[str]) -> str:
     protocol, before = start.groups()
     host = re.split(r"[/?#]", before)[0]
+    if before == _HIDDEN:
+        return start[0]
     if host == before:
         return protocol
     # An @ behind the host is part of a path, or of a password with such characters.

@@ -115,7 +115,7 @@ def _refused_connection(source: str) -> str:
         with socket.create_connection((address.hostname, address.port or _PORTS[address.scheme]), _PATIENCE):
             return ""
     except OSError as error:
-        return error.strerror or str(error)
+        return f"{error.strerror or error}{password_hint(source)}"
     except ValueError as error:  # for example a port that is no number; the error may quote a password
         return f"the address is not valid{password_hint(source)}" if "@" in source else str(error)
 

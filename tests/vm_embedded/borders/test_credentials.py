@@ -42,6 +42,7 @@ SECRET = "hunter2"
 )
 def test_the_address_is_shown_without_its_secrets(source, shown):
     assert without_password(source) == shown
+    assert str(InputError(shown)) == shown  # errors look for secrets again
 
 
 @pytest.mark.parametrize(
