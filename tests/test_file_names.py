@@ -4,6 +4,8 @@ import json
 import os
 import shutil
 import subprocess
+from functools import partial
+from unicodedata import normalize
 
 import cv2
 import numpy as np
@@ -11,7 +13,13 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from tests.drawn_scenes import FOLDER, IMAGES, MODEL
-from tests.programs import BIN
+from tests.programs import BIN, run_program
+from tests.vm_train.boxes.written import WRITERS
+from vm_embedded.cameras.open_camera import is_live
+from vm_embedded.errors import InputError
+from vm_embedded.files import read_text
+from vm_label.box_folder import read_box_folder
+from vm_train.boxes.read import read_boxes
 
 LENS = FOLDER / f"lens{IMAGES[0].stem.removeprefix('image')}.yaml"
 
@@ -194,3 +202,89 @@ def test_a_training_in_a_folder_of_any_name_ends_and_its_network_is_exported(box
     run("vm-train", "resume", b"r\xfcn", cwd=boxes)
     run("vm-export", b"r\xfcn/model.pt", "-o", b"m\xfc.onnx", cwd=boxes)
     lines(run("vm-detect", "--model", b"m\xfc.onnx", IMAGES[0], "--lens", LENS, cwd=boxes))
+
+
+def test_files_whose_names_have_colons_are_files(tmp_path):
+    prefixes = ("synthetic", "fault", "gstreamer", "ros", "http", "12:30", "udp")
+    names = [f"{prefix}:05.avi" for prefix in prefixes]
+    for name in names:
+        film(tmp_path / name, tmp_path, 1)
+    found = lines(run_program("vm-detect", *names, "--model", MODEL, "--lens", LENS, cwd=tmp_path).stdout)
+    assert [each["source"] for each in found] == names
+    for name in names[:3]:
+        assert is_live(name)
+        assert not is_live(str(tmp_path / name))
+
+
+def test_a_path_that_looks_like_an_address_is_a_path(tmp_path):
+    (tmp_path / "http:/b").mkdir(parents=True)
+    film(tmp_path / "http:/b/film.avi", tmp_path)
+    (tmp_path / "synthetic:fast").mkdir()
+    shutil.copy(IMAGES[0], tmp_path / "synthetic:fast")
+    shutil.copy(LENS, tmp_path / "tcp:lens.yaml")
+    given = ("--model", MODEL, "--lens", "tcp:lens.yaml")
+    run = partial(run_program, "vm-detect", cwd=tmp_path)
+    assert len(lines(run("--camera", "synthetic:fast", *given).stdout)) == 1
+    live = lines(run("--live", "http://b/film.avi", *given).stdout)
+    assert any(each.get("type") == "frame" for each in live)
+    saved = ("--save-boxes", "udp:boxes", "--save-video", "rtsp:o.mp4", "--save-overlay", "a://drawn")
+    assert len(lines(run("http://b/film.avi", *given, *saved).stdout)) == 4
+    assert all((tmp_path / each).stat().st_size for each in ("udp:boxes/classes.txt", "rtsp:o.mp4", "a:/drawn"))
+
+
+FORMS = [("NFC", "NFD"), ("NFD", "NFC")]
+CAFE = "Café Ångström 한글"
+
+
+@pytest.mark.parametrize(("written", "typed"), FORMS)
+def test_a_name_in_another_unicode_form_is_the_same_name(written, typed, tmp_path):
+    there, here = (normalize(each, CAFE) for each in (written, typed))
+    assert there != here
+    folder = tmp_path / there
+    folder.mkdir()
+    shutil.copy(IMAGES[0], folder / f"image{there}.jpg")
+    shutil.copy(LENS, folder / f"lens{here}.yaml")
+    shutil.copy(MODEL, folder / f"{there}.onnx")
+    film(folder / f"{there}.avi", tmp_path)
+    (folder / f"{there}.toml").write_text("[detector]\nthreads = 1\n")
+    given = ("--lens", f"{here}/lens{there}.yaml", "--config", f"{here}/{here}.toml", "--model", f"{here}/{here}.onnx")
+    run = partial(run_program, cwd=tmp_path)
+    assert len(lines(run("vm-detect", f"{here}/image{here}.jpg", f"{here}/{here}.avi", *given).stdout)) == 5
+    assert lines(run("vm-detect", "--live", f"{here}/{here}.avi", *given).stdout)
+    # Without --lens, the lens file beside the image counts.
+    assert len(lines(run("vm-detect", here, "--model", MODEL, "--save-boxes", f"{here}/boxes").stdout)) == 1
+    assert [each.name for each in tmp_path.iterdir() if each.is_dir()] == [there]
+    run("vm-calibrate", "lens", f"{here}/{here}.avi", "--board", "9x6", "-o", "lens.yaml", code=1)
+
+
+@pytest.mark.parametrize(("written", "typed"), FORMS)
+def test_annotations_whose_names_are_in_another_unicode_form_belong_to_their_images(written, typed, tmp_path):
+    there, here = (normalize(each, CAFE) for each in (written, typed))
+    for format, write in WRITERS.items():
+        folder = tmp_path / format
+        write(folder, {"a": [("ball", 20.0, 30.0, 40.0, 50.0)]}, beside=False)
+        for path in [each for each in folder.rglob("*") if each.stem == "a"]:
+            path.rename(path.with_name(f"{there if path.suffix == '.jpg' else here}{path.suffix}"))
+        for path in folder.rglob("*.json"):
+            path.write_text(path.read_text().replace("a.jpg", f"{here}.jpg"))
+        found = read_boxes(tmp_path / format)
+        assert found.faults == ()
+        assert len(found.pictures[0].boxes) == 1
+        path = next(each for each in folder.rglob("*.jpg"))
+        (path.parent / f"{here}.yaml").write_text("projection: RECTILINEAR\nfocal_length: 120.0\nfov: 1.5\n")
+        assert read_boxes(folder).pictures[0].lens is not None
+    assert read_box_folder(tmp_path / "yolo").crops
+
+
+def test_of_two_names_in_different_unicode_forms_each_is_itself(tmp_path):
+    paths = [tmp_path / normalize(form, CAFE) for form in ("NFC", "NFD")]
+    for path in paths:
+        path.write_text(repr(path))
+    assert [read_text(path) for path in paths] == list(map(repr, paths))
+    paths[0].unlink()
+    assert read_text(paths[0]) == repr(paths[1])
+    paths[1].unlink()
+    with pytest.raises(InputError, match="No such file"):
+        read_text(paths[0])
+    paths[0].write_text("new")  # the folder was changed since it was listed
+    assert read_text(paths[1]) == "new"

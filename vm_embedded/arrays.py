@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal
+from numbers import Real
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from .errors import InputError
 
 Floats = npt.NDArray[np.float64]
 """For geometry, in double precision, so that pixels agree with the reference to 1e-3 px."""
@@ -50,10 +54,30 @@ def numbers_or_nan(values: object) -> Floats:
 
     So the check of a caller for finite numbers also rejects what is no array of numbers.
     """
+    numbers = _numbers(values)
+    return np.array(np.nan) if numbers is None else numbers
+
+
+def one_number(value: object, name: str) -> float:
+    """A number of Python or numpy, also as an array of one number, as OpenCV returns them.
+
+    It may be NaN or infinite. Raises InputError with the name of the argument for anything else, also for true.
+    """
+    numbers = None if isinstance(value, list | tuple) else _numbers(value)
+    if numbers is None or numbers.size != 1:
+        raise InputError(f"{name} must be a number, not {str(value)[:60]!r} ({type(value).__name__})")
+    return float(numbers.item())
+
+
+def _numbers(values: object) -> Floats | None:
+    """A new array of these numbers; None for anything else, such as texts that could be read as numbers."""
     try:
-        return np.array(values, dtype=np.float64)
+        given = np.asarray(values)
+        if given.dtype.kind not in "iuf" and not all(isinstance(each, Real | Decimal) for each in given.flat):
+            return None
+        return given.astype(np.float64)
     except (TypeError, ValueError, OverflowError):
-        return np.array(np.nan)
+        return None
 
 
 def frozen(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

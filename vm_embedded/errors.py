@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+from .borders.credentials import without_credentials
 from .borders.text import printable
 
 _MOST_START, _MOST_END = 1500, 500
@@ -15,11 +16,11 @@ class VisualMeshError(Exception):
     """Base of all errors that a user can fix; the message is one line of text, of 2,000 characters and a few.
 
     Messages quote values from files and from the network, so what could end the line or control a terminal is escaped,
-    and the middle of a long message is left out.
+    passwords in addresses are hidden, and the middle of a long message is left out.
     """
 
     def __str__(self) -> str:
-        text = super().__str__()
+        text = without_credentials(super().__str__())
         if len(text) > _MOST_START + _MOST_END:
             text = f"{text[:_MOST_START]} ... {text[-_MOST_END:]}"
         return printable(text)
@@ -47,7 +48,7 @@ class ModelError(VisualMeshError):
 
 def one_line(error: BaseException) -> str:
     """The message of another library's error, as one line of at most 200 characters."""
-    return (" ".join(str(error).split()) or type(error).__name__)[:200]
+    return (" ".join(without_credentials(str(error)).split()) or type(error).__name__)[:200]
 
 
 def install_extra(extra: str) -> str:

@@ -14,8 +14,10 @@ import stat
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import IO, BinaryIO
+from unicodedata import normalize
 
 from .borders.text import utf8
 from .errors import InputError
@@ -31,6 +33,27 @@ _SHOWN = 24  # letters of a name in the name of its unfinished file, so that fil
 def exists(path: Path) -> bool:
     """Whether a path exists. False for one that can't be looked at, where Path.exists raises OSError."""
     return os.path.exists(path)  # noqa: PTH110
+
+
+def there(path: Path) -> Path:
+    """The path; if nothing is there, the existing one that differs from it only in the Unicode normal form of names.
+
+    Systems and programs write a letter such as é as one character or as two. People see no difference.
+    """
+    if str(path).isascii() or exists(path):
+        return path
+    folder, name = there(path.parent), path.name
+    if not name.isascii():
+        with suppress(OSError, ValueError):
+            name = _names_by_form(str(folder), folder.stat().st_mtime_ns).get(normalize("NFC", name), name)
+    return folder / name
+
+
+@lru_cache(16)
+def _names_by_form(folder: str, _changed: int) -> dict[str, str]:
+    """The names in a folder that are not ASCII, by their normal form NFC. _changed: when the folder was changed."""
+    names = sorted(each.name for each in Path(folder).iterdir())
+    return {normalize("NFC", name): name for name in names if not name.isascii()}
 
 
 def is_file(path: Path) -> bool:
@@ -170,9 +193,10 @@ def open_regular(path: Path) -> BinaryIO:
     """Open a regular file for reading.
 
     Reading a pipe, socket or device may wait forever, or never end. Raises OSError for those, for a folder, for a name
-    that can't be a path, and if the file can't be opened.
+    that can't be a path, and if the file can't be opened. The path may be in another normal form (see `there`).
     """
     try:
+        path = there(path)
         _check_regular(path, path.stat().st_mode)  # first of all, because some devices act when they are opened
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
     except ValueError as error:  # the name has a zero byte

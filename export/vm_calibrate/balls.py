@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.arrays import Floats, number_or_nan
-from vm_embedded.cameras.image_files import IMAGE_SUFFIXES, read_image
+from vm_embedded.cameras.frame_source import IMAGE_SUFFIXES
+from vm_embedded.cameras.image_files import read_image
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.files import read_text
 from vm_embedded.geometry.lens import Size

@@ -12,6 +12,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.cameras.image_files import open_source
+from vm_embedded.cli.program import complain
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Size
@@ -98,10 +99,13 @@ def _sharp_frames(source: str, left_out: Counter[str]) -> Iterator[tuple[str, Im
     Counts frames that can't be read in `left_out`.
     """
     opened = open_source(source)
-    if opened.count is None:
-        raise InputError(f"the number of frames of {source} is unknown; give a video file or a folder of pictures")
-    length = -(-opened.count // SEARCHED)
-    progress = ProgressBar(opened.count, "vm-calibrate")
+    count = opened.count
+    if count is None and not opened.files:
+        raise InputError(f"{source} has no end; give a video file or a folder of pictures")
+    if count is None:  # some videos do not tell their length
+        count = sum(1 for _ in open_source(source).frames)
+    length = -(-count // SEARCHED)
+    progress = ProgressBar(count, "vm-calibrate")
     best: tuple[float, str, Image] | None = None
     try:
         for frame in opened.frames:
@@ -121,6 +125,8 @@ def _sharp_frames(source: str, left_out: Counter[str]) -> Iterator[tuple[str, Im
             yield best[1:]
     finally:
         progress.clear()
+    for remark in filter(None, opened.remarks()):
+        complain("vm-calibrate", remark)
 
 
 def _gray(image: Image) -> Image:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from vm_embedded.cameras.image_files import IMAGE_SUFFIXES
+from vm_embedded.cameras.frame_source import IMAGE_SUFFIXES
 from vm_embedded.errors import InputError, unknown
 from vm_embedded.files import exists, read_text
 from vm_embedded.output.box_files import CANDIDATES, SAME_PLACE, CandidateBox, Shares, edges, overlap

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.arrays import Floats, Image
-from vm_embedded.cameras.camera import CameraSettings, without_password
+from vm_embedded.borders.credentials import without_password
+from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cameras.open_camera import ROS, Opener, camera_opener
 from vm_embedded.cameras.ros.camera_poses import newest_pose, orientation_of
 from vm_embedded.cameras.ros.images import jpeg_message

@@ -81,7 +81,8 @@ class TopicCamera:
             )
         try:
             image: Image = image_of(message, self._raw, self._settings.max_megapixels)
-            return RosShot(image, captured, lens=self._lens(), stamp=header.stamp, frame_id=header.frame_id)
+            stamp, frame_id, topic = header.stamp, header.frame_id, self._newest.topic
+            return RosShot(image, captured, lens=self._lens(), topic=topic, stamp=stamp, frame_id=frame_id)
         except InputError as error:
             raise BrokenFrameError(str(error)) from error
 

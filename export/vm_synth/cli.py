@@ -21,6 +21,7 @@ from vm_embedded.files import check_writable, write_file
 from vm_workstation.contact_sheet import check_sheet_path, check_sheet_size, choose_indices, write_sheet
 from vm_workstation.option_types import add_set, at_least
 from vm_workstation.stopping import stoppable
+from vm_workstation.worker_process import check_shared_memory
 
 from .dataset.assets import asset_files, read_assets
 from .dataset.contact_sheet import cell, object_name, read_labeled, sheet
@@ -204,6 +205,7 @@ def _render(options: argparse.Namespace) -> int:
     if workers < 1 or options.count < 1:
         name, value = ("--workers", workers) if workers < 1 else ("--count", options.count)
         raise InputError(f"{name} must be at least 1, not {value}")
+    check_shared_memory()
     job = _begin(options)
     own = shard_of(range(options.count), *options.shard)
     left = [index for index in own if not is_done(options.out, index)]

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import cv2
 
-from vm_embedded.errors import VisualMeshError
+from vm_embedded.errors import InputError, VisualMeshError
 
 Work = TypeVar("Work")
 Result = TypeVar("Result")
@@ -38,6 +38,20 @@ def start_worker() -> None:
     Thread(target=_end_with_parent, daemon=True).start()
 
 
+def check_shared_memory() -> None:
+    """Raise InputError if the system gives no shared memory, without which worker processes can't be connected.
+
+    Programs call it before they create a folder.
+    """
+    try:
+        get_context("spawn").Lock()
+    except (OSError, ImportError) as error:
+        raise InputError(
+            f"worker processes need shared memory, but /dev/shm can't be used ({getattr(error, 'strerror', error)}): "
+            "mount it writable (docker run --shm-size 1g), or give the fewest --workers that the program allows"
+        ) from error
+
+
 @contextmanager
 def worker_pool(
     count: int, start: Callable[..., None] = start_worker, arguments: tuple[Any, ...] = ()
@@ -45,8 +59,9 @@ def worker_pool(
     """A pool of `count` worker processes. At the end it cancels work that has not started.
 
     start: the function that each process calls first, with these arguments; it must call `start_worker`.
-    Raises VisualMeshError if a worker is killed.
+    Raises VisualMeshError if a worker is killed, and InputError as `check_shared_memory` does.
     """
+    check_shared_memory()
     pool = ProcessPoolExecutor(count, get_context("spawn"), start, arguments)
     try:
         yield pool

@@ -1,7 +1,8 @@
 """Label files in YOLO format: where the one of an image lies, and what its lines say.
 
 A line is `class x y width height`: the number of the class in the table of names, then center and size of a box as
-shares of the image. A detector may add a sixth value, its confidence.
+shares of the image. A detector may add a sixth value, its confidence. Or a line is `class x y x y x y ...`: the corners
+of a polygon or an oriented box, of which the outer box is read.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import exists
+from vm_embedded.files import exists, there
 from vm_embedded.output.box_files import Shares, edges
 
 from .yolo_names import tables_in
 
 _VALUES = ("x", "y", "width", "height", "confidence")
+
+_VISIBILITY = re.compile(r"[012](\.0*)?")
 
 _MOST_SHOWN = 20
 """Most names in a message about a line."""
@@ -51,7 +54,7 @@ def find_labels(image: Path) -> Path | None:
     places = [image.parent, image.parent / "labels"]
     above = [folder for folder in image.parents if folder.name == "images"]
     places += [folder.with_name("labels") / image.parent.relative_to(folder) for folder in above]
-    return next((path for path in (place / f"{image.stem}.txt" for place in places) if exists(path)), None)
+    return next(filter(exists, (there(place / f"{image.stem}.txt") for place in places)), None)
 
 
 def yolo_files(images: Iterable[Path]) -> Iterator[Path]:
@@ -81,11 +84,19 @@ def parse_labels(text: str, names: Sequence[str]) -> tuple[list[LabeledBox], lis
 
 def _parse(line: str, number: int, names: Sequence[str]) -> LabeledBox:
     words = line.split()
-    if len(words) not in (5, 6):
-        raise InputError(
-            f"{line.strip()[:60]!r} has {len(words)} values; allowed: class x y width height, and perhaps a confidence"
+    if len(words) in (5, 6):
+        x, y, width, height, *confidence = map(_number, _VALUES, words[1:])
+    elif _has_corners(words):
+        corners = [_number(f"value {at}", word) for at, word in enumerate(words[1:], start=2)]
+        (x, width), (y, height) = (
+            ((max(each) + min(each)) / 2, max(each) - min(each)) for each in (corners[::2], corners[1::2])
         )
-    x, y, width, height, *confidence = map(_number, _VALUES, words[1:])
+        confidence = []
+    else:
+        raise InputError(
+            f"{line.strip()[:60]!r} has {len(words)} values; allowed: class x y width height, and perhaps a "
+            "confidence; or class and three or more corners x y"
+        )
     for name, value in (("width", width), ("height", height)):
         if value <= 0.0:
             raise InputError(f"{name} {value:g} must be above 0")
@@ -100,6 +111,19 @@ def _parse(line: str, number: int, names: Sequence[str]) -> LabeledBox:
                 f"most {_OUTSIDE:g} outside"
             )
     return LabeledBox(number, _class_name(words[0], names), shares, confidence[0] if confidence else None)
+
+
+def _has_corners(words: Sequence[str]) -> bool:
+    """Whether the words of a line are a class and the corners of a polygon.
+
+    Not if they may also be a box with its confidence and the number of a track, or with key points: x, y and a
+    visibility of 0, 1 or 2 each.
+    """
+    if len(words) < 7 or len(words) % 2 == 0:
+        return False
+    track = len(words) == 7 and words[6].isdigit()
+    points = (len(words) - 5) % 3 == 0 and all(_VISIBILITY.fullmatch(word) for word in words[7::3])
+    return not track and not points
 
 
 def _number(name: str, word: str) -> float:

@@ -1,4 +1,4 @@
-"""The names of the classes of label files in YOLO format, from classes.txt, obj.names or data.yaml."""
+"""The names of the classes of label files in YOLO format, from classes.txt, obj.names, _darknet.labels or data.yaml."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from vm_embedded.files import exists, read_text
 
 from .class_names import class_name
 
-_TABLES = ("classes.txt", "obj.names", "data.yaml", "data.yml", "dataset.yaml", "dataset.yml")
+_TABLES = ("classes.txt", "obj.names", "_darknet.labels", "data.yaml", "data.yml", "dataset.yaml", "dataset.yml")
 
-_ENTRY = re.compile(r"^names[ \t]*:.*(?:\n(?:[ \t\-\]}#].*)?)*", re.MULTILINE)
-"""The lines of the entry `names`. The others may be YAML that read_yaml rejects, such as a download script."""
+_KEY = re.compile(r"names[ \t]*:")
+_NO_BRACKET = re.compile(r"""(?<![^ \[{,:])("[^"]*"|'[^']*')|(?<!\S)#.*""")
+"""Quoted texts and comments, whose brackets do not count."""
 
 
 class NameTables:
@@ -55,7 +56,7 @@ def _read(path: Path) -> tuple[str, ...]:
     text = read_text(path)
     try:
         # Not splitlines: for other programs, no other character ends a line.
-        lines = text.rstrip().split("\n") if path.suffix in (".txt", ".names") else _yaml_names(text)
+        lines = text.rstrip().split("\n") if path.suffix in (".txt", ".names", ".labels") else _yaml_names(text)
         if not lines or not all(line.strip() for line in lines):
             raise InputError("must give a name for each class number")
         names = tuple(map(class_name, lines))
@@ -68,8 +69,7 @@ def _read(path: Path) -> tuple[str, ...]:
 
 def _yaml_names(text: str) -> list[str]:
     """The entry `names` of a YAML text: a list, or a mapping from the numbers 0, 1, ... Raises InputError."""
-    found = _ENTRY.search(text)
-    entry = read_yaml(found[0]) if found else {"names": None}
+    entry = read_yaml(_entry(text)) or {"names": None}
     if not isinstance(entry, dict):
         raise InputError("names lacks a space after its colon")
     names = entry["names"]
@@ -80,3 +80,21 @@ def _yaml_names(text: str) -> list[str]:
     if not isinstance(names, list):
         raise InputError("lacks names, the list of class names")
     return ["" if name is None else str(name) for name in names]
+
+
+def _entry(text: str) -> str:
+    """The lines of the entry `names`; the others may be YAML that read_yaml rejects, such as a download script.
+
+    Lines belong to it if they are indented, and between brackets in any case.
+    """
+    entry: list[str] = []
+    depth = 0
+    for line in text.split("\n"):
+        if not entry and not _KEY.match(line):
+            continue
+        if entry and not depth and line[:1] not in ("", *" \t-]}#"):
+            break
+        entry.append(line)
+        plain = _NO_BRACKET.sub("", line)
+        depth += sum(map(plain.count, "[{")) - sum(map(plain.count, "]}"))
+    return "\n".join(entry)

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vm_embedded.output.box_files import edges
 from vm_workstation.yolo_labels import LabeledBox, find_labels, parse_labels
 
 NAMES = ("ball", "goal post")
@@ -45,7 +46,11 @@ def test_a_box_outside_of_the_image_is_a_fault(shares, away):
     ("line", "fault"),
     [
         ("0 0.5 0.5 0.1", "'0 0.5 0.5 0.1' has 4 values; allowed: class x y width height, and perhaps a confidence"),
-        ("0 0.1 0.1 0.9 0.1 0.9 0.9", "'0 0.1 0.1 0.9 0.1 0.9 0.9' has 7 values; allowed: class x y"),
+        ("0 0.1 0.1 0.9 0.1 0.9 0.9 0.1", "'0 0.1 0.1 0.9 0.1 0.9 0.9 0.1' has 8 values; allowed: class x y"),
+        ("0 0.1 0.1 0.1 0.1 0.9 7", "'0 0.1 0.1 0.1 0.1 0.9 7' has 7 values; allowed: class x y"),
+        ("0 0.1 0.1 0.9 0.1 0.9 inf", "value 7 'inf' is not a finite number"),
+        ("0 0.1 0.1 0.9 0.1 0.9 1.2", "the box reaches from 0.1 to 1.2 in y"),
+        ("0 0.1 0.1 0.9 0.1 0.5 0.1", "height 0 must be above 0"),
         ("0 0.5 half 0.1 0.1", "y 'half' is not a finite number"),
         ("0 0.5 0.5 nan 0.1", "width 'nan' is not a finite number"),
         ("0 0.5 0.5 0.1 0.1 inf", "confidence 'inf' is not a finite number"),
@@ -63,6 +68,35 @@ def test_a_bad_line_is_named_and_the_rest_is_used(line, fault):
     boxes, (found,) = parse_labels(f"1 0.5 0.5 0.1 0.1\n{line}\n0 0.2 0.2 0.1 0.1\n", NAMES)
     assert found.startswith(f"line 2: {fault}")
     assert [(box.line, box.class_name) for box in boxes] == [(1, "goal post"), (3, "ball")]
+
+
+@given(st.lists(st.tuples(*[st.floats(0.01, 0.99)] * 2), min_size=3, max_size=12), st.data())
+def test_of_a_polygon_the_outer_box_is_read(corners, data):
+    xs, ys = zip(*corners, strict=True)
+    if max(xs) - min(xs) < 1e-6 or max(ys) - min(ys) < 1e-6:
+        return
+    order = data.draw(st.permutations(corners))
+    text = " ".join(f"{x!r} {y!r}" for x, y in order)
+    (box,), faults = parse_labels(f"1 {text}\n", NAMES)
+    assert faults == []
+    assert edges(box.shares) == pytest.approx((min(xs), min(ys), max(xs), max(ys)))
+    assert box.confidence is None
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "0 0.5 0.5 0.05 0.04 0.5 0.5 2",  # one key point
+        "0 0.5 0.5 0.05 0.04 0.5 0.5 2 0.51 0.5 1",  # two, eleven values as five corners have
+        "0 0.5 0.5 0.05 0.04 0.5 0.5 2.000000 0.51 0.5 0.000000",
+        "0 0.5 0.5 0.05 0.04 0.87 1",  # confidence and track
+        "0 0.5 0.5 0.05 0.04 12",  # track
+    ],
+)
+def test_boxes_with_tracks_and_key_points_are_not_taken_for_polygons(line):
+    boxes, faults = parse_labels(line, NAMES)
+    assert boxes == []
+    assert len(faults) == 1
 
 
 def test_without_names_a_class_has_its_number():

@@ -9,9 +9,9 @@ from vm_workstation.yolo_names import NameTables
 
 
 def names_of(folder, **tables):
-    """The names after writing tables to a folder; in their names, _ is a dot."""
+    """The names after writing tables to a folder; in their names, the last _ is a dot."""
     for name, text in tables.items():
-        (folder / name.replace("_", ".")).write_text(text)
+        (folder / ".".join(name.rsplit("_", 1))).write_text(text)
     return NameTables(folder).of(folder)
 
 
@@ -23,6 +23,10 @@ def names_of(folder, **tables):
         ("obj_names", "ball\ngoal post"),
         ("data_yaml", "train: images\nnc: 2\nnames: [ball, 'goal post']\n"),
         ("data_yml", "names: [\n  'ball',\n  'goal post',\n]\nnc: 2\n"),
+        ("data_yaml", "train: a\nnames: [\n'ball',\n# a [comment\n'goal post'\n]\nnc: 2\ndownload: |\n  a: [x, {\n"),
+        ("data_yaml", 'names: {\n0: ball,\n"1": goal post\n} # }\nnc: 2\n'),
+        ("data_yaml", "names:\n  [\nball, goal post ]\nnc: 2\n"),
+        ("_darknet_labels", "ball\ngoal post\n"),
         ("data_yaml", "names:\n- ball\n# posts only\n\n- goal post\nnc: 2\n"),
         ("dataset_yaml", "path: ../set # root\n\nnames:\n  0: ball\n  1: goal post\n\ndownload: |\n  a: [script, {\n"),
         ("dataset_yml", "names: {0: ball, 1: goal post}"),

@@ -10,6 +10,7 @@ import cv2
 from ..arrays import Image
 from ..errors import InputError
 from ..files import library_path
+from .credentials import without_password
 
 _LONGEST = 200
 """Most characters that are drawn; a picture has no room for more."""
@@ -39,12 +40,13 @@ def open_capture(source: int | str | Path, backend: int = cv2.CAP_ANY, *options:
 
 def check_address(source: str) -> None:
     """Raise InputError for the address of a stream, or a pipeline, that is not UTF-8 or has a zero byte."""
+    shown = without_password(source)[:200]
     if "\0" in source:
-        raise InputError(f"the address of a camera can't have a zero byte, as in {source[:200]!r}")
+        raise InputError(f"the address of a camera can't have a zero byte, as in {shown!r}")
     try:
         source.encode()
     except UnicodeEncodeError as error:
-        raise InputError(f"the address of a camera must be UTF-8 text, not {source[:200]!r}") from error
+        raise InputError(f"the address of a camera must be UTF-8 text, not {shown!r}") from error
 
 
 def open_writer(path: Path, codec: int, rate: float, size: tuple[int, int]) -> cv2.VideoWriter:

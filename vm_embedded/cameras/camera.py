@@ -1,13 +1,13 @@
 """The camera protocol: shots, errors and settings that all live cameras share.
 
-The kinds of cameras: devices and streams through OpenCV (opencv.py), Motion JPEG over HTTP (mjpeg.py), files played at
-their own rate (files.py), a drawn field (synthetic.py), and another camera with scripted faults (fault.py).
+The kinds of cameras: devices and streams through OpenCV (opencv.py), Motion JPEG (mjpeg.py) and single images over HTTP
+(snapshots.py), files played at their own rate (files.py), a drawn field (synthetic.py), and another camera with
+scripted faults (fault.py).
 open_camera.py chooses among them.
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -41,7 +41,7 @@ class Shot:
     image: BGR, or the camera's own channels if the pixel format is another. captured: when the frame was taken, in
     monotonic time [s]. encoded: the JPEG that the camera sent, if it did. orientation, lens: of the camera, if the
     source knows them. truth: what a synthetic camera knows about its scene. arrived: when the frame arrived, in
-    monotonic time [s]; the grabber sets it.
+    monotonic time [s]; the grabber sets it. topic: of ROS, if the frame came from one.
     """
 
     image: Image
@@ -51,6 +51,7 @@ class Shot:
     lens: Lens | None = None
     truth: dict[str, Any] = field(default_factory=dict)
     arrived: float = 0.0
+    topic: str = ""
 
 
 class Camera(Protocol):
@@ -112,8 +113,3 @@ class CameraSettings:
 def camera_number(source: str) -> int | None:
     """The number of a device, as in /dev/videoN; None for any other source."""
     return int(source) if source.isascii() and source.isdigit() and len(source) <= _DIGITS else None
-
-
-def without_password(source: str) -> str:
-    """The source to show in messages: user and password are removed from an address."""
-    return re.sub(r"//[^/]*@", "//", source)

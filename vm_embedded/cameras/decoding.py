@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+from contextlib import suppress
 
 import cv2
 import numpy as np
@@ -11,27 +11,19 @@ import numpy.typing as npt
 from ..arrays import Image
 from ..errors import InputError
 from .camera import BrokenFrameError
-from .image_header import MAX_MEGAPIXELS, check_size
+from .exif import orientation_of, turned
+from .image_header import MAX_MEGAPIXELS, check_size, is_tiff
+from .jpeg_damage import check_damage, complete, is_progressive
 from .library_messages import library_messages
-
-_TAIL = 1024
-"""Bytes at the end of a file in which to look for its end marker; cameras and programs append other data to it."""
-
-_DAMAGED = re.compile(
-    r"Premature end of JPEG|Corrupt JPEG data: (?!\d+ extraneous bytes before marker 0xd9)|libpng error: "
-)
-"""What libjpeg and libpng say about an image with missing or wrong parts. Some cameras put bytes between a JPEG and its
-end marker, which do no harm."""
 
 
 def decode(content: bytes, raw: bool = False, max_megapixels: float = MAX_MEGAPIXELS) -> Image:
-    """Decode an image file to BGR, or with `raw` to its own channels; 16 bits become 8.
+    """Decode an image file to BGR, or with `raw` to its own channels, turned as in exif.py; 16 bits become 8.
 
     Raises InputError for content that is not an image, is larger than `max_megapixels` [Mpx], or has missing or damaged
     parts: OpenCV would fill them with gray, and report success.
     """
-    flags = cv2.IMREAD_UNCHANGED if raw else cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    image = decode_as(content, flags, max_megapixels)
+    image = decode_as(content, cv2.IMREAD_UNCHANGED if raw else cv2.IMREAD_COLOR, max_megapixels)
     if image.dtype == np.uint16:
         return (image.view(np.uint16) >> 8).astype(np.uint8)  # as OpenCV does for BGR
     if image.dtype != np.uint8:
@@ -42,24 +34,44 @@ def decode(content: bytes, raw: bool = False, max_megapixels: float = MAX_MEGAPI
 def decode_as(content: bytes, flags: int, max_megapixels: float = MAX_MEGAPIXELS) -> npt.NDArray[np.generic]:
     """Like `decode`, with the flags of cv2.imdecode, which may keep other types than uint8. Raises InputError."""
     check_size(content, max_megapixels)
-    if content.startswith(b"\xff\xd8") and b"\xff\xd9" not in content.rstrip(b"\x00")[-_TAIL:]:  # some cameras pad it
+    image = _decode_whole(content, flags | cv2.IMREAD_IGNORE_ORIENTATION)
+    # OpenCV turns a TIFF itself.
+    return image if is_tiff(content) else turned(image, orientation_of(content))
+
+
+def _decode_whole(content: bytes, flags: int) -> npt.NDArray[np.generic]:
+    """What OpenCV decodes. Raises InputError for what is no image, or has missing or damaged parts."""
+    if content.startswith(b"\xff\xd8"):
+        return _decode_jpeg(content, flags)
+    image, messages = _decode(content, flags)
+    fault = next((each for each in messages if each.startswith("libpng error: ")), "")
+    if fault:
+        raise InputError(f"is cut short or damaged ({fault})")
+    return _checked(image)
+
+
+def _decode_jpeg(content: bytes, flags: int) -> npt.NDArray[np.generic]:
+    content, had_end = complete(content)
+    image, warnings = _decode(content, flags)
+    if not had_end and (warnings or is_progressive(content)):
         raise InputError("is cut short")
-    with library_messages() as messages:
-        image = _decoded(content, flags)
-    damage = next(filter(_DAMAGED.match, messages), None)
-    if damage:
-        raise InputError(f"is cut short or damaged ({damage})")
+    if warnings:
+        check_damage(content, warnings[0])
+    return _checked(image)
+
+
+def _checked(image: npt.NDArray[np.generic] | None) -> npt.NDArray[np.generic]:
     if image is None:
         raise InputError("can't be decoded as an image")
     return image
 
 
-def _decoded(content: bytes, flags: int) -> npt.NDArray[np.generic] | None:
-    """What OpenCV decodes, None if it can't."""
-    try:
-        return cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
-    except cv2.error:
-        return None
+def _decode(content: bytes, flags: int) -> tuple[npt.NDArray[np.generic] | None, list[str]]:
+    """What OpenCV decodes, None if it can't; and the warnings of its libraries."""
+    image = None
+    with library_messages() as messages, suppress(cv2.error):
+        image = cv2.imdecode(np.frombuffer(content, dtype=np.uint8), flags)
+    return image, messages
 
 
 def decode_frame(content: bytes, raw: bool = False, max_megapixels: float = MAX_MEGAPIXELS) -> Image:

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from ..errors import InputError
 from ..geometry.lens_files import read_lens_file
 from .camera import BrokenFrameError, CameraError, CameraSettings, Shot
-from .image_files import Frame, lens_beside, open_source
+from .frame_source import Frame
+from .image_files import lens_beside, open_source
 
 RATE = 30.0
 """Frame rate of files without their own [1/s]."""

@@ -5,35 +5,28 @@ from __future__ import annotations
 import glob
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-import cv2
-import numpy as np
-
 from ..arrays import Image
-from ..borders.opencv_text import open_capture
+from ..borders.credentials import without_password
 from ..borders.text import utf8
 from ..detection.pixel_formats import FORMATS
 from ..errors import InputError
-from ..files import exists, is_file, open_regular, read_bytes, read_text
-from ..geometry.lens import Lens
-from ..geometry.orientation import Orientation
+from ..files import exists, is_file, read_bytes, read_text, there
 from .camera import camera_number
 from .decoding import decode
+from .frame_source import IMAGE_SUFFIXES, Frame, Source, joined
 from .image_header import MAX_MEGAPIXELS
-from .video_size import check_frame, check_video
+from .video_files import open_video
 
 MESSAGES = "recording.jsonl"
 """The file with the messages of a recording, one line for each image."""
 
 _BESIDE = ("mask", "coverage", "lens", "scene")
 """First parts of the names of files that belong to a frame imageX of vm-synth, and are none."""
-
-IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".pgm", ".ppm", ".tif", ".tiff", ".webp")
 
 
 def check_read_format(format: str) -> None:
@@ -49,45 +42,13 @@ def check_read_format(format: str) -> None:
         )
 
 
-@dataclass(frozen=True)
-class Frame:
-    """One frame of a source.
-
-    index: its number, from 0. source: its name in messages. stem: name of the file that it is from, without suffix.
-    read: returns the image, BGR, or in the file's own channels if the pixel format is another; raises InputError. path:
-    its image file; None for a frame of a video. stamp: time within its video or recording [s], or None. lens,
-    orientation: of the camera, if the source knows them.
-    """
-
-    index: int
-    source: str
-    stem: str
-    read: Callable[[], Image]
-    path: Path | None = None
-    stamp: float | None = None
-    lens: Lens | None = None
-    orientation: Orientation | None = None
-
-
-@dataclass(frozen=True)
-class Source:
-    """Frames to iterate over.
-
-    count: number of frames, if known. rate: frames per second [1/s], if known. files: that the frames are read from.
-    """
-
-    frames: Iterator[Frame]
-    count: int | None
-    rate: float | None = None
-    files: tuple[Path, ...] = ()
-
-
 def open_sources(names: Sequence[str], raw: bool = False, max_megapixels: float = MAX_MEGAPIXELS) -> Source:
     """Open several sources by name, one after the other; images alone are in the order of their numbers.
 
     With `raw`, images keep the channels of their files. Larger images are not decoded [Mpx]. Raises InputError as
     `open_source` does.
     """
+    names = list(map(_there, names))
     paths = _without_companions([Path(each) for each in names])
     kept = set(paths)
     names = [each for each in names if Path(each) in kept]
@@ -96,26 +57,22 @@ def open_sources(names: Sequence[str], raw: bool = False, max_megapixels: float 
     return joined([open_source(each, raw, max_megapixels) for each in names])
 
 
-def joined(opened: Sequence[Source]) -> Source:
-    """Several sources as one, with frames numbered from 0."""
-    if len(opened) == 1:
-        return opened[0]
-    frames = (frame for source in opened for frame in source.frames)
-    numbered = (replace(frame, index=index) for index, frame in enumerate(frames))
-    counts = [source.count for source in opened]
-    files = tuple(each for source in opened for each in source.files)
-    return Source(numbered, None if None in counts else sum(each or 0 for each in counts), files=files)
-
-
 def open_source(name: str, raw: bool = False, max_megapixels: float = MAX_MEGAPIXELS) -> Source:
     """Open a source by name. With `raw`, images keep the channels of their files. Larger images are not decoded [Mpx].
 
     Raises InputError if the source does not exist, contains no images or can't be opened.
     """
+    name = _there(name)
     try:
         return _open(name, Path(name), raw, max_megapixels)
     except OSError as error:
         raise InputError(f"can't read {name[:200]}: {error.strerror or error}") from error
+
+
+def _there(name: str) -> str:
+    """The name of a source; of a file or folder as in `files.there`."""
+    path = there(Path(name))
+    return name if path == Path(name) else str(path)
 
 
 def _open(name: str, path: Path, raw: bool, max_megapixels: float) -> Source:
@@ -128,14 +85,14 @@ def _open(name: str, path: Path, raw: bool, max_megapixels: float) -> Source:
     if path.is_file() and path.suffix.lower() in IMAGE_SUFFIXES:
         return _images([path], read)
     if path.exists() or camera_number(name) is not None:
-        return _video(name, max_megapixels)
+        return open_video(name, max_megapixels)
     if glob.has_magic(name):
         matches = glob.glob(name, recursive=True)  # noqa: PTH207 (the pattern may begin anywhere, at / too)
         found = [Path(each) for each in matches if Path(each).suffix.lower() in IMAGE_SUFFIXES]
         if not found:
             raise InputError(f"no images match {name}")
         return _images(_without_companions(found), read)
-    raise InputError(f"no such image, directory, video or camera: {name}")
+    raise InputError(f"no such image, directory, video or camera: {without_password(name)}")
 
 
 def _deeper(folder: Path) -> str:
@@ -160,7 +117,7 @@ def _without_companions(paths: Sequence[Path]) -> list[Path]:
 
 def _images(paths: list[Path], read: Callable[[Path], Image], times: Mapping[str, float] | None = None) -> Source:
     """The frames of image files. times: of some of them, by the names of the files without suffix [s]."""
-    paths, times = sorted(paths, key=_natural), times or {}
+    paths, times = sorted(paths, key=natural_key), times or {}
     frames = (
         Frame(index, utf8(path.name), path.stem, partial(read, path), path, times.get(path.stem))
         for index, path in enumerate(paths)
@@ -180,7 +137,7 @@ def _recorded_times(messages: Path) -> dict[str, float]:
     return {f"image{index:07d}": time - times[0] for index, time in enumerate(times)}
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
+def natural_key(path: Path) -> list[tuple[int, str]]:
     """A sort key that puts frame9 before frame10."""
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
@@ -208,66 +165,16 @@ def lens_place(path: Path | None) -> Path | None:
 def lens_beside(path: Path | None) -> Path | None:
     """The file lensNAME.yaml beside imageNAME.jpg, or None if it does not exist."""
     place = lens_place(path)
-    return place if place is not None and exists(place) else None
+    return None if place is None else _existing(place)
 
 
 def lens_file_of(image: Path) -> Path | None:
     """The lens file of a frame of any tool: NAME.yaml, lensNAME.yaml, or for imageNAME lensNAME.yaml; None without."""
-    beside = (image.with_suffix(".yaml"), image.with_name(f"lens{image.stem}.yaml"), lens_beside(image))
-    return next((each for each in beside if each is not None and exists(each)), None)
+    beside = (image.with_suffix(".yaml"), image.with_name(f"lens{image.stem}.yaml"))
+    return next(filter(None, map(_existing, beside)), None) or lens_beside(image)
 
 
-def _video(name: str, max_megapixels: float) -> Source:
-    """The frames of a video file; or of a camera, by number or device path. Raises OSError for an unreadable file."""
-    files = (Path(name),) if is_file(Path(name)) else ()
-    number = camera_number(name)
-    live = number is not None or Path(name).is_char_device()
-    if not live:
-        open_regular(Path(name)).close()  # OpenCV does not say why it can't read a file, and waits for a pipe's writer
-    capture = open_capture(Path(name) if number is None else number)
-    if not capture.isOpened():
-        if live:
-            raise InputError(f"can't open camera {name}")
-        raise InputError(f"{name} is neither an image ({', '.join(IMAGE_SUFFIXES)}) nor a video that OpenCV can read")
-    try:
-        check_video(capture, max_megapixels)
-    except InputError as error:
-        raise InputError(f"{name} {error}") from error
-    count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
-    first = _next_image(capture)
-    if first is None:
-        raise InputError(f"{'camera' if live else 'video'} {name} contains no frames that can be read")
-    rate = capture.get(cv2.CAP_PROP_FPS)
-    return Source(
-        _frames(capture, first, Path(name), max_megapixels),
-        None if live or count <= 0 else count,
-        rate if 0.0 < rate < 1e4 else None,
-        files,
-    )
-
-
-def _frames(capture: cv2.VideoCapture, first: Image, path: Path, max_megapixels: float) -> Iterator[Frame]:
-    image: Image | None = first
-    index = 0
-    while image is not None:
-        stamp = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
-        read = partial(_of_video, image, path.name, max_megapixels)
-        yield Frame(index, utf8(path.name), path.stem, read, None, stamp)
-        image = _next_image(capture)
-        index += 1
-    capture.release()
-
-
-def _of_video(image: Image, name: str, max_megapixels: float) -> Image:
-    """A frame of a video. Raises InputError if it is too large."""
-    try:
-        check_frame(image, max_megapixels)
-    except InputError as error:
-        raise InputError(f"frame of {name} {error}") from error
-    return image
-
-
-def _next_image(capture: cv2.VideoCapture) -> Image | None:
-    """The next image, or None at the end."""
-    good, image = capture.read()
-    return np.asarray(image, dtype=np.uint8) if good else None
+def _existing(path: Path) -> Path | None:
+    """The path as in `files.there`, or None if nothing is there."""
+    path = there(path)
+    return path if exists(path) else None

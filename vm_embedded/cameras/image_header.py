@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 
 from ..errors import InputError
@@ -12,7 +12,8 @@ from ..geometry.lens import Size
 MAX_MEGAPIXELS = 50.0
 """Largest image that is decoded if no setting says otherwise [Mpx]."""
 
-_PNG_START = b"\x89PNG\r\n\x1a\n"
+PNG_START = b"\x89PNG\r\n\x1a\n"
+_TIFF_STARTS = (b"II*\x00", b"MM\x00*")
 _PNG_CHUNK = 12
 """Bytes of a chunk besides its content: length, kind and checksum."""
 
@@ -52,8 +53,12 @@ def image_size(content: bytes) -> Size:
     return size
 
 
-def _jpeg(content: bytes) -> Size | None:
-    """The size in the first frame header. Bytes between two segments are skipped, as libjpeg does."""
+def jpeg_segments(content: bytes) -> Iterator[tuple[int, int]]:
+    """Marker and position of each segment of a JPEG that has a length, up to the data. The length is at the position.
+
+    Bytes between two segments are skipped, as libjpeg does. Raises IndexError, ValueError or struct.error where the
+    content ends.
+    """
     at = 2
     while True:
         at = content.index(b"\xff", at) + 1
@@ -63,32 +68,68 @@ def _jpeg(content: bytes) -> Size | None:
         at += 1
         if marker == 0 or marker in _STANDALONE:
             continue
-        length, _, height, width = struct.unpack_from(">HBHH", content, at)
-        if 0xC0 <= marker <= 0xCF and marker not in _NOT_FRAMES:
-            return width, height
-        if marker in (0xD9, 0xDA):  # the end, or the data: there is no frame
-            return None
-        at += length
+        yield marker, at
+        if marker in (0xD9, 0xDA):  # the end, or the data
+            return
+        at += int(struct.unpack_from(">H", content, at)[0])
 
 
-def _png(content: bytes) -> Size | None:
-    """The size of the image, or of a larger frame of its animation.
+def png_chunks(content: bytes) -> Iterator[tuple[bytes, int, int]]:
+    """Kind of each chunk of a PNG, and position and length of its content.
 
     Raises InputError if the content ends within a chunk: OpenCV allocates the length that a chunk declares.
     """
-    sizes: list[Size] = []
-    at, kind = len(_PNG_START), b""
+    at, kind = len(PNG_START), b""
     while kind != b"IEND":
         if at + _PNG_CHUNK > len(content):
             raise InputError("is cut short")
         length, kind = struct.unpack_from(">I4s", content, at)
         if at + _PNG_CHUNK + length > len(content):
             raise InputError("is cut short")
+        yield kind, at + 8, length
+        at += _PNG_CHUNK + length
+
+
+def is_tiff(content: bytes) -> bool:
+    """Whether this is a TIFF file, or has its form."""
+    return content.startswith(_TIFF_STARTS)
+
+
+def tiff_values(content: bytes, tags: Iterable[int]) -> dict[int, int]:
+    """The whole numbers of these tags in the first directory of a TIFF; 0 for one that it lacks.
+
+    Raises struct.error where the content ends.
+    """
+    order = "<" if content.startswith(b"II") else ">"
+    (directory,) = struct.unpack_from(order + "I", content, 4)
+    (count,) = struct.unpack_from(order + "H", content, directory)
+    values = dict.fromkeys(tags, 0)
+    for number in range(count):
+        place = directory + 2 + 12 * number
+        tag, kind = struct.unpack_from(order + "HH", content, place)
+        if tag in values:
+            (value,) = struct.unpack_from(order + ("H" if kind == 3 else "I"), content, place + 8)
+            values[tag] = max(values[tag], value)
+    return values
+
+
+def _jpeg(content: bytes) -> Size | None:
+    """The size in the first frame header."""
+    for marker, at in jpeg_segments(content):
+        if 0xC0 <= marker <= 0xCF and marker not in _NOT_FRAMES:
+            _, _, height, width = struct.unpack_from(">HBHH", content, at)
+            return width, height
+    return None
+
+
+def _png(content: bytes) -> Size | None:
+    """The size of the image, or of a larger frame of its animation."""
+    sizes: list[Size] = []
+    for kind, at, _ in png_chunks(content):
         if not sizes and kind != b"IHDR":
             return None
         if kind in (b"IHDR", b"fcTL"):  # fcTL: a frame of an animation, with its number before its size
-            sizes.append(struct.unpack_from(">II", content, at + (8 if kind == b"IHDR" else 12)))
-        at += _PNG_CHUNK + length
+            sizes.append(struct.unpack_from(">II", content, at + (0 if kind == b"IHDR" else 4)))
     return max(width for width, _ in sizes), max(height for _, height in sizes)
 
 
@@ -108,16 +149,7 @@ def _pnm(content: bytes) -> Size:
 
 
 def _tiff(content: bytes) -> Size:
-    order = "<" if content.startswith(b"II") else ">"
-    (directory,) = struct.unpack_from(order + "I", content, 4)
-    (count,) = struct.unpack_from(order + "H", content, directory)
-    values = dict.fromkeys((256, 257, 322, 323), 0)  # width and height of the image, and of a tile
-    for number in range(count):
-        place = directory + 2 + 12 * number
-        tag, kind = struct.unpack_from(order + "HH", content, place)
-        if tag in values:
-            (value,) = struct.unpack_from(order + ("H" if kind == 3 else "I"), content, place + 8)
-            values[tag] = max(values[tag], value)
+    values = tiff_values(content, (256, 257, 322, 323))  # width and height of the image, and of a tile
     return max(values[256], values[322]), max(values[257], values[323])
 
 
@@ -137,12 +169,11 @@ def _webp(content: bytes) -> Size | None:
 
 _READERS: dict[bytes, Callable[[bytes], Size | None]] = {
     b"\xff\xd8\xff": _jpeg,
-    _PNG_START: _png,
+    PNG_START: _png,
     b"BM": _bmp,
     b"P5": _pnm,
     b"P6": _pnm,
-    b"II*\x00": _tiff,
-    b"MM\x00*": _tiff,
+    **dict.fromkeys(_TIFF_STARTS, _tiff),
     b"RIFF": _webp,
 }
 """Functions that read the size, by the first bytes of the file."""

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import base64
 import http.client
 import time
 from contextlib import suppress
-from urllib.parse import SplitResult, quote, unquote, urlsplit
 
-from ..errors import InputError, one_line
-from .camera import BrokenFrameError, CameraError, CameraSettings, Shot, without_password
+from ..borders.credentials import without_password
+from ..errors import one_line
+from .camera import BrokenFrameError, CameraError, CameraSettings, Shot
 from .decoding import decode_frame
 from .frame_clock import FrameClock
-from .timed_stream import TimedStream
+from .http_get import HttpGet
 
 _LARGEST_PART = 64 * 2**20
 """Largest size of a part, which holds one image [bytes]."""
@@ -20,12 +19,13 @@ _LARGEST_PART = 64 * 2**20
 _MOST_HEADERS = 64
 """Most header lines of a part."""
 
-_ALLOWED = "/?%:@!$&'()*+,;="
-"""Characters besides letters and digits that may be in a path or query as they are, and "%", which escapes others."""
-
 
 class NotMotionJpegError(CameraError):
-    """The server sends another type of content."""
+    """The server sends another type of content. kind: such as image/jpeg."""
+
+    def __init__(self, message: str, kind: str) -> None:
+        super().__init__(message)
+        self.kind = kind
 
 
 class MjpegCamera:
@@ -37,42 +37,18 @@ class MjpegCamera:
     def __init__(self, settings: CameraSettings, raw: bool = False) -> None:
         self.settings = settings
         self._raw = raw
-        self._response: http.client.HTTPResponse | None = None
         self._begun = False  # whether a part was requested
         self._clock = FrameClock()
         self._past_boundary = False  # whether the boundary before the next part was read already
-        self._stream: TimedStream | None = None
-        url = parse_url(settings.source)
-        kind = http.client.HTTPSConnection if url.scheme == "https" else http.client.HTTPConnection
-        self._connection = kind(url.hostname or "", url.port, timeout=1e-3 * settings.open_ms)
-        try:
-            self._connection.connect()
-            self._stream = TimedStream(self._connection.sock, time.monotonic() + 1e-3 * settings.open_ms)
-            self._connection.sock = self._stream
-            self._response = self._request(url.path or "/", url.query, url.username, url.password)
-        except (OSError, http.client.HTTPException) as error:
-            self.close()
-            raise CameraError(f"no response from {self._name}: {one_line(error)}") from error
-        except CameraError:
-            self.close()
-            raise
-        self._stream.pause = 1e-3 * settings.lost_ms
-
-    def _request(self, path: str, query: str, user: str | None, password: str | None) -> http.client.HTTPResponse:
-        headers = {"Accept": "multipart/x-mixed-replace, */*"}
-        if user is not None:
-            credentials = f"{unquote(user)}:{unquote(password or '')}".encode()
-            headers["Authorization"] = "Basic " + base64.b64encode(credentials).decode()
-        self._connection.request("GET", f"{path}?{query}" if query else path, headers=headers)
-        response = self._connection.getresponse()
-        if response.status != 200:
-            raise CameraError(f"{self._name} responds {response.status} {response.reason[:100]}")
-        kind = response.headers.get_content_type()
-        boundary = response.headers.get_param("boundary")
+        self._get = HttpGet(settings.source, 1e-3 * settings.open_ms)
+        self._response, self._stream = self._get.response, self._get.stream
+        kind = self._response.headers.get_content_type()
+        boundary = self._response.headers.get_param("boundary")
         if kind != "multipart/x-mixed-replace" or not isinstance(boundary, str):
-            raise NotMotionJpegError(f"{self._name} sends {kind}, not multipart/x-mixed-replace")
+            self.close()
+            raise NotMotionJpegError(f"{self._name} sends {kind}, not multipart/x-mixed-replace", kind)
         self._boundary = b"--" + boundary.removeprefix("--").encode("latin-1")
-        return response
+        self._stream.pause = 1e-3 * settings.lost_ms
 
     @property
     def _name(self) -> str:
@@ -84,7 +60,6 @@ class MjpegCamera:
         Raises CameraError at the end of the stream, and BrokenFrameError for a bad image, or for one that is too old:
         decoding it would only delay the next.
         """
-        assert self._stream is not None
         limit = self.settings.lost_ms if self._begun else max(self.settings.open_ms, self.settings.lost_ms)
         asked = time.monotonic()
         self._stream.deadline, self._begun = asked + 1e-3 * limit, True
@@ -122,7 +97,6 @@ class MjpegCamera:
         return content, stamp
 
     def _read_line(self) -> bytes:
-        assert self._response is not None
         line = self._response.readline(65536)
         if not line:
             raise CameraError(f"{self._name} ended the stream")
@@ -130,7 +104,6 @@ class MjpegCamera:
 
     def _read_bytes(self, length: int) -> bytes:
         response, content = self._response, bytearray()
-        assert response is not None
         while len(content) < length:
             received = response.read1(length - len(content))
             if not received:
@@ -150,26 +123,4 @@ class MjpegCamera:
 
     def close(self) -> None:
         """End the connection."""
-        if self._stream is not None:
-            self._stream.disconnect()
-        self._connection.close()
-        if self._response is not None:
-            self._response.close()
-
-
-def parse_url(source: str) -> SplitResult:
-    """Split a URL into its parts, and escape what HTTP does not allow in path and query.
-
-    Raises InputError if the host is missing or invalid, or the port is.
-    """
-    try:
-        url = urlsplit(source)
-        valid = bool(url.hostname) and (url.port is None or url.port > 0)
-        (url.hostname or "").encode("idna")  # as the connection does
-    except ValueError as error:
-        raise InputError(f"{without_password(source)!r} is not a valid address: {error}") from error
-    if not valid:
-        raise InputError(
-            f"{without_password(source)!r} is not a valid address; write it like http://192.168.0.20:8080/stream"
-        )
-    return url._replace(path=quote(url.path, _ALLOWED), query=quote(url.query, _ALLOWED))
+        self._get.close()

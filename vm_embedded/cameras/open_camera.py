@@ -7,14 +7,17 @@ from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
+from ..borders.credentials import without_password
 from ..borders.opencv_text import check_address
 from ..errors import InputError, unknown
-from ..files import exists, is_file
-from .camera import Camera, CameraSettings, without_password
+from ..files import exists, is_file, there
+from .camera import Camera, CameraSettings
 from .fault import FaultCamera, Faults, FaultScript
 from .files import FileCamera
-from .mjpeg import MjpegCamera, NotMotionJpegError, parse_url
+from .http_get import parse_url
+from .mjpeg import MjpegCamera, NotMotionJpegError
 from .opencv import OpenCvCamera, check_opencv_settings, device_path
+from .snapshots import SnapshotCamera
 from .synthetic import SyntheticCamera, parse_motion
 
 ROS = "ros"
@@ -27,11 +30,16 @@ Opener = Callable[[], Camera]
 """Opens a camera. Raises CameraError if that fails now but may succeed later."""
 
 
+def _is_path(source: str) -> bool:
+    """Whether a source that looks like an address is a file or folder whose name has a colon."""
+    return ":" in source and device_path(source) is None and exists(there(Path(source)))
+
+
 def is_live(source: str) -> bool:
     """Whether a source is always a live camera: not a file, which vm-detect may also process frame by frame."""
     prefix = source.partition(":")[0]
     node = device_path(source)
-    return (
+    return not _is_path(source) and (
         prefix in ("synthetic", "fault", "gstreamer", ROS)
         or "://" in source
         or (node is not None and not is_file(node))
@@ -43,7 +51,7 @@ def brings_lens_and_pose(source: str) -> bool:
 
     A fault script also counts, whichever camera it adds faults to.
     """
-    return source.partition(":")[0] in ("synthetic", "fault", ROS)
+    return source.partition(":")[0] in ("synthetic", "fault", ROS) and not _is_path(source)
 
 
 def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
@@ -52,6 +60,8 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
     raw: images keep their own channels. Raises InputError for a source or setting that can never work.
     """
     source = settings.source
+    if _is_path(source):
+        return lambda: FileCamera(settings, raw)
     if source == ROS:
         raise InputError("camera ros, a topic of ROS, works only with vm-ros")
     if source.startswith("fault:"):
@@ -74,7 +84,7 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
         if raw and device_path(source) is None and not source.startswith("gstreamer:"):
             raise InputError(f"camera {without_password(source)} delivers colors: it supports only --format bgr")
         return lambda: OpenCvCamera(settings, raw)
-    if not exists(Path(source)):
+    if not exists(there(Path(source))):
         raise InputError(
             f"no such camera: {without_password(source)!r}; give a device, an address, an existing file or folder, "
             "synthetic, fault:SCRIPT or gstreamer:PIPELINE"
@@ -90,8 +100,8 @@ def _check_protocol(source: str) -> None:
 
 
 def _network_camera(settings: CameraSettings, raw: bool) -> Camera:
-    """A Motion JPEG stream, or any other stream that OpenCV reads from the address."""
+    """A Motion JPEG stream, single images, or any other stream that OpenCV reads from the address."""
     try:
         return MjpegCamera(settings, raw)
-    except NotMotionJpegError:
-        return OpenCvCamera(settings, raw)
+    except NotMotionJpegError as error:
+        return SnapshotCamera(settings, raw) if error.kind.startswith("image/") else OpenCvCamera(settings, raw)

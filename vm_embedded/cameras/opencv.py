@@ -14,10 +14,11 @@ os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")
 import cv2
 import numpy as np
 
+from ..borders.credentials import password_hint, without_password
 from ..borders.opencv_text import open_capture
 from ..errors import InputError
 from ..files import exists
-from .camera import EARLY, BrokenFrameError, CameraError, CameraSettings, Shot, camera_number, without_password
+from .camera import EARLY, BrokenFrameError, CameraError, CameraSettings, Shot, camera_number
 from .decoding import decode_frame
 from .frame_clock import FrameClock
 from .video_size import check_frame, check_video
@@ -73,7 +74,7 @@ class OpenCvCamera:
                 self._capture = open_capture(source, cv2.CAP_FFMPEG, limits)
         if not self._capture.isOpened():
             self._capture.release()
-            raise CameraError(f"can't open camera {without_password(source)}")
+            raise CameraError(f"can't open camera {without_password(source)}{password_hint(source)}")
         self._motion_jpeg = self._device is not None and self._configure()
         try:
             check_video(self._capture, settings.max_megapixels)

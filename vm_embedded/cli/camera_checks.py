@@ -7,11 +7,15 @@ import fcntl
 import os
 import socket
 import struct
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from ..cameras.camera import without_password
+from ..borders.credentials import password_hint, without_password
+from ..cameras.camera import CameraSettings
+from ..cameras.grabber import Grabber
+from ..cameras.open_camera import brings_lens_and_pose, camera_opener, is_live
 from ..cameras.opencv import device_path
 from .finding import BAD, GOOD, WARNING, Finding
 
@@ -22,16 +26,20 @@ _V4L2_BUF_TYPE_VIDEO_CAPTURE = 1
 _PORTS = {"http": 80, "https": 443, "rtsp": 554, "rtmp": 1935}
 """Usual ports of the addresses of cameras."""
 
+_FRAMES, _MOST_REJECTED = 5, 20
+"""Frames that show that a camera works, and rejected ones that show that it does not."""
+
 _PATIENCE = 3.0
 """How long to wait for the host of a camera [s]."""
 
 
-def check_cameras(source: str, fault: str, dev: Path) -> Iterator[Finding]:
-    """Whether each video device can be opened, and whether the configured camera exists.
+def check_cameras(camera: CameraSettings, raw: bool, fault: str, is_running: bool, dev: Path) -> Iterator[Finding]:
+    """Whether each video device can be opened, and whether the configured camera delivers frames.
 
-    source: of the configured camera, empty for none. fault: why it can never work, empty if it can. dev: folder with
-    the devices.
+    camera, raw: as for `camera_opener`. fault: why it can never work, empty if it can. is_running: whether a detector
+    reads it now; many cameras serve only one reader. dev: folder with the devices.
     """
+    source = camera.source
     nodes = sorted(dev.glob("video*"))
     for node in nodes:
         yield _check_video_device(node)
@@ -42,9 +50,20 @@ def check_cameras(source: str, fault: str, dev: Path) -> Iterator[Finding]:
     elif fault:
         yield Finding("camera", BAD, fault, "vm-detect --help lists the allowed cameras")
     elif (device := device_path(source)) is not None:
-        yield _check_configured_device(source, device, nodes, dev)
+        finding = _check_configured_device(source, device, nodes, dev)
+        yield finding
+        if finding.state != BAD and not is_running and dev == Path("/dev"):
+            yield _check_frames(camera, raw)
+    elif not is_live(source) or brings_lens_and_pose(source):
+        yield Finding("camera", GOOD, source)
+    elif refused := _refused_connection(source):
+        yield Finding(
+            "camera", BAD, f"{without_password(source)}: {refused}", "ping the host, and compare port and address"
+        )
+    elif is_running:
+        yield Finding("camera", GOOD, f"{without_password(source)}; a detector is running")
     else:
-        yield _check_reachable(source)
+        yield _check_frames(camera, raw)
 
 
 def _check_configured_device(source: str, device: Path, nodes: Sequence[Path], dev: Path) -> Finding:
@@ -62,12 +81,29 @@ def _check_configured_device(source: str, device: Path, nodes: Sequence[Path], d
     )
 
 
-def _check_reachable(source: str) -> Finding:
-    """Whether the host of a camera's address can be reached; other sources are good."""
-    shown, refused = without_password(source), _refused_connection(source)
-    if refused:
-        return Finding("camera", BAD, f"{shown}: {refused}", "ping the host, and compare port and address")
-    return Finding("camera", GOOD, shown)
+def _check_frames(camera: CameraSettings, raw: bool) -> Finding:
+    """Whether the camera delivers frames that can be used, read and decoded as by a detector."""
+    grabber, shown = Grabber(camera_opener(camera, raw), camera, lambda: None), without_password(camera.source)
+    began, size = time.monotonic(), ""
+    grabber.start()
+    counts = grabber.counts
+    while counts.grabbed < _FRAMES and counts.rejected < _MOST_REJECTED and not grabber.ended:
+        shot = grabber.take()
+        if shot is not None:
+            size = f"{shot.image.shape[1]} x {shot.image.shape[0]} px"
+        lost = grabber.supervise(time.monotonic())
+        if lost and grabber.trouble and (counts.reconnects or time.monotonic() - began > _PATIENCE):
+            break
+        time.sleep(0.01)
+    grabber.stop(_PATIENCE)
+    if not counts.grabbed:
+        return Finding("camera", BAD, f"{shown} delivers no frame: {grabber.trouble}", "look at it in a browser or VLC")
+    if counts.rejected:
+        seen = (
+            f"{shown}: {counts.rejected} of {counts.grabbed + counts.rejected} frames can't be used: {grabber.trouble}"
+        )
+        return Finding("camera", WARNING, seen, "check cable and network of the camera")
+    return Finding("camera", GOOD, f"{shown} delivers frames of {size}")
 
 
 def _refused_connection(source: str) -> str:
@@ -79,9 +115,9 @@ def _refused_connection(source: str) -> str:
         with socket.create_connection((address.hostname, address.port or _PORTS[address.scheme]), _PATIENCE):
             return ""
     except OSError as error:
-        return error.strerror or str(error)
-    except ValueError as error:  # for example a port that is no number
-        return str(error)
+        return f"{error.strerror or error}{password_hint(source)}"
+    except ValueError as error:  # for example a port that is no number; the error may quote a password
+        return f"the address is not valid{password_hint(source)}" if "@" in source else str(error)
 
 
 def _check_video_device(node: Path) -> Finding:

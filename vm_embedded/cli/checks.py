@@ -7,15 +7,18 @@ import math
 import os
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 
+from ..borders.sockets import is_listening
 from ..cameras.open_camera import brings_lens_and_pose, is_live
 from ..cameras.ros.bags import is_bag
 from ..errors import InputError, VisualMeshError, one_line
 from ..geometry.lens_doubt import lens_doubt
 from ..geometry.orientation import Orientation
 from ..live.configuration import Configuration
+from ..live.control import control_path
 from ..live.load_detector import check_height, prove_network
 from ..network.model_file import ModelFile
 from .camera_checks import check_cameras
@@ -42,13 +45,21 @@ def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator
             source = check_source(configuration)
         except VisualMeshError as error:
             fault = str(error)
-        yield from check_cameras(configuration.camera.source, fault, root / "dev")
+        raw = configuration.detector.format != "bgr"
+        yield from check_cameras(configuration.camera, raw, fault, _is_running(configuration), root / "dev")
         yield check_lens(configuration, source)
         yield check_pose(configuration, source, model)
         yield check_clock(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", time.time())
         yield from check_openings(configuration)
     except OSError as error:
         yield Finding("machine", WARNING, one_line(error))
+
+
+def _is_running(configuration: Configuration) -> bool:
+    """Whether a detector with this configuration runs."""
+    with suppress(InputError):
+        return is_listening(control_path(configuration.status.socket))
+    return False
 
 
 def check_model(configuration: Configuration) -> tuple[Finding, ModelFile | None]:

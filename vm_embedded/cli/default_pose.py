@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..cameras.image_files import Frame, lens_beside, lens_place
+from ..cameras.frame_source import Frame
+from ..cameras.image_files import lens_beside, lens_place
 from ..errors import InputError
 from ..geometry.lens import Lens, Size
 from ..geometry.lens_files import read_lens_file

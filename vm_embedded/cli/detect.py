@@ -11,6 +11,7 @@ from pathlib import Path
 
 import cv2
 
+from ..borders.credentials import without_password
 from ..cameras.library_messages import silence_opencv
 from ..cameras.open_camera import is_live
 from ..cameras.ros.bags import is_bag
@@ -162,7 +163,9 @@ def _run(options: argparse.Namespace) -> int:
     if not given.camera.source:
         parser().error("no camera: give a file or --camera, or [camera] source in vm.toml")
     if len(options.files) > 1 and (options.live or any(map(is_live, options.files))):
-        raise InputError(f"only one live camera at a time is possible, not {', '.join(options.files)}")
+        raise InputError(
+            f"only one live camera at a time is possible, not {', '.join(map(without_password, options.files))}"
+        )
     if options.live or is_live(given.camera.source):
         return _detect_live(options)
     _check_file_options(options)

@@ -10,14 +10,8 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 
 from ..arrays import Image
-from ..cameras.image_files import (
-    Frame,
-    Source,
-    check_read_format,
-    joined,
-    open_source,
-    open_sources,
-)
+from ..cameras.frame_source import Frame, Source, joined
+from ..cameras.image_files import check_read_format, open_source, open_sources
 from ..cameras.ros.bags import BagReading, is_bag, open_bag
 from ..detection.detections import Detections
 from ..detection.detector import Detector
@@ -34,6 +28,8 @@ from .closing_remarks import ClosingRemarks
 from .default_pose import DefaultPose
 from .program import complain
 from .progress import ProgressBar
+
+_ANY_SIZE = (640, 480)
 
 _IMAGES_RATE = 10.0
 """Frame rate of a video of images [1/s]."""
@@ -70,7 +66,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
             boxes = BoxWriter(options.save_boxes, classes)
         work = _Pass(detector, pose, tracker, options, emit_points, boxes, mcap, video, ClosingRemarks(detector))
         _process_all(source, work)
-    for remark in filter(None, (work.replaced, *work.remarks.lines())):
+    for remark in filter(None, (*source.remarks(), work.replaced, *work.remarks.lines())):
         complain("vm-detect", remark)
     return work.processed
 
@@ -124,7 +120,7 @@ def _open(names: Sequence[str], given: Configuration) -> Source:
     reading = BagReading(
         ros=given.ros,
         pose=given.pose,
-        own_lens=given.lens is not None or given.fov is not None,
+        own_lens=given.lens_for(_ANY_SIZE),
         orientation=given.fixed_orientation(),
         raw=raw,
         max_megapixels=largest,

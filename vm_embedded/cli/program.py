@@ -15,7 +15,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NoReturn, ParamSpec
 
+from ..borders.credentials import without_credentials
 from ..errors import VisualMeshError, unknown
+from ..files import there
 from .terminal import lost_output, open_streams, printable_output
 
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
@@ -70,7 +72,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print what is wrong as one line, and exit with status 2."""
-        message = self._unknown_option() or self._unknown_command(message) or message
+        message = without_credentials(self._unknown_option() or self._unknown_command(message) or message)
         self.exit(2, f"{self.prog}: {' '.join(message.split())}; {self.prog} --help lists the options\n")
 
     def _print_message(self, message: str, file: Any = None) -> None:
@@ -129,7 +131,7 @@ def _path(text: str) -> Path:
     """The path in an argument. Raises ArgumentTypeError for an empty one, which Path takes for the current folder."""
     if not text:
         raise argparse.ArgumentTypeError("the path is empty")
-    return Path(text)
+    return there(Path(text))
 
 
 def _whole_number(text: str) -> int:
@@ -238,7 +240,7 @@ def complain(prog: str, message: str) -> None:
 def system_error(error: OSError) -> str:
     """The message for an error of the system that nothing else explains; without a path, it is of standard output."""
     doing = "use" if error.filename is not None and error.errno != errno.ENOSPC else "write"
-    return f"can't {doing} {error.filename or 'standard output'}: {error.strerror or error}"
+    return f"can't {doing} {without_credentials(str(error.filename or 'standard output'))}: {error.strerror or error}"
 
 
 def _discard_lost(error: OSError) -> None:

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from dataclasses import Field, field, fields
 from typing import Any
 
+import numpy as np
+
 from ..errors import InputError, unknown
 
 Limits = tuple[float, float]
@@ -80,6 +82,8 @@ def checked(entry: Field[Any], value: Any) -> Any:
 
 def checked_number(entry: Field[Any], value: Any) -> float:
     """A number within the entry's limits: int if the entry's default is one, else float. Raises InputError."""
+    if isinstance(value, np.ndarray | np.generic) and value.size == 1:
+        value = value.item()  # OpenCV returns numbers like that
     low, high = entry.metadata["limits"]
     whole = isinstance(entry.default, int) and not isinstance(entry.default, bool)
     fits = isinstance(value, int if whole else int | float) and not isinstance(value, bool)

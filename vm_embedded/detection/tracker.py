@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats, numbers_or_nan
+from ..arrays import Floats, numbers_or_nan, one_number
 from ..errors import InputError
 from ..geometry.orientation import rotation_z
 from .detection import Detection
@@ -64,6 +64,7 @@ class Tracker:
 
         Raises InputError if a number is not finite, or if `moved` is not three numbers.
         """
+        time = one_number(time, "time")
         if not math.isfinite(time):
             raise InputError(f"time must be finite [s], not {time}")
         move = None if moved is None else _checked_move(moved)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Number
+from ..arrays import Floats, Number, one_number
 from ..errors import GeometryError
 from .shape import Shape, all_between, rays_to_circle
 
@@ -30,6 +30,7 @@ class Cylinder(Shape):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        object.__setattr__(self, "object_height", one_number(self.object_height, "object_height"))
         if not (math.isfinite(self.object_height) and self.object_height > 0):
             raise GeometryError(f"cylinder height must be a number above 0 m, not {self.object_height}")
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import Floats, Mask, numbers_or_nan
+from ..arrays import Floats, Mask, numbers_or_nan, one_number
 from ..errors import InputError
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ class Lens(ABC):
     size: Size | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "fov", one_number(self.fov, "lens fov"))
         if not (math.isfinite(self.fov) and 0.0 < self.fov <= 2.0 * math.pi):
             raise InputError(f"lens fov must be an angle above 0 and up to 2 pi rad, not {self.fov}")
         if self.size is None:

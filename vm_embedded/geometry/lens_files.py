@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,8 @@ from ..config.yaml_reader import read_yaml
 from ..errors import InputError, VisualMeshError, unknown
 from ..files import read_text
 from .calibrated_lenses import BrownLens, CalibratedLens, FisheyeLens
+from .calibration_models import FISHEYE, calibration_model, is_model_key
+from .foreign_lens_files import check_units, foreign_table, foreign_text
 from .lens import Lens
 from .orientation import Orientation
 from .radial_lenses import RadialLens, projection_named
@@ -31,8 +33,6 @@ _REFERENCE_KEYS = ("projection", "focal_length", "centre", "k", "fov", "size", "
 
 _REFERENCE_NAMES = {"centre": "center", "k": "distortion"}
 """The reference's names of keys, and ours."""
-
-_BROWN, _FISHEYE = ("plumb_bob", "rational_polynomial"), ("equidistant", "fisheye")
 
 _COEFFICIENT_KEYS = (
     "distortion_coefficients",
@@ -65,7 +65,7 @@ def read_lens_file(path: str | Path) -> LensFile:
     text = read_text(path, "lens file", _LARGEST)
     try:
         if path.suffix.lower() == ".toml":
-            table = parse_toml(text)
+            table = _read_text(text, parse_toml)
             return LensFile(lens_from_table(table.get("lens", table)), None, path)
         return replace(parse_lens_yaml(text), path=path)
     except VisualMeshError as error:
@@ -74,9 +74,12 @@ def read_lens_file(path: str | Path) -> LensFile:
 
 def parse_lens_yaml(text: str) -> LensFile:
     """Reads the text of a lens file in YAML. Raises InputError, also for a bad orientation GeometryError."""
-    table = read_yaml(text)
+    table = _read_text(text, read_yaml)
     if not isinstance(table, dict):
         raise InputError("expected a table of keys and values")
+    lens = table.get("lens")
+    if isinstance(lens, dict) and table.keys() <= {"lens", "Hoc"}:
+        table = {**lens, **{key: value for key, value in table.items() if key != "lens"}}
     hoc = table.pop("Hoc", None)
     orientation = None if hoc is None else Orientation.from_hoc(hoc)
     if not {"projection", "focal_length"} & table.keys():
@@ -86,6 +89,14 @@ def parse_lens_yaml(text: str) -> LensFile:
             raise InputError(unknown("lens key", key, _REFERENCE_KEYS))
     named = {str(_REFERENCE_NAMES.get(key, key)): value for key, value in table.items()}
     return LensFile(lens_from_table(named), orientation)
+
+
+def _read_text(text: str, parse: Callable[[str], Any]) -> Any:
+    """What a parser makes of a text. Raises InputError, which names the format of a file of another program."""
+    foreign = foreign_text(text, parse is parse_toml)
+    if foreign:
+        raise InputError(foreign)
+    return parse(text)
 
 
 def format_lens_file(lens: Lens, orientation: Orientation | None) -> str:
@@ -136,6 +147,7 @@ def lens_from_table(table: Mapping[str, Any]) -> RadialLens:
     """
     if not isinstance(table, Mapping):
         raise InputError(f"lens must be a table, not {str(table)[:60]}")
+    check_units(table)
     for key in table:
         if key not in _LENS_KEYS:
             raise InputError(unknown("lens key", key, _LENS_KEYS))
@@ -156,11 +168,13 @@ def lens_from_calibration(table: Mapping[str, Any]) -> Lens:
     """A lens from a calibration as ROS (camera_info) or OpenCV (camera_matrix, ...) writes it. Raises InputError."""
     matrix = _first(table, "camera_matrix", "K", "k", "cameraMatrix")
     if matrix is None:
-        raise InputError("found neither `projection`, as in a lens, nor `camera_matrix`, as in a calibration")
+        raise InputError(
+            foreign_table(table) or "found neither `projection`, as in a lens, nor `camera_matrix`, as in a calibration"
+        )
     k = _numbers(_data(matrix), "camera_matrix", 9)
     coefficients = _numbers(_data(_coefficients(table)), "distortion")
     width, height = (_first(table, f"image_{side}", side) for side in ("width", "height"))
-    model = _distortion_model(table, len(coefficients))
+    model = calibration_model(table)
     common: dict[str, Any] = {
         "focal_lengths": (k[0], k[4]),
         "optical_center": (k[2], k[5]),
@@ -168,14 +182,12 @@ def lens_from_calibration(table: Mapping[str, Any]) -> Lens:
     }
     if abs(k[1]) > 1e-6 * abs(k[0]):
         raise InputError(f"camera_matrix has a skew of {k[1]:g}, but only calibrations without skew are supported")
-    if model.lower() in _FISHEYE:
+    if model == FISHEYE:
         return FisheyeLens(fov=2.0 * math.pi, coefficients=tuple(coefficients), **common)
-    if model.lower() in _BROWN:
-        while len(coefficients) > 8 and coefficients[-1] == 0.0:
-            coefficients.pop()  # OpenCV writes 12 or 14 coefficients even if the last ones are zero
-        # Calibrations have no field of view. 160 degrees is as wide as a rectilinear picture gets.
-        return BrownLens(fov=math.radians(160.0), coefficients=tuple(coefficients), **common)
-    raise InputError(unknown("distortion_model", model, (*_BROWN, *_FISHEYE)))
+    while len(coefficients) > 8 and coefficients[-1] == 0.0:
+        coefficients.pop()  # OpenCV writes 12 or 14 coefficients even if the last ones are zero
+    # Calibrations have no field of view. 160 degrees is as wide as a rectilinear picture gets.
+    return BrownLens(fov=math.radians(160.0), coefficients=tuple(coefficients), **common)
 
 
 def _coefficients(table: Mapping[str, Any]) -> Any:
@@ -183,25 +195,10 @@ def _coefficients(table: Mapping[str, Any]) -> Any:
 
     Raises InputError for a key that may be meant for them, since a lens without its distortion is silently wrong.
     """
-    for key in table:
-        if "dist" in str(key).lower() and key not in (*_COEFFICIENT_KEYS, "distortion_model"):
+    for key, value in table.items():
+        if "dist" in str(key).lower() and key not in _COEFFICIENT_KEYS and not is_model_key(key, value):
             raise InputError(unknown("key", key, (*_COEFFICIENT_KEYS, "distortion_model")))
     return _first(table, *_COEFFICIENT_KEYS) or []
-
-
-def _distortion_model(table: Mapping[str, Any], coefficients: int) -> str:
-    """The distortion model: that of ROS, or what `fisheye_model` says, which OpenCV's calibration sample writes.
-
-    Raises InputError if the two contradict each other.
-    """
-    flag = table.get("fisheye_model")
-    if flag not in (None, 0, 1):
-        raise InputError(f"fisheye_model must be 0 or 1, not {str(flag)[:60]!r}")
-    by_count = "rational_polynomial" if coefficients == 8 else "plumb_bob"
-    model = str(table.get("distortion_model", "fisheye" if flag else by_count))
-    if flag is not None and bool(flag) != (model.lower() in _FISHEYE):
-        raise InputError(f"fisheye_model {int(flag)} contradicts distortion_model {model!r}: remove the wrong one")
-    return model
 
 
 def _first(table: Mapping[str, Any], *keys: str) -> Any:

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats, frozen, numbers_or_nan
+from ..arrays import Floats, frozen, numbers_or_nan, one_number
 from ..errors import GeometryError
 
 OPTICAL_TO_CAMERA: Floats = frozen(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))
@@ -69,13 +69,15 @@ class Orientation:
 
     height [m]: of the camera over the plane. rotation (3, 3): from the camera's frame to the plane's frame.
 
-    Raises GeometryError if the height is not a finite number above 0 or the matrix is not a rotation.
+    Raises GeometryError if the height is not above 0 and finite or the matrix is not a rotation, and InputError if the
+    height is not a number. An array of one number is a number.
     """
 
     height: float
     rotation: Floats
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "height", one_number(self.height, "height"))
         rotation = numbers_or_nan(self.rotation)
         if not math.isfinite(self.height) or self.height <= 0:
             raise GeometryError(f"camera height must be a number above 0 m, not {self.height}")
@@ -109,8 +111,9 @@ class Orientation:
         roll > 0 tilts to the right, pitch > 0 looks down, yaw > 0 turns to the left.
 
         Raises GeometryError for a roll or pitch beyond a full turn, which is probably in degrees, and for angles that
-        are not finite.
+        are not finite, and InputError for what is not a number.
         """
+        roll, pitch, yaw = (one_number(*each) for each in ((roll, "roll"), (pitch, "pitch"), (yaw, "yaw")))
         for name, angle in (("roll", roll), ("pitch", pitch)):
             if math.isfinite(angle) and abs(angle) > math.tau:
                 raise GeometryError(

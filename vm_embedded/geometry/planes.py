@@ -62,6 +62,7 @@ class Plane:
 
     def __post_init__(self) -> None:
         normal, offset = numbers_or_nan(self.normal), numbers_or_nan(self.offset)
+        offset = offset.reshape(()) if offset.size == 1 else offset  # an array of one number is a number
         length = float(np.linalg.norm(normal)) if normal.shape == (3,) else math.nan
         if not (math.isfinite(length) and length > 1e-9 and offset.shape == () and np.isfinite(offset)):
             raise GeometryError(

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import Floats, Number
+from ..arrays import Floats, Number, numbers_or_nan, one_number
 from ..errors import InputError, unknown
 from .distortion import distort, monotone_radius, undistort
 from .lens import Lens, Size
+from .shape import all_between
 
 if TYPE_CHECKING:
     from typing_extensions import Self  # typing has it from Python 3.11 on
@@ -42,6 +43,7 @@ class RadialLens(Lens):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        object.__setattr__(self, "focal_length", one_number(self.focal_length, "lens focal_length"))
         if not (math.isfinite(self.focal_length) and self.focal_length > 0):
             raise InputError(f"lens focal length must be above 0 px, not {self.focal_length}")
         self._store("center", 2)
@@ -114,12 +116,13 @@ class Rectilinear(RadialLens):
     def from_horizontal_fov(cls, fov: float, size: Size) -> Rectilinear:
         """A lens without distortion for images of this size [px], whose width shows the angle fov [rad].
 
-        Raises InputError for an angle outside of (0, pi).
+        Raises InputError for an angle outside of (0, pi), and for a size that is not two numbers above 0.
         """
+        fov, (width, height) = one_number(fov, "fov"), _two_above_zero(size)
         if not 0.0 < fov < math.pi:
             raise InputError(f"a horizontal angle of view must be above 0 and below pi rad, not {fov}")
-        focal_length = 0.5 * size[0] / math.tan(0.5 * fov)
-        diagonal = 2.0 * math.atan(0.5 * math.hypot(*size) / focal_length)
+        focal_length = 0.5 * width / math.tan(0.5 * fov)
+        diagonal = 2.0 * math.atan(0.5 * math.hypot(width, height) / focal_length)
         return cls(focal_length=focal_length, fov=diagonal, size=size)
 
     def __post_init__(self) -> None:
@@ -166,6 +169,14 @@ class Equidistant(RadialLens):
         sine = np.sqrt(1.0 - cosine * cosine)
         ratio = np.arctan2(sine, cosine) / sine
         return self.focal_length * np.where(sine > 1e-12, ratio, 1.0)
+
+
+def _two_above_zero(size: object) -> tuple[float, float]:
+    numbers = numbers_or_nan(size)
+    if numbers.shape != (2,) or not all_between(numbers, 0.0, math.inf):
+        raise InputError(f"size must be a width and a height above 0 px, not {size!r}")
+    width, height = numbers.tolist()
+    return width, height
 
 
 PROJECTIONS: dict[str, type[RadialLens]] = {

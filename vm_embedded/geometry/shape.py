@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Mask, Number
+from ..arrays import Floats, Mask, Number, one_number
 from ..errors import GeometryError
 
 
@@ -28,6 +28,7 @@ class Shape(ABC):
     radius: float
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", one_number(self.radius, "object radius"))
         if not (math.isfinite(self.radius) and self.radius > 0):
             raise GeometryError(f"object radius must be a positive number of meters, not {self.radius}")
 

@@ -18,9 +18,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Protocol
 
+from ..borders.credentials import without_password
 from ..borders.sockets import is_open_to_network
 from ..borders.text import to_json
-from ..cameras.camera import without_password
 from ..cameras.grabber import Grabber
 from ..cameras.open_camera import Opener
 from ..detection.detector import Detector

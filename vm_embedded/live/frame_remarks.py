@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..cameras.ros.lens import rectified_doubt
 from ..geometry.lens_doubt import lens_doubt
 from .answering import Answer
 
@@ -27,8 +28,9 @@ class FrameRemarks:
             self._began = answer.time
             height, width = answer.shot.image.shape[:2]
             doubt = lens_doubt(answer.lens, (width, height))
-            if doubt is not None:
-                yield "doubtful lens", str(doubt)
+            rectified = rectified_doubt(answer.shot.topic, answer.lens)
+            for each in filter(None, (doubt, rectified)):
+                yield "doubtful lens", str(each)
         if self._is_done:
             return
         is_seen = len(answer.detections.pixels) > 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..cameras.camera import without_password
+from ..borders.credentials import without_password
 from ..cameras.image_files import check_read_format
 from ..cameras.open_camera import Opener, brings_lens_and_pose, camera_opener, is_live
 from ..detection.detector import Detector

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from ..borders.credentials import without_password
 from ..borders.text import to_json
-from ..cameras.camera import without_password
 from ..errors import InputError
 from ..geometry.orientation import Orientation
 from ..output.messages import Message

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats, Indices, Mask, frozen
+from ..arrays import Floats, Indices, Mask, frozen, one_number
 from ..errors import GeometryError
 from ..geometry.shape import Shape
 
@@ -118,8 +118,10 @@ class MeshModel(ABC):
         The paper requires height and radius, too (section "Visual Mesh Geometry").
 
         Raises GeometryError for a shape, a height, a number of intersections or a distance that this model cannot
-        build.
+        build, and InputError for what is not a number.
         """
+        height, intersections = one_number(height, "height"), one_number(intersections, "intersections")
+        max_distance = one_number(max_distance, "max_distance")
         if not (math.isfinite(intersections) and intersections > 0):
             raise GeometryError(f"intersections must be above 0, not {intersections}")
         if not (math.isfinite(max_distance) and max_distance > 0):

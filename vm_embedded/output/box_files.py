@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import Floats, Image
-from ..cameras.image_files import Frame
+from ..cameras.frame_source import Frame
 from ..detection.detections import Detections
 from ..errors import InputError
 from ..files import read_bytes, write_file

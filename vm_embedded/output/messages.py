@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..cameras.camera import Shot
-from ..cameras.image_files import Frame
+from ..cameras.frame_source import Frame
 from ..detection.detections import ClassPoints, Detections
 
 STATES = ("starting", "ok", "degraded", "camera_lost", "pose_stale", "stopping")

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from ..arrays import Image
-from ..cameras.image_files import Frame
+from ..cameras.frame_source import Frame
 from ..detection.detections import Detections
 from ..errors import InputError
 from ..files import atomic_write, is_file

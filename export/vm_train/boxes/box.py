@@ -50,9 +50,8 @@ class Box:
 class BoxedPicture:
     """An image file with all its boxes; no boxes means that it shows nothing.
 
-    size: width and height [px]. Size and boxes are those of the image as read_upright reads it, turned as its EXIF
-    entry says. recording: the name that frames of one recording share; a split keeps them together. lens: the lens file
-    beside the image, or None.
+    size: width and height [px]. Size, boxes and lens are those of the image as turned by its EXIF entry. recording: the
+    name that frames of one recording share; a split keeps them together. lens: the lens file beside the image, or None.
     """
 
     image: Path

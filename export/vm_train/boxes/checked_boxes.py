@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
+from dataclasses import dataclass
 
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Size
@@ -26,6 +27,19 @@ _EQUAL = 0.9
 """Intersection over union from which on two boxes of a class are the same."""
 
 
+@dataclass(frozen=True)
+class CheckedBoxes:
+    """The good boxes of an image, and a line about each fault.
+
+    unusable: about boxes that are missing in `good`. Their objects must not become background, so the image can't be
+    used.
+    """
+
+    good: list[Box]
+    faults: list[str]
+    unusable: list[str]
+
+
 def is_cut(box: Box, size: Size) -> bool:
     """Whether a box reaches to the border of an image of this width and height [px]: part of the object is outside."""
     near = _NEAR_BORDER - 0.5
@@ -37,8 +51,8 @@ def is_round(box: Box) -> bool:
     return max(box.width, box.height) <= _ROUNDEST * min(box.width, box.height)
 
 
-def checked_boxes(boxes: list[RawBox], size: Size, round_names: Collection[str]) -> tuple[list[Box], list[str]]:
-    """The good boxes [px] of an image of this width and height, and a line about each fault.
+def checked_boxes(boxes: list[RawBox], size: Size, round_names: Collection[str]) -> CheckedBoxes:
+    """Check the boxes of an image of this width and height [px].
 
     boxes: with edges in pixels from 0 to width and height. round_names: classes of which a long box is a fault; the box
     stays, so that nothing else takes its place for background.
@@ -46,12 +60,12 @@ def checked_boxes(boxes: list[RawBox], size: Size, round_names: Collection[str])
     good: list[Box] = []
     places: list[str] = []
     grid = BoxGrid(_EQUAL)
-    faults = []
+    faults, unusable = [], []
     for raw in boxes:
         try:
             box = _inside(raw, size)
         except InputError as error:
-            faults.append(f"{raw.place}: {error}; box not used")
+            unusable.append(f"{raw.place}: {error}")
             continue
         same = [at for at, other in grid.near(box.name, box.edges) if overlap(box.edges, other) >= _EQUAL]
         if same:
@@ -65,7 +79,7 @@ def checked_boxes(boxes: list[RawBox], size: Size, round_names: Collection[str])
         grid.add(box.name, box.edges)
         good.append(box)
         places.append(raw.place)
-    return good, faults
+    return CheckedBoxes(good, faults, unusable)
 
 
 def _inside(raw: RawBox, size: Size) -> Box:

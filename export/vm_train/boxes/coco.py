@@ -1,20 +1,26 @@
-"""COCO: a JSON file with images, categories and annotations, whose boxes are left, top, width, height in pixels."""
+"""COCO: a JSON file with images, categories and annotations, whose boxes are left, top, width, height in pixels.
+
+Of a polygon without a box, and of a box with a rotation as CVAT writes it, the outer box is read.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter, defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Size
+from vm_embedded.output.box_files import Edges
 
 from .annotation import Annotation, Annotations, RawBox
 from .coco_file import CocoFile, Entry, Id, coco_files, is_id, number, parse_coco, shown
 from .folder_files import FolderFiles
 from .image_index import ImageIndex, image_folders, once_each
+from .outer_box import outer_box, outer_box_of_turned
 
 _MOST_SHOWN = 100
 """Most categories in a message, so that many wrong ones do not take long."""
@@ -59,17 +65,23 @@ class _Reader:
         """The images that can be used, with their boxes."""
         images = self._images()
         boxes: dict[Id, list[RawBox]] = defaultdict(list)
-        known = {entry.get("id") for entry in self._content.images if is_id(entry.get("id"))}
+        ids = [entry["id"] for entry in self._content.images if is_id(entry.get("id"))]
+        known = {str(each): each for each in ids} | {each: each for each in ids}  # some programs write 1 as "1"
         for position, entry in enumerate(self._content.annotations):
             name = shown(entry["id"]) if "id" in entry else f"at position {position}"
             place = f"{self._label} annotation {name}"
+            key = entry.get("image_id")
+            key = known.get(key, known.get(str(key))) if is_id(key) else None
+            if key is None:
+                self.faults.append(f"{place}: there is no image with id {shown(entry.get('image_id'))}; box not used")
+                continue
             try:
-                key = entry.get("image_id")
-                if not is_id(key) or key not in known:
-                    raise InputError(f"there is no image with id {shown(key)}")
                 boxes[key].append(_box(entry, place, self._content.categories))
             except InputError as error:
-                self.faults.append(f"{place}: {error}; box not used")
+                self.faults.append(f"{place}: {error}")
+                if key in images:
+                    self.faults[-1] += f"; {self._index.labels([images[key][0]])} not used"
+                    self.spoiled.add(images[key][0])
         return [
             Annotation(path, self._label, tuple(boxes[key]), size)
             for key, (path, size) in images.items()
@@ -122,13 +134,33 @@ def _size(entry: Entry) -> Size | None:
 
 
 def _box(entry: Entry, place: str, categories: Mapping[Id, str]) -> RawBox:
-    key, bbox = entry.get("category_id"), entry.get("bbox")
+    key = entry.get("category_id")
     if not is_id(key) or key not in categories:
         known = ", ".join(f"{each} {name}" for each, name in islice(categories.items(), _MOST_SHOWN))
         raise InputError(f"category {shown(key)} is unknown; categories has {known}"[:400])
     if entry.get("iscrowd"):
         raise InputError(f"marks a crowd of {categories[key]}, not a single one")
+    return RawBox(place, categories[key], _edges(entry))
+
+
+def _edges(entry: Entry) -> Edges:
+    """The box of an annotation, or the outer one of its polygons. Raises InputError."""
+    bbox, polygons = entry.get("bbox"), entry.get("segmentation")
+    if (not bbox or bbox == [0, 0, 0, 0]) and isinstance(polygons, list) and polygons:
+        corners = [corner for polygon in polygons for corner in _corners(polygon)]
+        return outer_box(corners)
     if not isinstance(bbox, list) or len(bbox) != 4:
         raise InputError(f"bbox {shown(bbox)} is not a list of left, top, width and height")
-    left, top, width, height = (number(value) for value in bbox)
-    return RawBox(place, categories[key], (left, top, left + width, top + height))
+    left, top, width, height = map(number, bbox)
+    edges = (left, top, left + width, top + height)
+    attributes = entry.get("attributes")
+    turn = attributes.get("rotation") if isinstance(attributes, dict) else None
+    return edges if turn is None else outer_box_of_turned(edges, math.radians(number(turn)))
+
+
+def _corners(polygon: object) -> Iterator[tuple[float, float]]:
+    """The corners of a polygon, a list x, y, x, y, and so on. Raises InputError."""
+    if not isinstance(polygon, list) or len(polygon) < 6 or len(polygon) % 2:
+        raise InputError(f"segmentation {shown(polygon)} is not a list x, y, x, y, ... of three or more corners")
+    values = map(number, polygon)
+    return zip(values, values, strict=True)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from vm_embedded.cameras.exif import UPRIGHT
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Size
 
 from .annotation import Annotation, RawBox
-from .image_facts import UPRIGHT, ImageFacts
+from .image_facts import ImageFacts
 
 
 def fit(annotation: Annotation, facts: ImageFacts, label: str) -> tuple[list[RawBox], list[str]]:

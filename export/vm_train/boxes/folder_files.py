@@ -7,7 +7,7 @@ from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
-from vm_embedded.cameras.image_files import IMAGE_SUFFIXES
+from vm_embedded.cameras.frame_source import IMAGE_SUFFIXES
 from vm_embedded.errors import InputError
 from vm_embedded.files import read_regular
 

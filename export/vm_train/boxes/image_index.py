@@ -6,8 +6,10 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from itertools import islice
 from pathlib import Path, PurePath, PureWindowsPath
+from unicodedata import normalize
 
 from vm_embedded.errors import InputError
+from vm_embedded.files import there
 
 from .annotation import Annotation, Annotations
 from .folder_files import FolderFiles
@@ -27,13 +29,13 @@ class ImageIndex:
         self._by_stem: dict[str, list[Path]] = defaultdict(list)
         self._by_place: dict[tuple[Path, str], list[Path]] = defaultdict(list)
         for path in files.images:
-            self._by_name[path.name].append(path)
-            self._by_stem[path.stem].append(path)
-            self._by_place[path.parent, path.stem].append(path)
+            self._by_name[_same(path.name)].append(path)
+            self._by_stem[_same(path.stem)].append(path)
+            self._by_place[path.parent, _same(path.stem)].append(path)
 
     def of_stem(self, annotation: Path) -> list[Path]:
         """The images with the stem of an annotation file: those beside it or in its folder of images, or else all."""
-        stem = annotation.stem
+        stem = _same(annotation.stem)
         near = [path for folder in image_folders(annotation) for path in self._by_place.get((folder, stem), [])]
         return near or self._by_stem.get(stem, [])
 
@@ -44,7 +46,7 @@ class ImageIndex:
         """
         parts = _parts(name)
         for folder in near:
-            if (path := folder.joinpath(*parts)) in self._images:
+            if (path := there(folder.joinpath(*parts))) in self._images:
                 return path
         found = self.of_name(name)
         if not found:
@@ -56,12 +58,17 @@ class ImageIndex:
     def of_name(self, name: str) -> list[Path]:
         """All images of a name, in any folder."""
         parts = _parts(name)
-        return self._by_name.get(parts[-1], []) if parts else []
+        return self._by_name.get(_same(parts[-1]), []) if parts else []
 
     def labels(self, paths: Iterable[Path]) -> str:
         """Paths below the folder, joined, for messages; at most _MOST_LABELS of them."""
         shown = [self._files.label(path) for path in islice(paths, _MOST_LABELS + 1)]
         return " and ".join(shown if len(shown) <= _MOST_LABELS else [*shown[:_MOST_LABELS], "others"])
+
+
+def _same(name: str) -> str:
+    """A name in the normal form in which names compare; see `files.there`."""
+    return normalize("NFC", name)
 
 
 def image_folders(annotation: Path) -> list[Path]:

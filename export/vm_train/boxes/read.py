@@ -12,13 +12,13 @@ from vm_embedded.geometry.lens_files import read_lens_file
 from vm_workstation.yolo_labels import yolo_files
 
 from .annotation import Annotation, Annotations
-from .box import Box, BoxedPicture, BoxedSet
-from .checked_boxes import checked_boxes
+from .box import BoxedPicture, BoxedSet
+from .checked_boxes import CheckedBoxes, checked_boxes
 from .coco import is_coco, read_coco
 from .coco_file import coco_files
 from .fit import fit
 from .folder_files import FolderFiles, find_files
-from .image_facts import UPRIGHT, ImageFacts, image_facts
+from .image_facts import ImageFacts, image_facts
 from .recordings import recordings
 from .voc import is_voc, read_voc
 from .yolo import is_yolo, read_yolo
@@ -37,6 +37,8 @@ def read_boxes(
     round_names: Collection[str] = ("ball",),
 ) -> BoxedSet:
     """All images of a folder and its sub-folders that have good annotations, and one line for each fault.
+
+    Every place without a box counts as background. So an image is left out if one of its boxes can't be read.
 
     format: one of FORMATS; None finds it out. names: for names of classes in the annotations, the names to use; others
     stay as they are. round_names: classes, after this renaming, of which a long box is a fault. Raises InputError if
@@ -103,24 +105,28 @@ def _checked(
             same = first.setdefault(facts.digest, path)
             if same != path:
                 raise InputError(f"the same image as {files.label(same)}")
-            boxes, wrong = _boxes(by_image[path], facts, files.label(path), names, round_names)
+            boxes = _boxes(by_image[path], facts, files.label(path), names, round_names)
         except InputError as error:
             faults.append(f"{files.label(path)}: {error}; not used")
             continue
-        lens, wrong_lens = _lens(files, path, facts)
-        pictures.append(BoxedPicture(path, facts.size, tuple(boxes), recording, lens))
-        faults += wrong + wrong_lens
+        faults += boxes.faults
+        if boxes.unusable:
+            faults += [f"{each}; {files.label(path)} not used" for each in boxes.unusable]
+            continue
+        lens, wrong = _lens(files, path, facts)
+        pictures.append(BoxedPicture(path, facts.size, tuple(boxes.good), recording, lens))
+        faults += wrong
     return pictures, faults
 
 
 def _boxes(
     annotation: Annotation, facts: ImageFacts, label: str, names: Mapping[str, str], round_names: Collection[str]
-) -> tuple[list[Box], list[str]]:
-    """The good boxes of an image in its upright pixels, and its faults. Raises InputError for a wrong size."""
+) -> CheckedBoxes:
+    """The boxes of an image in its upright pixels. Raises InputError for a wrong size."""
     raw, faults = fit(annotation, facts, label)
     renamed = [replace(each, name=names.get(each.name, each.name)) for each in raw]
-    boxes, wrong = checked_boxes(renamed, facts.size, round_names)
-    return boxes, faults + wrong
+    checked = checked_boxes(renamed, facts.size, round_names)
+    return replace(checked, faults=faults + checked.faults)
 
 
 def _lens(files: FolderFiles, image: Path, facts: ImageFacts) -> tuple[Path | None, list[str]]:
@@ -129,8 +135,6 @@ def _lens(files: FolderFiles, image: Path, facts: ImageFacts) -> tuple[Path | No
     if path is None:
         return None, []
     try:
-        if facts.orientation != UPRIGHT:
-            raise InputError(f"{image.name} is turned by its EXIF orientation {facts.orientation}, the lens is not")
         read_lens_file(path).lens.for_image(facts.size)
     except InputError as error:
         return None, [f"{files.label(path)}: {error}; {files.label(image)} is used without lens"]

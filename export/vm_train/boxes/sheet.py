@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 
 from vm_embedded.arrays import Floats, Image
+from vm_embedded.cameras.image_files import read_image
 from vm_workstation.contact_sheet import FAINT_INK, GAP, INK, LINE, PAPER, Color, scaled_pixels, write_text
 
 from .box import Box, BoxedPicture
 from .checked_boxes import is_cut
-from .image_facts import read_upright
 
 _CELL, _COLUMNS = 112, 16
 """Width and height of a crop [px], and crops in a row."""
@@ -65,7 +65,7 @@ def _cells(places: Sequence[Place], folder: Path, colors: Sequence[Color]) -> It
     for index in order:
         picture, box = places[index]
         if picture.image != path:
-            path, image = picture.image, read_upright(picture.image)
+            path, image = picture.image, read_image(picture.image)
         lines = (str(picture.image.relative_to(folder).with_suffix("")), f"{box.width:.0f} x {box.height:.0f} px")
         yield index, _cell(_crop(image, box, colors[index]), lines)
 

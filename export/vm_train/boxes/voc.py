@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -9,11 +11,13 @@ from xml.etree import ElementTree
 from vm_embedded.errors import InputError, one_line
 from vm_embedded.files import open_regular
 from vm_embedded.geometry.lens import Size
+from vm_embedded.output.box_files import Edges
 from vm_workstation.class_names import class_name
 
 from .annotation import Annotation, Annotations, RawBox
 from .folder_files import FolderFiles, read_bytes
 from .image_index import ImageIndex, image_folders, once_each
+from .outer_box import outer_box, outer_box_of_turned
 
 _EDGES = ("xmin", "ymin", "xmax", "ymax")
 _HEAD = 4096  # bytes in which to look for the root
@@ -47,13 +51,16 @@ def read_voc(files: FolderFiles) -> Annotations:
             faults.append(f"{label}: {error}{names}")
             continue
         boxes, wrong = _boxes(root, label)
+        size = None
         try:
-            found.append(Annotation(image, label, tuple(boxes), _size(root)))
+            size = _size(root)
         except InputError as error:
+            wrong.append(f"{label}: {error}")
+        if wrong:
             spoiled.add(image)
-            faults.append(f"{label}: {error}; {files.label(image)} not used")
+            faults += [f"{each}; {files.label(image)} not used" for each in wrong]
             continue
-        faults += wrong
+        found.append(Annotation(image, label, tuple(boxes), size))
     once = once_each(files, found)
     return replace(once, faults=(*faults, *once.faults), spoiled=once.spoiled | spoiled)
 
@@ -81,7 +88,8 @@ def _parse(path: Path) -> ElementTree.Element:
         raise InputError(f"is cut short or not XML ({one_line(error)})") from error
     assert isinstance(root, ElementTree.Element)
     if root.tag != "annotation":
-        raise InputError(f"begins with <{root.tag}>, not with <annotation>")
+        hint = ": this is CVAT's own format; export as COCO, Pascal VOC or YOLO" if root.tag == "annotations" else ""
+        raise InputError(f"begins with <{root.tag}>, not with <annotation>{hint}")
     return root
 
 
@@ -117,7 +125,7 @@ def _boxes(root: ElementTree.Element, label: str) -> tuple[list[RawBox], list[st
         try:
             boxes.append(_box(element, place))
         except InputError as error:
-            faults.append(f"{place}: {error}; box not used")
+            faults.append(f"{place}: {error}")
     return boxes, faults
 
 
@@ -126,14 +134,38 @@ def _box(element: ElementTree.Element, place: str) -> RawBox:
     if not text.strip():
         raise InputError("class unknown: <name> is missing or empty")
     name = class_name(text)
-    if element.find("bndbox") is None:
-        raise InputError(f"{name} lacks <bndbox> with {', '.join(_EDGES)}")
+    try:
+        return RawBox(place, name, _edges(element))
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
+
+
+def _edges(element: ElementTree.Element) -> Edges:
+    """The box of an object, or the outer one of its polygon or oriented box."""
+    if element.find("bndbox") is not None:
+        left, top, right, bottom = _numbers(element, "bndbox", _EDGES)
+        turns = (each for each in element.iterfind("attributes/attribute") if each.findtext("name") == "rotation")
+        turn = next(turns, None)
+        edges = (left, top, right, bottom)
+        return edges if turn is None else outer_box_of_turned(edges, math.radians(*_numbers(turn, ".", ["value"])))
+    if element.find("robndbox") is not None:
+        x, y, width, height, angle = _numbers(element, "robndbox", ("cx", "cy", "w", "h", "angle"))
+        edges = (x - width / 2.0, y - height / 2.0, x + width / 2.0, y + height / 2.0)
+        return outer_box_of_turned(edges, angle)
+    corners = len(element.findall("polygon/*")) // 2
+    if corners < 3:
+        raise InputError(f"there is no <bndbox> with {', '.join(_EDGES)}, <robndbox> or <polygon>")
+    xs, ys = (_numbers(element, "polygon", [f"{axis}{at}" for at in range(1, corners + 1)]) for axis in "xy")
+    return outer_box(zip(xs, ys, strict=True))
+
+
+def _numbers(element: ElementTree.Element, place: str, names: Iterable[str]) -> list[float]:
+    """The numbers in the entries of these names. Raises InputError that begins with the name of one and its text."""
     values = []
-    for edge in _EDGES:
-        text = (element.findtext(f"bndbox/{edge}") or "").strip()
+    for name in names:
+        text = (element.findtext(f"{place}/{name}") or "").strip()
         try:
             values.append(float(text))
         except ValueError as error:
-            raise InputError(f"{edge} {text[:20]!r} of {name} is not a number") from error
-    left, top, right, bottom = values
-    return RawBox(place, name, (left, top, right, bottom))
+            raise InputError(f"{name} {text[:20]!r} is not a number") from error
+    return values

@@ -43,20 +43,23 @@ def read_yolo(files: FolderFiles) -> Annotations:
             faults.append(f"{error}; {files.label(images[0])} not used")
             spoiled.add(images[0])
             continue
+        if wrong:
+            faults += [f"{label} {fault}; {files.label(images[0])} not used" for fault in wrong]
+            spoiled.add(images[0])
+            continue
         raw = tuple(RawBox(f"{label} line {each.line}", each.class_name, edges(each.shares)) for each in boxes)
         found.append(Annotation(images[0], label, raw, shares=True))
-        faults += [f"{label} {fault}; box not used" for fault in wrong]
     strays = [path for path in files.with_suffix(".txt") if path.absolute() not in used and _has_boxes(path)]
     faults += [f"{files.label(path)}: there is no image for it" for path in strays]
     return Annotations(tuple(found), tuple(faults), frozenset(spoiled))
 
 
 def _has_boxes(path: Path) -> bool:
-    """Whether a text file looks like a label file: its first line is empty or has a good box."""
+    """Whether a text file looks like a label file: its first line with content has a good box."""
     if path.name == CLASSES:
         return False
     try:
-        first = read_text(path).partition("\n")[0]
+        first = read_text(path).lstrip().partition("\n")[0]
     except InputError:
         return False
-    return not first.strip() or bool(parse_labels(first, ())[0])
+    return bool(parse_labels(first, ())[0])

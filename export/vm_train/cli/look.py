@@ -14,6 +14,7 @@ from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import SHIPPED, model_path
 from vm_workstation.option_types import add_set, at_least
+from vm_workstation.worker_process import check_shared_memory
 
 from ..data.pictures import find_pictures
 from ..data.split import split_by_seed
@@ -119,6 +120,8 @@ def run_look(options: argparse.Namespace) -> int:
     from ..look.run_folder import begin_look_run
     from ..look.start import LookStart
 
+    if (options.workers or len(os.sched_getaffinity(0))) > 1:
+        check_shared_memory()
     if options.boxes is not None:
         return begin_fine_tuning(options)
     if options.data is None:

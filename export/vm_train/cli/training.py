@@ -17,6 +17,7 @@ from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
+from vm_workstation.worker_process import check_shared_memory
 
 from ..data.inspection import inspect_pictures
 from ..data.picture_files import PictureFiles
@@ -44,6 +45,8 @@ def run_training(options: argparse.Namespace) -> int:
     """Begin a training, train, and return the exit status. Raises VisualMeshError."""
     from ..learning.hardware import set_up_hardware
 
+    if options.workers != 0:
+        check_shared_memory()
     start = load_start(options.start)
     configuration = read_configuration(options, start)
     with set_up_hardware(options.device, options.workers, options.threads) as hardware, ExitStack() as held:
@@ -66,6 +69,8 @@ def run_resume(options: argparse.Namespace) -> int:
     """Resume a training and return the exit status. Raises VisualMeshError."""
     from ..learning.hardware import set_up_hardware
 
+    if options.workers != 0:
+        check_shared_memory()
     with set_up_hardware(options.device, options.workers, options.threads) as hardware, ExitStack() as held:
         if hardware.is_leader:
             held.enter_context(locked(options.run))

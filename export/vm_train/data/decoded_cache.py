@@ -28,6 +28,9 @@ _HEADER = struct.Struct("<8s32sIIII")  # magic, fingerprint, width, height, byte
 MAGIC = b"vmtrain1"
 _FULL = "full"
 
+_TURNED = "turned by EXIF"
+"""Part of each fingerprint. Entries of versions that did not turn images count as absent."""
+
 _LONGEST = 200
 """Longest name of a picture that becomes the name of a file; file systems allow 255 bytes."""
 KEPT_FREE = 1 << 30
@@ -152,5 +155,5 @@ def fingerprint(files: PictureFiles, classes: Classes) -> bytes:
         places: tuple[object, ...] = ()
     else:
         stats, places = [files.shard.stat()], files.places
-    content = [[each.st_size, each.st_mtime_ns] for each in stats], places, list(classes.colors.items())
+    content = _TURNED, [[each.st_size, each.st_mtime_ns] for each in stats], places, list(classes.colors.items())
     return hashlib.sha256(json.dumps(content).encode()).digest()

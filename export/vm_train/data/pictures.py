@@ -102,7 +102,7 @@ def decode_picture(raw: RawPicture, classes: Classes, names: tuple[str, str, str
     """
     if names is None:
         names = (f"image of {raw.number}", f"mask of {raw.number}", f"lens of {raw.number}")
-    image = _decoded(raw.image, names[0], cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    image = _decoded(raw.image, names[0], cv2.IMREAD_COLOR)
     mask = _decoded(raw.mask, names[1], cv2.IMREAD_UNCHANGED)
     if mask.ndim != 3 or mask.shape[2] not in (3, 4) or mask.dtype != np.uint8:
         channels = mask.shape[2] if mask.ndim == 3 else 1

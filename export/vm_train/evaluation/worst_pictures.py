@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Image
+from vm_embedded.cameras.decoding import decode
 
 from .worst_errors import WorstError
 
@@ -23,9 +24,8 @@ _ROUND = 4  # fractional bits of corners in OpenCV
 
 
 def draw_error(error: WorstError) -> Image:
-    """The picture (200, w, 3) with all outlines. Raises PictureFault if the image can no longer be read."""
-    data = np.frombuffer(error.files.read("image"), dtype=np.uint8)
-    image = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION))
+    """The picture (200, w, 3) with all outlines. Raises InputError if the image can no longer be read."""
+    image = decode(error.files.read("image"))
     height, width = image.shape[:2]
     scale = _HEIGHT / height
     whole = np.array([[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5]])

@@ -68,7 +68,7 @@ def picture_of(example: Example, renaming: Mapping[str, str], normalized: bool) 
     another VisualMeshError, naming the feature, for anything else that makes the Example unusable.
     """
     features = _Features(example, {key: renaming.get(key, key) for key in KEYS})
-    image, suffix, size = features.picture("image", cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+    image, suffix, size = features.picture("image", cv2.IMREAD_COLOR)
     mask, mask_suffix, mask_size = features.picture("mask", cv2.IMREAD_UNCHANGED)
     if mask_suffix != ".png":
         raise InputError("mask is not a PNG file")

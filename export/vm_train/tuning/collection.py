@@ -9,11 +9,11 @@ from functools import partial
 import numpy as np
 
 from vm_embedded.arrays import Floats
+from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.network.look_contract import LookContract
 
 from ..boxes.box import BoxedPicture
-from ..boxes.image_facts import read_upright
 from ..look.chunks import collect_chunks
 from ..look.collection import random_of
 from ..look.labels import UNLABELED
@@ -60,7 +60,7 @@ class Collector:
     def __call__(self, frame: Frame) -> PatchChunk:
         """The patches of a frame. Raises InputError if it can't be read any more."""
         picture, settings = frame.picture, self.settings
-        pyramid = Pyramid(read_upright(picture.image), "bgr")
+        pyramid = Pyramid(read_image(picture.image), "bgr")
         objects = objects_of(picture, self.object_class, self.is_round)
         random = random_of(settings.seed, picture.image.name)
         windows = Windows.joined(

@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Image
+from vm_embedded.cameras.image_files import read_image
 from vm_embedded.files import write_file
 
 from ..boxes.box import BoxedPicture
-from ..boxes.image_facts import read_upright
 from ..evaluation.html_page import html_page, html_strip, html_table
 from .run_folder import TuningRun
 from .window_scores import PASSING, REPORTED, Looked, WindowScores
@@ -93,7 +93,7 @@ def _crops(frames: list[BoxedPicture], looked: Looked, chosen: npt.NDArray[np.bo
     rows = np.flatnonzero(chosen)
     for row in rows[np.argsort(-looked.probabilities[rows], kind="stable")][:_SHOWN]:
         frame = frames[looked.frames[row]]
-        crop = _crop(read_upright(frame.image), looked.windows.centers[row].tolist(), float(looked.windows.radii[row]))
+        crop = _crop(read_image(frame.image), looked.windows.centers[row].tolist(), float(looked.windows.radii[row]))
         jpeg = cv2.imencode(".jpg", crop, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
         yield jpeg, f"{looked.probabilities[row]:.2f}, {frame.image.stem}"
 

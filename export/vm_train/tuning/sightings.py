@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
+from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.looking import Look
 from vm_embedded.detection.pyramid import Pyramid
 
 from ..boxes.box import Box, BoxedPicture
-from ..boxes.image_facts import read_upright
 from ..boxes.unlabeled import Sighting
 from .boxed_objects import all_objects
 from .candidates import find_candidates, look_at_windows, search_radii
@@ -32,7 +32,7 @@ def clear_sightings(
         return
     radii = search_radii(objects)
     for picture in pictures:
-        pyramid = Pyramid(read_upright(picture.image), "bgr")
+        pyramid = Pyramid(read_image(picture.image), "bgr")
         candidates = find_candidates(pyramid, picture.size, look, radii, _ABOVE, _CANDIDATES)
         windows, probabilities = look_at_windows(pyramid, look, candidates)
         for (x, y), radius, probability in zip(windows.centers, windows.radii, probabilities, strict=True):

@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats
+from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.looking import Look
 from vm_embedded.detection.pyramid import Pyramid
 
 from ..boxes.box import BoxedPicture
-from ..boxes.image_facts import read_upright
 from ..look.collection import random_of
 from .boxed_objects import objects_of
 from .candidates import find_candidates, look_at_windows
@@ -115,7 +115,7 @@ def score_frames(
     for number, frame in enumerate(frames):
         if stop_requested():
             return None
-        pyramid = Pyramid(read_upright(frame.image), "bgr")
+        pyramid = Pyramid(read_image(frame.image), "bgr")
         objects = objects_of(frame, object_class, is_round)
         somewhere = random_windows(frame.size, radii, _RANDOM, random_of(0, frame.image.name))
         candidates = find_candidates(pyramid, frame.size, look, radii, _ABOVE, _CANDIDATES)

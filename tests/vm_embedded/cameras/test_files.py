@@ -9,7 +9,7 @@ import pytest
 from tests.messages import read_message
 from tests.preloaded import run_preloaded
 from tests.vm_embedded.live.running import COMMAND, DEMO, LENS, arguments, running
-from vm_embedded.cameras import image_files
+from vm_embedded.cameras import image_files, video_files
 from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cameras.grabber import same_image
 from vm_embedded.cameras.open_camera import camera_opener
@@ -68,7 +68,7 @@ def test_attack_2_a_video_of_large_frames_is_refused(video, tmp_path):
 
 
 def test_attack_2_a_frame_larger_than_the_video_said_is_left_out(monkeypatch, video):
-    monkeypatch.setattr(image_files, "check_video", lambda *given: None)
+    monkeypatch.setattr(video_files, "check_video", lambda *given: None)
     frames = list(image_files.open_source(str(video), max_megapixels=0.1).frames)
     assert len(frames) == 3
     with pytest.raises(InputError, match=r"frame of field\.avi has 640 x 512 px"):

@@ -16,7 +16,8 @@ from tests.vm_embedded.cameras.mjpeg_server import LiveServer, Server, time_of
 from tests.vm_embedded.live.running import DEMO, LENS, running
 from vm_embedded.cameras.camera import BrokenFrameError, CameraError, CameraSettings
 from vm_embedded.cameras.grabber import MOST_HANGING
-from vm_embedded.cameras.mjpeg import MjpegCamera, NotMotionJpegError, parse_url
+from vm_embedded.cameras.http_get import parse_url
+from vm_embedded.cameras.mjpeg import MjpegCamera, NotMotionJpegError
 from vm_embedded.cameras.open_camera import camera_opener
 from vm_embedded.cameras.synthetic import SIZE
 from vm_embedded.errors import InputError

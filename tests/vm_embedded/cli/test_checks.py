@@ -1,7 +1,6 @@
 """What vm-doctor finds on a good machine and on bad ones."""
 
 import os
-import socket
 from dataclasses import replace
 
 import cv2
@@ -9,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.drawn_scenes import FOLDER
+from tests.vm_embedded.cameras.mjpeg_server import Server
 from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cli.camera_source import SourceFacts, check_source
 from vm_embedded.cli.checks import check_lens, check_pose, run_checks
@@ -208,9 +208,11 @@ def test_an_object_that_is_too_large_for_the_height_of_the_camera_is_seen(height
 
 
 def test_a_live_camera_without_lens_or_pose_is_a_failure_of_these_and_not_of_the_model(root):
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        source = f"rtsp://127.0.0.1:{server.getsockname()[1]}/1"
-        seen = found(Configuration(camera=CameraSettings(source=source)), root)
+    noise = np.random.default_rng(0).integers(0, 256, (9, 64, 80, 3)).astype(np.uint8)
+    server = Server([cv2.imencode(".jpg", each)[1].tobytes() for each in noise])
+    source = server.address
+    seen = found(Configuration(camera=CameraSettings(source=source)), root)
+    server.kill()
     assert [seen[name].state for name in ("model", "camera", "lens", "pose")] == [GOOD, GOOD, BAD, BAD]
     low = FixedPose(height=0.5, pitch=0.1)
     given = Configuration(camera=CameraSettings(source=source), orientation=low, fov=1.0)

@@ -439,3 +439,109 @@ def test_attack_8_a_distortion_of_any_size_is_refused_or_works(k, projection, tm
         assert "308" in k
     else:
         assert 0.0 < found.lens.limit <= 0.75
+
+
+CAMERA_MATRIX = "camera_matrix: {rows: 3, cols: 3, data: [420.0, 0, 319.5, 0, 420.0, 255.5, 0, 0, 1]}\n"
+FOUR = "distortion_coefficients: [-0.05, 0.02, -0.003, 0.001]\n"
+
+
+def test_the_model_under_another_key_gives_the_same_places(shared):
+    reference, other = (read_lens_file(shared / "cases/lens" / name) for name in ("a_ref.yaml", "b_camera_model.yaml"))
+    assert reference.lens == other.lens
+    assert isinstance(other.lens, FisheyeLens)
+
+
+FISHEYES = (
+    "distortion_model: equidistant",
+    "distortion_model: Kannala-Brandt",
+    "distortionModel: fisheye",
+    "camera_model: opencv_fisheye",
+    "camera_model: pinhole\ndistortion_model: equi",
+    "lens_model: KannalaBrandt8",
+    "model_type: KANNALA_BRANDT",
+    "model: fisheye",
+    "type: 'Kb4'",
+    "lens: fisheye",
+    "distortion: equidistant",
+    "projection_model: Equidistant",
+    "fisheye: true",
+    "fisheye_model: 1",
+    "is_fisheye: 1",
+)
+BROWNS = (
+    "",
+    "distortion_model: RadTan",
+    "camera_model: pinhole",
+    "model: brown_conrady",
+    "fisheye: 0",
+    "distortion_model:",
+)
+
+
+@pytest.mark.parametrize("line", FISHEYES + BROWNS)
+def test_no_name_of_a_model_is_ignored(write, line):
+    lens = read_lens_file(write(f"{line}\n{CAMERA_MATRIX}{FOUR}")).lens
+    assert isinstance(lens, FisheyeLens if line in FISHEYES else BrownLens)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("camera_model: omni\ndistortion_model: radtan", "camera_model 'omni'"),
+        ("camera_model: ds", "camera_model 'ds'"),
+        ("model: Sony IMX", "model 'Sony IMX'"),
+        ("distortion_model: ftheta", "distortion_model 'ftheta'"),
+        ("distortion_model: inverse_brown_conrady\ncamera_model: pinhole", "inverse_brown_conrady"),
+        ("lens_type: 7", "lens_type 7"),
+        ("fisheye: true\ndistortion_model: plumb_bob", "contradicts"),
+        ("camera_model: fisheye\ndistortion_model: radtan", "contradicts"),
+        ("k1: -0.3", "'k1'"),
+        ("xi: 0.9", "'xi'"),
+    ],
+)
+def test_an_unknown_model_is_refused(write, line, says):
+    with pytest.raises(InputError, match=says):
+        read_lens_file(write(f"{line}\n{CAMERA_MATRIX}{FOUR}"))
+
+
+def test_the_name_of_a_camera_beside_a_model_does_no_harm(write):
+    lens = read_lens_file(write(f"camera_model: Sony IMX\ndistortion_model: fisheye\n{CAMERA_MATRIX}{FOUR}")).lens
+    assert isinstance(lens, FisheyeLens)
+
+
+def test_a_lens_in_a_table_is_read(write):
+    nested = "lens:\n" + "".join(f"  {each}\n" for each in REFERENCE.splitlines())
+    lens, hoc = nested.split("  Hoc:")
+    file = read_lens_file(write(REFERENCE))
+    for text in (nested, f"{lens}Hoc:{hoc}"):
+        other = read_lens_file(write(text))
+        assert other.lens == file.lens
+        np.testing.assert_array_equal(other.orientation.rotation, file.orientation.rotation)
+
+
+NUBOTS = "lens:\n  projection: EQUISOLID\n  focal_length: 0.38\n  centre: [0, 0]\n  k: [0, 0]\n  fov: auto\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("lens.yaml", "# oST version 5.0 parameters\n\n\n[image]\n\nwidth\n640\n\n[narrow_stereo]\n", "INI"),
+        ("ost.ini", "; made by hand\n[camera]\nfx = 420\nmodel = fish eye\n", "INI"),
+        ("lens.toml", "[image]\n\nwidth\n640\n", "INI"),
+        ("calibration.xml", '<?xml version="1.0"?>\n<opencv_storage><a>1</a></opencv_storage>\n', "XML"),
+        ("lens.yaml", "<calibration>\n  <f>420</f>\n</calibration>\n", "XML"),
+        ("lens.toml", "<opencv_storage>\n", "XML"),
+        ("lens.yaml", '[lens]\nprojection = "rectilinear"\n', "TOML"),
+        ("lens.yaml", NUBOTS, "NUbots"),
+        ("lens.yaml", "name: Left\nserial_number: 3\n" + NUBOTS, "NUbots"),
+        ("lens.toml", '[lens]\nprojection = "equisolid"\nfov = "auto"\n', "NUbots"),
+        ("lens.yaml", "cam0:\n  camera_model: pinhole\n  intrinsics: [1, 2, 3, 4]\n", "Kalibr"),
+        ("lens.yaml", "%YAML:1.0\nCamera.type: PinHole\nCamera.fx: 500\n", "ORB-SLAM"),
+        ("lens.yaml", "model_type: MEI\nprojection_parameters:\n  u0: 3\n", "camodocal"),
+        ("lens.yaml", "left:\n  " + CAMERA_MATRIX, "table 'left'"),
+        ("lens.yaml", "name: front\nlens:\n  projection: EQUISOLID\n", "table 'lens'"),
+    ],
+)
+def test_a_file_of_another_program_is_named(write, name, text, says):
+    with pytest.raises(InputError, match=rf"{name}: .*{says}"):
+        read_lens_file(write(text, name))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.vm_embedded.live.running import DEMO, running
+from vm_embedded.cameras.camera import Shot
 from vm_embedded.geometry.radial_lenses import Rectilinear
 from vm_embedded.live.answering import Answer
 from vm_embedded.live.frame_remarks import FrameRemarks
@@ -88,10 +89,20 @@ def test_a_robot_that_has_seen_the_plane_may_look_up():
     def events(*points):
         """The events of answers a second apart that have so many points."""
         watch = FrameRemarks()
-        shot, shown = SimpleNamespace(image=image), [SimpleNamespace(pixels=range(count)) for count in points]
+        shot, shown = Shot(image, 0.0), [SimpleNamespace(pixels=range(count)) for count in points]
         found = [watch.about(Answer(shot, lens, None, each, 7.0 + at)) for at, each in enumerate(shown)]
         return [event for each in found for event, _ in each]
 
     assert events(*[0] * 20) == ["plane not in view"]
     assert events(*[0] * 5, 9, *[0] * 20) == []
     assert events(9, *[0] * 20) == []
+
+
+@pytest.mark.parametrize("distortion", [(0.0, 0.0), (1e-7, 0.0)])
+@pytest.mark.parametrize("topic", ["/camera/image_raw", "/camera/image_rect", "/image_rect_color/compressed"])
+def test_a_raw_lens_on_a_topic_of_rectified_images_is_said(topic, distortion):
+    lens = Rectilinear(focal_length=400.0, fov=1.5, distortion=distortion)
+    shot = Shot(np.zeros((512, 640, 3), np.uint8), 0.0, topic=topic)
+    found = list(FrameRemarks().about(Answer(shot, lens, None, SimpleNamespace(pixels=range(9)), 7.0)))
+    assert [event for event, _ in found] == ["doubtful lens"] * ("rect" in topic and distortion[0] > 0.0)
+    assert all(topic in reason for _, reason in found)

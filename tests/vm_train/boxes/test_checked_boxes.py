@@ -38,10 +38,11 @@ def similar_boxes(draw):
 @given(similar_boxes())
 def test_a_box_is_left_out_if_one_before_it_that_stays_is_the_same(boxes):
     raw = [RawBox(f"a.txt line {number}", name, edges) for number, (name, edges) in enumerate(boxes, start=1)]
-    good, faults = checked_boxes(raw, SIZE, ())
+    found = checked_boxes(raw, SIZE, ())
     alone = [checked_boxes([each], SIZE, ()) for each in raw]
-    kept, said = [], []
-    for each, (single, fault) in zip(raw, alone, strict=True):
+    kept, said, unusable = [], [], []
+    for each, checked in zip(raw, alone, strict=True):
+        single = checked.good
         same = [
             at for at, box in kept for one in single if box.name == one.name and overlap(box.edges, one.edges) >= 0.9
         ]
@@ -49,9 +50,11 @@ def test_a_box_is_left_out_if_one_before_it_that_stays_is_the_same(boxes):
             said.append(f"{each.place}: the same box of {each.name} as {' '.join(same[0].split()[-2:])}; box not used")
         else:
             kept += [(each.place, box) for box in single]
-            said += fault
-    assert good == [box for _, box in kept]
-    assert faults == said
+            said += checked.faults
+            unusable += checked.unusable
+    assert found.good == [box for _, box in kept]
+    assert found.faults == said
+    assert found.unusable == unusable
 
 
 @given(similar_boxes(), st.sampled_from([0.1, 0.5, 0.9, 0.99]))
@@ -76,6 +79,6 @@ def test_thousands_of_boxes_are_compared_with_few(spread, monkeypatch):
     low = 200.0 + spread * corners * (400.0, 200.0)
     high = low + 20.0 * (1.0 + spread * sides)
     edges = [(*one, *other) for one, other in zip(low.tolist(), high.tolist(), strict=True)]
-    good, faults = checked_boxes([RawBox(f"a.txt line {at}", "ball", each) for at, each in enumerate(edges)], SIZE, ())
-    assert len(good) + len(faults) == count
+    found = checked_boxes([RawBox(f"a.txt line {at}", "ball", each) for at, each in enumerate(edges)], SIZE, ())
+    assert len(found.good) + len(found.faults) == count
     assert len(compared) < 50 * count

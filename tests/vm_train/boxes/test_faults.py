@@ -12,6 +12,7 @@ from .written import boxes_of, coco_table, voc_text, write_coco, write_image, wr
 BALL = ("ball", 20.0, 30.0, 40.0, 50.0)
 GOAL = ("goal", 100.0, 10.0, 110.0, 90.0)
 GOOD = {"good1": [BALL], "good2": [BALL, GOAL], "good3": []}
+GOOD_COUNTS = {"good1": 1, "good2": 2, "good3": 0}
 
 
 def cut(path, share=0.5):
@@ -41,13 +42,13 @@ def test_yolo_files_cut_short(tmp_path):
         tmp_path,
         [
             f"b.txt line 2: {text.splitlines()[1].rpartition(' ')[0]!r} has 4 values; allowed: class x y width height, "
-            "and perhaps a confidence; box not used",
+            "and perhaps a confidence; or class and three or more corners x y; b.jpg not used",
             f"can't read {tmp_path}/c.txt: it is not UTF-8 text; c.jpg not used",
             "d.txt: there is no image for it",
             "a.jpg: is cut short; not used",
             "e.jpg: no annotation names it; an image that shows nothing needs an empty one; not used",
         ],
-        {"b": 1, "good1": 1, "good2": 2, "good3": 0},
+        GOOD_COUNTS,
     )
 
 
@@ -95,30 +96,35 @@ def test_yolo_boxes_of_wrong_sizes(tmp_path):
         "0 0.5 0.5 0 0.1",
         "0 0.5 0.5 -0.1 0.1",
         "0 0.5 0.5 nan 0.1",
-        "0 0.98 0.5 0.1 0.1",
+        "0 0.5 0.5 0.1 0.1",
         "0 80 60 20 20",
-        "0 0.5001 0.5 0.1 0.1",
         "0 0.3 0.2 0.4 0.1",
         "0 0.2 x 0.4 0.1",
     ]
-    write_yolo(tmp_path, {**GOOD, "a": [BALL]})
+    checked = ["0 0.5 0.5 0.1 0.1", "0 0.98 0.5 0.1 0.1", "0 0.5001 0.5 0.1 0.1", "0 0.3 0.2 0.4 0.1"]
+    write_yolo(tmp_path, {**GOOD, "a": [BALL], "b": [BALL], "c": [BALL]})
     (tmp_path / "a.txt").write_text("\n".join(lines))
+    (tmp_path / "b.txt").write_text("\n".join(checked))
+    (tmp_path / "c.txt").write_text("\n".join([checked[0], *checked[2:]]))
     check(
         tmp_path,
         [
-            "a.txt line 2: width 0 must be above 0; box not used",
-            "a.txt line 3: width -0.1 must be above 0; box not used",
-            "a.txt line 4: width 'nan' is not a finite number; box not used",
+            "a.txt line 2: width 0 must be above 0; a.jpg not used",
+            "a.txt line 3: width -0.1 must be above 0; a.jpg not used",
+            "a.txt line 4: width 'nan' is not a finite number; a.jpg not used",
             "a.txt line 6: the box reaches from 70 to 90 in x; allowed: shares of the image from 0 to 1, and at most "
-            "0.1 outside; box not used",
-            "a.txt line 9: y 'x' is not a finite number; box not used",
-            "a.txt line 5: left, top, right, bottom 148.8, 54.0, 164.8, 66.0 px is outside of the image of 160 x 120 "
-            "px; box not used",
-            "a.txt line 7: the same box of ball as line 1; box not used",
-            "a.txt line 8: ball of 64 x 12 px, but width and height of a ball in full view differ by a factor of 2 at "
+            "0.1 outside; a.jpg not used",
+            "a.txt line 8: y 'x' is not a finite number; a.jpg not used",
+            "b.txt line 3: the same box of ball as line 1; box not used",
+            "b.txt line 4: ball of 64 x 12 px, but width and height of a ball in full view differ by a factor of 2 at "
+            "most; is it partly hidden? box kept",
+            "b.txt line 2: left, top, right, bottom 148.8, 54.0, 164.8, 66.0 px is outside of the image of 160 x 120 "
+            "px; b.jpg not used",
+            "c.txt line 2: the same box of ball as line 1; box not used",
+            "c.txt line 3: ball of 64 x 12 px, but width and height of a ball in full view differ by a factor of 2 at "
             "most; is it partly hidden? box kept",
         ],
-        {"a": 2, "good1": 1, "good2": 2, "good3": 0},
+        {"c": 2, **GOOD_COUNTS},
     )
 
 
@@ -136,11 +142,11 @@ def test_voc_images_and_boxes_of_wrong_sizes(tmp_path):
             "e.xml: size wide x 120 is not a width and a height in pixels; e.jpg not used",
             "a.jpg: a.xml states a size of 120 x 160 px, but the image has 160 x 120 px; not used",
             "b.jpg: b.xml states a size of 640 x 480 px, but the image has 160 x 120 px; not used",
-            "c.xml object 1: size -20 x 20 px; width and height must be above 0; box not used",
+            "c.xml object 1: size -20 x 20 px; width and height must be above 0; c.jpg not used",
             "d.xml object 2: the same box of ball as object 1; box not used",
-            "f.xml object 1: edges must be finite numbers, not 30, 40, 50, inf; box not used",
+            "f.xml object 1: edges must be finite numbers, not 30, 40, 50, inf; f.jpg not used",
         ],
-        {"c": 1, "d": 1, "f": 0, "good1": 1, "good2": 2, "good3": 0},
+        {"d": 1, **GOOD_COUNTS},
     )
 
 
@@ -156,7 +162,7 @@ def test_long_coco_ids_that_begin_alike_are_different(tmp_path):
 
 
 def test_coco_images_and_boxes_of_wrong_sizes(tmp_path):
-    write_coco(tmp_path, {**GOOD, "a": [BALL], "b": [BALL] * 6, "c": [BALL], "d": [BALL]})
+    write_coco(tmp_path, {**GOOD, "a": [BALL], "b": [BALL] * 6, "c": [BALL], "d": [BALL], "e": []})
     path = tmp_path / "instances.json"
     table = json.loads(path.read_text())
     images = {each["file_name"]: each for each in table["images"]}
@@ -167,6 +173,13 @@ def test_coco_images_and_boxes_of_wrong_sizes(tmp_path):
     wrong = ([20, 30, 0, 20], [20, 30, math.nan, 20], [20, 30, 20], [20, "30", 20, 20], [-30, 30, 40, 20])
     for entry, bbox in zip(bad, wrong, strict=False):
         entry["bbox"] = bbox
+    for at in (0, 1, 4):
+        bad[at]["image_id"] = images["e.jpg"]["id"]
+    later = (
+        (0, "size 0 x 20 px; width and height must be above 0"),
+        (1, "edges must be finite numbers, not 20, 30, nan, 50"),
+        (4, "left, top, right, bottom -30.0, 30.0, 10.0, 50.0 px is outside of the image of 160 x 120 px"),
+    )
     path.write_text(json.dumps(table))
     first = bad[0]["id"]
     check(
@@ -174,15 +187,12 @@ def test_coco_images_and_boxes_of_wrong_sizes(tmp_path):
         [
             'instances.json image 15: size 160 x "120" is not a width and a height in pixels; c.jpg not used',
             f"instances.json annotation {first + 2}: bbox [20, 30, 20] is not a list of left, top, width and height; "
-            "box not used",
-            f'instances.json annotation {first + 3}: "30" is not a number; box not used',
+            "b.jpg not used",
+            f'instances.json annotation {first + 3}: "30" is not a number; b.jpg not used',
             "a.jpg: instances.json states a size of 320 x 120 px, but the image has 160 x 120 px; not used",
-            f"instances.json annotation {first}: size 0 x 20 px; width and height must be above 0; box not used",
-            f"instances.json annotation {first + 1}: edges must be finite numbers, not 20, 30, nan, 50; box not used",
-            f"instances.json annotation {first + 4}: left, top, right, bottom -30.0, 30.0, 10.0, 50.0 px is outside of "
-            "the image of 160 x 120 px; box not used",
+            *(f"instances.json annotation {first + at}: {fault}; e.jpg not used" for at, fault in later),
         ],
-        {"b": 1, "d": 1, "good1": 1, "good2": 2, "good3": 0},
+        {"d": 1, **GOOD_COUNTS},
     )
 
 
@@ -207,13 +217,13 @@ def test_yolo_classes_unknown_and_images_of_one_name(tmp_path):
     check(
         tmp_path,
         [
-            "a.txt line 1: class 7 is unknown; the table of names has 0 to 1: ball, goal; box not used",
-            "a.txt line 2: class 'ball' is not a whole number from 0 up; box not used",
-            "a.txt line 3: class '-1' is not a whole number from 0 up; box not used",
+            "a.txt line 1: class 7 is unknown; the table of names has 0 to 1: ball, goal; a.jpg not used",
+            "a.txt line 2: class 'ball' is not a whole number from 0 up; a.jpg not used",
+            "a.txt line 3: class '-1' is not a whole number from 0 up; a.jpg not used",
             "b.jpg and b.png: two images with one name; b.txt may belong to either; not used",
             "z.jpg: the same image as good1.jpg; not used",
         ],
-        {"a": 1, "good1": 1, "good2": 2, "good3": 0},
+        GOOD_COUNTS,
     )
 
 
@@ -222,7 +232,7 @@ def test_voc_classes_unknown_and_images_of_one_name(tmp_path):
         tmp_path, {**GOOD, "a": [BALL, GOAL, ("goal", 50.0, 10.0, 60.0, 90.0)], "b": [BALL], "c": [BALL], "d": [BALL]}
     )
     text = (tmp_path / "a.xml").read_text().replace("<name>ball</name>", "<name> </name>")
-    (tmp_path / "a.xml").write_text(text.replace("<xmin>50.0", "<xmin>5O").replace("bndbox", "robndbox", 4))
+    (tmp_path / "a.xml").write_text(text.replace("<xmin>50.0", "<xmin>5O").replace("bndbox", "circle", 4))
     (tmp_path / "b.xml").write_text(voc_text("b", [BALL]))
     write_image(tmp_path / "b.png")
     write_image(tmp_path / "c.png")
@@ -234,16 +244,17 @@ def test_voc_classes_unknown_and_images_of_one_name(tmp_path):
     check(
         tmp_path,
         [
-            "a.xml object 1: class unknown: <name> is missing or empty; box not used",
-            "a.xml object 2: goal lacks <bndbox> with xmin, ymin, xmax, ymax; box not used",
-            "a.xml object 3: xmin '5O' of goal is not a number; box not used",
+            "a.xml object 1: class unknown: <name> is missing or empty; a.jpg not used",
+            "a.xml object 2: goal: there is no <bndbox> with xmin, ymin, xmax, ymax, <robndbox> or <polygon>; a.jpg "
+            "not used",
+            "a.xml object 3: goal: xmin '5O' is not a number; a.jpg not used",
             "b.xml: may belong to b.jpg and b.png: two images with one name; b.jpg and b.png not used",
             "e.xml: has a DOCTYPE, which is not allowed",
             "f.xml: begins with <html>, not with <annotation>",
             "d.jpg: annotated by d.xml and by d2.xml; not used",
             "c.png: no annotation names it; an image that shows nothing needs an empty one; not used",
         ],
-        {"a": 0, "c": 1, "good1": 1, "good2": 2, "good3": 0},
+        {"c": 1, **GOOD_COUNTS},
     )
 
 
@@ -270,12 +281,13 @@ def test_coco_classes_unknown_and_images_of_one_name(tmp_path):
             "not used",
             f"{label} image 16: image 15 has the same name: two images with one name; images/c.jpg not used",
             f"{label} image 17: there is no image 'none.jpg'; not used",
-            f"{label} annotation {first['id']}: category 99 is unknown; categories has 3 ball, 4 goal; box not used",
-            f"{label} annotation {second['id']}: marks a crowd of ball, not a single one; box not used",
+            f"{label} annotation {first['id']}: category 99 is unknown; categories has 3 ball, 4 goal; "
+            "images/a.jpg not used",
+            f"{label} annotation {second['id']}: marks a crowd of ball, not a single one; images/a.jpg not used",
             f"{label} annotation {third['id']}: there is no image with id 500; box not used",
             *(f"images/{name}.jpg: {unnamed}" for name in ("d", "e")),
         ],
-        {"a": 0, "good1": 1, "good2": 2, "good3": 0},
+        GOOD_COUNTS,
     )
 
 

@@ -106,10 +106,10 @@ def test_the_folder_of_images_is_enough(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "images")
     (tmp_path / "labels" / "b.txt").write_text("2 0.5 0.5 0.1 0.1\n")
     found = read_boxes(Path())
-    assert [(each.image, len(each.boxes)) for each in found.pictures] == [(Path("a.jpg"), 1), (Path("b.jpg"), 0)]
+    assert [(each.image, len(each.boxes)) for each in found.pictures] == [(Path("a.jpg"), 1)]
     assert found.names == ("ball",)
     assert found.faults == (
-        "../labels/b.txt line 1: class 2 is unknown; the table of names has 0 to 1: ball, goal post; box not used",
+        "../labels/b.txt line 1: class 2 is unknown; the table of names has 0 to 1: ball, goal post; b.jpg not used",
     )
 
 

@@ -1,11 +1,10 @@
 """Images that their EXIF entry turns."""
 
-import cv2
 import numpy as np
 import pytest
 from PIL import Image
 
-from vm_train.boxes.image_facts import read_upright
+from vm_embedded.cameras.image_files import read_image
 from vm_train.boxes.read import read_boxes
 
 from .written import SIZE, WRITERS, boxes_of, write_image, write_yolo
@@ -13,12 +12,6 @@ from .written import SIZE, WRITERS, boxes_of, write_image, write_yolo
 BALL = ("ball", 20.0, 30.0, 40.0, 50.0)
 GOAL = ("goal", 100.0, 10.0, 110.0, 90.0)
 GOOD = {"good1": [BALL], "good2": [BALL, GOAL], "good3": []}
-
-
-@pytest.mark.parametrize("orientation", range(1, 9))
-def test_an_image_is_read_as_opencv_turns_it(orientation, tmp_path):
-    write_image(tmp_path / "a.png", orientation=orientation)
-    np.testing.assert_array_equal(read_upright(tmp_path / "a.png"), cv2.imread(str(tmp_path / "a.png")))
 
 
 def marked(path, box, orientation):
@@ -50,7 +43,7 @@ def test_boxes_drawn_on_the_image_as_stored_are_turned_with_it(format, orientati
         "boxes turned"
     )
     (box,) = boxes["a"]
-    rows, columns = np.nonzero(read_upright(tmp_path / "a.jpg")[..., 0] > 127)
+    rows, columns = np.nonzero(read_image(tmp_path / "a.jpg")[..., 0] > 127)
     found = (columns.min() - 0.5, rows.min() - 0.5, columns.max() + 0.5, rows.max() + 0.5)
     assert (box.left, box.top, box.right, box.bottom) == found
 
@@ -72,15 +65,22 @@ def test_boxes_drawn_on_the_turned_image_are_right_and_other_sizes_are_not(forma
     ]
 
 
-def test_yolo_boxes_are_taken_as_drawn_on_the_turned_image(tmp_path):
-    write_yolo(tmp_path, {**GOOD, "a": [BALL]})
-    write_image(tmp_path / "a.jpg", orientation=6)
-    (tmp_path / "a.yaml").write_text("projection: RECTILINEAR\nfocal_length: 120.0\nfov: 1.5\n")
+def test_yolo_boxes_and_lenses_are_taken_as_those_of_the_turned_image(tmp_path):
+    write_yolo(tmp_path, {**GOOD, "a": [BALL], "b": [BALL]})
+    for name, size in (("a", (120, 160)), ("b", SIZE)):
+        write_image(tmp_path / f"{name}.jpg", orientation=6)
+        lens = f"projection: RECTILINEAR\nfocal_length: 120.0\nfov: 1.5\nsize: [{size[0]}, {size[1]}]\n"
+        (tmp_path / f"{name}.yaml").write_text(lens)
     found = read_boxes(tmp_path)
-    assert found.pictures[0].size == (120, 160)
-    assert found.pictures[0].lens is None
-    assert found.faults == (
-        "a.jpg: turned by its EXIF orientation 6; a.txt does not state whether its boxes are: taken as drawn on the "
-        "turned image",
-        "a.yaml: a.jpg is turned by its EXIF orientation 6, the lens is not; a.jpg is used without lens",
-    )
+    assert found.pictures[0].size == found.pictures[1].size == (120, 160)
+    assert [each.lens for each in found.pictures[:2]] == [tmp_path / "a.yaml", None]
+    for fault, stated in zip(found.faults, ("a.txt", "b.txt", "b.yaml"), strict=True):
+        assert stated in fault
+
+
+@pytest.mark.parametrize("suffix", [".tif", ".webp"])
+def test_a_tiff_is_turned_once_and_a_webp_too(suffix, tmp_path):
+    write_yolo(tmp_path, {**GOOD, "a": [BALL]})
+    write_image((tmp_path / "a.jpg").rename(tmp_path / f"a{suffix}"), orientation=6)
+    picture = read_boxes(tmp_path).pictures[0]
+    assert picture.size == (120, 160) == read_image(picture.image).shape[1::-1]

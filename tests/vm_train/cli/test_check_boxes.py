@@ -59,11 +59,11 @@ def test_faults_are_told_and_the_rest_is_counted(tmp_path):
     lines = done.stderr.splitlines()
     assert lines[0] == (
         "vm-train: bad.txt line 1: '0 0.5 0.5 0.1' has 4 values; allowed: class x y width height, and perhaps a "
-        "confidence; box not used"
+        "confidence; or class and three or more corners x y; bad.jpg not used"
     )
     assert len(lines) == 41
     assert lines[-1] == "vm-train: and 6 more; vm-train check --boxes --json FILE lists all"
-    assert done.stdout.startswith("4 pictures can be used, of 3 recordings; 45 faults\n")
+    assert done.stdout.startswith("3 pictures can be used, of 2 recordings; 45 faults\n")
 
 
 def test_misspelled_and_missing_classes_are_told(tmp_path):

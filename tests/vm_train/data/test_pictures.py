@@ -197,13 +197,19 @@ def test_labels_are_those_of_each_pixel_by_itself(height, width, seed):
     assert (CLASSES.labels(mask) == wanted).all()
 
 
-def test_the_turn_that_a_camera_notes_is_not_made(folder):
+def test_the_turn_that_a_camera_notes_is_made_and_the_mask_belongs_to_the_turned_picture(folder):
     turned = b"Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0"
     path = folder / "image0000001.jpg"
     data = path.read_bytes()
     path.write_bytes(data[:2] + b"\xff\xe1" + struct.pack(">H", len(turned) + 2) + turned + data[2:])
-    assert cv2.imread(str(path)).shape == (160, 120, 3)
-    assert read_picture(find_pictures(folder)[0], CLASSES).image.shape == (120, 160, 3)
+    with pytest.raises(PictureFault, match="160 x 120 px, but the image is 120 x 160 px"):
+        read_picture(find_pictures(folder)[0], CLASSES)
+    mask = folder / "mask0000001.png"
+    stored = cv2.imread(str(mask), cv2.IMREAD_UNCHANGED)
+    cv2.imwrite(str(mask), cv2.rotate(stored, cv2.ROTATE_90_CLOCKWISE))
+    picture = read_picture(find_pictures(folder)[0], CLASSES)
+    np.testing.assert_array_equal(picture.image, cv2.imread(str(path)))
+    assert picture.labels.shape == (160, 120)
 
 
 def test_suffixes_may_be_in_capitals(folder):

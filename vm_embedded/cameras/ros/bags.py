@@ -7,54 +7,73 @@ geometry_msgs/PoseStamped.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from ...arrays import Image
 from ...errors import InputError, VisualMeshError, one_line, unknown
-from ...files import is_file, open_regular
+from ...files import is_file, open_regular, there
 from ...geometry.lens import Lens
 from ...geometry.orientation import Orientation
 from ...poses.buffer import PoseBuffer, StalePoseError
 from ...poses.settings import PoseSettings
-from ..image_files import Frame, Source
+from ..frame_source import IMAGE_SUFFIXES, Frame, Source
+from ..image_files import natural_key
 from ..image_header import MAX_MEGAPIXELS
 from .bag_types import damage_errors, import_rosbags, typestore
 from .camera_poses import newest_pose, orientation_of
 from .images import image_of
-from .lens import lens_of
+from .lens import lens_of, rectified_doubt
 from .message_fields import MESSAGES
 from .settings import RosSettings, camera_info_beside
 from .stamps import seconds_of
 from .transforms import Transform, TransformTree
+from .unfinished import UnfinishedMcap, is_finished
 
 SUFFIXES = (".mcap", ".db3")
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+
+_METADATA = "metadata.yaml"
+"""The file that a recorder writes at its end."""
 
 _AHEAD = 1.0
 """How long after an image its pose may be in the bag [s]."""
 
 
 def is_bag(name: str) -> bool:
-    """Whether a source is a bag: a file, or the folder that `ros2 bag record` makes."""
-    path = Path(name)
-    return path.suffix.lower() in SUFFIXES or is_file(path / "metadata.yaml")
+    """Whether a source is a bag: a file, or the folder that `ros2 bag record` makes.
+
+    A recorder that is killed leaves no metadata.yaml in the folder.
+    """
+    path = there(Path(name))
+    return path.suffix.lower() in SUFFIXES or is_file(path / _METADATA) or bool(_files_of(path))
+
+
+def _files_of(folder: Path) -> list[Path]:
+    """The files of a bag in a folder without images, in the order of their numbers; none if it is no folder."""
+    try:
+        inside = sorted(folder.iterdir(), key=natural_key)
+    except OSError:
+        return []
+    if any(each.suffix.lower() in IMAGE_SUFFIXES for each in inside):
+        return []
+    return [each for each in inside if each.suffix.lower() in SUFFIXES and is_file(each)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class BagReading:
     """How to read a bag.
 
-    ros: its topics and frames. pose: from where poses come, and how old they may be. own_lens: the frames get no lens,
-    because the caller has one. orientation: used for all images instead of those in the bag. raw: images keep their own
+    ros: its topics and frames. pose: from where poses come, and how old they may be. own_lens: of the caller; then
+    the frames get none. orientation: used for all images instead of those in the bag. raw: images keep their own
     channels. max_megapixels: largest image [Mpx].
     """
 
     ros: RosSettings = field(default_factory=RosSettings)
     pose: PoseSettings = field(default_factory=PoseSettings)
-    own_lens: bool = False
+    own_lens: Lens | None = None
     orientation: Orientation | None = None
     raw: bool = False
     max_megapixels: float = MAX_MEGAPIXELS
@@ -63,14 +82,15 @@ class BagReading:
 def open_bag(name: str, reading: BagReading) -> Source:
     """The frames of a bag. Raises InputError if it can't be read, or if it is not clear which topic to take."""
     rosbags = import_rosbags()
-    path = Path(name)
+    path = there(Path(name))
     try:
         if not path.exists():
             raise InputError(f"no such bag: {name}")
         files = tuple(sorted(each for each in path.iterdir() if not each.is_dir())) if path.is_dir() else (path,)
         for each in files:
             open_regular(each).close()  # rosbags waits for the writer of a pipe
-        reader = rosbags.highlevel.AnyReader([path], default_typestore=typestore())
+        paths, remarks = _parts(path)
+        reader = rosbags.highlevel.AnyReader(paths, default_typestore=typestore())
         reader.open()
     except damage_errors() as error:
         place, reason = getattr(error, "filename", None) or name, getattr(error, "strerror", None) or one_line(error)
@@ -79,13 +99,34 @@ def open_bag(name: str, reading: BagReading) -> Source:
         images = _image_topic(name, reader, reading.ros.image)
         info = reading.ros.camera_info or camera_info_beside(images)
         _check_topics(name, reader, reading, info)
-    except InputError:
+    except InputError as error:
         reader.close()
-        raise
+        raise InputError("; ".join([str(error), *remarks])) from error
     count = reader.topics[images].msgcount
     rate = (count - 1) / (1e-9 * reader.duration) if count > 1 and reader.duration > 0 else None
     settings = replace(reading, ros=replace(reading.ros, image=images, camera_info=info))
-    return Source(_BagFrames(path.name, reader, settings).frames(), count, rate, files)
+    frames = _BagFrames(path.name, reader, settings)
+    return Source(frames.frames(), count, rate, files, lambda: [*remarks, *frames.remarks()])
+
+
+def _parts(path: Path) -> tuple[list[Any], list[str]]:
+    """What rosbags is to read of a bag, and remarks about what its recorder did not finish. Raises InputError, OSError.
+
+    An unfinished file is read up to its last whole record.
+    """
+    metadata = path / _METADATA
+    has_metadata = is_file(metadata) and metadata.stat().st_size > 0
+    files = _files_of(path) if path.is_dir() else [path]
+    if all(map(is_finished, files)):
+        if has_metadata or not path.is_dir():
+            return [path], []
+        return list(files), [f"the recording {path.name} was not finished: it has no {_METADATA}"]
+    parts: list[Any] = [each if is_finished(each) else UnfinishedMcap(each) for each in files if each.stat().st_size]
+    if not parts:
+        raise InputError(f"bag {path} is empty: its recorder was ended too early")
+    lost = sum(each.lost for each in parts if isinstance(each, UnfinishedMcap))
+    cut = f"; {lost} bytes at its end can't be read" if lost else ""
+    return parts, [f"the recording {path.name} was not finished{cut}"]
 
 
 def _image_topic(name: str, reader: Any, chosen: str) -> str:
@@ -132,7 +173,7 @@ class _BagFrames:
         self._tree, self._poses = TransformTree(), PoseBuffer(reading.pose)
         self._lens: Lens | None = None
         self._lens_trouble = (
-            "" if reading.own_lens else f"no message on {reading.ros.camera_info}; give --lens or --fov"
+            "" if reading.own_lens is not None else f"no message on {reading.ros.camera_info}; give --lens or --fov"
         )
         self._pose_trouble = ""
         self._count = 0
@@ -143,7 +184,7 @@ class _BagFrames:
         topics = {ros.image, ros.camera_info, *self._pose_topics}
         connections = [each for each in self._reader.connections if each.topic in topics]
         try:
-            for connection, logged, data in self._reader.messages(connections):
+            for connection, logged, data in self._messages(connections):
                 now, message = 1e-9 * logged, self._reader.deserialize(data, connection.msgtype)
                 if connection.topic == ros.image:
                     waiting.append(_Waiting(message, seconds_of(message.header.stamp), now))
@@ -161,8 +202,24 @@ class _BagFrames:
         finally:
             self._reader.close()
 
+    def _messages(self, connections: Sequence[Any]) -> Iterator[tuple[Any, int, bytes]]:
+        """The messages in the order of their times; those of unfinished files, which have no index, as they come."""
+        readers = self._reader.readers
+        if not any(isinstance(each.path, UnfinishedMcap) for each in readers):
+            yield from self._reader.messages(connections)
+            return
+        for reader in readers:
+            own = [each for each in connections if each.owner is reader.storage]
+            scan = isinstance(reader.path, UnfinishedMcap)
+            yield from reader.storage.messages_scan(own) if scan else reader.messages(own)
+
+    def remarks(self) -> list[str]:
+        """What is strange about the frames so far."""
+        lens = self._reading.own_lens or self._lens
+        return [rectified_doubt(self._reading.ros.image, lens)] if lens is not None else []
+
     def _take_lens(self, message: Any) -> None:
-        if self._reading.own_lens:
+        if self._reading.own_lens is not None:
             return
         try:
             self._lens, self._lens_trouble = lens_of(message), ""

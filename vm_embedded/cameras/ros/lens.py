@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from ...errors import InputError
-from ...geometry.calibrated_lenses import CalibratedLens, FisheyeLens
+from ...geometry.calibrated_lenses import BrownLens, CalibratedLens, FisheyeLens
 from ...geometry.lens import Lens
 from ...geometry.lens_files import lens_from_calibration
+from ...geometry.radial_lenses import Rectilinear
 
 
 def lens_of(message: Any) -> Lens:
@@ -32,6 +33,22 @@ def lens_of(message: Any) -> Lens:
         return lens_from_calibration(table)
     except InputError as error:
         raise InputError(f"camera_info: {error}") from error
+
+
+def rectified_doubt(topic: str, lens: Lens) -> str:
+    """Why a lens with distortion does not fit the images of a topic whose name says that they are rectified; else "".
+
+    image_proc publishes image_rect and image_rect_color beside the raw images, with the same camera_info.
+    """
+    is_straight = isinstance(lens, Rectilinear | BrownLens) and not any(
+        lens.distortion if isinstance(lens, Rectilinear) else lens.coefficients
+    )
+    if is_straight or not any(part.startswith("image_rect") for part in topic.split("/")):
+        return ""
+    return (
+        f"images on {topic} are rectified, but the lens is that of raw images, with distortion: use the topic "
+        "image_raw, or give --lens with the projection matrix P as camera_matrix and no distortion"
+    )
 
 
 def camera_info_message(types: Any, header: Any, lens: Lens, size: tuple[int, int]) -> Any | None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...cameras.image_files import Frame
+from ...cameras.frame_source import Frame
 from ...cameras.ros.bag_types import bag_types, import_rosbags, typestore
 from ...cameras.ros.images import jpeg_message
 from ...cameras.ros.lens import camera_info_message

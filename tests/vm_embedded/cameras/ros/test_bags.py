@@ -102,10 +102,10 @@ def test_what_is_missing_is_named_and_options_replace_it(tmp_path):
     bag = scene.write_bag(tmp_path / "bag", without=("/tf", "/tf_static", "/camera/camera_info"))
     for *_, trouble in frames(bag):
         assert "no message on /camera/camera_info; give --lens or --fov" in trouble
-    for *_, trouble in frames(bag, own_lens=True):
+    for *_, trouble in frames(bag, own_lens=LENS):
         assert "tf has sent no transform yet; give --height, or --pose-source topic:/NAME" in trouble
     fixed = scene.orientation(0.2)
-    for lens, orientation, _, image in frames(bag, own_lens=True, orientation=fixed):
+    for lens, orientation, _, image in frames(bag, own_lens=LENS, orientation=fixed):
         assert (lens, orientation) == (None, fixed)
         assert image.shape == (512, 640, 3)
 
