@@ -212,7 +212,7 @@ def _is_padded(start: bytes, data: bytes, image: npt.NDArray[np.generic] | None)
         return True
     last = data[-1] | (data[-1] + 1)  # its lowest zero becomes a one
     changed, warning = _decoded(start + data[:-1] + bytes([last]) + (b"\0" if last == 0xFF else b""))
-    return bool(warning) or not np.array_equal(image, changed)
+    return bool(warning) or image is None or changed is None or not np.array_equal(image, changed)
 
 
 def _decoded(picture: bytes) -> tuple[npt.NDArray[np.generic] | None, str]:

@@ -94,7 +94,7 @@ class _Film:
 
     def _next_stamp(self) -> float | None:
         """The time of the frame that was read last [s]: by the rate if the video has none; None without a rate."""
-        stamp: float | None = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+        stamp = float(self._capture.get(cv2.CAP_PROP_POS_MSEC)) / 1000.0
         if not math.isfinite(stamp) or stamp <= self._stamp:
             self._has_times = False
             if self.rate is None:
