@@ -77,7 +77,7 @@ OTHERS = [
     np.array([0.8, 0.9]),
     np.array([]),
     1j,
-    object(),
+    object,
 ]
 
 

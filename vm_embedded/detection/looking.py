@@ -22,7 +22,7 @@ from .observation import Observation
 from .peaks import LARGEST_SIZE, probability_of
 from .places import Places, PlanePlaces, mean_center
 from .prepared_view import PreparedView
-from .proposals import best_apart, propose_places
+from .proposals import best_apart, propose
 from .settings import Settings
 from .stopwatch import Stopwatch
 
@@ -108,18 +108,15 @@ def look_closely(
     proposals, with their reasons. watch: gets the stages propose and look. Raises ModelError if the network does not
     run.
     """
-    view, contract, scores = observation.view, look.contract, None
-    if contract.object_class in observation.manifest.peaks:
-        peaks = observation.find_peaks(contract.object_class, settings.max_proposals)
-        centers, scores = view.shape.center_along(peaks.rays, view.height), peaks.scores
-    else:
-        centers = propose_places(observation, probabilities, contract.above, settings.max_proposals)
+    contract = look.contract
+    most = settings.max_proposals
+    centers, scores = propose(observation, contract.object_class, probabilities, contract.above, most)
     watch.lap("propose")
     places = PlanePlaces(observation, centers)
     answers = look_at(places, look)
     if scores is not None and contract.mesh_weight:
         answers[:, 0] = probability_of(_log_odds(answers[:, 0]) + contract.mesh_weight * scores)
-    judged = _judged(view, places.centers, answers, settings, explain)
+    judged = _judged(observation.view, places.centers, answers, settings, explain)
     watch.lap("look")
     return judged
 

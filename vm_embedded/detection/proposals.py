@@ -1,8 +1,9 @@
-"""Proposals for the close look: where an object may be, from the points' probabilities, for all places at once.
+"""Proposals for the close look: where an object may be.
 
-A likely place is one that an object would fill with likely points. Its score is the sum of their probabilities. The
-place with the highest score comes first; then the best place outside of the first object, and so on. In the end each
-place moves to the mean of the points in it, weighted by their probabilities.
+They are the peaks of its class, if the network has peaks for it. Otherwise the points' probabilities tell, for all
+places at once. A likely place is one that an object would fill with likely points. Its score is the sum of their
+probabilities. The place with the highest score comes first; then the best place outside of the first object, and so on.
+In the end each place moves to the mean of the points in it, weighted by their probabilities.
 """
 
 from __future__ import annotations
@@ -17,6 +18,19 @@ _MOST_POINTS = 256
 
 _WHOLE_AND_CORE = np.array([1.0, 0.9])[:, None, None]
 """Shares of an object's radius. Only points in its core count for its score: those at the outline show both sides."""
+
+
+def propose(
+    observation: Observation, class_name: str, probabilities: Singles, above: float, most: int
+) -> tuple[Floats, Floats | None]:
+    """Centers (c, 3) of at most `most` places of a class, best first, and their scores (c,), if they are peaks.
+
+    probabilities, above: see `propose_places`, which peaks don't need.
+    """
+    if class_name not in observation.manifest.peaks:
+        return propose_places(observation, probabilities, above, most), None
+    peaks, view = observation.find_peaks(class_name, most), observation.view
+    return view.shape.center_along(peaks.rays, view.height), peaks.scores
 
 
 def propose_places(observation: Observation, probabilities: Singles, above: float, most: int) -> Floats:

@@ -24,7 +24,7 @@ from vm_embedded.detection.observation import Network, Observation, classify
 from vm_embedded.detection.places import PlanePlaces
 from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.detection.projection import Projection
-from vm_embedded.detection.proposals import propose_places
+from vm_embedded.detection.proposals import propose
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
@@ -159,12 +159,13 @@ def _answer(
     if look is not None:
         contract = look.contract
         probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
-        centers = propose_places(observation, probabilities, contract.above, settings.max_proposals)
-        proposals[contract.object_class] = centers @ observation.view.heading.T
+        name, most = contract.object_class, settings.max_proposals
+        centers, _ = propose(observation, name, probabilities, contract.above, most)
+        proposals[name] = centers @ observation.view.heading.T
         chain = chain_of(look)
         if len(chain) > 1:
             centers = passed_on(observation, centers, chain[0], worth_of(chain[1].contract))
-            passed[contract.object_class] = centers @ observation.view.heading.T
+            passed[name] = centers @ observation.view.heading.T
     return PictureAnswer(
         observation.pixels,
         distances,

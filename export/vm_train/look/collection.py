@@ -58,7 +58,9 @@ class Collector:
         settings, seen = self.run.configuration.patches, self.observer.observe(item.files)
         observation, truths, view = seen.observation, seen.truths, seen.observation.view
         share = 1.0 if item.validates else _SURER
-        places = proposed_places(observation, seen.probabilities, settings, self.glance, share)
+        places = proposed_places(
+            observation, self.observer.object_class, seen.probabilities, settings, self.glance, share
+        )
         if not item.validates:
             random = random_of(settings.seed, item.files.number)
             places += jittered_places(view, truths, settings, random)

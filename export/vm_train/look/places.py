@@ -15,7 +15,7 @@ from vm_embedded.detection.looking import Look, worth_of
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.patches import Tangents, cut_patches, patch_nodes
 from vm_embedded.detection.prepared_view import PreparedView
-from vm_embedded.detection.proposals import propose_places
+from vm_embedded.detection.proposals import propose
 
 from ..evaluation.answers import passed_on
 from .configuration import PatchSettings
@@ -60,13 +60,18 @@ class Places:
 
 
 def proposed_places(
-    observation: Observation, probabilities: Singles, settings: PatchSettings, glance: Look | None, share: float
+    observation: Observation,
+    class_name: str,
+    probabilities: Singles,
+    settings: PatchSettings,
+    glance: Look | None,
+    share: float,
 ) -> Places:
     """The proposals of a class from the slots' probabilities (m,), best first.
 
     share: of the probability above which the glance passes a proposal on. Raises ModelError if the glance does not run.
     """
-    centers = propose_places(observation, probabilities, settings.above, settings.proposals)
+    centers, _ = propose(observation, class_name, probabilities, settings.above, settings.proposals)
     if glance is not None:
         centers = passed_on(observation, centers, glance, share * worth_of(glance.contract))
     return Places.of(centers)

@@ -53,7 +53,7 @@ def test_random_places_are_in_the_picture_and_on_the_mesh(seed):
 
 def test_proposals_are_at_the_balls():
     observation = observation_of(VIEW, NEAR, FAR)
-    found = proposed_places(observation, observation.slot_probabilities[:, 0], PatchSettings(), None, 0.0)
+    found = proposed_places(observation, "ball", observation.slot_probabilities[:, 0], PatchSettings(), None, 0.0)
     labels = label_places(found.tangents(VIEW), truths(NEAR, FAR))
     assert set(labels.of) >= {0, 1}
 
